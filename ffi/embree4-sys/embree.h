@@ -1,0 +1,2 @@
+/* The only header bindgen reads for Embree. */
+#include <embree4/rtcore.h>

@@ -1,0 +1,40 @@
+//! Curves as people hand them over: control points in a basis, open or closed, with or without radii.
+
+use glam::DVec3;
+
+/// How control points make a curve. All bases are uniform.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Through every point; an open curve also reaches its first and its last point.
+    CatmullRom,
+    /// Cubic B-spline: near its points. An open curve begins near its second point, unless points are repeated.
+    BSpline,
+    /// Straight from point to point.
+    Linear,
+}
+
+/// One curve. Lengths are in the unit of its [`CurveSet`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// How `points` are meant.
+    pub basis: Basis,
+    /// Whether the last point is followed by the first (which is then not repeated in `points`).
+    pub closed: bool,
+    /// Control points; at least two, all finite.
+    pub points: Vec<DVec3>,
+    /// One radius for each point, where the file has them.
+    pub radii: Option<Vec<f64>>,
+}
+
+/// The curves of one file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CurveSet {
+    /// In the file's order.
+    pub curves: Vec<Curve>,
+    /// Millimetres per unit of length, where the format fixes it.
+    pub unit_mm: Option<f64>,
+    /// Which axis of the file points up (1 = y, 2 = z), where the file says so.
+    pub up_axis: Option<u8>,
+    /// What was repaired on the way in, one line each, for the user to see.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,4 @@
+//! Shapes, no light: yarn curves and their files, frames along them, plies in the cross-section.
+
+pub mod curve;
+pub mod curve_file;
