@@ -2,3 +2,7 @@
 
 pub mod curve;
 pub mod curve_file;
+pub mod section;
+mod spline;
+pub mod strand;
+pub mod yarn;

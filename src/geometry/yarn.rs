@@ -1,0 +1,242 @@
+//! What a yarn is made of: plies in its cross-section, how they turn, how many fibres each holds.
+//!
+//! All lengths are in units of the yarn's outer radius, so that one shape serves a yarn of any and of varying radius.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{Vec2, Vec3A};
+
+/// The most plies a yarn can have.
+pub const MAX_PLIES: usize = 64;
+
+/// One ply as a person describes it. Lengths in yarn radii, angles in radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlyParameters {
+    /// Geometric mean of the semi-axes of the ply's cross-section.
+    pub radius: f64,
+    /// Short over long semi-axis; the short one lies along the line to the yarn's axis. 1 for a round ply.
+    pub aspect: f64,
+    /// Distance of the ply's centre from the yarn's axis.
+    pub distance: f64,
+    /// Where the ply starts around the yarn.
+    pub angle: f64,
+    /// Number of fibres.
+    pub fibers: u32,
+    /// Radius of a fibre.
+    pub fiber_radius: f64,
+    /// Angle of the outermost fibres against the ply's axis; negative turns the other way.
+    pub fiber_twist: f64,
+}
+
+/// A ply made ready for rays.
+#[derive(Clone, Debug)]
+pub struct PlyShape {
+    /// Distance of the centre from the yarn's axis.
+    pub distance: f32,
+    /// Unit vector towards the centre when the yarn's phase is 0.
+    pub direction: Vec2,
+    /// Radius of the circle that the ply's section becomes when its axes are made equal without changing its area.
+    pub radius: f32,
+    /// `radius` over the semi-axis along the line to the yarn's axis, and over the one across it: (1, 1) if round.
+    pub stretch: Vec2,
+    /// Radius of a fibre.
+    pub fiber_radius: f32,
+    /// Radius within which the fibres' centres lie: `radius - fiber_radius`.
+    pub core_radius: f32,
+    /// Number of fibres.
+    pub fibers: f32,
+    /// Turns of the fibre pattern around the ply's axis, radians per yarn radius along the yarn.
+    pub fiber_rate: f32,
+}
+
+impl PlyShape {
+    /// The expected number of fibres on an untwisted chord whose signed distance from the ply's axis is `offset`
+    /// (yarn radii, in the circle of [`Self::radius`]).
+    ///
+    /// Centres are taken as even over the core. The paper's Eq. 2, d l sqrt(n / pi), lacks a factor
+    /// 1.128 / sqrt(d) against counted fibres; this form is exact to the counting noise.
+    #[inline]
+    pub fn fibers_on_chord(&self, offset: f32) -> f32 {
+        let inv = 1.0 / self.core_radius;
+        let upper = segment_area((offset + self.fiber_radius) * inv);
+        let lower = segment_area((offset - self.fiber_radius) * inv);
+        (self.fibers * std::f32::consts::FRAC_1_PI * (upper - lower)).max(0.0)
+    }
+}
+
+/// u sqrt(1 - u^2) + asin(u), with u clamped to [-1, 1]: area of the unit disc on one side of a chord, less pi / 2.
+#[inline]
+fn segment_area(u: f32) -> f32 {
+    let a = u.abs().min(1.0);
+    // asin(a) = pi/2 - sqrt(1 - a) poly(a), |error| < 2e-8 (Abramowitz and Stegun 4.4.46).
+    const C: [f32; 8] = [
+        -0.001_262_491_1,
+        0.006_670_09,
+        -0.017_088_126,
+        0.030_891_88,
+        -0.050_174_303,
+        0.088_978_99,
+        -0.214_598_8,
+        1.570_796_3,
+    ];
+    let poly = C[1..].iter().fold(C[0], |p, &c| p * a + c);
+    let asin = std::f32::consts::FRAC_PI_2 - (1.0 - a).sqrt() * poly;
+    (a * (1.0 - a * a).sqrt() + asin).copysign(u)
+}
+
+/// The cross-section of a yarn and how it turns along it.
+#[derive(Clone, Debug)]
+pub struct YarnShape {
+    /// The plies, at most [`MAX_PLIES`].
+    pub plies: Vec<PlyShape>,
+    /// Turns of the plies around the yarn's axis, radians per yarn radius along the yarn.
+    pub ply_rate: f32,
+    /// Whether any ply is elliptical.
+    pub elliptical: bool,
+    /// Whether rays see plies as tilted cylinders on a bent yarn; false is the paper's perpendicular section.
+    pub tilted: bool,
+    /// Whether one round ply fills the yarn, so that no ray through the yarn can miss it.
+    pub filled: bool,
+    /// The smallest turn of the section that maps it onto itself, radians: 2 pi, or a part of it for equal plies.
+    pub symmetry: f64,
+}
+
+impl YarnShape {
+    /// From the plies and the angle (radians) that a ply makes with the yarn's axis at its centre's distance.
+    ///
+    /// # Panics
+    /// If there is no ply, or more than [`MAX_PLIES`].
+    pub fn new(plies: &[PlyParameters], ply_twist: f64, tilted: bool) -> Self {
+        assert!((1..=MAX_PLIES).contains(&plies.len()), "a yarn has 1 to {MAX_PLIES} plies");
+        // The twist is stated for the mean distance; plies share one rate, or they would cut through each other.
+        let distance = plies.iter().map(|p| p.distance).sum::<f64>() / plies.len() as f64;
+        let ply_rate = if distance > 1e-9 { ply_twist.tan() / distance } else { 0.0 };
+        let shapes: Vec<PlyShape> = plies
+            .iter()
+            .map(|p| {
+                let root = p.aspect.sqrt();
+                let fiber_radius = p.fiber_radius.min(0.999 * p.radius);
+                PlyShape {
+                    distance: p.distance as f32,
+                    direction: Vec2::new(p.angle.cos() as f32, p.angle.sin() as f32),
+                    radius: p.radius as f32,
+                    stretch: Vec2::new((1.0 / root) as f32, root as f32),
+                    fiber_radius: fiber_radius as f32,
+                    core_radius: (p.radius - fiber_radius) as f32,
+                    fibers: p.fibers as f32,
+                    fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
+                }
+            })
+            .collect();
+        let equal = plies.iter().enumerate().all(|(k, p)| {
+            let even = TAU * k as f64 / plies.len() as f64;
+            PlyParameters { angle: 0.0, ..p.clone() } == PlyParameters { angle: 0.0, ..plies[0].clone() }
+                && (p.angle - plies[0].angle - even).abs() < 1e-9
+        });
+        Self {
+            elliptical: plies.iter().any(|p| (p.aspect - 1.0).abs() > 1e-6),
+            filled: plies.len() == 1 && plies[0].distance == 0.0 && plies[0].aspect == 1.0 && plies[0].radius >= 1.0,
+            symmetry: if equal { TAU / plies.len() as f64 } else { TAU },
+            plies: shapes,
+            ply_rate: ply_rate as f32,
+            tilted,
+        }
+    }
+}
+
+/// Radius and distance from the axis (yarn radii) of `count` equal round plies that touch each other and the
+/// yarn's outline.
+pub fn touching_plies(count: u32) -> (f64, f64) {
+    if count == 1 {
+        return (1.0, 0.0);
+    }
+    let s = (PI / f64::from(count)).sin();
+    let radius = s / (1.0 + s);
+    (radius, 1.0 - radius)
+}
+
+/// The tangent of a fibre, not of unit length (its z, along the yarn, is 1): a fibre at `at` in a ply with centre
+/// `centre`, both in the section of the yarn. `axis` is the unit vector from the yarn's axis to the ply.
+#[inline]
+pub fn fiber_tangent(ply: &PlyShape, ply_rate: f32, centre: Vec2, axis: Vec2, at: Vec2) -> Vec3A {
+    let p = at - centre;
+    if ply.stretch.x == 1.0 {
+        // Both rotations act on the same circle: the fibre's rate is the total one.
+        let (w, f) = (ply_rate, ply.fiber_rate);
+        return Vec3A::new(-(w * centre.y + f * p.y), w * centre.x + f * p.x, 1.0);
+    }
+    // The ellipse turns with the ply; within it fibres turn at the rest of their rate, as on a stretched circle.
+    let own = ply.fiber_rate - ply_rate;
+    let q = Vec2::new(p.dot(axis) * ply.stretch.x, p.perp_dot(axis) * -ply.stretch.y);
+    let turn = Vec2::new(-q.y / ply.stretch.x, q.x / ply.stretch.y) * own;
+    let local = turn.x * axis + turn.y * axis.perp();
+    Vec3A::new(-ply_rate * at.y + local.x, ply_rate * at.x + local.y, 1.0)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// `count` touching round plies with `fibers` each at area fraction `density`.
+    pub(crate) fn touching_yarn(count: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64) -> YarnShape {
+        let (radius, distance) = touching_plies(count);
+        let plies: Vec<PlyParameters> = (0..count)
+            .map(|k| PlyParameters {
+                radius,
+                aspect: 1.0,
+                distance,
+                angle: TAU * f64::from(k) / f64::from(count),
+                fibers,
+                fiber_radius: radius * (density / f64::from(fibers)).sqrt(),
+                fiber_twist,
+            })
+            .collect();
+        YarnShape::new(&plies, ply_twist, true)
+    }
+
+    #[test]
+    fn touching_plies_touch() {
+        for n in 2..=20 {
+            let (radius, distance) = touching_plies(n);
+            assert!((radius + distance - 1.0).abs() < 1e-12);
+            assert!((distance * (PI / f64::from(n)).sin() - radius).abs() < 1e-12, "neighbours of {n} plies touch");
+        }
+    }
+
+    #[test]
+    fn the_count_of_fibers_integrates_to_all_of_them() {
+        // Each fibre covers a width of 2 r_f of all offsets: int n(y) dy = 2 r_f n.
+        for (fibers, density) in [(25, 0.1), (100, 0.5), (400, 0.7)] {
+            let shape = touching_yarn(1, fibers, density, 0.0, 0.0);
+            let ply = &shape.plies[0];
+            let n = 20_000;
+            let sum: f64 = (0..n)
+                .map(|i| f64::from(ply.fibers_on_chord(-1.0 + 2.0 * (i as f32 + 0.5) / n as f32)) * 2.0 / f64::from(n))
+                .sum();
+            let want = 2.0 * f64::from(ply.fiber_radius) * f64::from(fibers);
+            assert!((sum / want - 1.0).abs() < 1e-4, "{sum} {want}");
+            assert_eq!(ply.fibers_on_chord(1.5), 0.0);
+        }
+    }
+
+    #[test]
+    fn the_segment_area_is_exact_to_single_precision() {
+        for i in 0..=2000 {
+            let u = -1.0 + f64::from(i) * 1e-3;
+            let want = u * (1.0 - u * u).max(0.0).sqrt() + u.clamp(-1.0, 1.0).asin();
+            assert!((f64::from(segment_area(u as f32)) - want).abs() < 4e-7, "u = {u}");
+        }
+    }
+
+    #[test]
+    fn elliptical_tangents_reduce_to_round_ones() {
+        let round = touching_yarn(3, 50, 0.4, 0.3, -0.5);
+        let mut ellipse = round.plies[0].clone();
+        ellipse.stretch = Vec2::new(1.0 + 1e-6, 1.0 - 1e-6);
+        let (centre, axis) = (Vec2::new(0.3, 0.44), Vec2::new(0.3, 0.44).normalize());
+        let at = Vec2::new(0.41, 0.2);
+        let a = fiber_tangent(&round.plies[0], round.ply_rate, centre, axis, at);
+        let b = fiber_tangent(&ellipse, round.ply_rate, centre, axis, at);
+        assert!((a - b).length() < 1e-5, "{a} {b}");
+    }
+}

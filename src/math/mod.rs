@@ -1,0 +1,11 @@
+//! Numbers, not yarns: colours in one register, frames, special functions, sample points.
+//!
+//! Knows nothing of curves, light or files. `f32` serves rays and directions, `f64` tables and sums.
+
+pub mod frame;
+pub mod rgb;
+pub mod sampler;
+pub mod special;
+pub mod warp;
+
+pub use rgb::Rgb;

@@ -1,0 +1,128 @@
+//! Random numbers as a function of (seed, pixel, sample, dimension): never of a thread or an order of work.
+
+/// A 32-bit mix with good avalanche (the lowbias32 finaliser of C. Wellons' hash prospector).
+#[inline]
+pub fn hash(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// A hash of two words.
+#[inline]
+pub fn hash2(a: u32, b: u32) -> u32 {
+    hash(a ^ hash(b).wrapping_add(0x9e37_79b9))
+}
+
+/// A float in [0, 1) from the upper bits of a word.
+#[inline]
+fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// How many sets of four dimensions come from the Sobol sequence; later ones, deep in a path, are plain random.
+const SOBOL_SETS: u32 = 24;
+/// The crate's sequence has 2^16 points; longer renders go on with another scrambling.
+const SOBOL_LENGTH: u32 = 1 << 16;
+
+/// The numbers of one sample of one pixel: Owen-scrambled Sobol points in sets of four dimensions.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    pixel: u32,
+    index: u32,
+    set: u32,
+}
+
+impl Sampler {
+    /// The sample `index` of the pixel `(x, y)` of the image, for a scene's `seed`.
+    pub fn new(seed: u32, x: u32, y: u32, index: u32) -> Self {
+        let pixel = hash2(hash2(seed, x), y);
+        let block = index / SOBOL_LENGTH;
+        let pixel = if block == 0 { pixel } else { hash2(pixel, block) };
+        Self { pixel, index: index % SOBOL_LENGTH, set: 0 }
+    }
+
+    /// The next four numbers in [0, 1).
+    #[inline]
+    pub fn next4(&mut self) -> [f32; 4] {
+        let set = self.set;
+        self.set += 1;
+        if set < SOBOL_SETS {
+            sobol_burley::sample_4d(self.index, set, self.pixel)
+        } else {
+            let mut stream = self.stream(set);
+            std::array::from_fn(|_| stream.next())
+        }
+    }
+
+    /// Plain random numbers without end for this sample, one stream for each `key`: for rejection sampling.
+    #[inline]
+    pub fn stream(&self, key: u32) -> Stream {
+        Stream { state: hash2(self.pixel ^ key.wrapping_mul(0x85eb_ca6b), self.index), weyl: 0 }
+    }
+
+    /// Which set of four numbers comes next: a key for [`Self::stream`] that differs at each vertex of a path.
+    pub fn position(&self) -> u32 {
+        self.set
+    }
+}
+
+/// Plain random numbers: a counter and a hash.
+#[derive(Clone, Debug)]
+pub struct Stream {
+    state: u32,
+    weyl: u32,
+}
+
+impl Stream {
+    /// A stream of its own for a number.
+    pub fn new(key: u32) -> Self {
+        Self { state: hash(key ^ 0xa511_e9b3), weyl: 0 }
+    }
+
+    /// The next number in [0, 1).
+    #[inline]
+    #[allow(clippy::should_implement_trait, reason = "a number source without an end is not an iterator here")]
+    pub fn next(&mut self) -> f32 {
+        self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
+        unit(hash(self.state ^ self.weyl))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_lie_in_the_unit_interval_and_are_even() {
+        for set_skip in [0, SOBOL_SETS + 3] {
+            let mut mean = [0.0f64; 4];
+            let n = 4096;
+            for i in 0..n {
+                let mut sampler = Sampler::new(3, 17, 5, i);
+                sampler.set = set_skip;
+                for (m, x) in mean.iter_mut().zip(sampler.next4()) {
+                    assert!((0.0..1.0).contains(&x));
+                    *m += f64::from(x) / f64::from(n);
+                }
+            }
+            let bound = if set_skip == 0 { 2e-4 } else { 0.02 };
+            assert!(mean.iter().all(|m| (m - 0.5).abs() < bound), "{mean:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_depend_on_every_part_of_the_key() {
+        let first = |seed, x, y, i| Sampler::new(seed, x, y, i).next4();
+        let base = first(1, 2, 3, 4);
+        assert_eq!(base, first(1, 2, 3, 4));
+        for other in [first(2, 2, 3, 4), first(1, 3, 3, 4), first(1, 2, 4, 4), first(1, 2, 3, 5), first(1, 2, 3, 4 + SOBOL_LENGTH)] {
+            assert_ne!(base, other);
+        }
+        let mut a = Sampler::new(1, 2, 3, 4).stream(1);
+        let mut b = Sampler::new(1, 2, 3, 4).stream(2);
+        assert_ne!(a.next(), b.next());
+    }
+}

@@ -1,0 +1,698 @@
+//! The aggregated yarn: one answer for the hundreds of fibres behind a point of a yarn.
+//!
+//! Light on its way along the camera's chord through the plies
+//! * meets no fibre at all (the unscattered share T0, a delta, [`AggregatedYarn::transparency`]),
+//! * passes all it meets as TT and leaves forward (lobe F),
+//! * or ends its chain at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
+//!   light. On the way there it is dimmed by the plies ahead ([`Vertex::optical_depth`]); what stays scatters on and
+//!   leaves in the end as lobe B.
+//!
+//! F takes the place of the paper's forward lobes (Eqs. 8 to 11, 15), B of its backward lobes without the single
+//! scattering that R and D already hold (Eqs. 12 to 14); the paper counts that twice and can double the energy.
+//!
+//! # Estimation
+//! A [`Vertex`] draws one node, and one direction from it. Whether that direction escapes decides between R/D/TT and
+//! B, as it would for a photon: with white fibres every weight is 1. The direction also serves as a one-sample
+//! estimate of the share that stays, so that no table of it is needed, in memory or in set-up time.
+//! Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light sampling
+//! and direction sampling (balance heuristic), all given the node and the direction drawn.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{Vec2, Vec3A};
+
+use super::{
+    Continuation, Direct, LobeValues,
+    fiber::FiberMaterial,
+    kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
+    medium::PlyOptics,
+    mis_weight,
+};
+use crate::{
+    geometry::{
+        section::{Crossings, PlyCrossing, Section},
+        yarn::{YarnShape, fiber_tangent},
+    },
+    math::{
+        Rgb,
+        frame::sin_cos,
+        sampler::Stream,
+        special::wrapped_normal,
+        warp::normal,
+    },
+};
+
+/// How strongly multiply scattered light moves sideways with the camera's offset.
+const LEAN_SIDEWAYS: f32 = 1.2;
+/// The most that the light's own way may brighten F against its mean: keeps sampled weights bounded.
+const MAX_FORWARD_GAIN: f32 = 3.0;
+/// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
+/// light's side, unknown then, does not make the true lobe wider than the sampled one.
+const SAMPLING_WIDENING: f32 = 0.7;
+
+/// A yarn's shape and the optics of its plies.
+#[derive(Clone, Debug)]
+pub struct AggregatedYarn {
+    shape: YarnShape,
+    plies: Vec<PlyOptics>,
+    /// Expected energy of a node in each ply, for choosing between plies.
+    node_gain: Vec<Rgb>,
+    /// Whether F follows the light's own way through the yarn; false only to compare with the bare model.
+    forward_follows_light: bool,
+}
+
+impl AggregatedYarn {
+    /// One material for each ply of the shape.
+    ///
+    /// # Panics
+    /// If their numbers differ.
+    pub fn new(shape: YarnShape, materials: &[&FiberMaterial]) -> Self {
+        assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
+        let count = shape.plies.len();
+        let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
+        let node_gain = plies.iter().map(|p| p.albedo * (p.closure + 1.0) * 0.5).collect();
+        Self { shape, plies, node_gain, forward_follows_light: true }
+    }
+
+    /// The yarn's geometry.
+    pub fn shape(&self) -> &YarnShape {
+        &self.shape
+    }
+
+    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
+    #[inline]
+    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
+        let depth: f32 = crossings.iter().map(|c| c.fibers * self.plies[c.ply].rho_unscattered).sum();
+        (-depth).exp()
+    }
+}
+
+/// Light that ends its chain: a place inside a ply.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// The ply.
+    ply: usize,
+    /// Where, in the section.
+    point: Vec2,
+    /// How far along the yarn.
+    travel: f32,
+    /// Unit tangent of the fibre there.
+    tangent: Vec3A,
+    /// 1 / z of `tangent`.
+    tangent_stretch: f32,
+    /// Sine and cosine of the camera's latitude against the fibre.
+    sin: f32,
+    cos: f32,
+    /// Expected fibres between the camera and the node.
+    before: f32,
+    /// Weight of an event here, before any albedo.
+    amplitude: Rgb,
+    /// Widths for sampling the lobes.
+    kappa_r: f32,
+    kappa_tt: f32,
+    /// Chances of R, TT and D.
+    chance: [f32; 3],
+    /// Throughput times amplitude: what decides between escape and B.
+    weight: Rgb,
+}
+
+/// Multiply scattered light of the node's ply.
+#[derive(Clone, Copy, Debug)]
+struct Backward {
+    frame: PlyFrame,
+    /// cos and sin of the azimuth towards which it leans.
+    lean_to: (f32, f32),
+    /// Energy, given the direction drawn.
+    energy: Rgb,
+    /// Chance that the drawn direction does not escape.
+    chance: f32,
+    /// Channel means of the ply's shares, for sampling.
+    mirrored: f32,
+    lean: f32,
+    kappa: f32,
+}
+
+/// Light that passes as TT.
+#[derive(Clone, Copy, Debug)]
+struct Forward {
+    frame: PlyFrame,
+    energy: Rgb,
+    /// Chance of each channel when sampling.
+    channel: [f32; 3],
+    kappa: Rgb,
+    sigma: [f32; 3],
+    /// Half way through the fibres on the camera's chord.
+    middle: f32,
+    /// Optical depths of the camera's half, and by how much the light's plain chords count.
+    half_depth: Rgb,
+    half_depth_unscattered: f32,
+    scale: f32,
+    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord.
+    norm: Rgb,
+}
+
+/// A ply's own frame: tangent, the camera's azimuth, and what completes them.
+#[derive(Clone, Copy, Debug)]
+struct PlyFrame {
+    x: Vec3A,
+    y: Vec3A,
+    z: Vec3A,
+    sin: f32,
+    cos: f32,
+}
+
+impl PlyFrame {
+    /// About the unit vector `tangent`, for a camera direction.
+    #[inline]
+    fn new(tangent: Vec3A, camera: Vec3A) -> Self {
+        let sin = tangent.dot(camera).clamp(-1.0, 1.0);
+        let across = camera - sin * tangent;
+        let cos = across.length();
+        let x = if cos > 1e-6 { across / cos } else { crate::math::frame::orthonormal_basis(tangent).0 };
+        Self { x, y: tangent.cross(x), z: tangent, sin, cos }
+    }
+
+    #[inline]
+    fn of_ply(shape: &YarnShape, crossing: &PlyCrossing, camera: Vec3A) -> Self {
+        let (w, c) = (shape.ply_rate, crossing.centre);
+        Self::new(Vec3A::new(-w * c.y, w * c.x, 1.0).normalize(), camera)
+    }
+
+    /// Latitudes of the camera and of `w`, and the cosine of `w`'s latitude.
+    #[inline]
+    fn latitudes(&self, w: Vec3A) -> (Latitudes, f32) {
+        let sin = w.dot(self.z).clamp(-1.0, 1.0);
+        let cos = (1.0 - sin * sin).sqrt();
+        (Latitudes::new(self.sin, self.cos, sin, cos), cos)
+    }
+
+    #[inline]
+    fn direction(&self, sin: f32, phi: f32) -> Vec3A {
+        let cos = (1.0 - sin * sin).max(0.0).sqrt();
+        let (s, c) = sin_cos(phi);
+        cos * (c * self.x + s * self.y) + sin * self.z
+    }
+}
+
+/// One place of scattering, for one camera direction: see the module's notes.
+#[derive(Clone, Debug)]
+pub struct Vertex<'a> {
+    yarn: &'a AggregatedYarn,
+    section: &'a Section,
+    camera: Vec3A,
+    forward: Option<Forward>,
+    forward_chance: f32,
+    node: Option<Node>,
+    backward: Option<Backward>,
+    /// The direction drawn from the node's lobes, their value there (with the way out), density, and chance to escape.
+    drawn: Drawn,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Drawn {
+    direction: Vec3A,
+    value: NodeValue,
+    escape: f32,
+}
+
+/// The node's lobes in one direction.
+#[derive(Clone, Copy, Debug)]
+struct NodeValue {
+    r: Rgb,
+    tt: Rgb,
+    d: Rgb,
+    /// Density of sampling, without the chance to escape.
+    pdf: f32,
+    /// e^-optical depth.
+    clear: Rgb,
+}
+
+impl<'a> Vertex<'a> {
+    /// Draws a node. `throughput` is the path's weight so far; `unscattered` is [`AggregatedYarn::transparency`] of
+    /// `crossings`, which the caller has already decided against: all values here are over 1 - `unscattered`.
+    #[inline]
+    pub fn new(
+        yarn: &'a AggregatedYarn,
+        section: &'a Section,
+        crossings: &Crossings,
+        unscattered: f32,
+        throughput: Rgb,
+        u: [f32; 4],
+        stream: &mut Stream,
+    ) -> Self {
+        let camera = Vec3A::new((1.0 - section.sin * section.sin).max(0.0).sqrt(), 0.0, section.sin);
+        let scattered = (1.0 - unscattered).max(1e-6);
+        let weight = throughput.max(Rgb::splat(1e-20)) / scattered;
+
+        // Along the chord, front to back: what reaches each ply, and what ends in it.
+        let mut reaching = Rgb::ONE;
+        let mut chain = Rgb::ZERO;
+        let mut total = 0.0;
+        let mut chosen: Option<(usize, Rgb, f32)> = None;
+        let mut pick = u[0];
+        for (i, c) in crossings.iter().enumerate() {
+            let optics = &yarn.plies[c.ply];
+            let depth = optics.rho * c.fibers;
+            let ended = depth.one_minus_exp_neg();
+            let energy = (reaching * ended * yarn.node_gain[c.ply]).weighted_mean(weight);
+            if energy > 0.0 {
+                // Reservoir of one: the same uniform number serves all plies.
+                total += energy;
+                let chance = energy / total;
+                if pick < chance {
+                    chosen = Some((i, reaching, energy));
+                    pick /= chance;
+                } else {
+                    pick = (pick - chance) / (1.0 - chance);
+                }
+                pick = pick.clamp(0.0, 0.999_999_94);
+            }
+            reaching *= (-depth).exp();
+            chain += optics.chain * c.fibers;
+        }
+        let forward = Forward::new(yarn, section, crossings, camera, reaching, chain, unscattered, weight, scattered);
+        let forward_energy = forward.as_ref().map_or(0.0, |f| f.energy.weighted_mean(throughput));
+        let mut vertex = Self {
+            yarn,
+            section,
+            camera,
+            forward,
+            forward_chance: if forward_energy > 0.0 { forward_energy / (forward_energy + total) } else { 0.0 },
+            node: None,
+            backward: None,
+            drawn: Drawn {
+                direction: Vec3A::ZERO,
+                value: NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: Rgb::ZERO, pdf: 0.0, clear: Rgb::ONE },
+                escape: 0.0,
+            },
+        };
+        if let Some((i, reaching, energy)) = chosen {
+            let share = energy / total * scattered;
+            vertex.draw_node(crossings, i, reaching / share, weight, throughput, u[1], pick);
+            vertex.draw_direction(crossings, i, [u[2], u[3]], stream);
+        }
+        vertex
+    }
+
+    /// Places the node along the chord of one ply: exponentially, by a channel drawn with the path's weights.
+    #[inline]
+    #[allow(clippy::too_many_arguments, reason = "one step of the constructor")]
+    fn draw_node(
+        &mut self,
+        crossings: &Crossings,
+        index: usize,
+        reaching: Rgb,
+        weight: Rgb,
+        throughput: Rgb,
+        u_depth: f32,
+        u_channel: f32,
+    ) {
+        let crossing = &crossings[index];
+        let optics = &self.yarn.plies[crossing.ply];
+        let depth = optics.rho * crossing.fibers;
+        let ended = depth.one_minus_exp_neg();
+        let chances = normalised((reaching * ended * self.yarn.node_gain[crossing.ply] * weight).to_array());
+        let channel = choose(chances, u_channel);
+        let (d, e) = (depth.to_array()[channel], ended.to_array()[channel]);
+        let x = if d > 1e-4 { (-(-u_depth * e).ln_1p() / d).clamp(0.0, 1.0) } else { u_depth };
+        // Density of x in [0, 1] for each channel: d e^-dx / (1 - e^-d), 1 for d -> 0.
+        let fall = (depth * -x).exp();
+        let density = fall * depth.select_below(1e-6, Rgb::ONE, depth / ended.max(Rgb::splat(1e-30)));
+        let drawn = Rgb::from(chances).weighted_mean(density) * 3.0;
+        let amplitude = reaching * ended * density / drawn.max(1e-30);
+
+        let depth_x = crossing.enter + (crossing.exit - crossing.enter) * x;
+        let travel = self.section.travel(depth_x);
+        let ply = &self.yarn.shape.plies[crossing.ply];
+        let (axis, centre) = if self.section.slope == 0.0 {
+            (crossing.axis, crossing.centre)
+        } else {
+            let axis = self.section.ply_axis(ply, Section::turn(&self.yarn.shape, travel));
+            (axis, self.section.ply_centre(ply, axis, travel))
+        };
+        let point = Vec2::new(depth_x, self.section.h);
+        let tangent = fiber_tangent(ply, self.yarn.shape.ply_rate, centre, axis, point);
+        let length = tangent.length();
+        let tangent = tangent / length;
+        let sin = tangent.dot(self.camera).clamp(-1.0, 1.0);
+        let before = crossing.fibers * x;
+        let widened = optics.chain.max_channel() * (before + SAMPLING_WIDENING);
+        let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
+        let weight = throughput.max(Rgb::splat(1e-20)) * amplitude;
+        let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
+        self.node = Some(Node {
+            ply: crossing.ply,
+            point,
+            travel,
+            tangent,
+            tangent_stretch: length,
+            sin,
+            cos: (1.0 - sin * sin).sqrt(),
+            before,
+            amplitude,
+            kappa_r: kappa(optics.beta_r_squared + widened * optics.beta_tt_squared),
+            kappa_tt: kappa((1.0 + widened) * optics.beta_tt_squared),
+            chance: normalised(lobes),
+            weight: weight * optics.albedo,
+        });
+    }
+
+    /// Draws a direction from the node's lobes; whether it escapes says how much light stays for B.
+    #[inline]
+    fn draw_direction(&mut self, crossings: &Crossings, index: usize, u: [f32; 2], stream: &mut Stream) {
+        let Some(node) = self.node else { return };
+        if node.chance.iter().sum::<f32>() <= 0.0 {
+            self.node = None;
+            return;
+        }
+        let crossing = &crossings[index];
+        let optics = &self.yarn.plies[node.ply];
+        let lobe = choose(node.chance, stream.next());
+        let sin = match lobe {
+            0 => sample_sine(node.kappa_r, node.sin, node.cos, u, stream),
+            1 => sample_sine(node.kappa_tt, node.sin, node.cos, u, stream),
+            _ => sample_sine_diffuse(u),
+        };
+        let frame = PlyFrame::new(node.tangent, self.camera);
+        let direction = frame.direction(sin, TAU * stream.next());
+        let value = self.node_value(&node, direction);
+        let escape = self.escape_chance(&node, optics, value.clear);
+        self.drawn = Drawn { direction, value, escape };
+
+        let energy = node.amplitude * optics.albedo * optics.closure * (Rgb::ONE - value.clear);
+        let frame = PlyFrame::of_ply(&self.yarn.shape, crossing, self.camera);
+        let relative = if self.yarn.shape.plies.len() == 1 {
+            crossing.offset / self.yarn.shape.plies[0].radius
+        } else {
+            self.section.h
+        };
+        let (lean_sin, lean_cos) = sin_cos(LEAN_SIDEWAYS * relative.clamp(-1.0, 1.0).asin());
+        self.backward = Some(Backward {
+            frame,
+            lean_to: (lean_cos, lean_sin),
+            energy,
+            chance: 1.0 - escape,
+            mirrored: optics.mirrored.mean(),
+            lean: optics.lean.mean().min(0.95),
+            kappa: 0.125 / optics.beta_r_squared.max(super::kernel::MIN_VARIANCE),
+        });
+    }
+
+    /// The optical depth between a node and the outside in a direction of the section's frame, per channel.
+    ///
+    /// Near its own fibre the way is clearer than the mean medium: the camera's ray has already swept a strip as wide
+    /// as a fibre (the "hot spot"), and the light starts at the fibre's surface, not at its centre.
+    #[inline]
+    fn optical_depth(&self, node: &Node, w: Vec3A) -> Rgb {
+        let shape = &self.yarn.shape;
+        let optics = &self.yarn.plies[node.ply];
+        let cos = (1.0 - w.z * w.z).max(1e-6).sqrt();
+        let ahead = Vec2::new(w.x, w.y) / cos;
+        let start = node.point + optics.shift * (Vec2::X + ahead);
+        let width = 2.0 * shape.plies[node.ply].fiber_radius;
+        let cleared = if ahead.x > 0.0 { width / ahead.y.abs().max(1e-6) } else { width };
+        let ramp = |t: f32| if t < cleared { 0.5 * t * t / cleared } else { t - 0.5 * cleared };
+        let mut depth = Rgb::ZERO;
+        self.section.chords_ahead(shape, start, node.travel, w, true, |ply, from, to| {
+            let length = ramp(to + optics.lead) - ramp(from + optics.lead);
+            depth += self.yarn.plies[ply].rho * (self.yarn.plies[ply].sigma * length);
+        });
+        let along = w.dot(node.tangent);
+        depth * ((1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos)
+    }
+
+    /// The node's lobes towards `w`, dimmed by the way out.
+    #[inline]
+    fn node_value(&self, node: &Node, w: Vec3A) -> NodeValue {
+        let optics = &self.yarn.plies[node.ply];
+        let depth = self.optical_depth(node, w);
+        let clear = (-depth).exp();
+        let sin = w.dot(node.tangent).clamp(-1.0, 1.0);
+        let cos = (1.0 - sin * sin).sqrt();
+        let at = Latitudes::new(node.sin, node.cos, sin, cos);
+        // Chains of TT on both sides widen the lobes.
+        let passed = optics.chain * (depth / optics.rho.max(Rgb::splat(1e-6)) + node.before);
+        let beta_tt = Rgb::splat(optics.beta_tt_squared);
+        let even = cos * (0.5 * FRAC_1_PI);
+        let scale = node.amplitude * clear * even;
+        let [p_r, p_tt, p_d] = node.chance;
+        let mut value = NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: optics.single_d * scale * DIFFUSE, pdf: p_d * DIFFUSE, clear };
+        if p_r > 0.0 {
+            let m = kernel(kappa_of_variance(passed * beta_tt + optics.beta_r_squared), at);
+            value.r = optics.single_r * scale * m;
+            value.pdf += p_r * kernel_scalar(node.kappa_r, at);
+        }
+        if p_tt > 0.0 {
+            let m = kernel(kappa_of_variance((passed + 1.0) * beta_tt), at);
+            value.tt = optics.single_tt * scale * m;
+            value.pdf += p_tt * kernel_scalar(node.kappa_tt, at);
+        }
+        value.pdf *= even;
+        value
+    }
+
+    /// The chance, given the clearness of a direction, that light sent there counts as escaped and not as B.
+    #[inline]
+    fn escape_chance(&self, node: &Node, optics: &PlyOptics, clear: Rgb) -> f32 {
+        let out = clear.weighted_mean(node.weight);
+        let stay = ((Rgb::ONE - clear) * optics.closure).weighted_mean(node.weight);
+        if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
+    }
+
+    /// The value of the lobes for light from `w` (section frame), in 1/steradian, with the cosine, over 1 - T0; each
+    /// component weighted against direction sampling, where `light_pdf` is the density (1/steradian) of drawing `w`,
+    /// or infinite for light that no sampled direction can meet.
+    #[inline]
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+        let mut lobes = LobeValues::default();
+        let mut forward_part = 0.0;
+        if let Some(forward) = &self.forward {
+            let (value, pdf) = self.forward_value(forward, w);
+            lobes.f = value * mis_weight(light_pdf, self.forward_chance * pdf);
+            forward_part = lobes.f.mean();
+        }
+        if let Some(node) = &self.node {
+            let at_node = 1.0 - self.forward_chance;
+            let value = self.node_value(node, w);
+            let escape = self.escape_chance(node, &self.yarn.plies[node.ply], value.clear);
+            let weight = mis_weight(light_pdf, at_node * escape * value.pdf);
+            lobes.r = value.r * weight;
+            lobes.tt = value.tt * weight;
+            lobes.d = value.d * weight;
+            if let Some(backward) = &self.backward {
+                let (value, pdf) = self.backward_value(backward, node.ply, w);
+                lobes.b = value * mis_weight(light_pdf, at_node * backward.chance * pdf);
+            }
+        }
+        let total = lobes.sum().mean();
+        Direct { lobes, forward_share: if total > 0.0 { forward_part / total } else { 0.0 } }
+    }
+
+    /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of F or B.
+    #[inline]
+    pub fn sample(&self, u: [f32; 3], stream: &mut Stream) -> Option<Continuation> {
+        if u[0] < self.forward_chance {
+            let forward = self.forward.as_ref()?;
+            let channel = choose(forward.channel, stream.next());
+            let kappa = forward.kappa.to_array()[channel];
+            let frame = &forward.frame;
+            let sin = sample_sine(kappa, frame.sin, frame.cos, [u[1], stream.next()], stream);
+            let w = frame.direction(sin, PI + forward.sigma[channel] * normal(u[2]));
+            let (value, pdf) = self.forward_value(forward, w);
+            let pdf = pdf * self.forward_chance;
+            return (pdf > 0.0).then(|| Continuation {
+                direction: w,
+                weight: value / pdf,
+                pdf,
+                shares: LobeValues { f: Rgb::ONE, ..LobeValues::default() },
+                start: self.forward_start(),
+            });
+        }
+        let node = self.node.as_ref()?;
+        let at_node = 1.0 - self.forward_chance;
+        let again = (u[0] - self.forward_chance) / at_node;
+        let start = self.node_start();
+        if again < self.drawn.escape {
+            let NodeValue { r, tt, d, pdf, .. } = self.drawn.value;
+            let pdf = pdf * at_node * self.drawn.escape;
+            let sum = r + tt + d;
+            let share = |lobe: Rgb| lobe / sum.max(Rgb::splat(1e-30));
+            return (pdf > 0.0).then(|| Continuation {
+                direction: self.drawn.direction,
+                weight: sum / pdf,
+                pdf,
+                shares: LobeValues { r: share(r), tt: share(tt), d: share(d), ..LobeValues::default() },
+                start,
+            });
+        }
+        let backward = self.backward.as_ref()?;
+        let frame = &backward.frame;
+        let lat = [u[1], stream.next()];
+        let sin = if stream.next() < backward.mirrored {
+            sample_sine(backward.kappa, frame.sin, frame.cos, lat, stream)
+        } else {
+            sample_sine_diffuse(lat)
+        };
+        // Azimuth with density (1 + lean cos(phi - phi0)) / 2 pi: uniform, then folded towards the front.
+        let mut phi = TAU * u[2];
+        if stream.next() < backward.lean && stream.next() > 0.5 * (1.0 + sin_cos(phi).1) {
+            phi = PI - phi;
+        }
+        let turned = backward.lean_to.1.atan2(backward.lean_to.0);
+        let w = frame.direction(sin, phi + turned);
+        let (value, pdf) = self.backward_value(backward, node.ply, w);
+        let pdf = pdf * at_node * backward.chance;
+        (pdf > 0.0).then(|| Continuation {
+            direction: w,
+            weight: value / pdf,
+            pdf,
+            shares: LobeValues { b: Rgb::ONE, ..LobeValues::default() },
+            start,
+        })
+    }
+
+    /// Depth (x of the section) from which light of the node's lobes and of B leaves.
+    #[inline]
+    pub fn node_start(&self) -> f32 {
+        self.node.map_or(self.section.enter, |n| n.point.x)
+    }
+
+    /// Depth from which light of F leaves: the middle of the fibres on the chord.
+    #[inline]
+    pub fn forward_start(&self) -> f32 {
+        self.forward.map_or(self.section.enter, |f| f.middle)
+    }
+
+    #[inline]
+    fn backward_value(&self, backward: &Backward, ply: usize, w: Vec3A) -> (Rgb, f32) {
+        let optics = &self.yarn.plies[ply];
+        let (at, cos) = backward.frame.latitudes(w);
+        let across = (w.dot(backward.frame.x), w.dot(backward.frame.y));
+        let length = (across.0 * across.0 + across.1 * across.1).sqrt().max(1e-12);
+        let lean = (across.0 * backward.lean_to.0 + across.1 * backward.lean_to.1) / length;
+        let m = if backward.mirrored > 0.0 { kernel_scalar(backward.kappa, at) } else { 0.0 };
+        let even = cos * (0.5 * FRAC_1_PI);
+        let latitude = optics.mirrored * (m - DIFFUSE) + DIFFUSE;
+        let value = backward.energy * latitude * (optics.lean * lean + 1.0) * even;
+        let pdf = (backward.mirrored * (m - DIFFUSE) + DIFFUSE) * (backward.lean * lean + 1.0) * even;
+        (value, pdf)
+    }
+
+    #[inline]
+    fn forward_value(&self, forward: &Forward, w: Vec3A) -> (Rgb, f32) {
+        let (at, cos) = forward.frame.latitudes(w);
+        let m = kernel(forward.kappa, at) * cos;
+        if m.max_channel() < 1e-12 {
+            return (Rgb::ZERO, 0.0);
+        }
+        let off = w.dot(forward.frame.y).atan2(w.dot(forward.frame.x)) - PI;
+        let around = Rgb::from(forward.sigma.map(|s| wrapped_normal(off, s)));
+        let density = m * around;
+        let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
+        let mut value = forward.energy * density;
+        if self.yarn.forward_follows_light {
+            value *= self.forward_gain(forward, w);
+        }
+        (value, pdf)
+    }
+
+    /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
+    #[inline]
+    fn forward_gain(&self, forward: &Forward, w: Vec3A) -> Rgb {
+        let mut depth = forward.half_depth;
+        let mut unscattered = forward.half_depth_unscattered;
+        let start = Vec2::new(forward.middle, self.section.h);
+        let travel = self.section.travel(forward.middle);
+        self.section.chords_ahead(&self.yarn.shape, start, travel, w, false, |ply, from, to| {
+            let optics = &self.yarn.plies[ply];
+            let fibers = forward.scale * optics.sigma * (to - from);
+            depth += optics.rho * fibers;
+            unscattered += optics.rho_unscattered * fibers;
+        });
+        let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
+        (passed * forward.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
+    }
+}
+
+impl Forward {
+    #[inline]
+    #[allow(clippy::too_many_arguments, reason = "one step of the vertex's constructor")]
+    fn new(
+        yarn: &AggregatedYarn,
+        section: &Section,
+        crossings: &Crossings,
+        camera: Vec3A,
+        passed: Rgb,
+        chain: Rgb,
+        unscattered: f32,
+        weight: Rgb,
+        scattered: f32,
+    ) -> Option<Self> {
+        let energy = (passed - unscattered).max(Rgb::ZERO);
+        let front = crossings.first()?;
+        // Below this the lobe cannot be told from zero in an image, and its shape is all cancellation.
+        if energy.max_channel() < 1e-7 {
+            return None;
+        }
+        let optics = &yarn.plies[front.ply];
+        // Mean number of TT events of light that had at least one: k / (1 - e^-k).
+        let events = chain.select_below(1e-6, Rgb::ONE, chain / chain.one_minus_exp_neg().max(Rgb::splat(1e-30)));
+        let sigma = (events.sqrt() * optics.beta_n).to_array();
+
+        let fibers: f32 = crossings.iter().map(|c| c.fibers).sum();
+        let mut left = 0.5 * fibers;
+        let mut middle = front.enter;
+        let mut half_depth = Rgb::ZERO;
+        let mut half_depth_unscattered = 0.0;
+        for c in crossings {
+            let optics = &yarn.plies[c.ply];
+            half_depth += optics.rho * (0.5 * c.fibers);
+            half_depth_unscattered += optics.rho_unscattered * 0.5 * c.fibers;
+            if left >= 0.0 {
+                let share = if c.fibers > 0.0 { (left / c.fibers).min(1.0) } else { 1.0 };
+                middle = c.enter + (c.exit - c.enter) * share;
+                left -= c.fibers;
+                if left == 0.0 {
+                    left = -1.0;
+                }
+            }
+        }
+        let mut plain = 0.0;
+        let start = Vec2::new(middle, section.h);
+        section.chords_ahead(&yarn.shape, start, section.travel(middle), -camera, false, |ply, from, to| {
+            plain += yarn.plies[ply].sigma * (to - from);
+        });
+        let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
+        Some(Self {
+            frame: PlyFrame::of_ply(&yarn.shape, front, camera),
+            energy: energy / scattered,
+            channel: normalised((energy * weight).to_array()),
+            kappa: kappa_of_variance(events * optics.beta_tt_squared),
+            sigma,
+            middle,
+            half_depth,
+            half_depth_unscattered,
+            scale,
+            norm: Rgb::ONE / energy.max(Rgb::splat(1e-12)),
+        })
+    }
+}
+
+/// Weights over their sum; zeros if there is nothing to choose.
+#[inline]
+fn normalised(w: [f32; 3]) -> [f32; 3] {
+    let total = w[0] + w[1] + w[2];
+    if total > 0.0 { w.map(|x| x / total) } else { [0.0; 3] }
+}
+
+/// Index chosen with the given chances, which sum to 1.
+#[inline]
+fn choose(chances: [f32; 3], u: f32) -> usize {
+    if u < chances[0] {
+        0
+    } else if u < chances[0] + chances[1] || chances[2] <= 0.0 {
+        if chances[1] > 0.0 { 1 } else { 0 }
+    } else {
+        2
+    }
+}

@@ -1,0 +1,204 @@
+//! One fibre: R, TT and D (paper Eqs. 5 and 6, with the kernel of [`super::kernel`] in place of their Gaussians).
+//!
+//! S = sum over lobes of a_p M_p(theta_i, theta_o) N_p(phi). R and D have N = 1 / 2 pi; TT is a normal distribution
+//! of standard deviation beta_n wrapped round phi = pi. (The paper prints it centred at 0, which by its own text is
+//! the backward direction.)
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::Vec3A;
+
+use super::kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel_scalar, sample_sine, sample_sine_diffuse};
+use crate::math::{
+    Rgb,
+    frame::sin_cos,
+    sampler::Stream,
+    special::{front_share_of_wrapped_normal, wrapped_normal},
+    warp::normal,
+};
+
+/// The BCSDF of a fibre: albedos are linear Rec.709, widths standard deviations in radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FiberMaterial {
+    /// Albedo of R, reflection at the surface.
+    pub r: [f64; 3],
+    /// Albedo of TT, light that passes through.
+    pub tt: [f64; 3],
+    /// Albedo of D, light scattered diffusely inside.
+    pub d: [f64; 3],
+    /// Longitudinal width of R, in theta_h.
+    pub beta_r: f64,
+    /// Longitudinal width of TT, in theta_h.
+    pub beta_tt: f64,
+    /// Azimuthal width of TT.
+    pub beta_n: f64,
+}
+
+impl FiberMaterial {
+    /// The share of TT that goes on forward as a chain: 2 q - 1 with q the share within a quarter turn of forward.
+    pub fn chain_share(&self) -> f64 {
+        2.0 * front_share_of_wrapped_normal(self.beta_n) - 1.0
+    }
+
+    /// The largest r + tt + d of the three channels.
+    pub fn largest_albedo(&self) -> f64 {
+        (0..3).map(|c| self.r[c] + self.tt[c] + self.d[c]).fold(0.0, f64::max)
+    }
+}
+
+/// A fibre's BCSDF made ready to evaluate: for explicit fibres, and the yardstick of every aggregate.
+#[derive(Clone, Debug)]
+pub struct FiberBcsdf {
+    r: Rgb,
+    tt: Rgb,
+    d: Rgb,
+    kappa_r: f32,
+    kappa_tt: f32,
+    beta_n: f32,
+}
+
+/// A direction drawn from a BCSDF: `weight` is value / density.
+#[derive(Clone, Copy, Debug)]
+pub struct FiberSample {
+    /// Where the light comes from, in the frame of [`FiberBcsdf::evaluate`].
+    pub wi: Vec3A,
+    /// Value over density, per channel.
+    pub weight: Rgb,
+    /// Density per steradian.
+    pub pdf: f32,
+}
+
+impl FiberBcsdf {
+    /// From the material's albedos and widths.
+    pub fn new(material: &FiberMaterial) -> Self {
+        let kappa = |beta: f64| kappa_of_variance(Rgb::splat((beta * beta) as f32)).to_array()[0];
+        Self {
+            r: material.r.into(),
+            tt: material.tt.into(),
+            d: material.d.into(),
+            kappa_r: kappa(material.beta_r),
+            kappa_tt: kappa(material.beta_tt),
+            beta_n: material.beta_n as f32,
+        }
+    }
+
+    /// S cos(theta_i) in 1/steradian and the density of [`Self::sample`] at `wi`. Frame: z along the fibre, the
+    /// camera's direction at azimuth 0 with sine and cosine of its latitude given. `throughput` weighs the channels
+    /// in the choice of a lobe and must be the same in both calls.
+    #[inline]
+    pub fn evaluate(&self, sin_o: f32, cos_o: f32, wi: Vec3A, throughput: Rgb) -> (Rgb, f32) {
+        let sin_i = wi.z;
+        let cos_i = (1.0 - sin_i * sin_i).max(0.0).sqrt();
+        let at = Latitudes::new(sin_o, cos_o, sin_i, cos_i);
+        let m_r = kernel_scalar(self.kappa_r, at);
+        let m_tt = kernel_scalar(self.kappa_tt, at);
+        let n_tt = if m_tt > 0.0 { wrapped_normal(wi.y.atan2(wi.x) - PI, self.beta_n) } else { 0.0 };
+        let r = m_r * cos_i * (0.5 * FRAC_1_PI);
+        let d = DIFFUSE * cos_i * (0.5 * FRAC_1_PI);
+        let tt = m_tt * cos_i * n_tt;
+        let [p_r, p_tt, p_d] = self.lobe_shares(throughput);
+        (self.r * r + self.tt * tt + self.d * d, p_r * r + p_tt * tt + p_d * d)
+    }
+
+    fn lobe_shares(&self, throughput: Rgb) -> [f32; 3] {
+        let w = [self.r, self.tt, self.d].map(|a| a.weighted_mean(throughput));
+        let total = w[0] + w[1] + w[2];
+        if total > 0.0 { w.map(|x| x / total) } else { [0.0; 3] }
+    }
+
+    /// Draws a direction; `None` for a black fibre.
+    #[inline]
+    pub fn sample(
+        &self,
+        sin_o: f32,
+        cos_o: f32,
+        throughput: Rgb,
+        u: [f32; 4],
+        stream: &mut Stream,
+    ) -> Option<FiberSample> {
+        let [p_r, p_tt, p_d] = self.lobe_shares(throughput);
+        if p_r + p_tt + p_d <= 0.0 {
+            return None;
+        }
+        let lat = [u[1], u[2]];
+        let (sin_i, phi) = if u[0] < p_r {
+            (sample_sine(self.kappa_r, sin_o, cos_o, lat, stream), TAU * u[3])
+        } else if u[0] < p_r + p_tt {
+            (sample_sine(self.kappa_tt, sin_o, cos_o, lat, stream), PI + self.beta_n * normal(u[3]))
+        } else {
+            (sample_sine_diffuse(lat), TAU * u[3])
+        };
+        let cos_i = (1.0 - sin_i * sin_i).max(0.0).sqrt();
+        let (s, c) = sin_cos(phi);
+        let wi = Vec3A::new(cos_i * c, cos_i * s, sin_i);
+        let (value, pdf) = self.evaluate(sin_o, cos_o, wi, throughput);
+        (pdf > 0.0).then(|| FiberSample { wi, weight: value / pdf, pdf })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(crate) fn lossless() -> FiberMaterial {
+        FiberMaterial { r: [0.2; 3], tt: [0.5; 3], d: [0.3; 3], beta_r: 0.15, beta_tt: 0.12, beta_n: 0.35 }
+    }
+
+    fn sphere(n_theta: usize, n_phi: usize) -> impl Iterator<Item = (Vec3A, f64)> {
+        let dt = std::f64::consts::PI / n_theta as f64;
+        let dp = std::f64::consts::TAU / n_phi as f64;
+        (0..n_theta * n_phi).map(move |i| {
+            let theta = (i / n_phi) as f64 * dt + 0.5 * dt - std::f64::consts::FRAC_PI_2;
+            let phi = (i % n_phi) as f64 * dp + 0.5 * dp;
+            let (s, c) = theta.sin_cos();
+            (Vec3A::new((c * phi.cos()) as f32, (c * phi.sin()) as f32, s as f32), c * dt * dp)
+        })
+    }
+
+    #[test]
+    fn a_white_fiber_keeps_all_light_from_every_side() {
+        for theta in [0.0f64, 0.4, 1.0, 1.4] {
+            for (br, btt, bn) in [(0.15, 0.12, 0.35), (0.5, 0.4, 1.2), (0.05, 0.05, 0.1)] {
+                let m = FiberMaterial { beta_r: br, beta_tt: btt, beta_n: bn, ..lossless() };
+                let bcsdf = FiberBcsdf::new(&m);
+                let (s, c) = (theta.sin() as f32, theta.cos() as f32);
+                let (mut energy, mut density) = (0.0, 0.0);
+                for (wi, dw) in sphere(600, 400) {
+                    let (value, pdf) = bcsdf.evaluate(s, c, wi, Rgb::ONE);
+                    energy += f64::from(value.mean()) * dw;
+                    density += f64::from(pdf) * dw;
+                }
+                assert!((energy - 1.0).abs() < 1e-3, "theta {theta}: energy {energy}");
+                assert!((density - 1.0).abs() < 1e-3, "theta {theta}: density {density}");
+                let mut stream = Stream::new(9);
+                for _ in 0..500 {
+                    let u = [0; 4].map(|_| stream.next());
+                    let sample = bcsdf.sample(s, c, Rgb::ONE, u, &mut stream).unwrap();
+                    assert!((sample.weight.mean() - 1.0).abs() < 1e-4, "a weight of {:?}", sample.weight);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_bcsdf_is_reciprocal() {
+        let bcsdf = FiberBcsdf::new(&lossless());
+        for i in 0..100 {
+            let (a, b) = (-1.4 + 0.028 * i as f32, 1.3 - 0.021 * i as f32);
+            let phi = 0.06 * i as f32;
+            let s = |theta_o: f32, theta_i: f32, phi: f32| {
+                let wi = Vec3A::new(theta_i.cos() * phi.cos(), theta_i.cos() * phi.sin(), theta_i.sin());
+                bcsdf.evaluate(theta_o.sin(), theta_o.cos(), wi, Rgb::ONE).0.mean() / theta_i.cos()
+            };
+            let (there, back) = (s(a, b, phi), s(b, a, -phi));
+            assert!((there / back - 1.0).abs() < 1e-4, "{there} {back}");
+        }
+    }
+
+    #[test]
+    fn a_black_fiber_scatters_nothing() {
+        let m = FiberMaterial { r: [0.0; 3], tt: [0.0; 3], d: [0.0; 3], ..lossless() };
+        let bcsdf = FiberBcsdf::new(&m);
+        assert!(bcsdf.sample(0.1, 0.99, Rgb::ONE, [0.5; 4], &mut Stream::new(1)).is_none());
+    }
+}

@@ -1,0 +1,192 @@
+//! A ply as a medium of fibres: what its material and its packing give before any ray is known, in `f64`.
+
+use std::f64::consts::{FRAC_PI_4, PI};
+
+use super::fiber::FiberMaterial;
+use crate::{
+    geometry::yarn::PlyShape,
+    math::{Rgb, special::escape_probability_of_disc},
+};
+
+/// Constants of the aggregated model that were calibrated on explicit fibres (untwisted single plies only).
+mod calibrated {
+    /// How much of pi/4 fibre radii between a fibre's centre and its surface dense packing takes away.
+    pub(super) const START_SHRINK: f64 = 0.4;
+    /// Weight of a fibre's own width in the escape of multiply scattered light.
+    pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
+    /// Strength and half point of the lean of multiply scattered light towards the camera, and its fall with albedo.
+    pub(super) const LEAN: f64 = 3.2;
+    pub(super) const LEAN_HALF: f64 = 10.0;
+    pub(super) const LEAN_ALBEDO: f64 = 0.14;
+}
+
+/// Share of the surroundings of a ply that an equal ply which touches it takes.
+const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
+
+/// The effective extinction, per expected fibre, of a chain of light that keeps the weight `1 - loss` at each fibre,
+/// when hard cores of area fraction `density` keep fibres apart.
+///
+/// rate = (b - W0(a b e^b)) / eta with b = eta / (1 - eta): 1 - a for sparse fibres, 1 / (1 - eta) for a = 0.
+pub fn extinction_rate(loss: f64, density: f64) -> f64 {
+    let b = density / (1.0 - density);
+    if b < 1e-4 {
+        return loss;
+    }
+    if loss >= 1.0 {
+        return 1.0 / (1.0 - density);
+    }
+    if loss <= 0.0 {
+        return 0.0;
+    }
+    if loss < 0.5 {
+        // Newton for log1p(-x / b) - x = log1p(-loss): no difference of near equals for small losses.
+        let goal = (-loss).ln_1p();
+        let mut x = b * loss / (1.0 + b);
+        for _ in 0..6 {
+            x += ((-x / b).ln_1p() - x - goal) / (1.0 / (b - x) + 1.0);
+        }
+        x / density
+    } else {
+        // Halley-free iteration for Lambert's W of e^l, which never forms e^l for large l.
+        let l = (1.0 - loss).ln() + b.ln() + b;
+        let mut w = if l < 1.0 { l.exp() / (1.0 + l.exp()) } else { l - l.ln() * l / (1.0 + l) };
+        for _ in 0..6 {
+            w *= (1.0 + l - w.ln()) / (1.0 + w);
+        }
+        (b - w) / density
+    }
+}
+
+/// A ply's fibres as light sees them. Lengths in yarn radii; albedos per channel.
+#[derive(Clone, Debug)]
+pub struct PlyOptics {
+    /// Expected fibres per length of a chord through the core.
+    pub sigma: f32,
+    /// Extinction per expected fibre of light that may pass fibres as TT.
+    pub rho: Rgb,
+    /// Extinction per expected fibre of unscattered light.
+    pub rho_unscattered: f32,
+    /// Weight that TT keeps on its way forward, at each fibre.
+    pub chain: Rgb,
+    /// Energy of single scattering by R, D and the part of TT that leaves the chain, over what leaves the chain.
+    pub single_r: Rgb,
+    /// As `single_r`, for D.
+    pub single_d: Rgb,
+    /// As `single_r`, for TT.
+    pub single_tt: Rgb,
+    /// Their sum: the albedo of an event that ends a chain.
+    pub albedo: Rgb,
+    /// Of light scattered twice or more: the share that leaves the yarn at last.
+    pub closure: Rgb,
+    /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
+    pub mirrored: Rgb,
+    /// How much that light leans towards where the camera looks from, 0 to 1.
+    pub lean: Rgb,
+    /// Squares of the fibre's widths.
+    pub beta_r_squared: f32,
+    /// As above.
+    pub beta_tt_squared: f32,
+    /// Azimuthal width of TT, radians.
+    pub beta_n: f32,
+    /// How far outside a fibre's centre the way of the light begins.
+    pub shift: f32,
+    /// How much longer the way of the light is than measured between cores.
+    pub lead: f32,
+}
+
+impl PlyOptics {
+    /// For a ply among `plies` of a yarn.
+    pub fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
+        let (n, radius) = (f64::from(ply.fibers), f64::from(ply.radius));
+        let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
+        let density = (n * fiber * fiber / (radius * radius)).min(0.85);
+        let sigma = 2.0 * fiber * n / (PI * core * core);
+        let f = material.chain_share();
+        let per_channel = |value: &dyn Fn(usize) -> f64| Rgb::from([value(0), value(1), value(2)]);
+
+        let r = |c: usize| material.r[c];
+        let d = |c: usize| material.d[c];
+        let tt_out = |c: usize| material.tt[c] * (1.0 - f);
+        let chain = |c: usize| material.tt[c] * f;
+        let ended = |c: usize| 1.0 - chain(c);
+        let rho = |c: usize| extinction_rate(ended(c), density);
+        // Light that leaves the chain, over what the chain loses; 0 where nothing is lost.
+        let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
+        let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
+        let radius_optical = |c: usize| sigma * rho(c) * core;
+        let escape = |c: usize| {
+            let t = radius_optical(c);
+            let e = escape_probability_of_disc(t);
+            let k = calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
+            let e = e * (1.0 + k) / (1.0 + k * e);
+            let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
+            e * (1.0 - neighbours * (e * t * PI / 2.0).min(1.0))
+        };
+        let closure = |c: usize| {
+            let gain = albedo(c) * escape(c);
+            // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
+            let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
+            if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
+        };
+        let mirrored = |c: usize| {
+            let out = r(c) + d(c) + tt_out(c);
+            if out <= 0.0 {
+                return 0.0;
+            }
+            let share = r(c) / out;
+            let again = albedo(c) * (1.0 - escape(c));
+            share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
+        };
+        let lean = |c: usize| {
+            let t = radius_optical(c);
+            (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c))).clamp(0.0, 1.0)
+        };
+        Self {
+            sigma: sigma as f32,
+            rho: per_channel(&rho),
+            rho_unscattered: extinction_rate(1.0, density) as f32,
+            chain: per_channel(&chain),
+            single_r: per_channel(&|c| single(r(c), c)),
+            single_d: per_channel(&|c| single(d(c), c)),
+            single_tt: per_channel(&|c| single(tt_out(c), c)),
+            albedo: per_channel(&albedo),
+            closure: per_channel(&closure),
+            mirrored: per_channel(&mirrored),
+            lean: per_channel(&lean),
+            beta_r_squared: (material.beta_r * material.beta_r) as f32,
+            beta_tt_squared: (material.beta_tt * material.beta_tt) as f32,
+            beta_n: material.beta_n as f32,
+            shift: (FRAC_PI_4 * (1.0 - calibrated::START_SHRINK * density).max(0.0) * fiber) as f32,
+            lead: (FRAC_PI_4 * fiber) as f32,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extinction_rate_solves_its_equation_and_meets_its_limits() {
+        for density in [1e-6, 1e-3, 0.1, 0.5, 0.85] {
+            let b = density / (1.0 - density);
+            for i in 0..400 {
+                let loss = 10f64.powf(-12.0 + 12.0 * f64::from(i) / 400.0);
+                let rate = extinction_rate(loss, density);
+                assert!(rate > 0.0 && rate.is_finite());
+                if b > 1e-4 {
+                    // W e^W = a b e^b with W = b - rate eta, in logarithms.
+                    let x = rate * density;
+                    let residual = (-x / b).ln_1p() - x - (-loss).ln_1p();
+                    assert!((residual / (-loss).ln_1p()).abs() < 1e-9, "density {density} loss {loss}: {residual}");
+                }
+            }
+            assert_eq!(extinction_rate(0.0, density), 0.0);
+            let opaque = extinction_rate(1.0, density);
+            assert!((opaque * (1.0 - density) - 1.0).abs() < 1e-3);
+            let (below, above) = (extinction_rate(0.5 - 1e-12, density), extinction_rate(0.5 + 1e-12, density));
+            assert!((below / above - 1.0).abs() < 1e-9, "both branches meet at density {density}");
+        }
+        assert!((extinction_rate(0.3, 1e-7) - 0.3).abs() < 1e-6);
+    }
+}
