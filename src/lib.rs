@@ -1,6 +1,7 @@
 //! x
 #![deny(unsafe_code)]
 pub mod ffi;
-pub mod math;
 pub mod geometry;
+pub mod math;
 pub mod scattering;
+pub mod scene;

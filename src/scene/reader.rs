@@ -1,0 +1,565 @@
+//! Typed reading of tables: every question names a key and what may stand there; wrong answers are collected.
+//!
+//! A [`Reader`] never stops at an error: it reports, answers with nothing (or the default), and goes on,
+//! so that a user sees everything that is wrong at once. After the last question [`Reader::finish`]
+//! reports every key nobody asked for.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use super::diagnostic::{Diagnostic, Diagnostics, Span, listed, nearest, shortened};
+use super::document::{Document, Entry, Node, Table, Value};
+
+/// Which numbers are allowed. Not-a-number and infinity never are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    low: Limit,
+    high: Limit,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Limit {
+    None,
+    Including(f64),
+    Excluding(f64),
+}
+
+impl Range {
+    /// Every number.
+    pub const FINITE: Range = Range { low: Limit::None, high: Limit::None };
+    /// Above 0.
+    pub const POSITIVE: Range = Range::above(0.0);
+    /// At least 0.
+    pub const NOT_NEGATIVE: Range = Range::at_least(0.0);
+    /// From 0 to 1, both included.
+    pub const UNIT: Range = Range::between(0.0, 1.0);
+
+    /// `low` and larger numbers.
+    pub const fn at_least(low: f64) -> Range {
+        Range { low: Limit::Including(low), high: Limit::None }
+    }
+
+    /// Numbers larger than `low`.
+    pub const fn above(low: f64) -> Range {
+        Range { low: Limit::Excluding(low), high: Limit::None }
+    }
+
+    /// `high` and smaller numbers.
+    pub const fn at_most(high: f64) -> Range {
+        Range { low: Limit::None, high: Limit::Including(high) }
+    }
+
+    /// Numbers smaller than `high`.
+    pub const fn below(high: f64) -> Range {
+        Range { low: Limit::None, high: Limit::Excluding(high) }
+    }
+
+    /// From `low` to `high`, both included.
+    pub const fn between(low: f64, high: f64) -> Range {
+        Range { low: Limit::Including(low), high: Limit::Including(high) }
+    }
+
+    /// This range up to `high`, included.
+    pub const fn and_at_most(self, high: f64) -> Range {
+        Range { low: self.low, high: Limit::Including(high) }
+    }
+
+    /// This range up to but without `high`.
+    pub const fn and_below(self, high: f64) -> Range {
+        Range { low: self.low, high: Limit::Excluding(high) }
+    }
+
+    /// Whether the number is allowed.
+    pub fn contains(&self, value: f64) -> bool {
+        let above_low = match self.low {
+            Limit::None => true,
+            Limit::Including(low) => value >= low,
+            Limit::Excluding(low) => value > low,
+        };
+        let below_high = match self.high {
+            Limit::None => true,
+            Limit::Including(high) => value <= high,
+            Limit::Excluding(high) => value < high,
+        };
+        value.is_finite() && above_low && below_high
+    }
+}
+
+/// The range in words, to stand after "must be": "at least 0", "above 0", "from 0 to 1", "finite".
+impl fmt::Display for Range {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.low, self.high) {
+            (Limit::Including(low), Limit::Including(high)) => return write!(formatter, "from {low} to {high}"),
+            (Limit::None, Limit::None) => return write!(formatter, "finite"),
+            _ => {}
+        }
+        match self.low {
+            Limit::None => {}
+            Limit::Including(low) => write!(formatter, "at least {low}")?,
+            Limit::Excluding(low) => write!(formatter, "above {low}")?,
+        }
+        if self.low != Limit::None && self.high != Limit::None {
+            write!(formatter, " and ")?;
+        }
+        match self.high {
+            Limit::None => Ok(()),
+            Limit::Including(high) => write!(formatter, "at most {high}"),
+            Limit::Excluding(high) => write!(formatter, "below {high}"),
+        }
+    }
+}
+
+/// How messages call a table.
+#[derive(Clone, Debug)]
+struct Title {
+    /// The names from the outside to here, with dots: `yarn.silk1`.
+    path: String,
+    /// The whole name: `[yarn.silk1]`, `[[light]] 2`; empty for the outermost table.
+    text: String,
+    /// What tables inside have to say after their own name: ` of [[light]] 2`.
+    suffix: String,
+}
+
+impl Title {
+    fn join(&self, key: &str) -> String {
+        let bare = |character: char| character.is_ascii_alphanumeric() || matches!(character, '_' | '-');
+        let key =
+            if !key.is_empty() && key.chars().all(bare) { key.to_owned() } else { format!("\"{}\"", shortened(key)) };
+        if self.path.is_empty() { key } else { format!("{}.{key}", self.path) }
+    }
+
+    fn table(&self, key: &str) -> Title {
+        let path = self.join(key);
+        Title { text: format!("[{path}]{}", self.suffix), suffix: self.suffix.clone(), path }
+    }
+
+    /// Counts from 1, as one would count in the file.
+    fn element(&self, key: &str, number: usize) -> Title {
+        let path = self.join(key);
+        let text = format!("[[{path}]] {number}{}", self.suffix);
+        Title { suffix: format!(" of {text}"), text, path }
+    }
+
+    /// ` in [yarn.silk1]`, or nothing for the outermost table.
+    fn inside(&self) -> String {
+        if self.text.is_empty() { String::new() } else { format!(" in {}", self.text) }
+    }
+}
+
+/// Reads one table and reports what is wrong with it.
+///
+/// The plain methods answer `None` when the key is absent; the `required_` ones report that as an error;
+/// those with `_or` answer a default. A wrong value is reported by all of them and counts as absent.
+pub struct Reader<'a> {
+    table: &'a Table,
+    title: Title,
+    diagnostics: &'a Diagnostics,
+    asked: RefCell<Vec<String>>,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads the outermost table of a document.
+    pub fn new(document: &'a Document, diagnostics: &'a Diagnostics) -> Reader<'a> {
+        let title = Title { path: String::new(), text: String::new(), suffix: String::new() };
+        Reader::with_title(&document.root, title, diagnostics)
+    }
+
+    fn with_title(table: &'a Table, title: Title, diagnostics: &'a Diagnostics) -> Reader<'a> {
+        Reader { table, title, diagnostics, asked: RefCell::new(Vec::new()) }
+    }
+
+    // Places and messages.
+
+    /// The table's name for messages: `[yarn.silk1]`, `[[light]] 2`; empty for the outermost table.
+    pub fn title(&self) -> &str {
+        &self.title.text
+    }
+
+    /// Where the table is announced.
+    pub fn header(&self) -> Span {
+        self.table.header()
+    }
+
+    /// Where the value of a key was written. Does not count as asking for the key.
+    pub fn span(&self, key: &str) -> Option<Span> {
+        self.table.get(key).map(|entry| entry.node.span)
+    }
+
+    /// Where a key was written. Does not count as asking for the key.
+    pub fn key_span(&self, key: &str) -> Option<Span> {
+        self.table.get(key).map(|entry| entry.key_span)
+    }
+
+    /// Whether the key is there, right or wrong. Counts as asking for it.
+    pub fn has(&self, key: &str) -> bool {
+        self.entry(key).is_some()
+    }
+
+    /// The keys that are there, in the order they were written. Does not count as asking for them.
+    pub fn keys(&self) -> impl Iterator<Item = &'a str> {
+        self.table.entries().map(|entry| entry.key.as_str())
+    }
+
+    /// Reports an error at the value of a key, or at the table's header when the key is absent.
+    pub fn error_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
+        self.report(Diagnostic::error(message), self.span(key), hint);
+    }
+
+    /// Reports a warning at the value of a key, or at the table's header when the key is absent.
+    pub fn warning_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
+        self.report(Diagnostic::warning(message), self.span(key), hint);
+    }
+
+    /// Reports an error at the table's header.
+    pub fn error(&self, message: impl Into<String>, hint: Option<&str>) {
+        self.report(Diagnostic::error(message), None, hint);
+    }
+
+    fn report(&self, diagnostic: Diagnostic, span: Option<Span>, hint: Option<&str>) {
+        let diagnostic = diagnostic.at(span.unwrap_or(self.header()));
+        self.diagnostics.push(match hint {
+            Some(hint) => diagnostic.hint(hint),
+            None => diagnostic,
+        });
+    }
+
+    /// Reports every key that is there but was never asked for.
+    pub fn finish(self) {
+        let asked = self.asked.borrow();
+        for entry in self.table.entries().filter(|entry| !entry.is_read()) {
+            let message = format!("unknown key `{}`{}", shortened(&entry.key), self.title.inside());
+            let hint = match nearest(&entry.key, asked.iter().map(String::as_str)) {
+                Some(key) => format!("did you mean `{key}`?"),
+                None if asked.is_empty() => "there are no keys here".to_owned(),
+                None => format!("known keys: {}", listed(asked.iter().map(|key| format!("`{key}`")), "and")),
+            };
+            self.diagnostics.push(Diagnostic::error(message).at(entry.key_span).hint(hint));
+        }
+    }
+
+    // Asking.
+
+    /// Lets a key be there without reading it.
+    pub fn ignore(&self, key: &str) {
+        self.entry(key);
+    }
+
+    /// The value under a key as it is.
+    pub fn node(&self, key: &str) -> Option<&'a Node> {
+        self.entry(key).map(|entry| &entry.node)
+    }
+
+    fn entry(&self, key: &str) -> Option<&'a Entry> {
+        let mut asked = self.asked.borrow_mut();
+        if !asked.iter().any(|known| known == key) {
+            asked.push(key.to_owned());
+        }
+        let entry = self.table.get(key)?;
+        entry.mark_read();
+        Some(entry)
+    }
+
+    /// The value under a key; its absence is an error at the table's header.
+    fn required(&self, key: &str) -> bool {
+        let there = self.has(key);
+        if !there {
+            self.error(format!("missing key `{key}`{}", self.title.inside()), None);
+        }
+        there
+    }
+
+    fn wrong_type(&self, key: &str, expected: &str, node: &Node) {
+        let message = format!("`{key}`: expected {expected}, found {}", node.value.kind());
+        self.diagnostics.push(Diagnostic::error(message).at(node.span));
+    }
+
+    // Numbers.
+
+    /// A number; integers are numbers too.
+    pub fn f64(&self, key: &str, range: Range) -> Option<f64> {
+        self.number(key, self.node(key)?, range, "a number")
+    }
+
+    /// A number, or the default.
+    pub fn f64_or(&self, key: &str, default: f64, range: Range) -> f64 {
+        self.f64(key, range).unwrap_or(default)
+    }
+
+    /// A number that must be there.
+    pub fn required_f64(&self, key: &str, range: Range) -> Option<f64> {
+        if self.required(key) { self.f64(key, range) } else { None }
+    }
+
+    fn number(&self, key: &str, node: &Node, range: Range, expected: &str) -> Option<f64> {
+        let value = match node.value {
+            Value::Float(value) => value,
+            Value::Integer(value) => value as f64,
+            _ => {
+                self.wrong_type(key, expected, node);
+                return None;
+            }
+        };
+        if !range.contains(value) {
+            let message = format!("`{key}` must be {range}, found {}", number_text(value));
+            self.diagnostics.push(Diagnostic::error(message).at(node.span));
+            return None;
+        }
+        Some(value)
+    }
+
+    /// A whole number, written without point and exponent.
+    pub fn u64(&self, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
+        let node = self.node(key)?;
+        let value = match node.value {
+            Value::Integer(value) => value,
+            Value::Float(value) => {
+                let message = format!("`{key}`: expected an integer, found a float");
+                let mut diagnostic = Diagnostic::error(message).at(node.span);
+                // Below 2^53 floats are exact, so the suggestion says the same number.
+                if value.fract() == 0.0 && (0.0..9e15).contains(&value) {
+                    diagnostic = diagnostic.hint(format!("write {value}"));
+                }
+                self.diagnostics.push(diagnostic);
+                return None;
+            }
+            _ => {
+                self.wrong_type(key, "an integer", node);
+                return None;
+            }
+        };
+        match u64::try_from(value) {
+            Ok(value) if range.contains(&value) => Some(value),
+            _ => {
+                let (low, high) = (range.start(), range.end());
+                let allowed = match *high {
+                    u64::MAX => format!("at least {low}"),
+                    _ => format!("from {low} to {high}"),
+                };
+                let message = format!("`{key}` must be {allowed}, found {value}");
+                self.diagnostics.push(Diagnostic::error(message).at(node.span));
+                None
+            }
+        }
+    }
+
+    /// A whole number, or the default.
+    pub fn u64_or(&self, key: &str, default: u64, range: RangeInclusive<u64>) -> u64 {
+        self.u64(key, range).unwrap_or(default)
+    }
+
+    /// A whole number that must be there.
+    pub fn required_u64(&self, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
+        if self.required(key) { self.u64(key, range) } else { None }
+    }
+
+    /// Three numbers in brackets, each in the range.
+    pub fn vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+        self.array(key, self.node(key)?, range, "an array of 3 numbers")
+    }
+
+    /// Three numbers in brackets, or the default.
+    pub fn vec3_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
+        self.vec3(key, range).unwrap_or(default)
+    }
+
+    /// Three numbers in brackets that must be there.
+    pub fn required_vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+        if self.required(key) { self.vec3(key, range) } else { None }
+    }
+
+    /// Two numbers in brackets, each in the range.
+    pub fn vec2(&self, key: &str, range: Range) -> Option<[f64; 2]> {
+        self.array(key, self.node(key)?, range, "an array of 2 numbers")
+    }
+
+    /// Red, green and blue in brackets, or one number for all three.
+    pub fn rgb(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+        const EXPECTED: &str = "a number or an array of 3 numbers";
+        let node = self.node(key)?;
+        match node.value {
+            Value::Array(_) => self.array(key, node, range, EXPECTED),
+            _ => self.number(key, node, range, EXPECTED).map(|value| [value; 3]),
+        }
+    }
+
+    /// A color, or the default.
+    pub fn rgb_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
+        self.rgb(key, range).unwrap_or(default)
+    }
+
+    /// A color that must be there.
+    pub fn required_rgb(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+        if self.required(key) { self.rgb(key, range) } else { None }
+    }
+
+    /// Any count of numbers in brackets, or one number without.
+    pub fn numbers(&self, key: &str, range: Range) -> Option<Vec<f64>> {
+        const EXPECTED: &str = "a number or an array of numbers";
+        let node = self.node(key)?;
+        let elements = match &node.value {
+            Value::Array(elements) => elements.as_slice(),
+            _ => std::slice::from_ref(node),
+        };
+        self.all(elements, |element| self.number(key, element, range, EXPECTED))
+    }
+
+    fn array<const COUNT: usize>(&self, key: &str, node: &Node, range: Range, expected: &str) -> Option<[f64; COUNT]> {
+        let Value::Array(elements) = &node.value else {
+            self.wrong_type(key, expected, node);
+            return None;
+        };
+        if elements.len() != COUNT {
+            let message = format!("`{key}`: expected {expected}, found {} in the array", elements.len());
+            self.diagnostics.push(Diagnostic::error(message).at(node.span));
+            return None;
+        }
+        let numbers = self.all(elements, |element| self.number(key, element, range, "a number"))?;
+        numbers.try_into().ok()
+    }
+
+    /// Reads every element, so that all errors are reported, and gives nothing if there was one.
+    fn all<T>(&self, elements: &'a [Node], read: impl Fn(&'a Node) -> Option<T>) -> Option<Vec<T>> {
+        let values: Vec<T> = elements.iter().filter_map(read).collect();
+        (values.len() == elements.len()).then_some(values)
+    }
+
+    // Words.
+
+    /// `true` or `false`.
+    pub fn bool(&self, key: &str) -> Option<bool> {
+        let node = self.node(key)?;
+        match node.value {
+            Value::Boolean(value) => Some(value),
+            _ => {
+                self.wrong_type(key, "true or false", node);
+                None
+            }
+        }
+    }
+
+    /// `true` or `false`, or the default.
+    pub fn bool_or(&self, key: &str, default: bool) -> bool {
+        self.bool(key).unwrap_or(default)
+    }
+
+    /// Text in quotes.
+    pub fn string(&self, key: &str) -> Option<&'a str> {
+        let node = self.node(key)?;
+        match &node.value {
+            Value::String(text) => Some(text),
+            _ => {
+                self.wrong_type(key, "a string", node);
+                None
+            }
+        }
+    }
+
+    /// Text, or the default.
+    pub fn string_or(&self, key: &str, default: &'a str) -> &'a str {
+        self.string(key).unwrap_or(default)
+    }
+
+    /// Text that must be there.
+    pub fn required_string(&self, key: &str) -> Option<&'a str> {
+        if self.required(key) { self.string(key) } else { None }
+    }
+
+    /// An array of texts, or one text; each with its place. Empty when the key is absent or wrong.
+    pub fn strings(&self, key: &str) -> Vec<(&'a str, Span)> {
+        let Some(node) = self.node(key) else { return Vec::new() };
+        let elements = match &node.value {
+            Value::Array(elements) => elements.as_slice(),
+            _ => std::slice::from_ref(node),
+        };
+        let read = |element: &'a Node| match &element.value {
+            Value::String(text) => Some((text.as_str(), element.span)),
+            _ => {
+                self.wrong_type(key, "a string or an array of strings", element);
+                None
+            }
+        };
+        self.all(elements, read).unwrap_or_default()
+    }
+
+    /// One of the names, as what it stands for.
+    pub fn one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+        let text = self.string(key)?;
+        if let Some((_, value)) = choices.iter().find(|(name, _)| *name == text) {
+            return Some(value.clone());
+        }
+        let hint = match nearest(text, choices.iter().map(|(name, _)| *name)) {
+            Some(name) => format!("did you mean \"{name}\"?"),
+            None => format!("expected {}", listed(choices.iter().map(|(name, _)| format!("\"{name}\"")), "or")),
+        };
+        self.error_at(key, format!("unknown value \"{}\" for `{key}`", shortened(text)), Some(&hint));
+        None
+    }
+
+    /// One of the names, or the default.
+    pub fn one_of_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> T {
+        self.one_of(key, choices).unwrap_or(default)
+    }
+
+    /// One of the names; the key must be there.
+    pub fn required_one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+        if self.required(key) { self.one_of(key, choices) } else { None }
+    }
+
+    // Tables.
+
+    /// A table.
+    pub fn table(&self, key: &str) -> Option<Reader<'a>> {
+        self.inner(key, self.node(key)?, self.title.table(key), "a table")
+    }
+
+    /// A table that must be there.
+    pub fn required_table(&self, key: &str) -> Option<Reader<'a>> {
+        if self.required(key) { self.table(key) } else { None }
+    }
+
+    /// An array of tables, or one table. Empty when the key is absent; what is no table is left out.
+    pub fn tables(&self, key: &str) -> Vec<Reader<'a>> {
+        const EXPECTED: &str = "a table or an array of tables";
+        let Some(node) = self.node(key) else { return Vec::new() };
+        let Value::Array(elements) = &node.value else {
+            return self.inner(key, node, self.title.table(key), EXPECTED).into_iter().collect();
+        };
+        let elements = elements.iter().enumerate();
+        elements
+            .filter_map(|(index, element)| self.inner(key, element, self.title.element(key, index + 1), EXPECTED))
+            .collect()
+    }
+
+    /// The tables inside the table under a key, with their names: all `[yarn.NAME]` for `yarn`.
+    /// Empty when the key is absent.
+    pub fn named_tables(&self, key: &str) -> Vec<(&'a str, Reader<'a>)> {
+        let Some(outer) = self.table(key) else { return Vec::new() };
+        let names: Vec<&str> = outer.keys().collect();
+        names.into_iter().filter_map(|name| Some((name, outer.table(name)?))).collect()
+    }
+
+    fn inner(&self, key: &str, node: &'a Node, title: Title, expected: &str) -> Option<Reader<'a>> {
+        match &node.value {
+            Value::Table(table) => Some(Reader::with_title(table, title, self.diagnostics)),
+            _ => {
+                self.wrong_type(&shortened(key), expected, node);
+                None
+            }
+        }
+    }
+}
+
+/// A number as a user would write it.
+fn number_text(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-5..1e16).contains(&size) && size.is_finite() {
+        format!("{value:e}")
+    } else {
+        // TOML's own spelling of what Rust calls NaN.
+        format!("{value}").replace("NaN", "nan")
+    }
+}
+
+#[cfg(test)]
+mod tests;
