@@ -5,3 +5,5 @@ pub mod geometry;
 pub mod math;
 pub mod scattering;
 pub mod scene;
+#[cfg(test)]
+mod testing;

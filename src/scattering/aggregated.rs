@@ -321,16 +321,22 @@ impl<'a> Vertex<'a> {
         let drawn = Rgb::from(chances).weighted_mean(density) * 3.0;
         let amplitude = reaching * ended * density / drawn.max(1e-30);
 
-        let depth_x = crossing.enter + (crossing.exit - crossing.enter) * x;
-        let travel = self.section.travel(depth_x);
+        self.node = Some(self.place_node(crossing, x, amplitude, throughput));
+    }
+
+    /// The node at the fraction `x` of a ply's chord.
+    #[inline]
+    fn place_node(&self, crossing: &PlyCrossing, x: f32, amplitude: Rgb, throughput: Rgb) -> Node {
+        let optics = &self.yarn.plies[crossing.ply];
         let ply = &self.yarn.shape.plies[crossing.ply];
+        let point = Vec2::new(crossing.enter + (crossing.exit - crossing.enter) * x, self.section.h);
+        let travel = self.section.travel(point.x);
         let (axis, centre) = if self.section.slope == 0.0 {
             (crossing.axis, crossing.centre)
         } else {
             let axis = self.section.ply_axis(ply, Section::turn(&self.yarn.shape, travel));
             (axis, self.section.ply_centre(ply, axis, travel))
         };
-        let point = Vec2::new(depth_x, self.section.h);
         let tangent = fiber_tangent(ply, self.yarn.shape.ply_rate, centre, axis, point);
         let length = tangent.length();
         let tangent = tangent / length;
@@ -340,7 +346,7 @@ impl<'a> Vertex<'a> {
         let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
         let weight = throughput.max(Rgb::splat(1e-20)) * amplitude;
         let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
-        self.node = Some(Node {
+        Node {
             ply: crossing.ply,
             point,
             travel,
@@ -354,7 +360,7 @@ impl<'a> Vertex<'a> {
             kappa_tt: kappa((1.0 + widened) * optics.beta_tt_squared),
             chance: normalised(lobes),
             weight: weight * optics.albedo,
-        });
+        }
     }
 
     /// Draws a direction from the node's lobes; whether it escapes says how much light stays for B.
@@ -380,6 +386,13 @@ impl<'a> Vertex<'a> {
         self.drawn = Drawn { direction, value, escape };
 
         let energy = node.amplitude * optics.albedo * optics.closure * (Rgb::ONE - value.clear);
+        self.backward = Some(self.backward_of(crossing, energy, 1.0 - escape));
+    }
+
+    /// Lobe B of a ply, for a given energy and chance of sampling.
+    #[inline]
+    fn backward_of(&self, crossing: &PlyCrossing, energy: Rgb, chance: f32) -> Backward {
+        let optics = &self.yarn.plies[crossing.ply];
         let frame = PlyFrame::of_ply(&self.yarn.shape, crossing, self.camera);
         let relative = if self.yarn.shape.plies.len() == 1 {
             crossing.offset / self.yarn.shape.plies[0].radius
@@ -387,15 +400,15 @@ impl<'a> Vertex<'a> {
             self.section.h
         };
         let (lean_sin, lean_cos) = sin_cos(LEAN_SIDEWAYS * relative.clamp(-1.0, 1.0).asin());
-        self.backward = Some(Backward {
+        Backward {
             frame,
             lean_to: (lean_cos, lean_sin),
             energy,
-            chance: 1.0 - escape,
+            chance,
             mirrored: optics.mirrored.mean(),
             lean: optics.lean.mean().min(0.95),
             kappa: 0.125 / optics.beta_r_squared.max(super::kernel::MIN_VARIANCE),
-        });
+        }
     }
 
     /// The optical depth between a node and the outside in a direction of the section's frame, per channel.
@@ -696,3 +709,6 @@ fn choose(chances: [f32; 3], u: f32) -> usize {
         2
     }
 }
+
+#[cfg(test)]
+mod tests;
