@@ -1,1 +1,6 @@
-//! x
+//! A renderer for knitted and woven cloth: yarns as curves, fibres by an analytic model.
+
+#![deny(unsafe_code)]
+
+pub mod ffi;
+pub mod image;
