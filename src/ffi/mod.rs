@@ -1,4 +1,11 @@
-//! The fence.
-#![allow(unsafe_code, reason = "the only room that talks to C and C++; every block says why it is sound")]
+//! The fence: what is written in C or C++ is reached through this folder, and `unsafe` is found nowhere else.
+//!
+//! - Each `unsafe` block says in a `SAFETY:` comment which promise it relies on, and what is passed out is safe to use.
+//! - No panic crosses into C, no exception into Rust: callbacks and C++ bodies catch them.
+//! - An error is read at once after the call that can fail, with its message, and becomes a `Result`.
+//! - What C allocates is released by `Drop`.
+#![allow(unsafe_code, reason = "calling C is unsafe; this folder is where it is checked")]
 
 pub mod embree;
+#[cfg(feature = "oiio")]
+pub mod oiio;

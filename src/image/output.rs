@@ -1,0 +1,199 @@
+//! Output files: which formats there are, whether a path can be written, and files that appear whole or not at all.
+
+use std::{
+    fs::{self, File},
+    io::{self, Seek as _},
+    path::Path,
+};
+
+use tempfile::NamedTempFile;
+
+use super::{
+    ImageError,
+    error::plain,
+    exr::{self, ChannelSpec, ExrLayout, Line, Sample},
+    oiio,
+    png::{self, Display},
+};
+
+/// The extensions that can be written, as an error lists them.
+const KNOWN: &str = "exr, png, hdr, tif, tiff, jpg, jpeg, bmp, tga, ppm and webp";
+
+/// What kind of file the extension of a path asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Multi-layer EXR: linear floats.
+    Exr,
+    /// PNG: eight bits for a screen.
+    Png,
+    /// A format of OpenImageIO with linear floats: hdr, tif, tiff.
+    Linear,
+    /// A format of OpenImageIO with eight bits for a screen: jpg, jpeg, bmp, tga, ppm, webp.
+    Screen,
+}
+
+impl Format {
+    /// The format that the extension names.
+    ///
+    /// # Errors
+    /// [`ImageError::Write`], which lists the known extensions.
+    pub fn of(path: &Path) -> Result<Self, ImageError> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            Some("hdr" | "tif" | "tiff") => Ok(Self::Linear),
+            Some("jpg" | "jpeg" | "bmp" | "tga" | "ppm" | "webp") => Ok(Self::Screen),
+            Some(other) => Err(ImageError::unwritable(path, format!("unknown extension `{other}`; known are {KNOWN}"))),
+            None => Err(ImageError::unwritable(path, format!("it has no extension; known are {KNOWN}"))),
+        }
+    }
+}
+
+/// Checks before a long render that a picture can be written to `path` afterwards, and creates missing directories.
+///
+/// The extension must be known; if the format needs OpenImageIO, it is loaded and asked. A file must be possible in
+/// the directory. An existing file stays untouched.
+///
+/// # Errors
+/// [`ImageError::Write`].
+pub fn check_writable(path: &Path) -> Result<Format, ImageError> {
+    let format = Format::of(path)?;
+    if matches!(format, Format::Linear | Format::Screen) {
+        oiio::check_writable(path)?;
+    }
+    check_target(path)?;
+    // Dropped at once, and with that removed.
+    temporary(path)?;
+    Ok(format)
+}
+
+/// Writes a file so that it is seen whole or not at all: the content goes to a temporary file beside it, which takes
+/// the name `path` at the end. Missing directories are created. A link is followed.
+///
+/// A target that is no ordinary file, such as /dev/stdout, is written to after the content is complete.
+///
+/// # Errors
+/// [`ImageError::Write`]; then nothing is left behind, and an older file of this name is as it was.
+pub fn write_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), ImageError> {
+    replace(path, |temporary| write(temporary.as_file_mut()).map_err(|error| plain(&error)))
+}
+
+/// Writes colours in the format that the extension names. `row` is asked for every row from the top and fills in
+/// associated linear RGBA.
+///
+/// EXR, Radiance and TIFF get linear floats, and alpha if `display.alpha` (Radiance has none); `display` is for the
+/// others only.
+///
+/// # Errors
+/// [`ImageError::Write`]; then nothing has been left behind.
+pub fn write_colors(
+    path: &Path,
+    width: usize,
+    height: usize,
+    display: &Display,
+    mut row: impl FnMut(usize, &mut [[f32; 4]]),
+) -> Result<(), ImageError> {
+    let format = Format::of(path)?;
+    let is_radiance = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
+    let channels = if display.alpha && !is_radiance { 4 } else { 3 };
+    match format {
+        Format::Png => return png::write(path, width, height, display, row),
+        Format::Exr => {
+            let channels = ["R", "G", "B", "A"][..channels].iter().map(|name| ChannelSpec::new(*name, Sample::F32));
+            let layout = ExrLayout::new(width, height, channels.collect());
+            let mut colors = vec![[0.0; 4]; width];
+            return exr::write(path, &layout, |y, lines| {
+                colors.fill([0.0; 4]);
+                row(y, &mut colors);
+                for (channel, line) in lines.iter_mut().enumerate() {
+                    if let Line::Float(line) = line {
+                        line.iter_mut().zip(&colors).for_each(|(sample, color)| *sample = color[channel]);
+                    }
+                }
+            });
+        }
+        Format::Linear | Format::Screen => {}
+    }
+    let screen = format == Format::Screen;
+    let mut samples = Vec::with_capacity(width * height * channels);
+    let mut colors = vec![[0.0; 4]; width];
+    for y in 0..height {
+        colors.fill([0.0; 4]);
+        row(y, &mut colors);
+        for color in &colors {
+            if screen {
+                let bytes = display.encode(*color);
+                samples.extend(bytes[..channels].iter().map(|byte| f32::from(*byte) / 255.0));
+            } else {
+                samples.extend_from_slice(&color[..channels]);
+            }
+        }
+    }
+    replace(path, |temporary| oiio::write(temporary.path(), [width, height], channels, &samples, screen))
+}
+
+/// Lets `write` fill a temporary file with the extension of `path`, then gives it that name.
+fn replace(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<(), String>) -> Result<(), ImageError> {
+    check_target(path)?;
+    // The name of a link stays a link: its target is what is replaced.
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let mut temporary = temporary(&target).map_err(|error| ImageError::unwritable(path, error.reason()))?;
+    write(&mut temporary).map_err(|reason| ImageError::unwritable(path, reason))?;
+    if is_special(&target) {
+        // Renaming would put a file in the place of the device or pipe.
+        let copied = File::options().write(true).open(&target).and_then(|mut device| {
+            temporary.rewind()?;
+            io::copy(&mut temporary, &mut device)
+        });
+        return copied.map(drop).map_err(|error| ImageError::unwritable(path, plain(&error)));
+    }
+    temporary.persist(&target).map_err(|error| ImageError::unwritable(path, plain(&error.error)))?;
+    Ok(())
+}
+
+/// Whether something that is neither a file nor a directory has this name: a device, a pipe.
+fn is_special(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+/// Refuses directories and read-only files, and creates the directory that the file goes into.
+fn check_target(path: &Path) -> Result<(), ImageError> {
+    if let Ok(metadata) = fs::metadata(path) {
+        if metadata.is_dir() {
+            return Err(ImageError::unwritable(path, "it is a directory"));
+        }
+        if metadata.permissions().readonly() {
+            return Err(ImageError::unwritable(path, "the file exists and is read-only"));
+        }
+    }
+    let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) else { return Ok(()) };
+    fs::create_dir_all(directory).map_err(|error| {
+        let reason = match error.kind() {
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => "a file is in its place".to_owned(),
+            _ => plain(&error),
+        };
+        ImageError::unwritable(
+            path,
+            format!("no directory `{}`, and it cannot be created: {reason}", directory.display()),
+        )
+    })
+}
+
+/// An empty file in the directory of `path`, with its extension and the permissions of any new file, that is removed
+/// when dropped.
+fn temporary(path: &Path) -> Result<NamedTempFile, ImageError> {
+    let suffix = path.extension().map(|extension| format!(".{}", extension.to_string_lossy())).unwrap_or_default();
+    let parent = path.parent().filter(|directory| !directory.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let elsewhere = std::env::temp_dir();
+    let directory = if is_special(path) { elsewhere.as_path() } else { parent };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".yarnray-").suffix(&suffix);
+    #[cfg(unix)]
+    // The umask still applies; without this, only the owner could read the picture.
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory).map_err(|error| {
+        let reason = format!("no file can be made in `{}`: {}", directory.display(), plain(&error));
+        ImageError::unwritable(path, reason)
+    })
+}
