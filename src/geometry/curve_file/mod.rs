@@ -1,0 +1,227 @@
+//! Curve files: bytes in, a [`CurveSet`] out, and back to bytes.
+//!
+//! Three formats are read: BCC (binary, Yuksel's yarn models), PYP (periodic yarn patterns of MADYPG) and plain text.
+//! Files come from strangers, so every number is checked before it is believed, memory stays a small multiple of the
+//! file's size, and small defects are repaired with a note for the user. Radii, units and the direction of up are only
+//! passed on; nothing is smoothed, scaled or sampled here.
+
+mod bcc;
+mod pyp;
+mod repair;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use std::borrow::Cow;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::curve::{Basis, CurveSet};
+
+pub use bcc::write_bcc;
+pub use text::write_text;
+
+/// What the file itself cannot say.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// How the points of a text file are meant; Catmull-Rom if absent. The other formats know their own basis.
+    pub basis: Option<Basis>,
+    /// How many cells of a periodic pattern (PYP) to lay out along x and y; each at least 1.
+    pub tile: [u32; 2],
+    /// The largest number of control points to accept, counted before repairs and, for PYP, over all cells.
+    pub max_points: u64,
+}
+
+impl Default for ReadOptions {
+    /// One cell, at most 2^26 points (1.6 GB of coordinates).
+    fn default() -> Self {
+        Self { basis: None, tile: [1, 1], max_points: 1 << 26 }
+    }
+}
+
+/// The file formats that [`parse`] understands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Binary Curve Collection: a 64-byte header, then a count and little-endian coordinates for each curve.
+    Bcc,
+    /// MADYPG periodic yarn pattern: text sections `*pattern`, `*Q` and `*E`, lengths in metres.
+    Pyp,
+    /// `x y z [radius]` on each line, a blank line between curves, `#` begins a comment. A curve whose last line
+    /// repeats its first, radius included, is closed (it needs four lines or more).
+    Text,
+}
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// No particular place: the file as a whole.
+    File,
+    /// Byte offset from the beginning, counted from 0.
+    Byte(u64),
+    /// Line number, counted from 1.
+    Line(u64),
+}
+
+/// Why a curve file could not be read. Displays as one line: file, place, problem, hint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CurveFileError {
+    /// The file as the caller named it; absent when the bytes came from elsewhere.
+    pub file: Option<PathBuf>,
+    /// Where the trouble begins.
+    pub place: Place,
+    /// What was expected and what was found.
+    pub problem: String,
+    /// What the user might try.
+    pub hint: Option<String>,
+}
+
+impl CurveFileError {
+    fn new(place: Place, problem: impl Into<String>) -> Self {
+        Self { file: None, place, problem: problem.into(), hint: None }
+    }
+
+    fn byte(offset: usize, problem: impl Into<String>) -> Self {
+        Self::new(Place::Byte(offset as u64), problem)
+    }
+
+    fn line(number: u64, problem: impl Into<String>) -> Self {
+        Self::new(Place::Line(number), problem)
+    }
+
+    fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    fn in_file(mut self, path: &Path) -> Self {
+        self.file = Some(path.to_path_buf());
+        self
+    }
+
+    fn too_many_points(place: Place, found: impl fmt::Display, options: &ReadOptions) -> Self {
+        Self::new(place, format!("{found} points are more than the {} allowed", options.max_points))
+    }
+}
+
+impl fmt::Display for CurveFileError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(out, "{}: ", file.display())?;
+        }
+        match self.place {
+            Place::File => {}
+            Place::Byte(offset) => write!(out, "byte {offset}: ")?,
+            Place::Line(number) => write!(out, "line {number}: ")?,
+        }
+        out.write_str(&self.problem)?;
+        match &self.hint {
+            Some(hint) => write!(out, "; {hint}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for CurveFileError {}
+
+/// Reads the curves of a file.
+///
+/// The content decides first (a BCC file is known by its first three letters), then the extension: `.bcc`, `.pyp`,
+/// `.txt` or `.curves`. Repairs are listed in [`CurveSet::notes`].
+///
+/// # Errors
+/// The file cannot be read, is of no known format, or breaks the rules of its format.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    read_unnamed(path, options).map_err(|error| error.in_file(path))
+}
+
+fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    let unreadable = |error| CurveFileError::new(Place::File, format!("cannot be read: {error}"));
+    let metadata =
+        fs::metadata(path).map_err(|error| unreadable(error).hint("is the path right, and may you read the file?"))?;
+    // A pipe or a device may never end.
+    if !metadata.is_file() {
+        return Err(CurveFileError::new(Place::File, "expected a regular file, found a folder, pipe or device"));
+    }
+    let bytes = fs::read(path).map_err(unreadable)?;
+    let format = recognise(&bytes, path).ok_or_else(|| {
+        CurveFileError::new(Place::File, "expected a curve file, found neither the letters BCC nor a known extension")
+            .hint("name it .bcc, .pyp, .txt or .curves after its content")
+    })?;
+    parse(&bytes, format, options)
+}
+
+fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
+    if bytes.starts_with(bcc::MAGIC) {
+        return Some(Format::Bcc);
+    }
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "bcc" => Some(Format::Bcc),
+        "pyp" => Some(Format::Pyp),
+        "txt" | "curves" => Some(Format::Text),
+        _ => None,
+    }
+}
+
+/// Reads curves from bytes of a known format; touches nothing outside its arguments.
+///
+/// # Errors
+/// The bytes break the rules of the format, or hold more points than allowed. [`CurveFileError::file`] is absent.
+pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    let mut set = match format {
+        Format::Bcc => bcc::parse(bytes, options)?,
+        Format::Pyp => pyp::parse(bytes, options)?,
+        Format::Text => text::parse(bytes, options)?,
+    };
+    if set.curves.is_empty() {
+        set.notes.push("the file holds no curve that can be drawn".into());
+    }
+    if format != Format::Text && options.basis.is_some() {
+        set.notes.push("the basis asked for was ignored: this format fixes its own".into());
+    }
+    if format != Format::Pyp && options.tile != [1, 1] {
+        set.notes.push("the tile counts asked for were ignored: only periodic patterns (.pyp) are tiled".into());
+    }
+    Ok(set)
+}
+
+/// One line of a text format.
+struct Line<'a> {
+    /// Counted from 1.
+    number: u64,
+    /// Without comment and surrounding space.
+    content: Cow<'a, str>,
+    /// Nothing on it, not even a comment.
+    blank: bool,
+}
+
+/// The lines of a text format. Bytes that are no UTF-8 become replacement characters, which no number contains.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    bytes.split(|&byte| byte == b'\n').zip(1..).map(|(raw, number)| {
+        let raw = raw.trim_ascii();
+        let end = raw.iter().position(|&byte| byte == b'#').unwrap_or(raw.len());
+        Line { number, content: String::from_utf8_lossy(raw[..end].trim_ascii()), blank: raw.is_empty() }
+    })
+}
+
+/// A finite number, or an error that says which one was expected.
+fn number(token: &str, name: &str, line: u64) -> Result<f64, CurveFileError> {
+    match token.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(CurveFileError::line(line, format!("expected a finite number for {name}, found {}", quoted(token)))),
+    }
+}
+
+/// A piece of the file for a message: quoted, escaped and not too long.
+fn quoted(token: &str) -> String {
+    const LONGEST: usize = 40;
+    let head: String = token.chars().take(LONGEST).collect();
+    let dots = if head.len() < token.len() { "..." } else { "" };
+    format!("\"{}{dots}\"", head.escape_debug())
+}
+
+/// A number of things with its noun, in the plural where needed.
+fn counted(count: u64, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
