@@ -2,6 +2,7 @@
 
 pub mod curve;
 pub mod curve_file;
+pub mod generate;
 pub mod section;
 mod spline;
 pub mod strand;

@@ -22,6 +22,14 @@ pub use exr::Attribute;
 /// The largest picture that is read: pixels times channels. 2 GiB as floats, an environment of 16384 x 8192 in RGB.
 pub const SAMPLE_LIMIT: usize = 1 << 29;
 
+/// Whether OpenImageIO has been loaded into this process; always false without the feature `oiio`.
+pub fn oiio_loaded() -> bool {
+    #[cfg(feature = "oiio")]
+    return crate::ffi::oiio::is_loaded();
+    #[cfg(not(feature = "oiio"))]
+    false
+}
+
 /// One channel of an [`Image`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {

@@ -158,7 +158,7 @@ fn is_special(path: &Path) -> bool {
 }
 
 /// Refuses directories and read-only files, and creates the directory that the file goes into.
-fn check_target(path: &Path) -> Result<(), ImageError> {
+pub fn check_target(path: &Path) -> Result<(), ImageError> {
     if let Ok(metadata) = fs::metadata(path) {
         if metadata.is_dir() {
             return Err(ImageError::unwritable(path, "it is a directory"));

@@ -3,6 +3,7 @@ pub mod aggregated;
 pub mod fiber;
 pub mod kernel;
 pub mod medium;
+pub mod yarn;
 
 use glam::Vec3A;
 

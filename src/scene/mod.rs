@@ -1,9 +1,259 @@
-//! From scene files to a checked description: text, positions, typed reading, and the messages on the way.
+//! What the user asked for: from TOML text to a checked [`Scene`], and every message on the way.
 //!
-//! [`document`] turns TOML text and `--set` options into one tree that knows where everything was written;
-//! [`reader`] reads that tree key by key and collects what is wrong; [`diagnostic`] shows it to the user.
-//! None of the three knows which keys the renderer has.
+//! [`document`] turns text and `--set` options into one tree that knows where everything was written; [`reader`]
+//! reads it key by key and collects what is wrong; [`diagnostic`] shows that to the user; [`load`] knows the
+//! renderer's keys, their ranges and units, and reads the files that a scene names. A [`Scene`] is a plain value in
+//! millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or Embree.
 
+pub mod camera;
 pub mod diagnostic;
 pub mod document;
+pub mod light;
+pub mod load;
 pub mod reader;
+
+use glam::{DAffine3, DVec3};
+
+pub use camera::Camera;
+pub use light::Light;
+
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        yarn::{PlyParameters, YarnShape},
+    },
+    image::png::Display,
+    math::Rgb,
+    scattering::fiber::FiberMaterial,
+};
+
+/// How yarns are represented.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Yarns are curves; plies and fibres are found analytically.
+    Yarn,
+}
+
+impl Mode {
+    /// Every mode with its name in files and on the command line.
+    pub const NAMES: [(&'static str, Self); 1] = [("yarn", Self::Yarn)];
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        name_of(self, &Self::NAMES)
+    }
+}
+
+/// The scattering model of a yarn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// Chains of TT, single scattering along the chord, multiple scattering by escape: the default.
+    Aggregated,
+    /// Two-stream energies on the camera's chord.
+    TwoStream,
+    /// The paper's model in its most charitable reading.
+    Paper,
+    /// The paper's equations as printed: gains energy.
+    Printed,
+}
+
+impl Model {
+    /// Every model with its name in files and on the command line.
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("aggregated", Self::Aggregated),
+        ("two-stream", Self::TwoStream),
+        ("paper", Self::Paper),
+        ("printed", Self::Printed),
+    ];
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        name_of(self, &Self::NAMES)
+    }
+}
+
+fn name_of<T: PartialEq>(value: T, names: &[(&'static str, T)]) -> &'static str {
+    names.iter().find(|(_, v)| *v == value).map_or("?", |(name, _)| name)
+}
+
+/// How samples spread around a pixel's centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PixelFilter {
+    /// Even over a square of this half width, in pixels.
+    Box(f32),
+    /// Falling linearly to zero at this distance.
+    Tent(f32),
+    /// Normal with this standard deviation, cut at three of them.
+    Gaussian(f32),
+}
+
+/// Settings of one render.
+#[derive(Clone, Debug)]
+pub struct RenderSettings {
+    /// How yarns are represented.
+    pub mode: Mode,
+    /// The yarns' scattering model.
+    pub model: Model,
+    /// Picture size in pixels.
+    pub width: u32,
+    /// As `width`.
+    pub height: u32,
+    /// The part that is rendered: x0, y0, x1, y1, the latter exclusive.
+    pub crop: [u32; 4],
+    /// Where a pixel's samples lie.
+    pub filter: PixelFilter,
+    /// Most samples per pixel.
+    pub spp: u32,
+    /// Stop after so many seconds of rendering.
+    pub time: Option<f64>,
+    /// Stop when the estimated relative mean square error is below this.
+    pub noise: Option<f64>,
+    /// Most scattering events of a path.
+    pub max_bounces: u32,
+    /// Threads; `None` for all cores.
+    pub threads: Option<usize>,
+    /// Start of all random numbers.
+    pub seed: u32,
+    /// Smaller or faster BVH.
+    pub compact_bvh: bool,
+}
+
+/// Layers of an EXR beside the picture and its alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layers {
+    /// R, TT, D, F and B of the first scattering, and what came without.
+    pub lobes: bool,
+    /// Distance to the first yarn or ground along the view.
+    pub depth: bool,
+    /// Normal of the first ply.
+    pub normal: bool,
+    /// Variance of each pixel's mean.
+    pub variance: bool,
+    /// Number of samples.
+    pub samples: bool,
+}
+
+impl Layers {
+    /// All of them.
+    pub const ALL: Self = Self { lobes: true, depth: true, normal: true, variance: true, samples: true };
+    /// None of them.
+    pub const NONE: Self = Self { lobes: false, depth: false, normal: false, variance: false, samples: false };
+}
+
+/// A kind of yarn.
+#[derive(Clone, Debug)]
+pub struct Yarn {
+    /// Its name in the scene.
+    pub name: String,
+    /// Outer radius, millimetres, where curves have none of their own.
+    pub radius: f64,
+    /// The plies, lengths in yarn radii.
+    pub plies: Vec<PlyParameters>,
+    /// Angle of the plies against the yarn, radians.
+    pub ply_twist: f64,
+    /// The fibre of each ply: name and material.
+    pub fibers: Vec<(String, FiberMaterial)>,
+    /// Whether rays see plies as tilted cylinders; false is the paper's perpendicular section.
+    pub tilted: bool,
+}
+
+impl Yarn {
+    /// The cross-section, ready for rays.
+    pub fn shape(&self) -> YarnShape {
+        YarnShape::new(&self.plies, self.ply_twist, self.tilted)
+    }
+}
+
+/// Curves of one kind of yarn.
+#[derive(Clone, Debug)]
+pub struct Fabric {
+    /// Where the curves came from, for messages.
+    pub origin: String,
+    /// Index into [`Scene::yarns`].
+    pub yarn: usize,
+    /// Curves and their radii, millimetres, about the scene's middle.
+    pub curves: Vec<(Curve, Vec<f64>)>,
+    /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
+    pub phases: Vec<f64>,
+    /// The basis for Embree.
+    pub basis: Basis,
+    /// How far a resampled curve may lie from the given one, in yarn radii; 0 keeps the given points.
+    pub tolerance: f64,
+    /// The longest segment, in yarn radii.
+    pub longest_segment: f64,
+}
+
+impl Fabric {
+    /// Number of control points, as given.
+    pub fn control_points(&self) -> usize {
+        self.curves.iter().map(|(c, _)| c.points.len()).sum()
+    }
+}
+
+/// A diffuse floor.
+#[derive(Clone, Copy, Debug)]
+pub struct Ground {
+    /// Its y, millimetres.
+    pub height: f32,
+    /// Albedo.
+    pub albedo: Rgb,
+}
+
+/// A checked scene: millimetres, radians, origin at the middle of the cloth.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The scene file, as it was named.
+    pub path: String,
+    /// Settings of the render.
+    pub render: RenderSettings,
+    /// How pictures for a screen are made.
+    pub display: Display,
+    /// Layers of an EXR.
+    pub layers: Layers,
+    /// The view.
+    pub camera: Camera,
+    /// Kinds of yarn that fabrics use.
+    pub yarns: Vec<Yarn>,
+    /// The cloth.
+    pub fabrics: Vec<Fabric>,
+    /// The lights.
+    pub lights: Vec<Light>,
+    /// The floor.
+    pub ground: Option<Ground>,
+    /// What was subtracted from all positions, millimetres.
+    pub middle: DVec3,
+    /// A fingerprint of everything that changes the picture.
+    pub fingerprint: String,
+    /// What the user should know and what did not stop the scene from loading.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// The box around all control points, with their radii; `None` without cloth.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        bounds(&self.fabrics)
+    }
+}
+
+/// The box around the control points of `fabrics`, with their radii.
+pub fn bounds(fabrics: &[Fabric]) -> Option<(DVec3, DVec3)> {
+    fabrics
+        .iter()
+        .flat_map(|f| &f.curves)
+        .flat_map(|(c, radii)| c.points.iter().zip(radii))
+        .map(|(p, &r)| (*p - r, *p + r))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Moves curves by a transform whose scale is the same along all axes; radii grow with it.
+pub fn transform_curves(curves: &mut [(Curve, Vec<f64>)], by: &DAffine3) {
+    let scale = by.matrix3.x_axis.length();
+    for (curve, radii) in curves {
+        for p in &mut curve.points {
+            *p = by.transform_point3(*p);
+        }
+        for r in radii {
+            *r *= scale;
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! `yarnray info`
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::{Failure, SceneArgs, bytes_in_words};
+use crate::{
+    geometry::{
+        curve::{Basis, CurveSet},
+        curve_file::{self, ReadOptions},
+    },
+    plan::Plan,
+    scene::Scene,
+    trace::World,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray info scenes/swatch.toml          counts, bounds, memory, what is used and what is left out
+  yarnray info glove.bcc                   what a curve file holds
+  yarnray info scenes/swatch.toml --json   the same for programs";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct InfoArgs {
+    /// A scene (.toml) or a curve file (.bcc, .pyp, .txt).
+    file: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    options: SceneArgs,
+}
+
+pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    let is_scene = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let (report, text) = if is_scene {
+        let scene = args.options.load(&args.file)?;
+        scene_report(&scene)?
+    } else {
+        let set = curve_file::read(&args.file, &ReadOptions::default())
+            .map_err(|e| Failure::Input(format!("error: {e}")))?;
+        curves_report(&args.file, &set)
+    };
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&report).expect("numbers and text become JSON"));
+    } else {
+        print!("{text}");
+    }
+    Ok(())
+}
+
+fn list(v: DVec3) -> Value {
+    json!([v.x, v.y, v.z])
+}
+
+fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
+    let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+    let closed = set.curves.iter().filter(|c| c.closed).count();
+    let open = set.curves.len() - closed;
+    let all = || set.curves.iter().flat_map(|c| &c.points);
+    let low = all().copied().reduce(DVec3::min).unwrap_or_default();
+    let high = all().copied().reduce(DVec3::max).unwrap_or_default();
+    let length: f64 = set
+        .curves
+        .iter()
+        .map(|c| {
+            let closing = if c.closed { c.points[c.points.len() - 1].distance(c.points[0]) } else { 0.0 };
+            closing + c.points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
+        })
+        .sum();
+    let basis = match set.curves.first().map(|c| c.basis) {
+        Some(Basis::CatmullRom) => "catmull-rom",
+        Some(Basis::BSpline) => "b-spline",
+        Some(Basis::Linear) => "linear",
+        None => "none",
+    };
+    let radii = set.curves.iter().any(|c| c.radii.is_some());
+    let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
+    let report = json!({
+        "file": path.display().to_string(),
+        "curves": set.curves.len(), "closed": closed, "open": open,
+        "points": points, "basis": basis, "radii": radii, "up": up,
+        "unit_mm": set.unit_mm, "length": length,
+        "bounds": [list(low), list(high)], "notes": set.notes,
+    });
+    let mut text = format!(
+        "{}\n  curves    {} ({closed} closed, {open} open), {basis}\n  points    {points}\n  length    {length:.6}\n  bounds    {low:.4} to {high:.4}\n  radii     {}\n  unit      {}\n",
+        path.display(),
+        set.curves.len(),
+        if radii { "in the file" } else { "none: the scene's yarn gives them" },
+        set.unit_mm.map_or("not stated".to_owned(), |u| format!("{u} mm")),
+    );
+    for note in &set.notes {
+        text += &format!("  note      {note}\n");
+    }
+    (report, text)
+}
+
+fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
+    // Building is the surest estimate, and takes less time than any picture.
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let (world, _) = World::new(scene, threads)?;
+    let plan = Plan::new(scene);
+    let render = &scene.render;
+    let (low, high) = scene.bounds().map_or((DVec3::ZERO, DVec3::ZERO), |(a, b)| (a + scene.middle, b + scene.middle));
+    let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
+    let fabrics: Vec<Value> = scene
+        .fabrics
+        .iter()
+        .zip(world.weaves())
+        .map(|(f, w)| {
+            json!({
+                "source": f.origin, "yarn": scene.yarns[f.yarn].name, "yarns": w.strands.yarns(),
+                "given_points": f.control_points(), "segments": w.strands.segments().len(),
+                "length_mm": w.strands.length(), "tight_bends": w.strands.tight_bends().len(),
+            })
+        })
+        .collect();
+    let reasons = |used: bool| -> Vec<Value> {
+        plan.features.iter().filter(|f| f.used == used).map(|f| json!({"name": f.name, "reason": f.reason})).collect()
+    };
+    let report = json!({
+        "scene": scene.path, "fingerprint": scene.fingerprint,
+        "mode": render.mode.name(), "model": render.model.name(),
+        "image": {"width": render.width, "height": render.height, "spp": render.spp},
+        "fabrics": fabrics,
+        "bounds_mm": [list(low), list(high)],
+        "memory": {"geometry_bytes": world.geometry_bytes(), "bvh_bytes": world.bvh_bytes()},
+        "pixels": pixels,
+        "used": reasons(true), "left_out": reasons(false),
+        "warnings": scene.warnings,
+    });
+    let mut text = format!(
+        "{}\n  picture   {} x {}, {} spp, mode {}, model {}\n  bounds    {low:.3} to {high:.3} mm\n",
+        scene.path,
+        render.width,
+        render.height,
+        render.spp,
+        render.mode.name(),
+        render.model.name()
+    );
+    for (f, w) in scene.fabrics.iter().zip(world.weaves()) {
+        let yarn = &scene.yarns[f.yarn];
+        let plies = &yarn.plies;
+        text += &format!(
+            "  fabric    {}: {} yarns of `{}` ({} plies of {} fibres), {:.1} m, {} points given, {} segments made\n",
+            f.origin,
+            w.strands.yarns(),
+            yarn.name,
+            plies.len(),
+            plies[0].fibers,
+            w.strands.length() / 1000.0,
+            f.control_points(),
+            w.strands.segments().len()
+        );
+    }
+    text += &format!(
+        "  memory    curves {}, BVH {}\n",
+        bytes_in_words(world.geometry_bytes()),
+        bytes_in_words(world.bvh_bytes())
+    );
+    for used in [true, false] {
+        text += if used { "  used\n" } else { "  left out\n" };
+        for f in plan.features.iter().filter(|f| f.used == used) {
+            text += &format!("    {:18}{}\n", f.name, f.reason);
+        }
+    }
+    for warning in &scene.warnings {
+        text += &format!("  warning   {warning}\n");
+    }
+    Ok((report, text))
+}

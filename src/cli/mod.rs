@@ -1,0 +1,205 @@
+//! The command line: one file per command, from arguments to a call and to what is printed.
+//!
+//! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted.
+
+mod info;
+mod render;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::{
+    image::output,
+    scene::{
+        Model, Mode, Scene,
+        document::Value,
+        load::{LoadError, LoadOptions, load},
+    },
+};
+
+/// A renderer for knitted and woven cloth: yarns are curves, an analytic model answers for their fibres.
+#[derive(Parser, Debug)]
+#[command(name = "yarnray", version, long_version = crate::image::exr::SOFTWARE.strip_prefix("yarnray ").unwrap_or(""), after_help = EXAMPLES, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  yarnray render scenes/swatch.toml -o swatch.exr -o swatch.png
+  yarnray render scenes/glove.toml --curves glove.bcc --spp 128 -o glove.png
+  yarnray info scenes/swatch.toml
+
+`yarnray COMMAND --help` has more for each command.";
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Render a scene.
+    Render(render::RenderArgs),
+    /// Tell what a scene or curve file holds, and what a render of it uses and leaves out.
+    Info(info::InfoArgs),
+}
+
+/// What a command ends with besides success.
+#[derive(Debug)]
+enum Failure {
+    /// Bad usage or input: exit status 2.
+    Input(String),
+    /// Interrupted; what there was is saved: exit status 130.
+    Interrupted,
+}
+
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+impl From<crate::image::ImageError> for Failure {
+    fn from(error: crate::image::ImageError) -> Self {
+        Self::Input(format!("error: {error}"))
+    }
+}
+
+impl From<crate::ffi::embree::EmbreeError> for Failure {
+    fn from(error: crate::ffi::embree::EmbreeError) -> Self {
+        Self::Input(format!("error: {error}"))
+    }
+}
+
+/// Runs the program with the process's arguments.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Render(args) => render::run(&args),
+        Command::Info(args) => info::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Input(message)) => {
+            eprintln!("{message}");
+            ExitCode::from(2)
+        }
+        Err(Failure::Interrupted) => ExitCode::from(130),
+    }
+}
+
+/// Options that commands share which load a scene.
+#[derive(Args, Debug, Clone, Default)]
+struct SceneArgs {
+    /// How yarns are represented.
+    #[arg(long, value_parser = names(&Mode::NAMES))]
+    mode: Option<String>,
+    /// The yarns' scattering model.
+    #[arg(long, value_parser = names(&Model::NAMES))]
+    model: Option<String>,
+    /// Stop at this many samples per pixel.
+    #[arg(long, value_name = "N")]
+    spp: Option<u32>,
+    /// Stop after this many seconds of rendering.
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<f64>,
+    /// Stop at this estimated relative mean square error.
+    #[arg(long, value_name = "X")]
+    noise: Option<f64>,
+    /// Picture width in pixels.
+    #[arg(long, value_name = "N")]
+    width: Option<u32>,
+    /// Picture height in pixels.
+    #[arg(long, value_name = "N")]
+    height: Option<u32>,
+    /// Render only these pixels (the last two exclusive).
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_delimiter = ',', num_args = 4)]
+    crop: Option<Vec<u32>>,
+    /// Most scattering events of a path.
+    #[arg(long, value_name = "N")]
+    max_bounces: Option<u32>,
+    /// Threads; all cores if not given.
+    #[arg(long, short = 'j', value_name = "N")]
+    threads: Option<u32>,
+    /// Start of all random numbers.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Override any key of the scene by its dotted path (repeatable).
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Render this curve file in place of the first fabric's curves.
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
+    /// Let the camera frame what there is.
+    #[arg(long)]
+    frame: bool,
+}
+
+fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValuesParser {
+    list.iter().map(|(name, _)| *name).collect::<Vec<_>>().into()
+}
+
+impl SceneArgs {
+    /// Loads a scene with these options.
+    fn load(&self, path: &std::path::Path) -> Result<Scene, LoadError> {
+        let mut options = LoadOptions {
+            assignments: self.set.clone(),
+            curves: self.curves.clone(),
+            frame: self.frame,
+            ..LoadOptions::default()
+        };
+        let mut set = |key: &str, value: Option<Value>, shown: String| {
+            if let Some(value) = value {
+                let option = format!("--{} {shown}", key.replace('_', "-"));
+                options.settings.push((format!("render.{key}"), value, option));
+            }
+        };
+        let text = |v: &Option<String>| (v.clone().map(Value::from), v.clone().unwrap_or_default());
+        let count = |v: Option<u32>| (v.map(|n| Value::Integer(n.into())), v.map_or(String::new(), |n| n.to_string()));
+        let number = |v: Option<f64>| (v.map(Value::Float), v.map_or(String::new(), |n| n.to_string()));
+        for (key, (value, shown)) in [
+            ("mode", text(&self.mode)),
+            ("model", text(&self.model)),
+            ("spp", count(self.spp)),
+            ("time", number(self.time)),
+            ("noise", number(self.noise)),
+            ("width", count(self.width)),
+            ("height", count(self.height)),
+            ("max_bounces", count(self.max_bounces)),
+            ("threads", count(self.threads)),
+            ("seed", count(self.seed)),
+        ] {
+            set(key, value, shown);
+        }
+        if let Some(crop) = &self.crop {
+            let shown = crop.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+            options.assignments.push(format!("render.crop=[{shown}]"));
+        }
+        load(path, &options)
+    }
+}
+
+/// Writes text to a file that appears whole or not at all.
+fn write_text(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+    use std::io::Write as _;
+    Ok(output::write_file(path, |file| file.write_all(text.as_bytes()))?)
+}
+
+/// A number of bytes for people.
+fn bytes_in_words(bytes: u64) -> String {
+    let b = bytes as f64;
+    match bytes {
+        0..1_000 => format!("{bytes} B"),
+        1_000..1_000_000 => format!("{:.1} kB", b / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", b / 1e6),
+        _ => format!("{:.2} GB", b / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,210 @@
+//! `yarnray render`
+
+use std::{
+    io::IsTerminal as _,
+    path::PathBuf,
+    sync::{Arc, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::{Failure, SceneArgs, bytes_in_words, write_text};
+use crate::{
+    image::{self, output::Format, png::ToneMap},
+    render::{self, Progress, Rendered, Stop, picture},
+    report::{Phases, RunRecord},
+    scene::{Layers, Scene},
+    trace::World,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray render scenes/swatch.toml                                  writes out/swatch.exr
+  yarnray render scenes/swatch.toml --spp 256 -o s.exr -o s.png      two formats of one render
+  yarnray render scenes/glove.toml --curves glove.bcc --time 30      the best picture of half a minute
+  yarnray render scenes/swatch.toml --crop 300,200,460,320 -o c.png  a part of the frame
+  yarnray render scenes/single_yarn.toml --set yarn.sample.plies=1   any key of the scene";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct RenderArgs {
+    /// The scene file.
+    scene: PathBuf,
+    /// Where to write; the extension names the format (.exr, .png, .hdr, .tif, ...). Repeatable. Default: out/SCENE.exr
+    #[arg(short, long = "out", value_name = "PATH")]
+    out: Vec<PathBuf>,
+    /// Curve of the picture for a screen.
+    #[arg(long, value_parser = ["srgb", "filmic"])]
+    tone_map: Option<String>,
+    /// Exposure of the picture for a screen, in stops.
+    #[arg(long, value_name = "STOPS", allow_hyphen_values = true)]
+    exposure: Option<f32>,
+    /// Write statistics as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    stats: Option<PathBuf>,
+    /// No progress and no summary.
+    #[arg(long, short)]
+    quiet: bool,
+    /// More about the scene and the run.
+    #[arg(long, short)]
+    verbose: bool,
+    #[command(flatten)]
+    options: SceneArgs,
+}
+
+pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let started = Instant::now();
+    let mut scene = args.options.load(&args.scene)?;
+    let outputs = outputs(args);
+    let mut layered = false;
+    for path in outputs.iter().chain(&args.stats) {
+        if args.stats.as_ref() == Some(path) {
+            continue;
+        }
+        layered |= image::output::check_writable(path)? == Format::Exr;
+    }
+    if let Some(stats) = &args.stats {
+        image::output::check_target(stats)?;
+    }
+    if !layered {
+        scene.layers = Layers::NONE;
+    }
+    match args.tone_map.as_deref() {
+        Some("filmic") => scene.display.tone_map = ToneMap::Filmic,
+        Some(_) => scene.display.tone_map = ToneMap::Srgb,
+        None => {}
+    }
+    if let Some(exposure) = args.exposure {
+        scene.display.exposure = exposure;
+    }
+    let threads = scene.render.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
+    let load = started.elapsed();
+    pool.install(|| {
+        let (world, made) = World::new(&scene, threads)?;
+        warn(args, &scene, &world);
+        let interrupt = interrupt_flag();
+        let bar = bar(args);
+        let rendered = render::render(&scene, &world, &interrupt, |p| show(&bar, args, p));
+        bar.finish_and_clear();
+
+        let mut phases = Phases { load, made, render: rendered.elapsed, ..Phases::default() };
+        let writing = Instant::now();
+        let command = std::env::args().collect::<Vec<_>>().join(" ");
+        let record = |phases| RunRecord { scene: &scene, world: &world, rendered: &rendered, phases, threads };
+        let attributes = record(phases).attributes(&command);
+        for path in &outputs {
+            picture::write(path, &scene, &rendered.film, &attributes)?;
+        }
+        phases.write = writing.elapsed();
+        phases.total = started.elapsed();
+        if let Some(path) = &args.stats {
+            let text = serde_json::to_string_pretty(&record(phases).to_json()).expect("numbers and text become JSON");
+            write_text(path, &(text + "\n"))?;
+        }
+        if !args.quiet {
+            summary(args, &world, &rendered, &phases, &outputs);
+        }
+        if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+    })
+}
+
+fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
+    if args.out.is_empty() {
+        let stem = args.scene.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+        return vec![PathBuf::from("out").join(stem + ".exr")];
+    }
+    args.out.clone()
+}
+
+/// Raised by SIGINT or SIGTERM; a second signal ends the process at once.
+fn interrupt_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // Registration fails only for signals that cannot be caught.
+        let _ = signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag));
+        let _ = signal_hook::flag::register(signal, Arc::clone(&flag));
+    }
+    flag
+}
+
+fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
+    if args.quiet {
+        return;
+    }
+    for warning in &scene.warnings {
+        eprintln!("warning: {warning}");
+    }
+    const SHOWN: usize = 3;
+    let total = world.tight_bends().count();
+    for (weave, bend) in world.tight_bends().take(if args.verbose { usize::MAX } else { SHOWN }) {
+        eprintln!(
+            "warning: {}: yarn {} bends too tightly at segment {}: its radius is {:.2} times its radius of curvature, \
+             and the tube folds into itself",
+            scene.fabrics[weave].origin, bend.yarn, bend.segment, bend.tightness
+        );
+    }
+    if total > SHOWN && !args.verbose {
+        eprintln!("warning: ... and {} more yarns with such bends (-v shows all)", total - SHOWN);
+    }
+    if scene.lights.is_empty() {
+        eprintln!("warning: the scene has no light: the picture will be black");
+    }
+}
+
+fn bar(args: &RenderArgs) -> ProgressBar {
+    if args.quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
+    let style = ProgressStyle::with_template("{wide_bar} {percent}%  {msg}  {elapsed} (left: {eta})");
+    bar.set_style(style.expect("the template is well formed"));
+    bar
+}
+
+fn show(bar: &ProgressBar, args: &RenderArgs, p: Progress) {
+    let noise = p.noise.map_or(String::new(), |n| format!(", noise {n:.2e}"));
+    bar.set_position((p.share * 1000.0) as u64);
+    bar.set_message(format!("{} of {} spp{noise}", p.spp, p.spp_end));
+    if args.verbose && bar.is_hidden() && !args.quiet {
+        let left = p.elapsed.as_secs_f64() * (1.0 / p.share.max(1e-3) - 1.0);
+        eprintln!("{} of {} spp{noise}, {:.1} s, about {left:.0} s left", p.spp, p.spp_end, p.elapsed.as_secs_f64());
+    }
+}
+
+fn summary(args: &RenderArgs, world: &World, rendered: &Rendered, phases: &Phases, outputs: &[PathBuf]) {
+    let s = |d: Duration| format!("{:.2} s", d.as_secs_f64());
+    let (_, spp, _) = rendered.film.samples();
+    let c = &rendered.counters;
+    for path in outputs {
+        eprintln!("wrote {}", path.display());
+    }
+    eprintln!(
+        "{spp:.0} spp in {} ({:.2} M samples/s), stopped by {}; load {}, curves {}, BVH {}, total {}",
+        s(phases.render),
+        c.camera as f64 / 1e6 / phases.render.as_secs_f64().max(1e-9),
+        rendered.stop.name(),
+        s(phases.load),
+        s(phases.made.generate),
+        s(phases.made.build),
+        s(phases.total),
+    );
+    if args.verbose {
+        eprintln!(
+            "curves {}, BVH {}, peak memory {}; rays: {} from the camera, {} bounced, {} to lights",
+            bytes_in_words(world.geometry_bytes()),
+            bytes_in_words(world.bvh_bytes()),
+            bytes_in_words(crate::report::peak_rss_bytes()),
+            c.camera,
+            c.bounce,
+            c.shadow
+        );
+    }
+    if c.invalid > 0 {
+        eprintln!("warning: {} samples were not finite and were left out", c.invalid);
+    }
+}

@@ -1,0 +1,399 @@
+//! Light along a path: what one sample of one pixel sees.
+//!
+//! A path tracer with next event estimation and multiple importance sampling. The one special thing is cloth: a ray
+//! that meets a yarn is let through with the chance that it meets no fibre (which is no scattering event), else it
+//! scatters at a vertex of the yarn's model, and goes on from inside the yarn, whose own plies the model has already
+//! put in its way.
+
+use glam::{Vec2, Vec3A};
+
+use crate::{
+    ffi::embree::Ray,
+    geometry::section::Crossings,
+    math::{Rgb, frame::orthonormal_basis, sampler::Sampler, warp},
+    scattering::{LobeValues, mis_weight, yarn::YarnVertex},
+    scene::{Ground, Light, Scene, light::Environment},
+    trace::{Hit, World},
+};
+
+/// Scattering events before paths may end by chance.
+const ROULETTE_AFTER: u32 = 4;
+/// Most yarns a path may pass unscattered in a row: a guard against geometry that repeats a hit for ever.
+const MOST_PASSES: u32 = 10_000;
+/// Where a ray that passes a yarn starts again, in yarn radii behind the surface.
+const PASS_OFFSET: f32 = 1e-3;
+
+/// What one sample saw.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// 1 if the camera's ray met cloth or ground that scattered it, else 0.
+    pub alpha: f32,
+    /// Depth along the view and normal where it first scattered; zero without.
+    pub depth: f32,
+    /// As `depth`.
+    pub normal: Vec3A,
+    /// The radiance by the lobe of the first scattering at cloth; what came otherwise is in none.
+    pub lobes: LobeValues,
+}
+
+/// What was done, for the statistics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Rays from the camera.
+    pub camera: u64,
+    /// Rays that go on: after scattering or through a yarn.
+    pub bounce: u64,
+    /// Rays towards lights.
+    pub shadow: u64,
+    /// Camera paths that scattered at cloth, and their scattering events.
+    pub cloth_paths: u64,
+    /// As `cloth_paths`.
+    pub events: u64,
+    /// Samples that were not finite and were left out.
+    pub invalid: u64,
+}
+
+impl Counters {
+    /// Adds what another worker did.
+    pub fn add(&mut self, other: &Self) {
+        self.camera += other.camera;
+        self.bounce += other.bounce;
+        self.shadow += other.shadow;
+        self.cloth_paths += other.cloth_paths;
+        self.events += other.events;
+        self.invalid += other.invalid;
+    }
+}
+
+/// A scene ready for paths: shared by all threads.
+#[derive(Debug)]
+pub struct Integrator<'a> {
+    world: &'a World,
+    ground: Option<Ground>,
+    /// The sky; several are added up.
+    skies: Vec<(&'a Environment, f32)>,
+    /// Lights for shadow rays: each with its chance, summed up.
+    lights: Vec<(&'a Light, f32, f32)>,
+    max_bounces: u32,
+    /// View direction for depths.
+    back: Vec3A,
+}
+
+/// A worker's own memory: reused from sample to sample.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    crossings: Crossings,
+    shadow_crossings: Crossings,
+}
+
+/// A path on its way.
+struct Path<'s> {
+    ray: Ray,
+    throughput: Rgb,
+    /// Density of the ray's direction, for weighing the sky against its shadow rays; infinite from the camera.
+    pdf: f32,
+    bounces: u32,
+    passes: u32,
+    /// Lobes of the first scattering at cloth to which what is found now belongs.
+    shares: Option<LobeValues>,
+    sampler: &'s mut Sampler,
+}
+
+impl<'a> Integrator<'a> {
+    /// For a scene and its cloth.
+    pub fn new(scene: &'a Scene, world: &'a World) -> Self {
+        let sampled: Vec<&Light> =
+            scene.lights.iter().filter(|l| l.needs_shadow_rays() && l.power() > 0.0).collect();
+        let total: f32 = sampled.iter().map(|l| l.power()).sum();
+        let mut sum = 0.0;
+        let lights: Vec<_> = sampled
+            .into_iter()
+            .map(|light| {
+                let chance = light.power() / total;
+                sum += chance;
+                (light, chance, sum)
+            })
+            .collect();
+        let skies = scene
+            .lights
+            .iter()
+            .filter_map(|light| match light {
+                Light::Environment(sky) => {
+                    let chance = lights.iter().find(|(l, _, _)| std::ptr::eq(*l, light)).map_or(0.0, |(_, c, _)| *c);
+                    Some((sky, chance))
+                }
+                _ => None,
+            })
+            .collect();
+        Self {
+            world,
+            ground: scene.ground,
+            skies,
+            lights,
+            max_bounces: scene.render.max_bounces,
+            back: Vec3A::from(scene.camera.back_f32()),
+        }
+    }
+
+    /// Follows one path from the camera.
+    pub fn sample(&self, ray: Ray, sampler: &mut Sampler, scratch: &mut Scratch, counters: &mut Counters) -> Sample {
+        let mut sample = Sample::default();
+        let mut path = Path {
+            ray,
+            throughput: Rgb::ONE,
+            pdf: f32::INFINITY,
+            bounces: 0,
+            passes: 0,
+            shares: None,
+            sampler,
+        };
+        let camera = ray.origin;
+        counters.camera += 1;
+        let mut cloth_events = 0;
+        loop {
+            let hit = self.world.intersect(&path.ray);
+            let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
+            let first = path.bounces == 0;
+            let go_on = match (hit, ground) {
+                (hit, Some((ground, t))) if hit.is_none_or(|h| t < h.t) => {
+                    if first {
+                        let point = path.ray.origin + t * path.ray.direction;
+                        sample.alpha = 1.0;
+                        sample.depth = (camera - point).dot(self.back);
+                        sample.normal = Vec3A::Y;
+                    }
+                    self.scatter_at_ground(&ground, t, &mut path, &mut sample, scratch, counters)
+                }
+                (Some(hit), _) => {
+                    let (go_on, scattered) = self.scatter_at_yarn(&hit, &mut path, &mut sample, scratch, counters);
+                    if scattered {
+                        cloth_events += 1;
+                        if first {
+                            sample.alpha = 1.0;
+                            let point = hit.section.centre + hit.section.radius * hit.normal;
+                            sample.depth = (camera - point).dot(self.back);
+                        }
+                    }
+                    go_on
+                }
+                _ => {
+                    let light = self.sky(&path);
+                    self.add(&mut sample, path.shares, path.throughput * light);
+                    false
+                }
+            };
+            if !go_on {
+                break;
+            }
+            counters.bounce += 1;
+        }
+        if cloth_events > 0 {
+            counters.cloth_paths += 1;
+            counters.events += cloth_events;
+        }
+        sample
+    }
+
+    /// Adds light to a sample, and to the lobes it belongs to.
+    #[inline]
+    fn add(&self, sample: &mut Sample, shares: Option<LobeValues>, light: Rgb) {
+        sample.radiance += light;
+        if let Some(shares) = shares {
+            let part = shares.scaled(light);
+            let lobes = &mut sample.lobes;
+            lobes.r += part.r;
+            lobes.tt += part.tt;
+            lobes.d += part.d;
+            lobes.f += part.f;
+            lobes.b += part.b;
+        }
+    }
+
+    /// What a ray that meets nothing sees, weighed against shadow rays towards the same sky.
+    #[inline]
+    fn sky(&self, path: &Path<'_>) -> Rgb {
+        let mut light = Rgb::ZERO;
+        for &(sky, chance) in &self.skies {
+            if path.pdf == f32::INFINITY {
+                if sky.visible {
+                    light += sky.radiance(path.ray.direction);
+                }
+                continue;
+            }
+            let other = if chance > 0.0 { chance * sky.pdf(path.ray.direction) } else { 0.0 };
+            light += sky.radiance(path.ray.direction) * mis_weight(path.pdf, other);
+        }
+        light
+    }
+
+    /// Whether a path may go on after a scattering event of weight `weight`.
+    #[inline]
+    fn survives(&self, path: &mut Path<'_>, weight: Rgb, u: f32) -> bool {
+        path.throughput *= weight;
+        path.bounces += 1;
+        let largest = path.throughput.max_channel();
+        if !(largest > 0.0) || path.bounces >= self.max_bounces {
+            // At the limit the path still collects what its last ray meets: only its scattering ends.
+            return largest > 0.0 && path.bounces == self.max_bounces;
+        }
+        if path.bounces > ROULETTE_AFTER && largest < 1.0 {
+            let keep = largest.max(0.05);
+            if u >= keep {
+                return false;
+            }
+            path.throughput /= keep;
+        }
+        true
+    }
+
+    /// Scatters at a yarn or passes it. Returns whether the path goes on, and whether it scattered.
+    #[inline]
+    fn scatter_at_yarn(
+        &self,
+        hit: &Hit,
+        path: &mut Path<'_>,
+        sample: &mut Sample,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> (bool, bool) {
+        let section = &hit.section;
+        let yarn = &self.world.weaves()[hit.weave].yarn;
+        section.crossings(yarn.shape(), &mut scratch.crossings);
+        let unscattered = yarn.transparency(&scratch.crossings);
+        let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
+        if u_pass < unscattered {
+            path.passes += 1;
+            // Behind the surface, so that the same hit is not found again.
+            let behind = section.centre + section.radius * (1.0 - PASS_OFFSET) * hit.normal;
+            path.ray = Ray::new(behind, path.ray.direction);
+            return (path.passes < MOST_PASSES, false);
+        }
+        if path.bounces >= self.max_bounces {
+            return (false, false);
+        }
+        if path.bounces == 0
+            && let Some(front) = scratch.crossings.first()
+        {
+            sample.normal = section.to_world(front.normal(section));
+        }
+        let u = path.sampler.next4();
+        let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
+        let mut stream = path.sampler.stream(path.sampler.position());
+        let vertex = yarn.vertex(section, &scratch.crossings, unscattered, path.throughput, u, &mut stream);
+
+        if let Some((direct, light)) = self.light_at_yarn(&vertex, hit, u_light_choice, Vec2::new(u_light_x, u_light_y), stream.next(), scratch, counters)
+        {
+            let found = direct.scaled(path.throughput * light);
+            match path.shares {
+                None => {
+                    sample.radiance += found.sum();
+                    let lobes = &mut sample.lobes;
+                    lobes.r += found.r;
+                    lobes.tt += found.tt;
+                    lobes.d += found.d;
+                    lobes.f += found.f;
+                    lobes.b += found.b;
+                }
+                Some(_) => self.add(sample, path.shares, found.sum()),
+            }
+        }
+
+        let Some(next) = vertex.sample([u_component, u_x, u_y], &mut stream) else { return (false, true) };
+        if path.shares.is_none() && path.bounces == 0 {
+            path.shares = Some(next.shares);
+        }
+        path.pdf = next.pdf;
+        path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
+        (self.survives(path, next.weight, u_roulette), true)
+    }
+
+    /// Draws a light and a direction towards it: the lobes' values and the light that arrives, 0 or more.
+    #[inline]
+    #[allow(clippy::too_many_arguments, reason = "random numbers are drawn by the caller, in a fixed order")]
+    fn light_at_yarn(
+        &self,
+        vertex: &YarnVertex<'_>,
+        hit: &Hit,
+        u_choice: f32,
+        u: Vec2,
+        u_start: f32,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> Option<(LobeValues, Rgb)> {
+        let &(light, chance, _) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())?;
+        let section = &hit.section;
+        let node = section.point_on_ray(vertex.node_start());
+        let towards = light.sample(node, u)?;
+        let local = section.to_local(towards.direction);
+        let direct = vertex.evaluate(local, towards.pdf * chance);
+        let value = direct.lobes.sum();
+        if !(value.max_channel() > 0.0) {
+            return None;
+        }
+        let start =
+            if u_start < direct.forward_share { section.point_on_ray(vertex.forward_start()) } else { node };
+        let mut ray = Ray::new(start, towards.direction);
+        ray.t_far = towards.distance;
+        counters.shadow += 1;
+        let passed = self.shadow(&ray, scratch);
+        (passed > 0.0).then(|| (direct.lobes, towards.weight * (passed / chance)))
+    }
+
+    /// The share of light that comes through along a shadow ray.
+    #[inline]
+    fn shadow(&self, ray: &Ray, scratch: &mut Scratch) -> f32 {
+        if self.ground.is_some_and(|g| distance_to_ground(&g, ray).is_some()) {
+            return 0.0;
+        }
+        self.world.transmittance(ray, &mut scratch.shadow_crossings)
+    }
+
+    /// Scatters at the diffuse ground.
+    fn scatter_at_ground(
+        &self,
+        ground: &Ground,
+        t: f32,
+        path: &mut Path<'_>,
+        sample: &mut Sample,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> bool {
+        if path.bounces >= self.max_bounces {
+            return false;
+        }
+        let [u_choice, light_x, light_y, u_roulette] = path.sampler.next4();
+        let [x, y, _, _] = path.sampler.next4();
+        let side = if path.ray.direction.y < 0.0 { 1.0 } else { -1.0 };
+        let normal = Vec3A::new(0.0, side, 0.0);
+        let mut point = path.ray.origin + t * path.ray.direction;
+        point.y = ground.height + side * 1e-5 * (1.0 + ground.height.abs().max(t));
+        let even = std::f32::consts::FRAC_1_PI;
+        if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())
+            && let Some(towards) = light.sample(point, Vec2::new(light_x, light_y))
+        {
+            let cos = towards.direction.dot(normal);
+            if cos > 0.0 {
+                let mut ray = Ray::new(point, towards.direction);
+                ray.t_far = towards.distance;
+                counters.shadow += 1;
+                let passed = self.world.transmittance(&ray, &mut scratch.shadow_crossings);
+                let weight = mis_weight(towards.pdf * chance, cos * even) * cos * even * passed / chance;
+                self.add(sample, path.shares, path.throughput * ground.albedo * towards.weight * weight);
+            }
+        }
+        let w = warp::cosine_hemisphere(Vec2::new(x, y));
+        let (s, t) = orthonormal_basis(normal);
+        path.ray = Ray::new(point, w.x * s + w.y * t + w.z * normal);
+        path.pdf = (w.z * even).max(1e-9);
+        self.survives(path, ground.albedo, u_roulette)
+    }
+}
+
+/// Where a ray meets the ground.
+#[inline]
+fn distance_to_ground(ground: &Ground, ray: &Ray) -> Option<f32> {
+    let t = (ground.height - ray.origin.y) / ray.direction.y;
+    (t > ray.t_near && t < ray.t_far && t.is_finite()).then_some(t)
+}

@@ -1,0 +1,139 @@
+//! What a run was: one record, written as statistics or as the metadata of a picture.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::{
+    image::Attribute,
+    plan::Plan,
+    render::Rendered,
+    scene::Scene,
+    trace::{BuildTimes, World},
+};
+
+/// Seconds of each phase.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Phases {
+    /// Reading scene, curves and images.
+    pub load: Duration,
+    /// Curves, and Embree's BVH.
+    pub made: BuildTimes,
+    /// Samples.
+    pub render: Duration,
+    /// Output files.
+    pub write: Duration,
+    /// From the start of the program.
+    pub total: Duration,
+}
+
+/// Everything that is known of a run.
+#[derive(Debug)]
+pub struct RunRecord<'a> {
+    /// What was rendered.
+    pub scene: &'a Scene,
+    /// With what.
+    pub world: &'a World,
+    /// The result.
+    pub rendered: &'a Rendered,
+    /// How long it took.
+    pub phases: Phases,
+    /// With how many threads.
+    pub threads: usize,
+}
+
+/// The most memory this process has held, in bytes; 0 where the system does not say.
+pub fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()).map_or(0, |kib| kib * 1024)
+}
+
+impl RunRecord<'_> {
+    /// The statistics of `--stats`.
+    pub fn to_json(&self) -> Value {
+        let scene = self.scene;
+        let render = &scene.render;
+        let film = &self.rendered.film;
+        let counters = &self.rendered.counters;
+        let (spp_min, spp_mean, spp_max) = film.samples();
+        let strands = || self.world.weaves().iter().map(|w| &w.strands);
+        let plan = Plan::new(scene);
+        let geometry = self.world.geometry_bytes();
+        let bvh = self.world.bvh_bytes();
+        let lights: u64 = scene
+            .lights
+            .iter()
+            .map(|l| match l {
+                crate::scene::Light::Environment(e) => e.image.as_ref().map_or(0, |m| m.bytes()),
+                _ => 0,
+            })
+            .sum();
+        let seconds = |d: Duration| d.as_secs_f64();
+        json!({
+            "yarnray": env!("CARGO_PKG_VERSION"),
+            "commit": env!("YARNRAY_COMMIT"),
+            "embree": self.world.embree_version(),
+            "scene": scene.path,
+            "fingerprint": scene.fingerprint,
+            "mode": render.mode.name(),
+            "model": render.model.name(),
+            "seed": render.seed,
+            "threads": self.threads,
+            "stopped_by": self.rendered.stop.name(),
+            "image": {"width": film.width, "height": film.height, "spp_min": spp_min, "spp_mean": spp_mean, "spp_max": spp_max},
+            "seconds": {
+                "load": seconds(self.phases.load),
+                "generate": seconds(self.phases.made.generate),
+                "build": seconds(self.phases.made.build),
+                "render": seconds(self.phases.render),
+                "write": seconds(self.phases.write),
+                "total": seconds(self.phases.total),
+            },
+            "rays": {"camera": counters.camera, "bounce": counters.bounce, "shadow": counters.shadow},
+            "mean_bounces": if counters.cloth_paths > 0 { counters.events as f64 / counters.cloth_paths as f64 } else { 0.0 },
+            "invalid_samples": counters.invalid,
+            "memory": {
+                "geometry_bytes": geometry,
+                "bvh_bytes": bvh,
+                "scene_bytes": geometry + bvh + lights,
+                "peak_rss_bytes": peak_rss_bytes(),
+            },
+            "curves": {
+                "yarns": strands().map(crate::geometry::strand::Strands::yarns).sum::<usize>(),
+                "fibers": 0,
+                "control_points": strands().map(|s| s.points().len()).sum::<usize>(),
+                "segments": strands().map(|s| s.segments().len()).sum::<usize>(),
+                "given_points": scene.fabrics.iter().map(crate::scene::Fabric::control_points).sum::<usize>(),
+                "length_mm": strands().map(crate::geometry::strand::Strands::length).sum::<f64>(),
+            },
+            "noise": {"rel_mse_estimate": film.relative_error()},
+            "used": plan.names(true),
+            "left_out": plan.names(false),
+        })
+    }
+
+    /// The metadata of an EXR.
+    pub fn attributes(&self, command_line: &str) -> Vec<(String, Attribute)> {
+        let scene = self.scene;
+        let text = |s: &str| Attribute::Text(s.to_owned());
+        let (_, spp, _) = self.rendered.film.samples();
+        let mut out = vec![
+            ("yarnray.scene".to_owned(), text(&scene.path)),
+            ("yarnray.fingerprint".to_owned(), text(&scene.fingerprint)),
+            ("yarnray.mode".to_owned(), text(scene.render.mode.name())),
+            ("yarnray.model".to_owned(), text(scene.render.model.name())),
+            ("yarnray.seed".to_owned(), text(&scene.render.seed.to_string())),
+            ("yarnray.spp".to_owned(), Attribute::Double(spp)),
+            ("yarnray.stopped_by".to_owned(), text(self.rendered.stop.name())),
+            ("yarnray.seconds".to_owned(), Attribute::Double(self.phases.render.as_secs_f64())),
+            ("yarnray.threads".to_owned(), Attribute::Whole(self.threads as i32)),
+            ("yarnray.embree".to_owned(), text(&self.world.embree_version())),
+            ("yarnray.command".to_owned(), text(command_line)),
+        ];
+        if let Some(noise) = self.rendered.film.relative_error() {
+            out.push(("yarnray.rel_mse_estimate".to_owned(), Attribute::Double(noise)));
+        }
+        out
+    }
+}

@@ -1,0 +1,99 @@
+//! Any of the yarn models behind one face: the only place that asks which it is.
+
+use glam::Vec3A;
+
+use super::{
+    Continuation, Direct,
+    aggregated::{AggregatedYarn, Vertex},
+};
+use crate::{
+    geometry::{
+        section::{Crossings, PlyCrossing, Section},
+        yarn::YarnShape,
+    },
+    math::{Rgb, sampler::Stream},
+};
+
+/// A yarn with one of the models.
+#[derive(Clone, Debug)]
+pub enum YarnScatterer {
+    /// The recommended model.
+    Aggregated(AggregatedYarn),
+}
+
+/// One scattering at such a yarn.
+#[derive(Clone, Debug)]
+pub enum YarnVertex<'a> {
+    /// Of [`YarnScatterer::Aggregated`].
+    Aggregated(Vertex<'a>),
+}
+
+impl YarnScatterer {
+    /// The yarn's geometry.
+    #[inline]
+    pub fn shape(&self) -> &YarnShape {
+        match self {
+            Self::Aggregated(yarn) => yarn.shape(),
+        }
+    }
+
+    /// The share of light that passes all plies on the ray and meets no fibre.
+    #[inline]
+    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
+        match self {
+            Self::Aggregated(yarn) => yarn.transparency(crossings),
+        }
+    }
+
+    /// Draws what is random about a scattering, given that the ray was not let through; see [`Vertex::new`].
+    #[inline]
+    pub fn vertex<'a>(
+        &'a self,
+        section: &'a Section,
+        crossings: &Crossings,
+        unscattered: f32,
+        throughput: Rgb,
+        u: [f32; 4],
+        stream: &mut Stream,
+    ) -> YarnVertex<'a> {
+        match self {
+            Self::Aggregated(yarn) => {
+                YarnVertex::Aggregated(Vertex::new(yarn, section, crossings, unscattered, throughput, u, stream))
+            }
+        }
+    }
+}
+
+impl YarnVertex<'_> {
+    /// The value for light from `w`; see [`Vertex::evaluate`].
+    #[inline]
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+        match self {
+            Self::Aggregated(v) => v.evaluate(w, light_pdf),
+        }
+    }
+
+    /// Where the path goes on; see [`Vertex::sample`].
+    #[inline]
+    pub fn sample(&self, u: [f32; 3], stream: &mut Stream) -> Option<Continuation> {
+        match self {
+            Self::Aggregated(v) => v.sample(u, stream),
+        }
+    }
+
+    /// Depth in the section from which light of the node leaves.
+    #[inline]
+    pub fn node_start(&self) -> f32 {
+        match self {
+            Self::Aggregated(v) => v.node_start(),
+        }
+    }
+
+    /// Depth in the section from which light of lobe F leaves.
+    #[inline]
+    pub fn forward_start(&self) -> f32 {
+        match self {
+            Self::Aggregated(v) => v.forward_start(),
+        }
+    }
+}

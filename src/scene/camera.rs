@@ -1,0 +1,151 @@
+//! From a pixel to a ray.
+
+use glam::{DVec3, Vec2, Vec3, Vec3A};
+
+use crate::ffi::embree::Ray;
+
+/// How far the view opens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Vertical angle, radians.
+    Perspective(f64),
+    /// Height of the picture, millimetres.
+    Orthographic(f64),
+}
+
+/// A camera: where it stands and what it sees. Right-handed, +y up, looking along -z unless told otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it stands, millimetres about the scene's middle.
+    pub position: DVec3,
+    /// Unit vectors: to the right of the picture, up in it, and towards the viewer.
+    pub right: DVec3,
+    /// As `right`.
+    pub up: DVec3,
+    /// As `right`.
+    pub back: DVec3,
+    /// How far the view opens.
+    pub projection: Projection,
+}
+
+impl Camera {
+    /// At `position`, looking at `target`; `None` if they coincide or `up` is along the view.
+    pub fn looking_at(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Option<Self> {
+        let back = (position - target).try_normalize()?;
+        let right = up.cross(back).try_normalize()?;
+        Some(Self { position, right, up: back.cross(right), back, projection })
+    }
+
+    /// Moves the camera so that all of `points` (position and radius) are in a picture of the given aspect (width over
+    /// height), keeping its directions; `margin` is the share of the picture left free on each side.
+    pub fn framing<'a>(
+        &self,
+        points: impl Iterator<Item = (&'a DVec3, f64)> + Clone,
+        aspect: f64,
+        margin: f64,
+    ) -> Self {
+        let axis = |d: DVec3| {
+            points.clone().fold((f64::MAX, f64::MIN), |(low, high), (p, r)| (low.min(p.dot(d) - r), high.max(p.dot(d) + r)))
+        };
+        let (x, y, z) = (axis(self.right), axis(self.up), axis(self.back));
+        if x.0 > x.1 {
+            return *self;
+        }
+        let mid = |r: (f64, f64)| 0.5 * (r.0 + r.1);
+        let shrink = (1.0 - 2.0 * margin).max(0.05);
+        let centre = mid(x) * self.right + mid(y) * self.up + mid(z) * self.back;
+        match self.projection {
+            Projection::Orthographic(_) => {
+                let height = ((y.1 - y.0).max((x.1 - x.0) / aspect) / shrink).max(1e-9);
+                let position = centre + (z.1 - mid(z) + height) * self.back;
+                Self { position, projection: Projection::Orthographic(height), ..*self }
+            }
+            Projection::Perspective(angle) => {
+                let slope_y = (0.5 * angle).tan() * shrink;
+                let slope_x = slope_y * aspect;
+                // A point at height h above the axis is seen from the distance h / slope in front of it.
+                let distance = points
+                    .map(|(p, r)| {
+                        let q = *p - centre;
+                        let side = ((q.dot(self.right).abs() + r) / slope_x).max((q.dot(self.up).abs() + r) / slope_y);
+                        q.dot(self.back) + side
+                    })
+                    .fold(0.0, f64::max);
+                Self { position: centre + distance.max(1e-9) * self.back, ..*self }
+            }
+        }
+    }
+
+    /// The ray through a point of a picture, in pixels from its upper left corner.
+    #[inline]
+    pub fn ray(&self, point: Vec2, width: u32, height: u32) -> Ray {
+        let (w, h) = (f64::from(width), f64::from(height));
+        let x = (2.0 * f64::from(point.x) - w) / h;
+        let y = 1.0 - 2.0 * f64::from(point.y) / h;
+        let (origin, direction) = match self.projection {
+            Projection::Perspective(angle) => {
+                let slope = (0.5 * angle).tan();
+                (self.position, (x * slope * self.right + y * slope * self.up - self.back).normalize())
+            }
+            Projection::Orthographic(size) => {
+                (self.position + 0.5 * size * (x * self.right + y * self.up), -self.back)
+            }
+        };
+        Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()))
+    }
+
+    /// The direction towards the viewer in single precision: distances along it are depths.
+    pub fn back_f32(&self) -> Vec3 {
+        self.back.as_vec3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud() -> Vec<DVec3> {
+        (0..200)
+            .map(|i| {
+                let t = f64::from(i);
+                DVec3::new(30.0 * (0.7 * t).sin(), 12.0 * (1.3 * t).cos(), 8.0 * (2.1 * t).sin())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn framing_shows_every_point_and_fills_the_picture() {
+        for projection in [Projection::Perspective(0.6), Projection::Orthographic(1.0)] {
+            for (aspect, direction) in [(1.0, DVec3::Z), (1.8, DVec3::new(1.0, 0.5, 0.3)), (0.6, DVec3::new(-0.2, 1.0, 0.4))] {
+                let points = cloud();
+                let camera = Camera::looking_at(direction, DVec3::ZERO, DVec3::Y, projection).unwrap();
+                let camera = camera.framing(points.iter().map(|p| (p, 0.5)), aspect, 0.05);
+                let mut widest: f64 = 0.0;
+                for p in &points {
+                    let q = *p - camera.position;
+                    let (x, y, z) = (q.dot(camera.right), q.dot(camera.up), -q.dot(camera.back));
+                    assert!(z > 0.0, "in front of the camera");
+                    let half = match camera.projection {
+                        Projection::Perspective(a) => z * (0.5 * a).tan(),
+                        Projection::Orthographic(h) => 0.5 * h,
+                    };
+                    widest = widest.max(x.abs() / (half * aspect)).max(y.abs() / half);
+                }
+                assert!(widest < 0.91 && widest > 0.75, "{projection:?} {aspect}: {widest}");
+            }
+        }
+    }
+
+    #[test]
+    fn rays_go_where_the_picture_shows() {
+        let camera =
+            Camera::looking_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).unwrap();
+        let middle = camera.ray(Vec2::new(50.0, 25.0), 100, 50);
+        assert!((middle.direction - Vec3A::NEG_Z).length() < 1e-6);
+        let corner = camera.ray(Vec2::ZERO, 100, 50).direction;
+        assert!(corner.x < 0.0 && corner.y > 0.0, "the first pixel is at the upper left");
+        assert!((corner.y / -corner.z - 0.5f32.tan()).abs() < 1e-5);
+        assert!(Camera::looking_at(DVec3::ZERO, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
+        assert!(Camera::looking_at(DVec3::Y, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
+    }
+}

@@ -1,0 +1,235 @@
+//! `[[fabric]]`: curves from a file or a generator, and the yarn they are of.
+
+use std::{
+    collections::BTreeMap,
+    f64::consts::TAU,
+    path::{Path, PathBuf},
+};
+
+use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
+
+use super::{
+    super::{Fabric, Yarn, transform_curves},
+    Context, Range, Reader, UNITS, counted, radians,
+};
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        curve_file::{self, ReadOptions},
+        generate::{Stockinette, straight},
+    },
+    math::sampler::Stream,
+    scene::diagnostic::{Span, unknown_name},
+};
+
+/// How finely curves are resampled, for all fabrics.
+pub(super) struct Detail {
+    basis: Basis,
+    tolerance: f64,
+    longest_segment: f64,
+}
+
+impl Detail {
+    pub(super) fn read(table: Option<&Reader<'_>>) -> Self {
+        let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
+        let basis = table.map_or(Basis::CatmullRom, |t| t.one_of_or("curve_basis", Basis::CatmullRom, &bases));
+        let tolerance = table.map_or(0.01, |t| t.f64_or("curve_tolerance", 0.01, Range::between(0.0, 1.0)));
+        let longest_segment = table.map_or(1.5, |t| t.f64_or("longest_segment", 1.5, Range::above(0.0)));
+        Self { basis, tolerance, longest_segment }
+    }
+}
+
+enum Source {
+    File { path: PathBuf, span: Span, unit: Option<f64>, options: ReadOptions, up: Up },
+    Stockinette(Stockinette),
+    Straight { count: u32, length: f64, spacing: f64 },
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Up {
+    /// As the file says; y if it does not.
+    Auto,
+    Y,
+    Z,
+}
+
+/// A fabric whose text is sound and whose curves are not read yet.
+pub(super) struct FabricPlan {
+    yarn: String,
+    radius: Option<f64>,
+    phases: Option<Vec<f64>>,
+    transform: DAffine3,
+    source: Source,
+}
+
+/// Reads one `[[fabric]]`; `curves` takes the place of its file or generator.
+pub(super) fn plan(
+    table: Reader<'_>,
+    context: &Context<'_>,
+    yarns: &BTreeMap<String, Yarn>,
+    curves: Option<&Path>,
+) -> Option<FabricPlan> {
+    let yarn = table.required_string("yarn").map(str::to_owned);
+    if let Some(name) = &yarn
+        && !yarns.contains_key(name)
+    {
+        let (message, hint) = unknown_name("yarn", name, yarns.keys().map(String::as_str));
+        table.error_at("yarn", message, Some(&hint));
+    }
+    let radius = table.f64("radius", Range::POSITIVE).map(|r| r * context.unit);
+    let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
+    let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
+    let [rx, ry, rz] = table.vec3_or("rotate", [0.0; 3], Range::FINITE).map(radians);
+    let translate = context.position(table.vec3_or("translate", [0.0; 3], Range::FINITE));
+    let rotation = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
+    let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), rotation, translate);
+    let source = match table.table("source") {
+        Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| yarns.get(y)), curves),
+        None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),
+        None => {
+            table.error("missing table `source`: where the curves come from", Some("source = { type = \"stockinette\" } or { type = \"file\", path = \"glove.bcc\" }"));
+            None
+        }
+    };
+    table.finish();
+    Some(FabricPlan { yarn: yarn?, radius, phases, transform, source: source? })
+}
+
+fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Reader<'_>>) -> Source {
+    let mut options = ReadOptions::default();
+    let mut up = Up::Auto;
+    if let Some(table) = table {
+        let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
+        options.basis = table.one_of("basis", &bases);
+        up = table.one_of_or("up", Up::Auto, &[("auto", Up::Auto), ("y", Up::Y), ("z", Up::Z)]);
+        if let Some(tile) = table.numbers("tile", Range::between(1.0, 100_000.0)) {
+            match tile.as_slice() {
+                &[x, y] if x.fract() == 0.0 && y.fract() == 0.0 => options.tile = [x as u32, y as u32],
+                _ => table.error_at("tile", "expected two whole numbers", Some("tile = [8, 12] repeats a pattern 8 times across and 12 times up")),
+            }
+        }
+    }
+    Source::File { path, span, unit, options, up }
+}
+
+fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves: Option<&Path>) -> Option<Source> {
+    let kinds = [("file", 0), ("stockinette", 1), ("straight", 2)];
+    let kind = table.required_one_of("type", &kinds);
+    let header = table.header();
+    let made = match kind {
+        Some(0) => {
+            let unit = table.one_of("unit", &UNITS);
+            let named = table.string("path");
+            let path = match (curves, named) {
+                (Some(path), _) => Some(path.to_owned()),
+                (None, Some(name)) => Some(context.resolve(name, table.span("path").unwrap_or(table.header()))),
+                (None, None) => {
+                    table.error("this fabric has no curve file of its own", Some("give one with --curves FILE, or add `path = \"FILE\"`"));
+                    None
+                }
+            };
+            let span = if curves.is_some() { table.header() } else { table.span("path").unwrap_or(table.header()) };
+            // Read all keys in any case, so that each is known.
+            let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table));
+            path.map(|_| source)
+        }
+        Some(1) => {
+            let s = Stockinette {
+                stitches: table.u64_or("stitches", 20, counted(1..=10_000)) as u32,
+                rows: table.u64_or("rows", 20, counted(1..=10_000)) as u32,
+                width: table.f64_or("stitch_width", Stockinette::WIDTH, Range::between(1.0, 100.0)),
+                height: table.f64_or("row_height", Stockinette::HEIGHT, Range::between(0.1, 100.0)),
+                points: table.u64_or("points", 32, counted(8..=1000)) as u32,
+            };
+            if u64::from(s.stitches) * u64::from(s.rows) * u64::from(s.points) > 1 << 26 {
+                table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
+            }
+            Some(Source::Stockinette(s))
+        }
+        Some(2) => Some(Source::Straight {
+            count: table.u64_or("count", 1, counted(1..=1_000_000)) as u32,
+            length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
+            spacing: table.f64("spacing", Range::POSITIVE).map_or(yarn.map_or(1.0, |y| 2.0 * y.radius), |s| s * context.unit),
+        }),
+        _ => None,
+    };
+    if let (Some(path), Some(1 | 2)) = (curves, kind) {
+        table.finish();
+        return Some(file_source(path.to_owned(), header, None, None));
+    }
+    table.finish();
+    made
+}
+
+impl FabricPlan {
+    /// Reads or makes the curves.
+    pub(super) fn make(
+        self,
+        index: usize,
+        context: &Context<'_>,
+        yarns: &BTreeMap<String, Yarn>,
+        seed: u32,
+        detail: &Detail,
+        warnings: &mut Vec<String>,
+    ) -> Option<Fabric> {
+        let place = yarns.keys().position(|name| *name == self.yarn)?;
+        let yarn = &yarns[&self.yarn];
+        let radius = self.radius.unwrap_or(yarn.radius);
+        let with_radii = |curves: Vec<Curve>, own: bool, scale: f64| -> Vec<(Curve, Vec<f64>)> {
+            curves
+                .into_iter()
+                .map(|mut curve| {
+                    let radii = curve.radii.take().filter(|_| own && self.radius.is_none());
+                    let radii = radii.map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
+                    (curve, radii)
+                })
+                .collect()
+        };
+        let (origin, mut curves) = match self.source {
+            Source::Stockinette(s) => {
+                (format!("stockinette, {} x {}", s.stitches, s.rows), with_radii(s.curves(2.0 * radius), false, 1.0))
+            }
+            Source::Straight { count, length, spacing } => {
+                (format!("{count} straight"), with_radii(straight(count, length, spacing), false, 1.0))
+            }
+            Source::File { path, span, unit, options, up } => {
+                let set = match curve_file::read(&path, &options) {
+                    Ok(set) => set,
+                    Err(error) => {
+                        context.error(span, error.to_string(), None);
+                        return None;
+                    }
+                };
+                warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
+                let scale = unit.or(set.unit_mm).unwrap_or(context.unit);
+                let mut curves = with_radii(set.curves, true, scale);
+                // Radii are in millimetres already; the transform below would scale them with the points.
+                for (curve, _) in &mut curves {
+                    for p in &mut curve.points {
+                        *p *= scale;
+                    }
+                }
+                if up == Up::Z || (up == Up::Auto && set.up_axis == Some(2)) {
+                    // z up becomes y up: a quarter turn about x.
+                    let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+                    transform_curves(&mut curves, &DAffine3::from_mat3(turn));
+                }
+                (path.display().to_string(), curves)
+            }
+        };
+        transform_curves(&mut curves, &self.transform);
+        let phases = self.phases.unwrap_or_else(|| {
+            let mut stream = Stream::new(seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
+            curves.iter().map(|_| TAU * f64::from(stream.next())).collect()
+        });
+        Some(Fabric {
+            origin,
+            yarn: place,
+            curves,
+            phases,
+            basis: detail.basis,
+            tolerance: detail.tolerance,
+            longest_segment: detail.longest_segment,
+        })
+    }
+}

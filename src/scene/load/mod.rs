@@ -1,0 +1,305 @@
+//! The renderer's keys: from a document to a checked [`Scene`], with every range, unit and default.
+//!
+//! All mistakes of a scene are reported together, each where it was written. Only when the text is sound are curve
+//! files and images read.
+
+mod cloth;
+mod settings;
+mod view;
+mod yarns;
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use glam::{DAffine3, DVec3};
+
+use super::{
+    Fabric, Ground, Light, Scene, bounds,
+    diagnostic::{Diagnostic, Diagnostics, Sources, Span},
+    document::{Document, MAX_FILE_BYTES, Value},
+    reader::{Range, Reader},
+    transform_curves,
+};
+use crate::math::Rgb;
+
+/// What the command line adds to a scene file.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// `KEY=VALUE` of each `--set`.
+    pub assignments: Vec<String>,
+    /// Keys that have an option of their own: dotted path, value, and the option as it was given.
+    pub settings: Vec<(String, Value, String)>,
+    /// `--curves`: this file in place of the first fabric's curves.
+    pub curves: Option<PathBuf>,
+    /// `--frame`: the camera frames what there is.
+    pub frame: bool,
+}
+
+/// Why a scene could not be loaded: text for the user, one or more messages with their places.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LoadError(pub String);
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.trim_end())
+    }
+}
+
+impl std::error::Error for LoadError {}
+
+/// Units of length and their millimetres.
+const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)];
+
+/// What all parts of the loader share.
+struct Context<'a> {
+    sources: &'a Sources,
+    diagnostics: &'a Diagnostics,
+    /// Millimetres per unit of the scene.
+    unit: f64,
+}
+
+impl Context<'_> {
+    /// A path as it is meant: relative to the file that names it, or to where the program runs if an option does.
+    fn resolve(&self, path: &str, span: Span) -> PathBuf {
+        let source = span.source();
+        let base = if self.sources.is_option(source) { None } else { Path::new(self.sources.name(source)).parent() };
+        base.map_or_else(|| PathBuf::from(path), |base| base.join(path))
+    }
+
+    fn error(&self, span: Span, message: impl Into<String>, hint: Option<String>) {
+        let diagnostic = Diagnostic::error(message).at(span);
+        self.diagnostics.push(match hint {
+            Some(hint) => diagnostic.hint(hint),
+            None => diagnostic,
+        });
+    }
+
+    /// A vector in the scene's unit, as millimetres.
+    fn position(&self, v: [f64; 3]) -> DVec3 {
+        DVec3::from(v) * self.unit
+    }
+}
+
+/// Loads a scene file.
+///
+/// # Errors
+/// Everything that is wrong with it, as text for the user.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let mut sources = Sources::new();
+    let diagnostics = Diagnostics::new();
+    let name = path.display().to_string();
+    let scene = read_text(path)
+        .map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))
+        .map(|text| load_text(&name, &text, options, &mut sources, &diagnostics))?;
+    match scene {
+        Some(mut scene) if !diagnostics.has_errors() => {
+            if !diagnostics.is_empty() {
+                scene.warnings.push(diagnostics.render(&sources).trim_end().to_owned());
+            }
+            Ok(scene)
+        }
+        _ => Err(LoadError(diagnostics.render(&sources))),
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, String> {
+    let meta = std::fs::metadata(path).map_err(|e| in_words(&e))?;
+    if !meta.is_file() {
+        return Err("not a file".to_owned());
+    }
+    if meta.len() > MAX_FILE_BYTES {
+        return Err(format!("a scene file of {} bytes; at most {MAX_FILE_BYTES} are read", meta.len()));
+    }
+    let bytes = std::fs::read(path).map_err(|e| in_words(&e))?;
+    String::from_utf8(bytes).map_err(|e| format!("byte {}: not UTF-8 text", e.utf8_error().valid_up_to()))
+}
+
+/// An input error without its number.
+fn in_words(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "no such file".to_owned(),
+        std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+fn load_text(
+    name: &str,
+    text: &str,
+    options: &LoadOptions,
+    sources: &mut Sources,
+    diagnostics: &Diagnostics,
+) -> Option<Scene> {
+    let mut document = Document::parse(name, text, sources, diagnostics)?;
+    merge_libraries(&mut document, sources, diagnostics);
+    for (key, value, label) in &options.settings {
+        document.set(key, value.clone(), label, sources, diagnostics);
+    }
+    for assignment in &options.assignments {
+        document.apply_option(assignment, sources, diagnostics);
+    }
+    if diagnostics.has_errors() {
+        return None;
+    }
+    build(name, &document, options, sources, diagnostics)
+}
+
+/// Adds the tables of the files under `library`; what the scene itself says wins.
+fn merge_libraries(document: &mut Document, sources: &mut Sources, diagnostics: &Diagnostics) {
+    let paths: Vec<(String, Span)> =
+        Reader::new(document, diagnostics).strings("library").into_iter().map(|(p, s)| (p.to_owned(), s)).collect();
+    for (path, span) in paths {
+        let full = Context { sources, diagnostics, unit: 1.0 }.resolve(&path, span);
+        match read_text(&full) {
+            Ok(text) => {
+                if let Some(library) = Document::parse(&full.display().to_string(), &text, sources, diagnostics) {
+                    document.merge(library, sources);
+                }
+            }
+            Err(problem) => diagnostics.push(
+                Diagnostic::error(format!("cannot read the library {}: {problem}", full.display()))
+                    .at(span)
+                    .hint("paths are relative to the file that names them"),
+            ),
+        }
+    }
+}
+
+fn build(
+    name: &str,
+    document: &Document,
+    options: &LoadOptions,
+    sources: &Sources,
+    diagnostics: &Diagnostics,
+) -> Option<Scene> {
+    let root = Reader::new(document, diagnostics);
+    root.strings("library");
+    root.u64("schema", 1..=1);
+    let unit = root.one_of_or("unit", 1.0, &UNITS);
+    let context = Context { sources, diagnostics, unit };
+
+    let render_table = root.table("render");
+    let settings = settings::render(render_table.as_ref());
+    let (display, layers) = settings::output(root.table("output"));
+    let tilted = render_table.as_ref().is_none_or(|r| {
+        r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)])
+    });
+    let detail = cloth::Detail::read(render_table.as_ref());
+    if let Some(table) = render_table {
+        table.finish();
+    }
+    let yarns = yarns::read(&root, &context, tilted);
+    let fabric_tables = root.tables("fabric");
+    if fabric_tables.is_empty() && options.curves.is_some() {
+        root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
+    }
+    let plans: Vec<Option<cloth::FabricPlan>> = fabric_tables
+        .into_iter()
+        .enumerate()
+        .map(|(i, table)| {
+            let curves = if i == 0 { options.curves.as_deref() } else { None };
+            cloth::plan(table, &context, &yarns, curves)
+        })
+        .collect();
+    let camera_plan = view::camera(&root, &context, options.frame);
+    let light_plans = view::lights(&root, &context);
+    let ground_plan = view::ground(&root, &context);
+    root.finish();
+    if diagnostics.has_errors() {
+        return None;
+    }
+
+    // The text is sound: now the files.
+    let mut warnings = Vec::new();
+    let mut fabrics: Vec<Fabric> = plans
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .filter_map(|(i, plan)| plan.make(i, &context, &yarns, settings.as_ref()?.seed, &detail, &mut warnings))
+        .collect();
+    let mut lights: Vec<Light> = light_plans.into_iter().flatten().filter_map(|l| l.make(&context)).collect();
+    if diagnostics.has_errors() {
+        return None;
+    }
+
+    // Single precision is kept for what is near: the middle of the cloth becomes the origin.
+    let middle = bounds(&fabrics).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    for fabric in &mut fabrics {
+        transform_curves(&mut fabric.curves, &DAffine3::from_translation(-middle));
+    }
+    for light in &mut lights {
+        if let Light::Point { position, .. } = light {
+            *position = (position.as_dvec3() - middle).as_vec3a();
+        }
+    }
+    let render = settings?;
+    let aspect = f64::from(render.width) / f64::from(render.height);
+    let camera = camera_plan?.make(&fabrics, middle, aspect);
+    let ground = ground_plan.map(|plan| {
+        let height = plan.height.map(|h| h * unit - middle.y);
+        let lowest = bounds(&fabrics).map_or(0.0, |(low, _)| low.y);
+        Ground { height: height.unwrap_or(lowest) as f32, albedo: Rgb::from(plan.albedo) }
+    });
+    let used: Vec<usize> = fabrics.iter().map(|f| f.yarn).collect();
+    let mut scene = Scene {
+        path: name.to_owned(),
+        render,
+        display,
+        layers,
+        camera,
+        yarns: yarns.into_values().collect(),
+        fabrics,
+        lights,
+        ground,
+        middle,
+        fingerprint: String::new(),
+        warnings,
+    };
+    keep_used_yarns(&mut scene, &used);
+    warn_about_precision(&mut scene);
+    scene.fingerprint = settings::fingerprint(&scene);
+    Some(scene)
+}
+
+/// Drops kinds of yarn that no fabric uses: libraries hold many.
+fn keep_used_yarns(scene: &mut Scene, used: &[usize]) {
+    let mut kept = Vec::new();
+    for fabric in &mut scene.fabrics {
+        let place = kept.iter().position(|&y| y == fabric.yarn).unwrap_or_else(|| {
+            kept.push(fabric.yarn);
+            kept.len() - 1
+        });
+        fabric.yarn = place;
+    }
+    debug_assert!(kept.iter().all(|y| used.contains(y)));
+    let mut all: Vec<Option<super::Yarn>> = scene.yarns.drain(..).map(Some).collect();
+    scene.yarns = kept.into_iter().filter_map(|y| all[y].take()).collect();
+}
+
+/// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.
+fn warn_about_precision(scene: &mut Scene) {
+    let Some((low, high)) = scene.bounds() else { return };
+    let thinnest = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(_, r)| r).copied().fold(f64::MAX, f64::min);
+    let ratio = 0.5 * (high - low).length() / thinnest;
+    if ratio > 1e5 {
+        scene.warnings.push(format!(
+            "the scene is {ratio:.1e} times as wide as its thinnest yarn: positions of hits are uncertain by more than \
+             0.2 % of that yarn's radius"
+        ));
+    }
+}
+
+/// A range for counts of pixels and the like.
+const fn counted(range: std::ops::RangeInclusive<u64>) -> std::ops::RangeInclusive<u64> {
+    range
+}
+
+/// Angles in files are degrees.
+fn radians(degrees: f64) -> f64 {
+    degrees.to_radians()
+}
+
+/// Twist angles: less than a quarter turn, or yarn would be infinitely long.
+const TWIST: Range = Range::between(-89.9, 89.9);

@@ -1,0 +1,148 @@
+//! `[render]` and `[output]`, and the fingerprint of a scene.
+
+use std::fmt::Write as _;
+
+use super::{super::*, Range, Reader, counted};
+use crate::image::png::ToneMap;
+
+const SIZE: std::ops::RangeInclusive<u64> = counted(1..=65_536);
+
+/// The settings of `[render]`; `None` if one is wrong.
+pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
+    let defaults = RenderSettings {
+        mode: Mode::Yarn,
+        model: Model::Aggregated,
+        width: 768,
+        height: 576,
+        crop: [0, 0, 768, 576],
+        filter: PixelFilter::Gaussian(0.5),
+        spp: 64,
+        time: None,
+        noise: None,
+        max_bounces: 64,
+        threads: None,
+        seed: 0,
+        compact_bvh: true,
+    };
+    let Some(table) = table else { return Some(defaults) };
+    let width = table.u64_or("width", 768, SIZE) as u32;
+    let height = table.u64_or("height", 576, SIZE) as u32;
+    let crop = table.numbers("crop", Range::at_least(0.0));
+    let crop = match crop.as_deref() {
+        None => [0, 0, width, height],
+        Some(&[x0, y0, x1, y1]) => {
+            let c = [x0, y0, x1, y1].map(|v| v as u32);
+            if c[0] >= c[2] || c[1] >= c[3] || c[2] > width || c[3] > height || [x0, y0, x1, y1].iter().any(|v| v.fract() != 0.0)
+            {
+                let message = format!("the crop must be whole pixels x0 < x1 <= {width} and y0 < y1 <= {height}");
+                table.error_at("crop", message, Some("crop = [x0, y0, x1, y1], the latter two exclusive"));
+            }
+            c
+        }
+        Some(_) => {
+            table.error_at("crop", "expected four numbers", Some("crop = [x0, y0, x1, y1], the latter two exclusive"));
+            [0, 0, width, height]
+        }
+    };
+    let kind = table.one_of_or("filter", 2, &[("box", 0), ("tent", 1), ("gaussian", 2)]);
+    let filter_width = table.f64("filter_width", Range::above(0.0).and_at_most(16.0)).map(|w| w as f32);
+    let filter = match kind {
+        0 => PixelFilter::Box(filter_width.unwrap_or(0.5)),
+        1 => PixelFilter::Tent(filter_width.unwrap_or(1.0)),
+        _ => PixelFilter::Gaussian(filter_width.unwrap_or(0.5)),
+    };
+    Some(RenderSettings {
+        mode: table.one_of_or("mode", defaults.mode, &Mode::NAMES),
+        model: table.one_of_or("model", defaults.model, &Model::NAMES),
+        width,
+        height,
+        crop,
+        filter,
+        spp: table.u64_or("spp", 64, counted(1..=u64::from(u32::MAX))) as u32,
+        time: table.f64("time", Range::above(0.0)),
+        noise: table.f64("noise", Range::above(0.0)),
+        max_bounces: table.u64_or("max_bounces", 64, counted(0..=1_000_000)) as u32,
+        threads: table.u64("threads", counted(1..=4096)).map(|t| t as usize),
+        seed: table.u64_or("seed", 0, counted(0..=u64::from(u32::MAX))) as u32,
+        compact_bvh: table.one_of_or("bvh", true, &[("compact", true), ("fast", false)]),
+    })
+}
+
+/// The settings of `[output]`.
+pub(super) fn output(table: Option<Reader<'_>>) -> (Display, Layers) {
+    let Some(table) = table else { return (Display::default(), Layers::ALL) };
+    let display = Display {
+        tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &[("srgb", ToneMap::Srgb), ("filmic", ToneMap::Filmic)]),
+        exposure: table.f64_or("exposure", 0.0, Range::between(-100.0, 100.0)) as f32,
+        alpha: table.bool_or("alpha", false),
+    };
+    let mut layers = Layers::ALL;
+    if table.has("layers") {
+        layers = Layers::NONE;
+        for (name, _) in table.strings("layers") {
+            match name {
+                "lobes" => layers.lobes = true,
+                "depth" => layers.depth = true,
+                "normal" => layers.normal = true,
+                "variance" => layers.variance = true,
+                "samples" => layers.samples = true,
+                _ => table.error_at(
+                    "layers",
+                    format!("unknown layer `{name}`"),
+                    Some("known are lobes, depth, normal, variance and samples"),
+                ),
+            }
+        }
+    }
+    table.finish();
+    (display, layers)
+}
+
+/// FNV-1a over what is written to it.
+struct Fnv(u64);
+
+impl Fnv {
+    fn bytes(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.0 = (self.0 ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}
+
+impl std::fmt::Write for Fnv {
+    fn write_str(&mut self, s: &str) -> std::fmt::Result {
+        self.bytes(s.as_bytes());
+        Ok(())
+    }
+}
+
+/// A fingerprint of everything that changes the picture: not of samples, time, threads or outputs.
+pub(super) fn fingerprint(scene: &Scene) -> String {
+    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+    let r = &scene.render;
+    let same = (r.mode, r.model, r.width, r.height, r.crop, r.filter, r.max_bounces, r.seed);
+    let written = write!(hash, "{same:?} {:?} {:?} {:?}", scene.camera, scene.yarns, scene.ground);
+    debug_assert!(written.is_ok(), "hashing cannot fail");
+    for light in &scene.lights {
+        if let Light::Environment(light::Environment { radiance, image: Some(map), visible }) = light {
+            let _ = write!(hash, "image {radiance:?} {visible} {:?}", map.rotation());
+            for value in map.pixels().as_flattened() {
+                hash.bytes(&value.to_bits().to_le_bytes());
+            }
+        } else {
+            let _ = write!(hash, "{light:?}");
+        }
+    }
+    for fabric in &scene.fabrics {
+        let _ = write!(hash, "{} {:?} {:?} {} {}", fabric.yarn, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment);
+        for (curve, radii) in &fabric.curves {
+            let _ = write!(hash, "{:?} {}", curve.basis, curve.closed);
+            for (p, r) in curve.points.iter().zip(radii) {
+                for v in [p.x, p.y, p.z, *r] {
+                    hash.bytes(&v.to_bits().to_le_bytes());
+                }
+            }
+        }
+    }
+    format!("{:016x}", hash.0)
+}

@@ -1,0 +1,207 @@
+//! `camera`, `[[light]]` and `[ground]`.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::{DVec3, Mat3A, Vec3A};
+
+use super::{
+    super::{
+        Fabric,
+        camera::{Camera, Projection},
+        document::Value,
+        light::{Environment, EnvironmentMap, Light},
+    },
+    Context, Range, Reader, radians,
+};
+use crate::{image, math::Rgb, scene::diagnostic::Span};
+
+/// A camera before the cloth is known.
+pub(super) struct CameraPlan {
+    camera: Camera,
+    /// Margin, if the camera is to frame the cloth.
+    frame: Option<f64>,
+}
+
+const DEFAULT_FOV: f64 = 30.0;
+const DEFAULT_MARGIN: f64 = 0.04;
+
+fn default_camera(direction: DVec3, up: DVec3, projection: Projection) -> Option<Camera> {
+    Camera::looking_at(direction, DVec3::ZERO, up, projection)
+}
+
+/// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth.
+pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraPlan> {
+    let framing = |direction: DVec3| {
+        let projection = Projection::Perspective(radians(DEFAULT_FOV));
+        Some(CameraPlan { camera: default_camera(direction, DVec3::Y, projection)?, frame: Some(DEFAULT_MARGIN) })
+    };
+    let Some(node) = root.node("camera") else { return framing(DVec3::Z) };
+    if let Value::String(word) = &node.value {
+        if word != "frame" {
+            context.error(node.span, format!("unknown camera \"{word}\""), Some("camera = \"frame\", or a [camera] table".to_owned()));
+        }
+        return framing(DVec3::Z);
+    }
+    let table = root.table("camera")?;
+    let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2)];
+    let kind = table.one_of_or("type", 0, &kinds);
+    let up = DVec3::from(table.vec3_or("up", [0.0, 1.0, 0.0], Range::FINITE));
+    let fov = |table: &Reader<'_>| {
+        Projection::Perspective(radians(table.f64_or("fov", DEFAULT_FOV, Range::above(0.0).and_below(180.0))))
+    };
+    let plan = if kind == 0 {
+        let direction = DVec3::from(table.vec3_or("direction", [0.0, 0.0, 1.0], Range::FINITE));
+        let margin = table.f64_or("margin", DEFAULT_MARGIN, Range::between(-5.0, 0.45));
+        let flat = table.one_of_or("projection", false, &[("perspective", false), ("orthographic", true)]);
+        let projection = if flat { Projection::Orthographic(1.0) } else { fov(&table) };
+        match default_camera(direction, up, projection) {
+            Some(camera) => Some(CameraPlan { camera, frame: Some(margin) }),
+            None => {
+                table.error("`direction` and `up` of the camera must not be parallel or zero", None);
+                None
+            }
+        }
+    } else {
+        let position = table.required_vec3("position", Range::FINITE);
+        let target = table.vec3_or("target", [0.0; 3], Range::FINITE);
+        let projection = if kind == 1 {
+            fov(&table)
+        } else {
+            Projection::Orthographic(table.required_f64("size", Range::POSITIVE).unwrap_or(1.0) * context.unit)
+        };
+        position.and_then(|position| {
+            let made = Camera::looking_at(context.position(position), context.position(target), up, projection);
+            if made.is_none() {
+                table.error_at("position", "`position` and `target` must differ, and not along `up`", None);
+            }
+            made.map(|camera| CameraPlan { camera, frame: frame.then_some(DEFAULT_MARGIN) })
+        })
+    };
+    table.finish();
+    plan
+}
+
+impl CameraPlan {
+    /// The camera for cloth that lies about `middle`.
+    pub(super) fn make(self, fabrics: &[Fabric], middle: DVec3, aspect: f64) -> Camera {
+        match self.frame {
+            None => Camera { position: self.camera.position - middle, ..self.camera },
+            Some(margin) => {
+                let points = fabrics
+                    .iter()
+                    .flat_map(|f| &f.curves)
+                    .flat_map(|(curve, radii)| curve.points.iter().zip(radii.iter().copied()));
+                self.camera.framing(points, aspect, margin)
+            }
+        }
+    }
+}
+
+/// A light whose image is not read yet.
+pub(super) enum LightPlan {
+    Ready(Light),
+    Image { path: PathBuf, span: Span, environment: Environment, rotation: Mat3A },
+}
+
+/// Reads every `[[light]]`.
+pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<LightPlan>> {
+    root.tables("light").into_iter().map(|table| light(table, context)).collect()
+}
+
+fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
+    let bright = Range::at_least(0.0);
+    let kind = table.required_one_of("type", &[("environment", 0), ("distant", 1), ("point", 2)]);
+    let plan = match kind {
+        Some(0) => {
+            let radiance = Rgb::from(table.rgb_or("radiance", [1.0; 3], bright));
+            let environment = Environment { radiance, image: None, visible: table.bool_or("visible", true) };
+            let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE)) as f32;
+            match table.string("image") {
+                None => Some(LightPlan::Ready(Light::Environment(environment))),
+                Some(path) => {
+                    let span = table.span("image").unwrap_or(table.header());
+                    let rotation = Mat3A::from_rotation_y(-turn);
+                    Some(LightPlan::Image { path: context.resolve(path, span), span, environment, rotation })
+                }
+            }
+        }
+        Some(1) => {
+            let towards = table.required_vec3("towards", Range::FINITE);
+            let angle = radians(table.f64_or("angular_radius", 0.0, Range::between(0.0, 90.0)));
+            let irradiance = Rgb::from(table.rgb_or("irradiance", [std::f64::consts::PI; 3], bright));
+            towards.and_then(|t| {
+                let unit = DVec3::from(t).try_normalize();
+                if unit.is_none() {
+                    table.error_at("towards", "the direction towards a light cannot be zero", None);
+                }
+                // 1 - cos, without the cancellation of small angles.
+                let one_minus_cos = (2.0 * (0.5 * angle).sin().powi(2)) as f32;
+                unit.map(|u| LightPlan::Ready(Light::Distant { towards: u.as_vec3a(), one_minus_cos, irradiance }))
+            })
+        }
+        Some(2) => {
+            let position = table.required_vec3("position", Range::FINITE);
+            // Radiant intensity is per square of the scene's unit.
+            let area = context.unit * context.unit;
+            let intensity = table.rgb_or("intensity", [1.0; 3], bright).map(|i| i * area);
+            position.map(|p| {
+                let position: Vec3A = context.position(p).as_vec3a();
+                LightPlan::Ready(Light::Point { position, intensity: Rgb::from(intensity) })
+            })
+        }
+        _ => None,
+    };
+    table.finish();
+    plan
+}
+
+impl LightPlan {
+    /// Reads the image, if the light has one.
+    pub(super) fn make(self, context: &Context<'_>) -> Option<Light> {
+        let (path, span, environment, rotation) = match self {
+            Self::Ready(light) => return Some(light),
+            Self::Image { path, span, environment, rotation } => (path, span, environment, rotation),
+        };
+        let picture = match image::read(&path) {
+            Ok(picture) => picture,
+            Err(error) => {
+                context.error(span, error.to_string(), None);
+                return None;
+            }
+        };
+        let Some([r, g, b]) = picture.rgb() else {
+            context.error(span, format!("{}: no colour channels", path.display()), None);
+            return None;
+        };
+        let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+        let map = EnvironmentMap::new(picture.width, picture.height, pixels, rotation);
+        Some(Light::Environment(Environment { image: Some(Arc::new(map)), ..environment }))
+    }
+}
+
+/// A floor before the cloth is known.
+pub(super) struct GroundPlan {
+    /// In scene units; `None` for right below the cloth.
+    pub(super) height: Option<f64>,
+    pub(super) albedo: [f64; 3],
+}
+
+/// Reads `[ground]`.
+pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>) -> Option<GroundPlan> {
+    let table = root.table("ground")?;
+    let auto = match table.node("height") {
+        None => true,
+        Some(node) => match &node.value {
+            Value::String(word) if word == "auto" => true,
+            Value::String(word) => {
+                context.error(node.span, format!("unknown height \"{word}\""), Some("a number, or \"auto\" for right below the cloth".to_owned()));
+                true
+            }
+            _ => false,
+        },
+    };
+    let height = if auto { None } else { table.f64("height", Range::FINITE) };
+    let albedo = table.rgb_or("albedo", [0.5; 3], Range::UNIT);
+    table.finish();
+    Some(GroundPlan { height, albedo })
+}

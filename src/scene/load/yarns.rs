@@ -1,0 +1,184 @@
+//! `[fiber.NAME]` and `[yarn.NAME]`: what cloth is made of.
+
+use std::{collections::BTreeMap, f64::consts::TAU};
+
+use super::{super::Yarn, Context, Range, Reader, TWIST, counted, radians};
+use crate::{
+    geometry::yarn::{MAX_PLIES, PlyParameters, touching_plies},
+    scattering::fiber::FiberMaterial,
+    scene::diagnostic::unknown_name,
+};
+
+/// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake.
+pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> BTreeMap<String, Yarn> {
+    let fibers: BTreeMap<&str, FiberMaterial> =
+        root.named_tables("fiber").into_iter().filter_map(|(name, table)| Some((name, fiber(table)?))).collect();
+    root.named_tables("yarn")
+        .into_iter()
+        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, &fibers, tilted)?)))
+        .collect()
+}
+
+fn fiber(table: Reader<'_>) -> Option<FiberMaterial> {
+    // Half a turn and more is as wide as anything can be; zero would be a mirror no light finds.
+    let width = Range::above(0.0).and_at_most(360.0);
+    let [r, tt, d] = ["r", "tt", "d"].map(|key| table.rgb_or(key, [0.0; 3], Range::UNIT));
+    let beta_r = table.f64_or("beta_r", 10.0, width);
+    let beta_tt = table.f64_or("beta_tt", 10.0, width);
+    let beta_n = table.f64_or("beta_n", 20.0, width);
+    for c in 0..3 {
+        let sum = r[c] + tt[c] + d[c];
+        if sum > 1.0 + 1e-9 {
+            let channel = ["red", "green", "blue"][c];
+            let key = ["d", "tt", "r"].into_iter().find(|k| table.has(k)).unwrap_or("d");
+            let message = format!("r + tt + d is {sum:.4} in {channel}: the fibre would make light");
+            table.error_at(key, message, Some("the three albedos of a channel sum to at most 1"));
+            break;
+        }
+    }
+    table.finish();
+    Some(FiberMaterial {
+        r,
+        tt,
+        d,
+        beta_r: radians(beta_r),
+        beta_tt: radians(beta_tt),
+        beta_n: radians(beta_n),
+    })
+}
+
+/// The keys of one ply, each with the yarn's own value behind it.
+struct PlyKeys {
+    radius: Option<f64>,
+    aspect: f64,
+    fiber: Option<String>,
+    fibers: Option<u64>,
+    fiber_radius: Option<f64>,
+    density: Option<f64>,
+    fiber_twist: f64,
+    angle: Option<f64>,
+}
+
+impl PlyKeys {
+    fn read(table: &Reader<'_>, behind: Option<&PlyKeys>) -> Self {
+        let fiber_radius = table.f64("fiber_radius", Range::POSITIVE);
+        let density = table.f64("density", Range::above(0.0).and_at_most(100.0));
+        if fiber_radius.is_some() && density.is_some() {
+            table.error_at("density", "give `fiber_radius` or `density`, not both", Some("density = fibers * (fiber_radius / ply_radius)^2"));
+        }
+        let own = fiber_radius.is_some() || density.is_some();
+        Self {
+            radius: table.f64("ply_radius", Range::POSITIVE).or(behind.and_then(|b| b.radius)),
+            aspect: table.f64_or("ply_aspect", behind.map_or(1.0, |b| b.aspect), Range::above(0.0).and_at_most(1.0)),
+            fiber: table.string("fiber").map(str::to_owned).or_else(|| behind.and_then(|b| b.fiber.clone())),
+            fibers: table.u64("fibers", counted(0..=1_000_000)).or(behind.and_then(|b| b.fibers)),
+            fiber_radius: fiber_radius.or(if own { None } else { behind.and_then(|b| b.fiber_radius) }),
+            density: density.or(if own { None } else { behind.and_then(|b| b.density) }),
+            fiber_twist: table.f64_or("fiber_twist", behind.map_or(0.0, |b| b.fiber_twist), TWIST),
+            angle: table.f64("ply_angle", Range::FINITE).map(radians),
+        }
+    }
+}
+
+fn yarn(
+    name: &str,
+    table: Reader<'_>,
+    context: &Context<'_>,
+    fibers: &BTreeMap<&str, FiberMaterial>,
+    tilted: bool,
+) -> Option<Yarn> {
+    let radius = table.f64("radius", Range::POSITIVE);
+    let ply_twist = table.f64_or("ply_twist", 0.0, TWIST);
+    let distance = table.f64("ply_distance", Range::at_least(0.0));
+    let shared = PlyKeys::read(&table, None);
+    let ply_tables = table.tables("ply");
+    let count = table.u64("plies", counted(1..=MAX_PLIES as u64));
+    let count = match (count, ply_tables.len()) {
+        (Some(n), m) if m > 0 && n != m as u64 => {
+            table.error_at("plies", format!("plies = {n}, but there are {m} [[yarn.{name}.ply]] tables"), Some("leave `plies` out"));
+            m as u64
+        }
+        (_, m) if m > MAX_PLIES => {
+            table.error_at("ply", format!("{m} plies; at most {MAX_PLIES} are possible"), None);
+            return None;
+        }
+        (_, m) if m > 0 => m as u64,
+        (n, _) => n.unwrap_or(1),
+    };
+    let Some(radius) = radius else {
+        table.error(format!("missing key `radius` in {}", table.title()), Some("outer radius of the yarn; the radii of a curve file win over it"));
+        table.finish();
+        return None;
+    };
+    let (touching, _) = touching_plies(count as u32);
+
+    let mut plies = Vec::new();
+    let mut materials = Vec::new();
+    let mut make = |keys: &PlyKeys, place: &Reader<'_>, index: usize| {
+        let ply_radius = keys.radius.map_or(touching, |r| r / radius);
+        if ply_radius > 1.0 + 1e-9 {
+            place.error_at("ply_radius", "a ply cannot be thicker than its yarn", Some("ply_radius <= radius"));
+        }
+        let short = ply_radius * keys.aspect.sqrt();
+        let long = ply_radius / keys.aspect.sqrt();
+        let distance = distance.map_or(if count == 1 { 0.0 } else { (1.0 - short).max(0.0) }, |d| d / radius);
+        if distance.hypot(long).max(distance + short) > 1.0 + 1e-6 && count > 1 && distance + short > 1.0 + 1e-6 {
+            place.error_at("ply_distance", "the ply reaches beyond the yarn's radius", Some("ply_distance + ply_radius <= radius"));
+        }
+        let Some(n) = keys.fibers else {
+            place.error("missing key `fibers`: the number of fibres in a ply", None);
+            return;
+        };
+        let fiber_radius = match (keys.fiber_radius, keys.density) {
+            (Some(r), _) => r / radius,
+            (None, Some(d)) => ply_radius * (d / n.max(1) as f64).sqrt(),
+            (None, None) => {
+                place.error("missing key `fiber_radius`", Some("or give `density`, the share of the ply's section that fibres fill"));
+                return;
+            }
+        };
+        if fiber_radius >= ply_radius {
+            let key = if keys.fiber_radius.is_some() { "fiber_radius" } else { "density" };
+            place.error_at(key, format!("fibres of radius {:.4} do not fit a ply of radius {:.4}", fiber_radius * radius, ply_radius * radius), None);
+        }
+        let Some(fiber) = &keys.fiber else {
+            place.error("missing key `fiber`: the name of a [fiber.NAME] table", None);
+            return;
+        };
+        let Some(material) = fibers.get(fiber.as_str()) else {
+            let (message, hint) = unknown_name("fiber", fiber, fibers.keys().copied());
+            place.error_at("fiber", message, Some(&hint));
+            return;
+        };
+        plies.push(PlyParameters {
+            radius: ply_radius.min(1.0),
+            aspect: keys.aspect,
+            distance,
+            angle: keys.angle.unwrap_or(TAU * index as f64 / count as f64),
+            fibers: n as u32,
+            fiber_radius,
+            fiber_twist: radians(keys.fiber_twist),
+        });
+        materials.push((fiber.clone(), material.clone()));
+    };
+    if ply_tables.is_empty() {
+        for index in 0..count as usize {
+            make(&shared, &table, index);
+        }
+    } else {
+        for (index, ply) in ply_tables.into_iter().enumerate() {
+            let keys = PlyKeys::read(&ply, Some(&shared));
+            make(&keys, &ply, index);
+            ply.finish();
+        }
+    }
+    table.finish();
+    (plies.len() == count as usize).then(|| Yarn {
+        name: name.to_owned(),
+        radius: radius * context.unit,
+        plies,
+        ply_twist: radians(ply_twist),
+        fibers: materials,
+        tilted,
+    })
+}

@@ -1,0 +1,96 @@
+//! What Embree asks during traversal.
+
+use super::{Weave, section_at};
+use crate::{
+    ffi::embree::{HitFilter, Ray, RawHit},
+    geometry::section::Crossings,
+};
+
+/// Below this a shadow ray counts as blocked.
+const OPAQUE: f32 = 1e-3;
+
+/// Whether a hit is where the ray leaves a yarn.
+#[inline]
+fn leaves(ray: &Ray, hit: &RawHit) -> bool {
+    hit.normal.dot(ray.direction) > 0.0
+}
+
+/// Lets rays through between the plies.
+pub(super) struct GapFilter<'a> {
+    pub(super) weaves: &'a [Weave],
+    pub(super) ray: &'a Ray,
+}
+
+impl HitFilter for GapFilter<'_> {
+    #[inline]
+    fn accept(&mut self, hit: &RawHit) -> bool {
+        if leaves(self.ray, hit) {
+            return false;
+        }
+        let weave = &self.weaves[hit.geometry as usize];
+        let shape = weave.yarn.shape();
+        shape.filled || section_at(weave, self.ray, hit).meets_ply(shape)
+    }
+}
+
+/// Number of hits a shadow ray remembers to tell repeats.
+const REMEMBERED: usize = 8;
+
+/// Multiplies what each yarn on a shadow ray lets pass; one hit counts once, however often Embree offers it.
+pub(super) struct ShadowFilter<'a> {
+    weaves: &'a [Weave],
+    ray: &'a Ray,
+    crossings: &'a mut Crossings,
+    passed: f32,
+    seen: [(u32, u32, f32); REMEMBERED],
+    next: usize,
+}
+
+impl<'a> ShadowFilter<'a> {
+    pub(super) fn new(weaves: &'a [Weave], ray: &'a Ray, crossings: &'a mut Crossings) -> Self {
+        Self { weaves, ray, crossings, passed: 1.0, seen: [(u32::MAX, 0, 0.0); REMEMBERED], next: 0 }
+    }
+
+    /// The share of light that all hits so far let pass.
+    pub(super) fn passed(&self) -> f32 {
+        self.passed
+    }
+
+    /// Whether this is a hit seen before: the same place, offered again or by the neighbouring segment at a joint.
+    #[inline]
+    fn repeated(&mut self, hit: &RawHit, radius: f32) -> bool {
+        let near = 1e-3 * radius;
+        let same = |&(geometry, segment, t): &(u32, u32, f32)| {
+            geometry == hit.geometry && segment.abs_diff(hit.segment) <= 1 && (t - hit.t).abs() <= near
+        };
+        if self.seen.iter().any(same) {
+            return true;
+        }
+        self.seen[self.next % REMEMBERED] = (hit.geometry, hit.segment, hit.t);
+        self.next += 1;
+        false
+    }
+}
+
+impl HitFilter for ShadowFilter<'_> {
+    #[inline]
+    fn accept(&mut self, hit: &RawHit) -> bool {
+        if leaves(self.ray, hit) {
+            return false;
+        }
+        let weave = &self.weaves[hit.geometry as usize];
+        let section = section_at(weave, self.ray, hit);
+        section.crossings(weave.yarn.shape(), self.crossings);
+        if self.crossings.is_empty() {
+            return false;
+        }
+        let through = weave.yarn.transparency(self.crossings);
+        if through < OPAQUE {
+            return true;
+        }
+        if !self.repeated(hit, section.radius) {
+            self.passed *= through;
+        }
+        self.passed < OPAQUE
+    }
+}
