@@ -1,7 +1,9 @@
 //! x
 pub mod aggregated;
+pub mod closed_forms;
 pub mod fiber;
 pub mod kernel;
+pub mod lobes;
 pub mod medium;
 pub mod yarn;
 
