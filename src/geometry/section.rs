@@ -18,7 +18,7 @@ use crate::math::frame::sin_cos;
 /// Slope along the yarn beyond which a ray counts as no steeper.
 const MAX_SLOPE: f32 = 3.0;
 /// How far along the yarn, in yarn radii, turning and bending are followed.
-const MAX_TRAVEL: f32 = 2.0;
+const MAX_TRAVEL: f32 = 1.2;
 
 /// The same for the way of the light, measured to the plies' nearest points.
 const MAX_LIGHT_TRAVEL: f32 = 1.2;
@@ -316,13 +316,20 @@ impl Section {
                 centre = self.ply_centre(ply, axis, travel + further);
             }
             let radius = if core { ply.core_radius } else { ply.radius };
-            let (from, way, square) = if ply.stretch.x == 1.0 {
-                (start - centre, ahead, 1.0)
+            // The centre moves on while the way goes past it.
+            let drift = if further.abs() < MAX_LIGHT_TRAVEL {
+                slope * (shape.ply_rate * ply.distance * axis.perp() + (travel + further) * self.bend)
+            } else {
+                Vec2::ZERO
+            };
+            let (from, way) = (start - centre + nearest * drift, ahead - drift);
+            let (from, way) = if ply.stretch.x == 1.0 {
+                (from, way)
             } else {
                 let to_circle = |p: Vec2| Vec2::new(p.dot(axis), axis.perp_dot(p)) * ply.stretch;
-                let way = to_circle(ahead);
-                (to_circle(start - centre), way, way.length_squared())
+                (to_circle(from), to_circle(way))
             };
+            let square = way.length_squared().max(1e-6);
             let b = from.dot(way) / square;
             let reach = b * b - (from.length_squared() - radius * radius) / square;
             if reach > 0.0 {
