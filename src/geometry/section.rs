@@ -303,8 +303,8 @@ impl Section {
         start: Vec2,
         travel: f32,
         w: Vec3A,
-        core: bool,
-        mut visit: impl FnMut(usize, f32, f32),
+        core: Option<usize>,
+        mut visit: impl FnMut(usize, f32, f32, f32),
     ) {
         let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
         let ahead = Vec2::new(w.x, w.y) / cos;
@@ -323,7 +323,7 @@ impl Section {
                 }
                 centre = self.ply_centre(ply, axis, travel + further);
             }
-            let radius = if core { ply.core_radius } else { ply.radius };
+            let radius = if core == Some(index) { ply.core_radius } else { ply.radius };
             // The centre moves on while the way goes past it.
             let drift = if further.abs() < MAX_LIGHT_TRAVEL {
                 slope * (shape.ply_rate * ply.distance * axis.perp() + (travel + further) * self.bend)
@@ -344,7 +344,7 @@ impl Section {
                 let half = reach.sqrt();
                 let leave = half - b;
                 if leave > 0.0 {
-                    visit(index, (-b - half).max(0.0), leave);
+                    visit(index, (-b - half).max(0.0), leave, way.perp_dot(from) / square.sqrt());
                 }
             }
         }

@@ -426,9 +426,15 @@ impl<'a> Vertex<'a> {
         let cleared = if ahead.x > 0.0 { width / ahead.y.abs().max(1e-6) } else { width };
         let ramp = |t: f32| if t < cleared { 0.5 * t * t / cleared } else { t - 0.5 * cleared };
         let mut depth = Rgb::ZERO;
-        self.section.chords_ahead(shape, start, node.travel, w, true, |ply, from, to| {
-            let length = ramp(to + optics.lead) - ramp(from + optics.lead);
-            depth += self.yarn.plies[ply].rho * (self.yarn.plies[ply].sigma * length);
+        self.section.chords_ahead(shape, start, node.travel, w, Some(node.ply), |ply, from, to, offset| {
+            let fibers = if ply == node.ply {
+                self.yarn.plies[ply].sigma * (ramp(to + optics.lead) - ramp(from + optics.lead))
+            } else {
+                let all = shape.plies[ply].fibers_on_chord(offset);
+                let full = 2.0 * (shape.plies[ply].radius.powi(2) - offset * offset).max(1e-8).sqrt();
+                all * (((to - from) / full).min(1.0))
+            };
+            depth += self.yarn.plies[ply].rho * fibers;
         });
         let along = w.dot(node.tangent);
         depth * ((1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos)
@@ -616,7 +622,7 @@ impl<'a> Vertex<'a> {
         let mut unscattered = forward.half_depth_unscattered;
         let start = Vec2::new(forward.middle, self.section.h);
         let travel = self.section.travel(forward.middle);
-        self.section.chords_ahead(&self.yarn.shape, start, travel, w, false, |ply, from, to| {
+        self.section.chords_ahead(&self.yarn.shape, start, travel, w, None, |ply, from, to, _| {
             let optics = &self.yarn.plies[ply];
             let fibers = forward.scale * optics.sigma * (to - from);
             depth += optics.rho * fibers;
@@ -672,7 +678,7 @@ impl Forward {
         }
         let mut plain = 0.0;
         let start = Vec2::new(middle, section.h);
-        section.chords_ahead(&yarn.shape, start, section.travel(middle), -camera, false, |ply, from, to| {
+        section.chords_ahead(&yarn.shape, start, section.travel(middle), -camera, None, |ply, from, to, _| {
             plain += yarn.plies[ply].sigma * (to - from);
         });
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
