@@ -70,7 +70,7 @@ impl AggregatedYarn {
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
         let count = shape.plies.len();
         let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
-        let node_gain = plies.iter().map(|p| p.albedo * (p.closure + 1.0) * 0.5).collect();
+        let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
         Self { shape, plies, node_gain, forward_follows_light: true }
     }
 
@@ -122,14 +122,29 @@ struct Backward {
     frame: PlyFrame,
     /// cos and sin of the azimuth towards which it leans.
     lean_to: (f32, f32),
-    /// Energy, given the direction drawn.
+    /// Energy that leaves the node's ply, given the direction drawn.
     energy: Rgb,
-    /// Chance that the drawn direction does not escape.
+    /// Chance that the node's drawn direction does not escape.
     chance: f32,
+    /// In a yarn of several plies: light that leaves the ply and meets another one.
+    again: Option<Again>,
     /// Channel means of the ply's shares, for sampling.
     mirrored: f32,
     lean: f32,
     kappa: f32,
+}
+
+/// Light that left the node's ply in a direction drawn from its lobe, as far as other plies took it up.
+#[derive(Clone, Copy, Debug)]
+struct Again {
+    /// The direction, B's value over density there, and its density.
+    direction: Vec3A,
+    weight: Rgb,
+    pdf: f32,
+    /// Chance that it goes on in this direction.
+    open: f32,
+    /// Energy that other plies took up and give off evenly.
+    energy: Rgb,
 }
 
 /// Light that passes as TT.
@@ -225,6 +240,8 @@ struct NodeValue {
     pdf: f32,
     /// e^-optical depth.
     clear: Rgb,
+    /// e^-optical depth of the other plies alone.
+    open: Rgb,
 }
 
 impl<'a> Vertex<'a> {
@@ -282,7 +299,7 @@ impl<'a> Vertex<'a> {
             backward: None,
             drawn: Drawn {
                 direction: Vec3A::ZERO,
-                value: NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: Rgb::ZERO, pdf: 0.0, clear: Rgb::ONE },
+                value: NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: Rgb::ZERO, pdf: 0.0, clear: Rgb::ONE, open: Rgb::ONE },
                 escape: 0.0,
             },
         };
@@ -385,8 +402,28 @@ impl<'a> Vertex<'a> {
         let escape = self.escape_chance(&node, optics, value.clear);
         self.drawn = Drawn { direction, value, escape };
 
-        let energy = node.amplitude * optics.albedo * optics.closure * (Rgb::ONE - value.clear);
-        self.backward = Some(self.backward_of(crossing, energy, 1.0 - escape));
+        let energy = node.amplitude * optics.albedo * optics.leaves_ply * (Rgb::ONE - value.clear);
+        let mut backward = self.backward_of(crossing, energy, 1.0 - escape);
+        if self.yarn.shape.plies.len() > 1 && backward.chance > 0.0 {
+            let w = backward.draw(stream);
+            let (value, pdf) = self.backward_value(&backward, node.ply, w);
+            if pdf > 0.0 {
+                let open = (-self.optical_depth(&node, w).1).exp();
+                let weight = value / pdf;
+                let energy = weight * (Rgb::ONE - open) * optics.leaves_yarn;
+                let chance = self.open_chance(&node, optics, open);
+                backward.again = Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy });
+            }
+        }
+        self.backward = Some(backward);
+    }
+
+    /// The chance, given how open a direction is, that multiply scattered light goes on in it.
+    #[inline]
+    fn open_chance(&self, node: &Node, optics: &PlyOptics, open: Rgb) -> f32 {
+        let out = open.weighted_mean(node.weight);
+        let stay = ((Rgb::ONE - open) * optics.leaves_yarn).weighted_mean(node.weight);
+        if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 
     /// Lobe B of a ply, for a given energy and chance of sampling.
@@ -405,18 +442,20 @@ impl<'a> Vertex<'a> {
             lean_to: (lean_cos, lean_sin),
             energy,
             chance,
+            again: None,
             mirrored: optics.mirrored.mean(),
             lean: optics.lean.mean().min(0.95),
             kappa: 0.125 / optics.beta_r_squared.max(super::kernel::MIN_VARIANCE),
         }
     }
 
-    /// The optical depth between a node and the outside in a direction of the section's frame, per channel.
+    /// The optical depth between a node and the outside in a direction of the section's frame, per channel: of all
+    /// plies, and of all but the node's own.
     ///
     /// Near its own fibre the way is clearer than the mean medium: the camera's ray has already swept a strip as wide
     /// as a fibre (the "hot spot"), and the light starts at the fibre's surface, not at its centre.
     #[inline]
-    fn optical_depth(&self, node: &Node, w: Vec3A) -> Rgb {
+    fn optical_depth(&self, node: &Node, w: Vec3A) -> (Rgb, Rgb) {
         let shape = &self.yarn.shape;
         let optics = &self.yarn.plies[node.ply];
         let cos = (1.0 - w.z * w.z).max(1e-6).sqrt();
@@ -425,26 +464,28 @@ impl<'a> Vertex<'a> {
         let width = 2.0 * shape.plies[node.ply].fiber_radius;
         let cleared = if ahead.x > 0.0 { width / ahead.y.abs().max(1e-6) } else { width };
         let ramp = |t: f32| if t < cleared { 0.5 * t * t / cleared } else { t - 0.5 * cleared };
-        let mut depth = Rgb::ZERO;
+        let mut own = Rgb::ZERO;
+        let mut others = Rgb::ZERO;
         self.section.chords_ahead(shape, start, node.travel, w, Some(node.ply), |ply, from, to, offset| {
-            let fibers = if ply == node.ply {
-                self.yarn.plies[ply].sigma * (ramp(to + optics.lead) - ramp(from + optics.lead))
+            if ply == node.ply {
+                own += optics.rho * (optics.sigma * (ramp(to + optics.lead) - ramp(from + optics.lead)));
             } else {
-                let all = shape.plies[ply].fibers_on_chord(offset);
-                let full = 2.0 * (shape.plies[ply].radius.powi(2) - offset * offset).max(1e-8).sqrt();
-                all * (((to - from) / full).min(1.0))
-            };
-            depth += self.yarn.plies[ply].rho * fibers;
+                let other = &shape.plies[ply];
+                let full = 2.0 * (other.radius * other.radius - offset * offset).max(1e-8).sqrt();
+                others += self.yarn.plies[ply].rho * (other.fibers_on_chord(offset) * ((to - from) / full).min(1.0));
+            }
         });
         let along = w.dot(node.tangent);
-        depth * ((1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos)
+        let tilt = (1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos;
+        others *= tilt;
+        (own * tilt + others, others)
     }
 
     /// The node's lobes towards `w`, dimmed by the way out.
     #[inline]
     fn node_value(&self, node: &Node, w: Vec3A) -> NodeValue {
         let optics = &self.yarn.plies[node.ply];
-        let depth = self.optical_depth(node, w);
+        let (depth, others) = self.optical_depth(node, w);
         let clear = (-depth).exp();
         let sin = w.dot(node.tangent).clamp(-1.0, 1.0);
         let cos = (1.0 - sin * sin).sqrt();
@@ -455,7 +496,7 @@ impl<'a> Vertex<'a> {
         let even = cos * (0.5 * FRAC_1_PI);
         let scale = node.amplitude * clear * even;
         let [p_r, p_tt, p_d] = node.chance;
-        let mut value = NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: optics.single_d * scale * DIFFUSE, pdf: p_d * DIFFUSE, clear };
+        let mut value = NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: optics.single_d * scale * DIFFUSE, pdf: p_d * DIFFUSE, clear, open: (-others).exp() };
         if p_r > 0.0 {
             let m = kernel(kappa_of_variance(passed * beta_tt + optics.beta_r_squared), at);
             value.r = optics.single_r * scale * m;
@@ -474,7 +515,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     fn escape_chance(&self, node: &Node, optics: &PlyOptics, clear: Rgb) -> f32 {
         let out = clear.weighted_mean(node.weight);
-        let stay = ((Rgb::ONE - clear) * optics.closure).weighted_mean(node.weight);
+        let stay = ((Rgb::ONE - clear) * optics.leaves_yarn).weighted_mean(node.weight);
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 
@@ -499,8 +540,18 @@ impl<'a> Vertex<'a> {
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
             if let Some(backward) = &self.backward {
-                let (value, pdf) = self.backward_value(backward, node.ply, w);
-                lobes.b = value * mis_weight(light_pdf, at_node * backward.chance * pdf);
+                let optics = &self.yarn.plies[node.ply];
+                let (first, pdf) = self.backward_value(backward, node.ply, w);
+                let chance = at_node * backward.chance;
+                lobes.b = match &backward.again {
+                    None => first * mis_weight(light_pdf, chance * pdf),
+                    Some(again) => {
+                        let open = self.open_chance(node, optics, value.open);
+                        let even = even_over_fibers(backward.frame.latitudes(w).1);
+                        first * value.open * mis_weight(light_pdf, chance * open * pdf)
+                            + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even)
+                    }
+                };
             }
         }
         let total = lobes.sum().mean();
@@ -545,29 +596,25 @@ impl<'a> Vertex<'a> {
             });
         }
         let backward = self.backward.as_ref()?;
-        let frame = &backward.frame;
-        let lat = [u[1], stream.next()];
-        let sin = if stream.next() < backward.mirrored {
-            sample_sine(backward.kappa, frame.sin, frame.cos, lat, stream)
-        } else {
-            sample_sine_diffuse(lat)
+        let shares = LobeValues { b: Rgb::ONE, ..LobeValues::default() };
+        let chance = at_node * backward.chance;
+        let (direction, value, pdf) = match &backward.again {
+            None => {
+                let w = backward.draw(stream);
+                let (value, pdf) = self.backward_value(backward, node.ply, w);
+                (w, value, pdf)
+            }
+            Some(again) if stream.next() < again.open => (again.direction, again.weight * again.pdf, again.pdf * again.open),
+            Some(again) => {
+                let frame = &backward.frame;
+                let sin = sample_sine_diffuse([u[1], stream.next()]);
+                let w = frame.direction(sin, TAU * u[2]);
+                let even = even_over_fibers((1.0 - sin * sin).max(0.0).sqrt());
+                (w, again.energy * even, even * (1.0 - again.open))
+            }
         };
-        // Azimuth with density (1 + lean cos(phi - phi0)) / 2 pi: uniform, then folded towards the front.
-        let mut phi = TAU * u[2];
-        if stream.next() < backward.lean && stream.next() > 0.5 * (1.0 + sin_cos(phi).1) {
-            phi = PI - phi;
-        }
-        let turned = backward.lean_to.1.atan2(backward.lean_to.0);
-        let w = frame.direction(sin, phi + turned);
-        let (value, pdf) = self.backward_value(backward, node.ply, w);
-        let pdf = pdf * at_node * backward.chance;
-        (pdf > 0.0).then(|| Continuation {
-            direction: w,
-            weight: value / pdf,
-            pdf,
-            shares: LobeValues { b: Rgb::ONE, ..LobeValues::default() },
-            start,
-        })
+        let pdf = pdf * chance;
+        (pdf > 0.0).then(|| Continuation { direction, weight: value / pdf, pdf, shares, start })
     }
 
     /// Depth (x of the section) from which light of the node's lobes and of B leaves.
@@ -631,6 +678,36 @@ impl<'a> Vertex<'a> {
         let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
         (passed * forward.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
+}
+
+impl Backward {
+    /// Draws a direction from the lobe.
+    #[inline]
+    fn draw(&self, stream: &mut Stream) -> Vec3A {
+        let frame = &self.frame;
+        let lat = [stream.next(), stream.next()];
+        let sin = if stream.next() < self.mirrored {
+            sample_sine(self.kappa, frame.sin, frame.cos, lat, stream)
+        } else {
+            sample_sine_diffuse(lat)
+        };
+        // Azimuth with density (1 + lean cos(phi - phi0)) / 2 pi: uniform, then folded towards the front.
+        let mut phi = TAU * stream.next();
+        if stream.next() < self.lean && stream.next() > 0.5 * (1.0 + sin_cos(phi).1) {
+            phi = PI - phi;
+        }
+        // Turned by phi0.
+        let (s, c) = sin_cos(phi);
+        let (c0, s0) = self.lean_to;
+        let cos = (1.0 - sin * sin).max(0.0).sqrt();
+        cos * ((c * c0 - s * s0) * frame.x + (s * c0 + c * s0) * frame.y) + sin * frame.z
+    }
+}
+
+/// Density per steradian of the diffuse lobe about an axis, by the cosine of the latitude: (2/pi) cos / 2 pi.
+#[inline]
+fn even_over_fibers(cos: f32) -> f32 {
+    DIFFUSE * cos * (0.5 * FRAC_1_PI)
 }
 
 impl Forward {

@@ -18,6 +18,8 @@ mod calibrated {
     pub(super) const LEAN: f64 = 3.2;
     pub(super) const LEAN_HALF: f64 = 10.0;
     pub(super) const LEAN_ALBEDO: f64 = 0.14;
+    /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
+    pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.65;
 }
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
@@ -76,8 +78,10 @@ pub struct PlyOptics {
     pub single_tt: Rgb,
     /// Their sum: the albedo of an event that ends a chain.
     pub albedo: Rgb,
-    /// Of light scattered twice or more: the share that leaves the yarn at last.
-    pub closure: Rgb,
+    /// Of light scattered twice or more: the share that leaves this ply at last.
+    pub leaves_ply: Rgb,
+    /// The same for leaving the yarn, when its other plies are met at random.
+    pub leaves_yarn: Rgb,
     /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
     pub mirrored: Rgb,
     /// How much that light leans towards where the camera looks from, 0 to 1.
@@ -118,12 +122,17 @@ impl PlyOptics {
             let t = radius_optical(c);
             let e = escape_probability_of_disc(t);
             let k = calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
-            let e = e * (1.0 + k) / (1.0 + k * e);
-            let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
-            e * (1.0 - neighbours * (e * t * PI / 2.0).min(1.0))
+            e * (1.0 + k) / (1.0 + k * e)
         };
-        let closure = |c: usize| {
-            let gain = albedo(c) * escape(c);
+        let escape_past = |neighbours: f64, c: usize| {
+            let e = escape(c);
+            e * (1.0 - neighbours * (e * radius_optical(c) * PI / 2.0).min(1.0))
+        };
+        let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
+        let escape_yarn = |c: usize| escape_past(neighbours, c);
+        let escape_ply = |c: usize| escape_past(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c);
+        let closure = |escape: f64, c: usize| {
+            let gain = albedo(c) * escape;
             // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
             let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
             if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
@@ -134,7 +143,7 @@ impl PlyOptics {
                 return 0.0;
             }
             let share = r(c) / out;
-            let again = albedo(c) * (1.0 - escape(c));
+            let again = albedo(c) * (1.0 - escape_yarn(c));
             share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
         };
         let lean = |c: usize| {
@@ -150,7 +159,8 @@ impl PlyOptics {
             single_d: per_channel(&|c| single(d(c), c)),
             single_tt: per_channel(&|c| single(tt_out(c), c)),
             albedo: per_channel(&albedo),
-            closure: per_channel(&closure),
+            leaves_ply: per_channel(&|c| closure(escape_ply(c), c)),
+            leaves_yarn: per_channel(&|c| closure(escape_yarn(c), c)),
             mirrored: per_channel(&mirrored),
             lean: per_channel(&lean),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
