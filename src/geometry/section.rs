@@ -193,7 +193,13 @@ impl Section {
     /// How far along the yarn from the frame's origin the ray is when it is at depth `x`.
     #[inline]
     pub fn travel(&self, x: f32) -> f32 {
-        ((x - self.enter) * self.slope).clamp(-MAX_TRAVEL, MAX_TRAVEL)
+        ((x - self.enter) * self.slope / self.straightness(Vec2::new(x, self.h))).clamp(-MAX_TRAVEL, MAX_TRAVEL)
+    }
+
+    /// By how much a tangent (of z = 1) turns over a `travel` along the bent yarn.
+    #[inline]
+    pub fn bent(&self, travel: f32) -> Vec3A {
+        Vec3A::new(self.bend.x * travel, self.bend.y * travel, 0.0)
     }
 
     /// (sin, cos) of the turn of the plies over a `travel` along the yarn.

@@ -188,9 +188,10 @@ impl PlyFrame {
     }
 
     #[inline]
-    fn of_ply(shape: &YarnShape, crossing: &PlyCrossing, camera: Vec3A) -> Self {
+    fn of_ply(shape: &YarnShape, section: &Section, crossing: &PlyCrossing, camera: Vec3A) -> Self {
         let (w, c) = (shape.ply_rate, crossing.centre);
-        Self::new(Vec3A::new(-w * c.y, w * c.x, 1.0).normalize(), camera)
+        let bent = section.bent(section.travel(c.x));
+        Self::new((Vec3A::new(-w * c.y, w * c.x, 1.0) + bent).normalize(), camera)
     }
 
     /// Latitudes of the camera and of `w`, and the cosine of `w`'s latitude.
@@ -354,7 +355,7 @@ impl<'a> Vertex<'a> {
             let axis = self.section.ply_axis(ply, Section::turn(&self.yarn.shape, travel));
             (axis, self.section.ply_centre(ply, axis, travel))
         };
-        let tangent = fiber_tangent(ply, self.yarn.shape.ply_rate, centre, axis, point);
+        let tangent = fiber_tangent(ply, self.yarn.shape.ply_rate, centre, axis, point) + self.section.bent(travel);
         let length = tangent.length();
         let tangent = tangent / length;
         let sin = tangent.dot(self.camera).clamp(-1.0, 1.0);
@@ -430,7 +431,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     fn backward_of(&self, crossing: &PlyCrossing, energy: Rgb, chance: f32) -> Backward {
         let optics = &self.yarn.plies[crossing.ply];
-        let frame = PlyFrame::of_ply(&self.yarn.shape, crossing, self.camera);
+        let frame = PlyFrame::of_ply(&self.yarn.shape, self.section, crossing, self.camera);
         let relative = if self.yarn.shape.plies.len() == 1 {
             crossing.offset / self.yarn.shape.plies[0].radius
         } else {
@@ -760,7 +761,7 @@ impl Forward {
         });
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
         Some(Self {
-            frame: PlyFrame::of_ply(&yarn.shape, front, camera),
+            frame: PlyFrame::of_ply(&yarn.shape, section, front, camera),
             energy: energy / scattered,
             channel: normalised((energy * weight).to_array()),
             kappa: kappa_of_variance(events * optics.beta_tt_squared),
