@@ -19,7 +19,7 @@ mod calibrated {
     pub(super) const LEAN_HALF: f64 = 10.0;
     pub(super) const LEAN_ALBEDO: f64 = 0.14;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
-    pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.65;
+    pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.5;
 }
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.

@@ -5,6 +5,7 @@ use glam::Vec3A;
 use super::{
     Continuation, Direct,
     aggregated::{AggregatedYarn, Vertex},
+    lobes::{ChordVertex, ChordYarn},
 };
 use crate::{
     geometry::{
@@ -19,6 +20,8 @@ use crate::{
 pub enum YarnScatterer {
     /// The recommended model.
     Aggregated(AggregatedYarn),
+    /// The comparison models, which look at the camera's chord only.
+    Chord(ChordYarn),
 }
 
 /// One scattering at such a yarn.
@@ -26,6 +29,8 @@ pub enum YarnScatterer {
 pub enum YarnVertex<'a> {
     /// Of [`YarnScatterer::Aggregated`].
     Aggregated(Vertex<'a>),
+    /// Of [`YarnScatterer::Chord`].
+    Chord(ChordVertex<'a>),
 }
 
 impl YarnScatterer {
@@ -34,6 +39,7 @@ impl YarnScatterer {
     pub fn shape(&self) -> &YarnShape {
         match self {
             Self::Aggregated(yarn) => yarn.shape(),
+            Self::Chord(yarn) => yarn.shape(),
         }
     }
 
@@ -42,6 +48,7 @@ impl YarnScatterer {
     pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
         match self {
             Self::Aggregated(yarn) => yarn.transparency(crossings),
+            Self::Chord(yarn) => yarn.transparency(crossings),
         }
     }
 
@@ -60,6 +67,9 @@ impl YarnScatterer {
             Self::Aggregated(yarn) => {
                 YarnVertex::Aggregated(Vertex::new(yarn, section, crossings, unscattered, throughput, u, stream))
             }
+            Self::Chord(yarn) => {
+                YarnVertex::Chord(ChordVertex::new(yarn, section, crossings, unscattered, throughput, u, stream))
+            }
         }
     }
 }
@@ -70,6 +80,7 @@ impl YarnVertex<'_> {
     pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
         match self {
             Self::Aggregated(v) => v.evaluate(w, light_pdf),
+            Self::Chord(v) => v.evaluate(w, light_pdf),
         }
     }
 
@@ -78,6 +89,7 @@ impl YarnVertex<'_> {
     pub fn sample(&self, u: [f32; 3], stream: &mut Stream) -> Option<Continuation> {
         match self {
             Self::Aggregated(v) => v.sample(u, stream),
+            Self::Chord(v) => v.sample(u, stream),
         }
     }
 
@@ -86,6 +98,7 @@ impl YarnVertex<'_> {
     pub fn node_start(&self) -> f32 {
         match self {
             Self::Aggregated(v) => v.node_start(),
+            Self::Chord(v) => v.node_start(),
         }
     }
 
@@ -94,6 +107,7 @@ impl YarnVertex<'_> {
     pub fn forward_start(&self) -> f32 {
         match self {
             Self::Aggregated(v) => v.forward_start(),
+            Self::Chord(v) => v.forward_start(),
         }
     }
 }

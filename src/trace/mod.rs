@@ -20,7 +20,11 @@ use crate::{
         section::{Crossings, Section},
         strand::{StrandOptions, Strands, TightBend},
     },
-    scattering::{aggregated::AggregatedYarn, yarn::YarnScatterer},
+    scattering::{
+        aggregated::AggregatedYarn,
+        lobes::{ChordModel, ChordYarn},
+        yarn::YarnScatterer,
+    },
     scene::{Fabric, Model, Scene, Yarn},
 };
 use filter::{GapFilter, ShadowFilter};
@@ -193,7 +197,11 @@ impl Weave {
 /// The yarn with the model that the scene asks for.
 fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
     let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
+    let chord = |model| YarnScatterer::Chord(ChordYarn::new(yarn.shape(), &materials, model));
     match model {
-        _ => YarnScatterer::Aggregated(AggregatedYarn::new(yarn.shape(), &materials)),
+        Model::Aggregated => YarnScatterer::Aggregated(AggregatedYarn::new(yarn.shape(), &materials)),
+        Model::TwoStream => chord(ChordModel::TwoStream),
+        Model::Paper => chord(ChordModel::Paper),
+        Model::Printed => chord(ChordModel::Printed),
     }
 }
