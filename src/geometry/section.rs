@@ -230,7 +230,7 @@ impl Section {
 
     /// Where the ray passes a ply.
     ///
-    /// Depth and turning depend on each other; three rounds settle them to 1e-3 of a yarn radius for twists up to 45 degrees.
+    /// Depth and turning depend on each other; two rounds settle them, three where the ray is steep.
     #[inline]
     fn follow(&self, shape: &YarnShape, ply: &PlyShape) -> Passage {
         let mut axis = self.ply_axis(ply, (0.0, 1.0));
@@ -241,7 +241,7 @@ impl Section {
         let untwisted = shape.ply_rate == 0.0;
         let mut travel = 0.0;
         let mut straightness = 1.0;
-        for _ in 0..3 {
+        for _ in 0..if self.slope.abs() < 1.0 { 2 } else { 3 } {
             straightness = self.straightness(Vec2::new(centre.x, self.h));
             travel = (-(self.enter - centre.x) * self.slope / straightness).clamp(-MAX_TRAVEL, MAX_TRAVEL);
             if !untwisted {

@@ -355,8 +355,10 @@ fn resample(chain: &Chain, lengths: &[f64], closed: bool, radius: f64, options: 
     let longest = (options.longest_segment * radius).max(total * 1e-7);
     let fewest = if closed { 4 } else { 1 };
     let mut count = ((total / longest).ceil() as usize).max(fewest);
-    // Beyond twice the given points the curve's own corners, not the spacing, set the error.
-    let most = (2 * chain.segments()).max(count);
+    // With as many points as were given, those given are exact; another basis may need some more.
+    let exact = chain.basis == options.basis;
+    let most = if exact { chain.segments() } else { 2 * chain.segments() }.max(fewest);
+    count = count.min(most);
     loop {
         let knots: Vec<DVec4> = (0..=count).map(|i| point_at(total * i as f64 / count as f64).at).collect();
         let made = interpolate(&knots, closed, options.basis);
@@ -371,8 +373,11 @@ fn resample(chain: &Chain, lengths: &[f64], closed: bool, radius: f64, options: 
                 (off - off.dot(t) * t).length()
             })
             .fold(0.0, f64::max);
-        if worst <= allowed || count >= most {
+        if worst <= allowed || (count >= most && !exact) {
             return made;
+        }
+        if count >= most {
+            return Chain { basis: chain.basis, points: chain.points.clone() };
         }
         // The error of a cubic falls with the third power of the spacing at least.
         let grow = (worst / allowed).powf(1.0 / 3.0).clamp(1.1, 2.0);

@@ -3,7 +3,7 @@
 use super::{Weave, section_at};
 use crate::{
     ffi::embree::{HitFilter, Ray, RawHit},
-    geometry::section::Crossings,
+    geometry::section::{Crossings, Section},
 };
 
 /// Below this a shadow ray counts as blocked.
@@ -17,8 +17,25 @@ fn leaves(ray: &Ray, hit: &RawHit) -> bool {
 
 /// Lets rays through between the plies.
 pub(super) struct GapFilter<'a> {
-    pub(super) weaves: &'a [Weave],
-    pub(super) ray: &'a Ray,
+    weaves: &'a [Weave],
+    ray: &'a Ray,
+    /// The hit accepted last and its section: mostly the one that stands in the end.
+    last: Option<(RawHit, Section)>,
+}
+
+impl<'a> GapFilter<'a> {
+    pub(super) fn new(weaves: &'a [Weave], ray: &'a Ray) -> Self {
+        Self { weaves, ray, last: None }
+    }
+
+    /// The section at a hit: the one made when it was accepted, or made anew.
+    #[inline]
+    pub(super) fn section(&self, hit: &RawHit) -> Section {
+        match &self.last {
+            Some((last, section)) if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u => *section,
+            _ => section_at(&self.weaves[hit.geometry as usize], self.ray, hit),
+        }
+    }
 }
 
 impl HitFilter for GapFilter<'_> {
@@ -29,7 +46,15 @@ impl HitFilter for GapFilter<'_> {
         }
         let weave = &self.weaves[hit.geometry as usize];
         let shape = weave.yarn.shape();
-        shape.filled || section_at(weave, self.ray, hit).meets_ply(shape)
+        if shape.filled {
+            return true;
+        }
+        let section = section_at(weave, self.ray, hit);
+        let stands = section.meets_ply(shape);
+        if stands {
+            self.last = Some((*hit, section));
+        }
+        stands
     }
 }
 

@@ -130,9 +130,15 @@ impl World {
         if !ray.is_finite() {
             return None;
         }
-        let mut filter = GapFilter { weaves: &self.weaves, ray };
+        let mut filter = GapFilter::new(&self.weaves, ray);
         let raw = self.scene.intersect(ray, &mut filter)?;
-        Some(self.hit(ray, &raw))
+        Some(Hit {
+            t: raw.t,
+            weave: raw.geometry as usize,
+            segment: raw.segment,
+            normal: raw.normal.normalize_or(-ray.direction),
+            section: filter.section(&raw),
+        })
     }
 
     /// The share of light that comes through along a ray: 0 or the product of what each yarn lets pass.
@@ -148,18 +154,6 @@ impl World {
     /// The bare traversal of the same scene, for measuring what filters and shading cost.
     pub fn bare(&self) -> &CommittedScene {
         &self.scene
-    }
-
-    #[inline]
-    fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
-        let weave = &self.weaves[raw.geometry as usize];
-        Hit {
-            t: raw.t,
-            weave: raw.geometry as usize,
-            segment: raw.segment,
-            normal: raw.normal.normalize_or(-ray.direction),
-            section: section_at(weave, ray, raw),
-        }
     }
 
     /// Places where a yarn bends more tightly than its radius allows: weave, then the place.

@@ -33,8 +33,8 @@ impl Detail {
     pub(super) fn read(table: Option<&Reader<'_>>) -> Self {
         let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
         let basis = table.map_or(Basis::CatmullRom, |t| t.one_of_or("curve_basis", Basis::CatmullRom, &bases));
-        let tolerance = table.map_or(0.01, |t| t.f64_or("curve_tolerance", 0.01, Range::between(0.0, 1.0)));
-        let longest_segment = table.map_or(1.5, |t| t.f64_or("longest_segment", 1.5, Range::above(0.0)));
+        let tolerance = table.map_or(0.02, |t| t.f64_or("curve_tolerance", 0.02, Range::between(0.0, 1.0)));
+        let longest_segment = table.map_or(3.0, |t| t.f64_or("longest_segment", 3.0, Range::above(0.0)));
         Self { basis, tolerance, longest_segment }
     }
 }
