@@ -36,12 +36,27 @@ impl Plan {
             "plies wind around the yarn",
             "plies run along the yarn",
         );
-        add("tilted_plies", shapes.iter().any(|s| s.tilted), "rays follow plies along the yarn", "the section is perpendicular");
+        add(
+            "tilted_plies",
+            shapes.iter().any(|s| s.tilted),
+            "rays follow plies along the yarn",
+            "the section is perpendicular",
+        );
         add("environment", any_light(&|l| matches!(l, Light::Environment(_))), "the sky shines", "no sky");
         add("environment_image", any_light(&image), "the sky has an image", "no light has an image");
-        add("distant_light", any_light(&|l| matches!(l, Light::Distant { .. })), "a light is far away", "no distant light");
+        add(
+            "distant_light",
+            any_light(&|l| matches!(l, Light::Distant { .. })),
+            "a light is far away",
+            "no distant light",
+        );
         add("point_light", any_light(&|l| matches!(l, Light::Point { .. })), "a light is a point", "no point light");
-        add("shadow_rays", any_light(&Light::needs_shadow_rays), "a light is sampled", "every light is found by sampled directions");
+        add(
+            "shadow_rays",
+            any_light(&Light::needs_shadow_rays),
+            "a light is sampled",
+            "every light is found by sampled directions",
+        );
         add("mis", any_light(&image), "the sky is sampled in two ways", "each light is found in one way only");
         add("ground", scene.ground.is_some(), "there is a floor", "no floor");
         add("lobe_layers", scene.layers.lobes, "asked for", "no output holds them");

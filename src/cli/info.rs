@@ -40,8 +40,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         let scene = args.options.load(&args.file)?;
         scene_report(&scene)?
     } else {
-        let set = curve_file::read(&args.file, &ReadOptions::default())
-            .map_err(|e| Failure::Input(format!("error: {e}")))?;
+        let set =
+            curve_file::read(&args.file, &ReadOptions::default()).map_err(|e| Failure::Input(format!("error: {e}")))?;
         curves_report(&args.file, &set)
     };
     if args.json {

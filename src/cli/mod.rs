@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::{
     image::output,
     scene::{
-        Model, Mode, Scene,
+        Mode, Model, Scene,
         document::Value,
         load::{LoadError, LoadOptions, load},
     },

@@ -433,20 +433,12 @@ fn interpolate(knots: &[DVec4], closed: bool, basis: Basis) -> Chain {
     Chain { basis, points }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn options(basis: Basis) -> StrandOptions {
-        StrandOptions {
-            basis,
-            tolerance: 0.01,
-            longest_segment: 1.5,
-            ply_rate: 0.4,
-            symmetry: TAU,
-            phases: vec![0.7],
-        }
+        StrandOptions { basis, tolerance: 0.01, longest_segment: 1.5, ply_rate: 0.4, symmetry: TAU, phases: vec![0.7] }
     }
 
     fn knit_like(n: usize, closed: bool) -> Curve {
@@ -480,7 +472,8 @@ mod tests {
                             .map(|(i, u)| {
                                 let place = s.place(i, u);
                                 let off = p.as_vec3a() - place.centre;
-                                (off - off.dot(place.tangent) * place.tangent).length() + if off.length() > 1.0 { 9.0 } else { 0.0 }
+                                (off - off.dot(place.tangent) * place.tangent).length()
+                                    + if off.length() > 1.0 { 9.0 } else { 0.0 }
                             })
                             .fold(f32::MAX, f32::min)
                     })
@@ -572,7 +565,10 @@ mod tests {
                 let s = strands(curve, 0.3, &options(target));
                 for i in 0..s.segments().len() as u32 {
                     let place = s.place(i, 0.5);
-                    assert!(place.centre.is_finite() && place.normal.is_finite() && place.phase.is_finite(), "{points:?}");
+                    assert!(
+                        place.centre.is_finite() && place.normal.is_finite() && place.phase.is_finite(),
+                        "{points:?}"
+                    );
                 }
             }
         }

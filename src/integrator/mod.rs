@@ -104,8 +104,7 @@ struct Path<'s> {
 impl<'a> Integrator<'a> {
     /// For a scene and its cloth.
     pub fn new(scene: &'a Scene, world: &'a World) -> Self {
-        let sampled: Vec<&Light> =
-            scene.lights.iter().filter(|l| l.needs_shadow_rays() && l.power() > 0.0).collect();
+        let sampled: Vec<&Light> = scene.lights.iter().filter(|l| l.needs_shadow_rays() && l.power() > 0.0).collect();
         let total: f32 = sampled.iter().map(|l| l.power()).sum();
         let mut sum = 0.0;
         let lights: Vec<_> = sampled
@@ -140,15 +139,8 @@ impl<'a> Integrator<'a> {
     /// Follows one path from the camera.
     pub fn sample(&self, ray: Ray, sampler: &mut Sampler, scratch: &mut Scratch, counters: &mut Counters) -> Sample {
         let mut sample = Sample::default();
-        let mut path = Path {
-            ray,
-            throughput: Rgb::ONE,
-            pdf: f32::INFINITY,
-            bounces: 0,
-            passes: 0,
-            shares: None,
-            sampler,
-        };
+        let mut path =
+            Path { ray, throughput: Rgb::ONE, pdf: f32::INFINITY, bounces: 0, passes: 0, shares: None, sampler };
         let camera = ray.origin;
         counters.camera += 1;
         let mut cloth_events = 0;
@@ -283,8 +275,15 @@ impl<'a> Integrator<'a> {
         let mut stream = path.sampler.stream(path.sampler.position());
         let vertex = yarn.vertex(section, &scratch.crossings, unscattered, path.throughput, u, &mut stream);
 
-        if let Some((direct, light)) = self.light_at_yarn(&vertex, hit, u_light_choice, Vec2::new(u_light_x, u_light_y), stream.next(), scratch, counters)
-        {
+        if let Some((direct, light)) = self.light_at_yarn(
+            &vertex,
+            hit,
+            u_light_choice,
+            Vec2::new(u_light_x, u_light_y),
+            stream.next(),
+            scratch,
+            counters,
+        ) {
             let found = direct.scaled(path.throughput * light);
             match path.shares {
                 None => {
@@ -332,8 +331,7 @@ impl<'a> Integrator<'a> {
         if !(value.max_channel() > 0.0) {
             return None;
         }
-        let start =
-            if u_start < direct.forward_share { section.point_on_ray(vertex.forward_start()) } else { node };
+        let start = if u_start < direct.forward_share { section.point_on_ray(vertex.forward_start()) } else { node };
         let mut ray = Ray::new(start, towards.direction);
         ray.t_far = towards.distance;
         counters.shadow += 1;

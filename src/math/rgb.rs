@@ -72,7 +72,8 @@ impl Rgb {
     #[inline]
     pub fn one_minus_exp_neg(self) -> Self {
         let x = self.0;
-        let series = x * (f32x4::ONE - x * (f32x4::HALF - x * (f32x4::splat(1.0 / 6.0) - x * f32x4::splat(1.0 / 24.0))));
+        let series =
+            x * (f32x4::ONE - x * (f32x4::HALF - x * (f32x4::splat(1.0 / 6.0) - x * f32x4::splat(1.0 / 24.0))));
         let direct = f32x4::ONE - (-x).exp();
         Self(x.simd_lt(f32x4::splat(0.03)).select(series, direct))
     }

@@ -118,7 +118,13 @@ mod tests {
         let first = |seed, x, y, i| Sampler::new(seed, x, y, i).next4();
         let base = first(1, 2, 3, 4);
         assert_eq!(base, first(1, 2, 3, 4));
-        for other in [first(2, 2, 3, 4), first(1, 3, 3, 4), first(1, 2, 4, 4), first(1, 2, 3, 5), first(1, 2, 3, 4 + SOBOL_LENGTH)] {
+        for other in [
+            first(2, 2, 3, 4),
+            first(1, 3, 3, 4),
+            first(1, 2, 4, 4),
+            first(1, 2, 3, 5),
+            first(1, 2, 3, 4 + SOBOL_LENGTH),
+        ] {
             assert_ne!(base, other);
         }
         let mut a = Sampler::new(1, 2, 3, 4).stream(1);

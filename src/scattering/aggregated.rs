@@ -33,13 +33,7 @@ use crate::{
         section::{Crossings, PlyCrossing, Section},
         yarn::{YarnShape, fiber_tangent},
     },
-    math::{
-        Rgb,
-        frame::sin_cos,
-        sampler::Stream,
-        special::wrapped_normal,
-        warp::normal,
-    },
+    math::{Rgb, frame::sin_cos, sampler::Stream, special::wrapped_normal, warp::normal},
 };
 
 /// How strongly multiply scattered light moves sideways with the camera's offset.
@@ -300,7 +294,14 @@ impl<'a> Vertex<'a> {
             backward: None,
             drawn: Drawn {
                 direction: Vec3A::ZERO,
-                value: NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: Rgb::ZERO, pdf: 0.0, clear: Rgb::ONE, open: Rgb::ONE },
+                value: NodeValue {
+                    r: Rgb::ZERO,
+                    tt: Rgb::ZERO,
+                    d: Rgb::ZERO,
+                    pdf: 0.0,
+                    clear: Rgb::ONE,
+                    open: Rgb::ONE,
+                },
                 escape: 0.0,
             },
         };
@@ -497,7 +498,14 @@ impl<'a> Vertex<'a> {
         let even = cos * (0.5 * FRAC_1_PI);
         let scale = node.amplitude * clear * even;
         let [p_r, p_tt, p_d] = node.chance;
-        let mut value = NodeValue { r: Rgb::ZERO, tt: Rgb::ZERO, d: optics.single_d * scale * DIFFUSE, pdf: p_d * DIFFUSE, clear, open: (-others).exp() };
+        let mut value = NodeValue {
+            r: Rgb::ZERO,
+            tt: Rgb::ZERO,
+            d: optics.single_d * scale * DIFFUSE,
+            pdf: p_d * DIFFUSE,
+            clear,
+            open: (-others).exp(),
+        };
         if p_r > 0.0 {
             let m = kernel(kappa_of_variance(passed * beta_tt + optics.beta_r_squared), at);
             value.r = optics.single_r * scale * m;
@@ -605,7 +613,9 @@ impl<'a> Vertex<'a> {
                 let (value, pdf) = self.backward_value(backward, node.ply, w);
                 (w, value, pdf)
             }
-            Some(again) if stream.next() < again.open => (again.direction, again.weight * again.pdf, again.pdf * again.open),
+            Some(again) if stream.next() < again.open => {
+                (again.direction, again.weight * again.pdf, again.pdf * again.open)
+            }
             Some(again) => {
                 let frame = &backward.frame;
                 let sin = sample_sine_diffuse([u[1], stream.next()]);

@@ -24,16 +24,7 @@ pub const MIN_VARIANCE: f32 = 1e-8;
 const KAPPA_ASYMPTOTIC: f32 = 1e5;
 
 /// (pi / 2)^2 C(kappa)^2 = P / Q, fitted for 4e-6 over all kappa >= 0; C is the factor kappa / (pi I1(kappa) e^-kappa).
-const P: [f32; 8] = [
-    0.034_491_077,
-    0.053_869_43,
-    0.383_853_46,
-    0.899_761_1,
-    1.917_204_4,
-    2.669_632_8,
-    2.351_903,
-    1.0,
-];
+const P: [f32; 8] = [0.034_491_077, 0.053_869_43, 0.383_853_46, 0.899_761_1, 1.917_204_4, 2.669_632_8, 2.351_903, 1.0];
 const Q: [f32; 5] = [0.021_957_702, 0.017_794_89, 0.218_347_29, 0.351_789_56, 1.0];
 
 /// The sines and cosines of two latitudes.
@@ -169,7 +160,8 @@ mod tests {
                 sum *= std::f64::consts::PI / f64::from(n);
                 assert!((sum - 1.0).abs() < 2e-4, "beta {beta} theta {ti}: {sum}");
             }
-            let (a, b) = (kernel_scalar(kappa as f32, latitudes(0.7, -0.4)), kernel_scalar(kappa as f32, latitudes(-0.4, 0.7)));
+            let (a, b) =
+                (kernel_scalar(kappa as f32, latitudes(0.7, -0.4)), kernel_scalar(kappa as f32, latitudes(-0.4, 0.7)));
             assert_eq!(a, b, "reciprocity at beta {beta}");
         }
         assert!((kernel_scalar(0.0, latitudes(0.3, 1.0)) - DIFFUSE).abs() < 1e-6);
@@ -190,10 +182,18 @@ mod tests {
     #[test]
     fn samples_follow_the_density() {
         // Chi-square over 40 bins of equal expected count in sin(theta), each width and latitude; bound at about 4 sigma.
-        for (case, (beta, ti)) in
-            [(0.02f64, 0.3f64), (0.15, 0.0), (0.15, 1.2), (0.5, -0.8), (0.59, 0.4), (0.61, 0.4), (2.0, 1.5), (0.15, 1.56)]
-                .into_iter()
-                .enumerate()
+        for (case, (beta, ti)) in [
+            (0.02f64, 0.3f64),
+            (0.15, 0.0),
+            (0.15, 1.2),
+            (0.5, -0.8),
+            (0.59, 0.4),
+            (0.61, 0.4),
+            (2.0, 1.5),
+            (0.15, 1.56),
+        ]
+        .into_iter()
+        .enumerate()
         {
             let kappa = 0.25 / (beta * beta);
             let (si, ci) = (ti.sin() as f32, ti.cos() as f32);

@@ -148,7 +148,8 @@ impl PlyOptics {
         };
         let lean = |c: usize| {
             let t = radius_optical(c);
-            (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c))).clamp(0.0, 1.0)
+            (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c)))
+                .clamp(0.0, 1.0)
         };
         Self {
             sigma: sigma as f32,

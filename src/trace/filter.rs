@@ -2,7 +2,7 @@
 
 use super::{Weave, section_at};
 use crate::{
-    ffi::embree::{HitFilter, Ray, RawHit},
+    ffi::embree::{HitFilter, RawHit, Ray},
     geometry::section::{Crossings, Section},
 };
 
@@ -32,7 +32,11 @@ impl<'a> GapFilter<'a> {
     #[inline]
     pub(super) fn section(&self, hit: &RawHit) -> Section {
         match &self.last {
-            Some((last, section)) if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u => *section,
+            Some((last, section))
+                if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u =>
+            {
+                *section
+            }
             _ => section_at(&self.weaves[hit.geometry as usize], self.ray, hit),
         }
     }

@@ -14,7 +14,7 @@ use std::{
 use glam::Vec3A;
 
 use crate::{
-    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, EmbreeError, Ray, RawHit, SceneBuilder},
+    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, EmbreeError, RawHit, Ray, SceneBuilder},
     geometry::{
         curve::Basis,
         section::{Crossings, Section},
@@ -79,8 +79,11 @@ impl World {
     /// What Embree says, mostly that memory is short.
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), EmbreeError> {
         let started = Instant::now();
-        let weaves: Vec<Weave> =
-            scene.fabrics.iter().map(|fabric| Weave::new(fabric, &scene.yarns[fabric.yarn], scene.render.model)).collect();
+        let weaves: Vec<Weave> = scene
+            .fabrics
+            .iter()
+            .map(|fabric| Weave::new(fabric, &scene.yarns[fabric.yarn], scene.render.model))
+            .collect();
         let generate = started.elapsed();
         let started = Instant::now();
         let device = Device::new(threads)?;
@@ -91,7 +94,11 @@ impl World {
                 Basis::BSpline => CurveBasis::BSpline,
                 Basis::CatmullRom | Basis::Linear => CurveBasis::CatmullRom,
             };
-            builder.add_round_curves(basis, Arc::clone(weave.strands.points()), Arc::clone(weave.strands.segments()))?;
+            builder.add_round_curves(
+                basis,
+                Arc::clone(weave.strands.points()),
+                Arc::clone(weave.strands.segments()),
+            )?;
         }
         let committed = builder.commit()?;
         let gapless = weaves.iter().all(|w| w.yarn.shape().filled);

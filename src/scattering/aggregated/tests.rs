@@ -153,7 +153,8 @@ fn build(case: (u32, u32, f64, f64, f64, f32, f32, f32), m: &FiberMaterial) -> (
 fn values_agree_with_the_reference_vectors() {
     let Some(text) = crate::testing::shared("oracle/model_vectors.json") else { return };
     let vectors: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let numbers = |v: &serde_json::Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
+    let numbers =
+        |v: &serde_json::Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
     let triple = |v: &serde_json::Value| -> [f64; 3] { numbers(v).try_into().unwrap() };
     let mut compared = 0;
     for (index, v) in vectors.as_array().unwrap().iter().enumerate() {
@@ -200,7 +201,11 @@ fn values_agree_with_the_reference_vectors() {
                     let got = f64::from(value[lobe].to_array()[c]);
                     // Far in the tails of narrow lobes single-precision sines set the last digits of the exponent.
                     let slack = 2e-4 * want[c] + 2e-6;
-                    assert!((got - want[c]).abs() < slack, "vector {index} direction {d} {name}[{c}]: {got}, not {}", want[c]);
+                    assert!(
+                        (got - want[c]).abs() < slack,
+                        "vector {index} direction {d} {name}[{c}]: {got}, not {}",
+                        want[c]
+                    );
                     compared += 1;
                 }
             }
@@ -216,7 +221,10 @@ fn white_fibers_keep_all_light() {
         let ([f, s, b], t0) = energies(&yarn, &section);
         let total = f64::from(t0 + (f + s + b).mean());
         // The share that escapes is taken across the yarn only, which is off by some percent for twisted fibres.
-        assert!((total - 1.0).abs() < if case.4 == 0.0 { 0.02 } else { 0.05 }, "{case:?}: {total} = {t0} + {f:?} + {s:?} + {b:?}");
+        assert!(
+            (total - 1.0).abs() < if case.4 == 0.0 { 0.02 } else { 0.05 },
+            "{case:?}: {total} = {t0} + {f:?} + {s:?} + {b:?}"
+        );
     }
 }
 
@@ -254,7 +262,11 @@ fn drawn_vertices_average_to_the_quadrature() {
                 // B takes its share from the node's lobes, the specification from directions across the yarn: they
                 // differ by design.
                 let slack = [1e-3, 0.01, 0.15][k] * want + 5.0 * se + 1e-5;
-                assert!((mean[i][k] - want).abs() < slack, "{case:?} direction {i} lobe {k}: {} +- {se}, not {want}", mean[i][k]);
+                assert!(
+                    (mean[i][k] - want).abs() < slack,
+                    "{case:?} direction {i} lobe {k}: {} +- {se}, not {want}",
+                    mean[i][k]
+                );
             }
         }
     }
@@ -294,7 +306,10 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
             }
             let se = ((square - sum * sum).max(0.0) / f64::from(n)).sqrt();
             let both_se = ((both_square - both * both).max(0.0) / f64::from(n)).sqrt();
-            assert!((sum - both).abs() < 4.5 * (se + both_se) + 1e-4, "{case:?}: {sum} +- {se}, with light {both} +- {both_se}");
+            assert!(
+                (sum - both).abs() < 4.5 * (se + both_se) + 1e-4,
+                "{case:?}: {sum} +- {se}, with light {both} +- {both_se}"
+            );
             assert!(largest < 6.0, "{case:?}: a weight of {largest}");
             if white {
                 let off = f64::from(1.0 - t0) * (sum - 1.0);
@@ -388,7 +403,9 @@ fn black_empty_and_extreme_yarns_stay_finite_and_dark() {
     let wide = material(SILK, [4.0, 4.0, 4.0]);
     let mut stream = Stream::new(3);
     for m in [black, clear, narrow, wide, lossless()] {
-        for (plies, fibers, density, twist) in [(1, 1, 1e-6, 0.0), (1, 5000, 0.9, 1.57), (3, 10, 2.0, -1.5), (64, 3, 0.3, 0.4)] {
+        for (plies, fibers, density, twist) in
+            [(1, 1, 1e-6, 0.0), (1, 5000, 0.9, 1.57), (3, 10, 2.0, -1.5), (64, 3, 0.3, 0.4)]
+        {
             let yarn = yarn(plies, fibers, density, twist, -twist, &m);
             for theta in [0.0, 1.2, 1.570_795, -1.570_796_3] {
                 for h in [0.0, 0.5, 1.0, -1.0, 0.999_999] {

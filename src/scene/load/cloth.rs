@@ -24,16 +24,17 @@ use crate::{
 
 /// How finely curves are resampled, for all fabrics.
 pub(super) struct Detail {
-    basis: Basis,
+    /// `None` for that of each file: exact, where points are kept.
+    basis: Option<Basis>,
     tolerance: f64,
     longest_segment: f64,
 }
 
 impl Detail {
     pub(super) fn read(table: Option<&Reader<'_>>) -> Self {
-        let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
-        let basis = table.map_or(Basis::CatmullRom, |t| t.one_of_or("curve_basis", Basis::CatmullRom, &bases));
-        let tolerance = table.map_or(0.02, |t| t.f64_or("curve_tolerance", 0.02, Range::between(0.0, 1.0)));
+        let bases = [("auto", None), ("catmull-rom", Some(Basis::CatmullRom)), ("b-spline", Some(Basis::BSpline))];
+        let basis = table.and_then(|t| t.one_of_or("curve_basis", None, &bases));
+        let tolerance = table.map_or(0.005, |t| t.f64_or("curve_tolerance", 0.005, Range::between(0.0, 1.0)));
         let longest_segment = table.map_or(3.0, |t| t.f64_or("longest_segment", 3.0, Range::above(0.0)));
         Self { basis, tolerance, longest_segment }
     }
@@ -87,7 +88,10 @@ pub(super) fn plan(
         Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| yarns.get(y)), curves),
         None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),
         None => {
-            table.error("missing table `source`: where the curves come from", Some("source = { type = \"stockinette\" } or { type = \"file\", path = \"glove.bcc\" }"));
+            table.error(
+                "missing table `source`: where the curves come from",
+                Some("source = { type = \"stockinette\" } or { type = \"file\", path = \"glove.bcc\" }"),
+            );
             None
         }
     };
@@ -105,7 +109,11 @@ fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Read
         if let Some(tile) = table.numbers("tile", Range::between(1.0, 100_000.0)) {
             match tile.as_slice() {
                 &[x, y] if x.fract() == 0.0 && y.fract() == 0.0 => options.tile = [x as u32, y as u32],
-                _ => table.error_at("tile", "expected two whole numbers", Some("tile = [8, 12] repeats a pattern 8 times across and 12 times up")),
+                _ => table.error_at(
+                    "tile",
+                    "expected two whole numbers",
+                    Some("tile = [8, 12] repeats a pattern 8 times across and 12 times up"),
+                ),
             }
         }
     }
@@ -124,7 +132,10 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
                 (Some(path), _) => Some(path.to_owned()),
                 (None, Some(name)) => Some(context.resolve(name, table.span("path").unwrap_or(table.header()))),
                 (None, None) => {
-                    table.error("this fabric has no curve file of its own", Some("give one with --curves FILE, or add `path = \"FILE\"`"));
+                    table.error(
+                        "this fabric has no curve file of its own",
+                        Some("give one with --curves FILE, or add `path = \"FILE\"`"),
+                    );
                     None
                 }
             };
@@ -149,7 +160,9 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
         Some(2) => Some(Source::Straight {
             count: table.u64_or("count", 1, counted(1..=1_000_000)) as u32,
             length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
-            spacing: table.f64("spacing", Range::POSITIVE).map_or(yarn.map_or(1.0, |y| 2.0 * y.radius), |s| s * context.unit),
+            spacing: table
+                .f64("spacing", Range::POSITIVE)
+                .map_or(yarn.map_or(1.0, |y| 2.0 * y.radius), |s| s * context.unit),
         }),
         _ => None,
     };
@@ -180,7 +193,8 @@ impl FabricPlan {
                 .into_iter()
                 .map(|mut curve| {
                     let radii = curve.radii.take().filter(|_| own && self.radius.is_none());
-                    let radii = radii.map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
+                    let radii = radii
+                        .map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
                     (curve, radii)
                 })
                 .collect()
@@ -222,12 +236,16 @@ impl FabricPlan {
             let mut stream = Stream::new(seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
             curves.iter().map(|_| TAU * f64::from(stream.next())).collect()
         });
+        let of_file = match curves.first().map(|(curve, _)| curve.basis) {
+            Some(Basis::BSpline) => Basis::BSpline,
+            _ => Basis::CatmullRom,
+        };
         Some(Fabric {
             origin,
             yarn: place,
             curves,
             phases,
-            basis: detail.basis,
+            basis: detail.basis.unwrap_or(of_file),
             tolerance: detail.tolerance,
             longest_segment: detail.longest_segment,
         })

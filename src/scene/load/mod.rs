@@ -183,9 +183,9 @@ fn build(
     let render_table = root.table("render");
     let settings = settings::render(render_table.as_ref());
     let (display, layers) = settings::output(root.table("output"));
-    let tilted = render_table.as_ref().is_none_or(|r| {
-        r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)])
-    });
+    let tilted = render_table
+        .as_ref()
+        .is_none_or(|r| r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)]));
     let detail = cloth::Detail::read(render_table.as_ref());
     if let Some(table) = render_table {
         table.finish();

@@ -32,7 +32,11 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         None => [0, 0, width, height],
         Some(&[x0, y0, x1, y1]) => {
             let c = [x0, y0, x1, y1].map(|v| v as u32);
-            if c[0] >= c[2] || c[1] >= c[3] || c[2] > width || c[3] > height || [x0, y0, x1, y1].iter().any(|v| v.fract() != 0.0)
+            if c[0] >= c[2]
+                || c[1] >= c[3]
+                || c[2] > width
+                || c[3] > height
+                || [x0, y0, x1, y1].iter().any(|v| v.fract() != 0.0)
             {
                 let message = format!("the crop must be whole pixels x0 < x1 <= {width} and y0 < y1 <= {height}");
                 table.error_at("crop", message, Some("crop = [x0, y0, x1, y1], the latter two exclusive"));
@@ -134,7 +138,11 @@ pub(super) fn fingerprint(scene: &Scene) -> String {
         }
     }
     for fabric in &scene.fabrics {
-        let _ = write!(hash, "{} {:?} {:?} {} {}", fabric.yarn, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment);
+        let _ = write!(
+            hash,
+            "{} {:?} {:?} {} {}",
+            fabric.yarn, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment
+        );
         for (curve, radii) in &fabric.curves {
             let _ = write!(hash, "{:?} {}", curve.basis, curve.closed);
             for (p, r) in curve.points.iter().zip(radii) {

@@ -38,7 +38,11 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
     let Some(node) = root.node("camera") else { return framing(DVec3::Z) };
     if let Value::String(word) = &node.value {
         if word != "frame" {
-            context.error(node.span, format!("unknown camera \"{word}\""), Some("camera = \"frame\", or a [camera] table".to_owned()));
+            context.error(
+                node.span,
+                format!("unknown camera \"{word}\""),
+                Some("camera = \"frame\", or a [camera] table".to_owned()),
+            );
         }
         return framing(DVec3::Z);
     }
@@ -194,7 +198,11 @@ pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>) -> Option<GroundP
         Some(node) => match &node.value {
             Value::String(word) if word == "auto" => true,
             Value::String(word) => {
-                context.error(node.span, format!("unknown height \"{word}\""), Some("a number, or \"auto\" for right below the cloth".to_owned()));
+                context.error(
+                    node.span,
+                    format!("unknown height \"{word}\""),
+                    Some("a number, or \"auto\" for right below the cloth".to_owned()),
+                );
                 true
             }
             _ => false,

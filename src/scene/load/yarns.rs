@@ -37,14 +37,7 @@ fn fiber(table: Reader<'_>) -> Option<FiberMaterial> {
         }
     }
     table.finish();
-    Some(FiberMaterial {
-        r,
-        tt,
-        d,
-        beta_r: radians(beta_r),
-        beta_tt: radians(beta_tt),
-        beta_n: radians(beta_n),
-    })
+    Some(FiberMaterial { r, tt, d, beta_r: radians(beta_r), beta_tt: radians(beta_tt), beta_n: radians(beta_n) })
 }
 
 /// The keys of one ply, each with the yarn's own value behind it.
@@ -64,7 +57,11 @@ impl PlyKeys {
         let fiber_radius = table.f64("fiber_radius", Range::POSITIVE);
         let density = table.f64("density", Range::above(0.0).and_at_most(100.0));
         if fiber_radius.is_some() && density.is_some() {
-            table.error_at("density", "give `fiber_radius` or `density`, not both", Some("density = fibers * (fiber_radius / ply_radius)^2"));
+            table.error_at(
+                "density",
+                "give `fiber_radius` or `density`, not both",
+                Some("density = fibers * (fiber_radius / ply_radius)^2"),
+            );
         }
         let own = fiber_radius.is_some() || density.is_some();
         Self {
@@ -95,7 +92,11 @@ fn yarn(
     let count = table.u64("plies", counted(1..=MAX_PLIES as u64));
     let count = match (count, ply_tables.len()) {
         (Some(n), m) if m > 0 && n != m as u64 => {
-            table.error_at("plies", format!("plies = {n}, but there are {m} [[yarn.{name}.ply]] tables"), Some("leave `plies` out"));
+            table.error_at(
+                "plies",
+                format!("plies = {n}, but there are {m} [[yarn.{name}.ply]] tables"),
+                Some("leave `plies` out"),
+            );
             m as u64
         }
         (_, m) if m > MAX_PLIES => {
@@ -106,7 +107,10 @@ fn yarn(
         (n, _) => n.unwrap_or(1),
     };
     let Some(radius) = radius else {
-        table.error(format!("missing key `radius` in {}", table.title()), Some("outer radius of the yarn; the radii of a curve file win over it"));
+        table.error(
+            format!("missing key `radius` in {}", table.title()),
+            Some("outer radius of the yarn; the radii of a curve file win over it"),
+        );
         table.finish();
         return None;
     };
@@ -123,7 +127,11 @@ fn yarn(
         let long = ply_radius / keys.aspect.sqrt();
         let distance = distance.map_or(if count == 1 { 0.0 } else { (1.0 - short).max(0.0) }, |d| d / radius);
         if distance.hypot(long).max(distance + short) > 1.0 + 1e-6 && count > 1 && distance + short > 1.0 + 1e-6 {
-            place.error_at("ply_distance", "the ply reaches beyond the yarn's radius", Some("ply_distance + ply_radius <= radius"));
+            place.error_at(
+                "ply_distance",
+                "the ply reaches beyond the yarn's radius",
+                Some("ply_distance + ply_radius <= radius"),
+            );
         }
         let Some(n) = keys.fibers else {
             place.error("missing key `fibers`: the number of fibres in a ply", None);
@@ -133,13 +141,24 @@ fn yarn(
             (Some(r), _) => r / radius,
             (None, Some(d)) => ply_radius * (d / n.max(1) as f64).sqrt(),
             (None, None) => {
-                place.error("missing key `fiber_radius`", Some("or give `density`, the share of the ply's section that fibres fill"));
+                place.error(
+                    "missing key `fiber_radius`",
+                    Some("or give `density`, the share of the ply's section that fibres fill"),
+                );
                 return;
             }
         };
         if fiber_radius >= ply_radius {
             let key = if keys.fiber_radius.is_some() { "fiber_radius" } else { "density" };
-            place.error_at(key, format!("fibres of radius {:.4} do not fit a ply of radius {:.4}", fiber_radius * radius, ply_radius * radius), None);
+            place.error_at(
+                key,
+                format!(
+                    "fibres of radius {:.4} do not fit a ply of radius {:.4}",
+                    fiber_radius * radius,
+                    ply_radius * radius
+                ),
+                None,
+            );
         }
         let Some(fiber) = &keys.fiber else {
             place.error("missing key `fiber`: the name of a [fiber.NAME] table", None);
