@@ -1,1 +1,25 @@
+//! Integration tests: the program and the library from outside, as people and scripts meet them.
+//!
+//! Data that lies beside the project is looked for under `YARNRAY_SHARED`, or `../shared`; what needs it says that it
+//! was skipped where it is absent.
 
+// What the command line promises: help, info, statistics, outputs, stops, signals, metadata.
+mod cli;
+// The same picture to the bit: threads, repeated runs, crops; and another one for another seed.
+mod determinism;
+// What bad input is answered with: whole messages, exit status 2, no output.
+mod errors;
+// Pictures against explicit fibres, where the truths lie beside the project.
+mod fabric_truth;
+// White cloth under a white sky is as bright as the sky.
+mod furnace;
+// Damaged scene files give errors, never panics.
+mod fuzz;
+// What must not change a picture: units, places, seams, and the way plies are intersected where it cannot matter.
+mod invariance;
+// Which room of the crate may use which, and what may stand in one room only.
+mod layering;
+// Every scene of the project, and real curve files.
+mod scenes;
+// Temporary directories, runs of the program, pictures: what the others share.
+mod support;

@@ -1,0 +1,114 @@
+//! A woven cloth against path-traced explicit fibres: the truths of `oracle/fabric`.
+
+use std::{fmt::Write as _, path::Path};
+
+use serde_json::Value;
+
+use crate::support::{directory, render_file, shared, write};
+
+/// An array of a .npy file of little-endian f32, with its shape.
+fn read_npy(path: &Path) -> (Vec<usize>, Vec<f64>) {
+    let bytes = std::fs::read(path).unwrap();
+    assert!(bytes.starts_with(b"\x93NUMPY\x01"), "version 1 of .npy");
+    let header = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let text = std::str::from_utf8(&bytes[10..10 + header]).unwrap();
+    assert!(text.contains("'<f4'") && text.contains("'fortran_order': False"), "{text}");
+    let shape = text.split_once("'shape': (").unwrap().1.split_once(')').unwrap().0;
+    let shape: Vec<usize> = shape.split(',').map(str::trim).filter(|s| !s.is_empty()).map(|s| s.parse().unwrap()).collect();
+    let values: Vec<f64> =
+        bytes[10 + header..].as_chunks().0.iter().map(|c| f64::from(f32::from_le_bytes(*c))).collect();
+    assert_eq!(values.len(), shape.iter().product::<usize>());
+    (shape, values)
+}
+
+/// The scene that a truth is of, with the sky or the light from in front.
+fn scene(truth: &Value, curves: &Path, sky: bool) -> String {
+    let material = &truth["material"];
+    let camera = &truth["camera"];
+    let degrees = |v: &Value| v.as_f64().unwrap().to_degrees();
+    let phases: Vec<f64> = truth["phases"].as_array().unwrap().iter().map(degrees).collect();
+    let (x, y) = (7f64.to_radians().tan() * 100.0, (-4f64).to_radians().tan() * 100.0);
+    let mut text = String::new();
+    writeln!(text, "render = {{ width = {}, height = {}, filter = \"box\" }}", camera["pixels"][0], camera["pixels"][1])
+        .unwrap();
+    writeln!(text, "[camera]\ntype = \"orthographic\"\nposition = [{x}, {y}, 100]\nsize = {}", camera["height"]).unwrap();
+    writeln!(text, "[fiber.f]\nr = {}\ntt = {}\nd = {}", material["a_r"], material["a_tt"], material["a_d"]).unwrap();
+    for (key, name) in [("beta_r", "beta_R"), ("beta_tt", "beta_TT"), ("beta_n", "beta_N")] {
+        writeln!(text, "{key} = {}", degrees(&material[name])).unwrap();
+    }
+    writeln!(text, "[yarn.y]\nfiber = \"f\"").unwrap();
+    for (key, name) in [
+        ("radius", "R"),
+        ("plies", "n_plies"),
+        ("ply_twist", "ply_twist_deg"),
+        ("ply_radius", "r_p"),
+        ("fibers", "n"),
+        ("fiber_radius", "r_f"),
+        ("fiber_twist", "fibre_twist_deg"),
+    ] {
+        writeln!(text, "{key} = {}", truth[name]).unwrap();
+    }
+    writeln!(text, "[[fabric]]\nyarn = \"y\"\nphase = {phases:?}").unwrap();
+    writeln!(text, "source = {{ type = \"file\", path = {:?}, basis = \"b-spline\" }}", curves.display().to_string())
+        .unwrap();
+    if sky {
+        text += "[[light]]\ntype = \"environment\"\nradiance = 1\n";
+    } else {
+        let towards = &truth["lights"]["front"]["direction"];
+        writeln!(text, "[[light]]\ntype = \"distant\"\ntowards = {towards}\nirradiance = 1\nangular_radius = 1").unwrap();
+    }
+    text
+}
+
+/// Means over boxes of 8 x 8 pixels; rows and columns that fill no box are left out.
+fn boxes(pixels: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
+    let height = pixels.len() / width;
+    let mut out = Vec::new();
+    for by in 0..height / 8 {
+        for bx in 0..width / 8 {
+            let inside: Vec<[f64; 3]> =
+                (0..64).map(|i| pixels[(8 * by + i / 8) * width + 8 * bx + i % 8]).collect();
+            out.push(crate::support::mean(&inside));
+        }
+    }
+    out
+}
+
+#[test]
+fn a_weave_looks_as_its_fibres_do() {
+    let Some(folder) = shared("oracle/fabric") else { return };
+    let name = "weave50";
+    let truth: Value = serde_json::from_str(&std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap()).unwrap();
+    let curves = folder.join(format!("{name}_yarns.txt")).canonicalize().unwrap();
+    let (shape, values) = read_npy(&folder.join(format!("{name}_mean.npy")));
+    let [3, height, width, 3] = shape[..] else { panic!("{shape:?}") };
+    let picture_of = |light: usize| -> Vec<[f64; 3]> {
+        let size = height * width * 3;
+        values[light * size..(light + 1) * size].as_chunks().0.to_vec()
+    };
+    // Where there is cloth: it shines under one of the two sharp lights.
+    let sharp: Vec<f64> = picture_of(1).iter().zip(picture_of(2)).map(|(a, b)| a.iter().chain(&b).sum()).collect();
+    let limit = 0.02 * sharp.iter().sum::<f64>() / sharp.len() as f64;
+    let directory = directory();
+    for (light, label, allowed) in [(0, "sky", 0.05), (1, "front", 0.11)] {
+        let file = write(directory.path(), "scene.toml", scene(&truth, &curves, light == 0));
+        let ours = render_file(&file, &["--spp", "48"]);
+        assert_eq!([ours.image.width, ours.image.height], [width, height]);
+        let (ours, theirs) = (ours.colors(), picture_of(light));
+        let on_cloth = |p: &[[f64; 3]]| -> [f64; 3] {
+            crate::support::mean(&p.iter().zip(&sharp).filter(|&(_, &s)| s > limit).map(|(c, _)| *c).collect::<Vec<_>>())
+        };
+        let (a, b) = (on_cloth(&ours), on_cloth(&theirs));
+        let ratio: [f64; 3] = std::array::from_fn(|k| a[k] / b[k]);
+        let (a, b) = (boxes(&ours, width), boxes(&theirs, width));
+        let level = crate::support::mean(&b);
+        let errors = a.iter().zip(&b).flat_map(|(a, b)| {
+            let level = level;
+            (0..3).map(move |k| (a[k] - b[k]).abs() / (b[k] + 0.05 * level[k])).collect::<Vec<_>>()
+        });
+        let error = errors.sum::<f64>() / (3 * a.len()) as f64;
+        eprintln!("{name}, {label}: mean ratio {ratio:.3?}, mean relative error of 8 x 8 boxes {error:.4}");
+        assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.08), "{label}: mean ratio {ratio:.3?}");
+        assert!(error < allowed, "{label}: {error:.4}");
+    }
+}

@@ -1,0 +1,188 @@
+//! What must not change a picture.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec3, Vec3A};
+use yarnray::geometry::{
+    curve::{Basis, Curve},
+    section::Place,
+    strand::{StrandOptions, Strands},
+};
+
+use crate::support::{difference, render};
+
+/// Straight yarns before a fixed camera, every length in `unit` of `per_unit` millimetres, all moved by `offset` mm.
+fn straight(unit: &str, per_unit: f64, offset: f64, ply_twist: f64, extra: &str) -> String {
+    let l = |mm: f64| mm / per_unit;
+    let o = l(offset);
+    format!(
+        r#"
+        unit = "{unit}"
+        [render]
+        width = 40
+        height = 30
+        spp = 64
+        filter = "box"
+        {extra}
+        [camera]
+        type = "orthographic"
+        position = [{o}, {o}, {}]
+        target = [{o}, {o}, {o}]
+        size = {}
+        [fiber.f]
+        r = 0.2
+        tt = [0.1, 0.4, 0.25]
+        d = [0.03, 0.35, 0.1]
+        [yarn.y]
+        radius = {}
+        plies = 3
+        ply_twist = {ply_twist}
+        fiber = "f"
+        fibers = 50
+        density = 0.3
+        fiber_twist = -20
+        [[fabric]]
+        yarn = "y"
+        phase = 20
+        translate = [{o}, {o}, {o}]
+        source = {{ type = "straight", length = {}, count = 3, spacing = {} }}
+        [[light]]
+        type = "environment"
+        radiance = 0.3
+        [[light]]
+        type = "distant"
+        towards = [0.4, 0.5, 0.8]
+        irradiance = 2
+        angular_radius = 1
+        [[light]]
+        type = "point"
+        position = [{}, {o}, {}]
+        intensity = {}
+        "#,
+        l(offset + 50.0),
+        l(6.0),
+        l(1.0),
+        l(12.0),
+        l(2.1),
+        l(offset + 3.0),
+        l(offset + 10.0),
+        // Intensity is per square of the unit.
+        40.0 / (per_unit * per_unit),
+    )
+}
+
+#[track_caller]
+fn alike(name: &str, a: &str, b: &str, mean: f64, rmse: f64) {
+    let (a, b) = (render(a, &[]), render(b, &[]));
+    let ratio: [f64; 3] = std::array::from_fn(|k| b.mean()[k] / a.mean()[k]);
+    let difference = difference(&a, &b);
+    eprintln!("{name}: mean ratio {ratio:.5?}, relative RMSE {difference:.5}");
+    assert!(ratio.iter().all(|r| (r - 1.0).abs() < mean), "{name}: {ratio:?}");
+    assert!(difference < rmse, "{name}: {difference}");
+}
+
+#[test]
+fn units_do_not_matter() {
+    let millimetres = straight("mm", 1.0, 0.0, 15.0, "");
+    alike("cm", &millimetres, &straight("cm", 10.0, 0.0, 15.0, ""), 2e-3, 0.05);
+    alike("m", &millimetres, &straight("m", 1000.0, 0.0, 15.0, ""), 2e-3, 0.05);
+}
+
+#[test]
+fn places_do_not_matter() {
+    let here = straight("mm", 1.0, 0.0, 15.0, "");
+    alike("moved by a metre", &here, &straight("mm", 1.0, 1e3, 15.0, ""), 2e-3, 0.05);
+    alike("moved by a kilometre", &here, &straight("mm", 1.0, 1e6, 15.0, ""), 2e-3, 0.05);
+}
+
+#[test]
+fn the_ways_to_intersect_plies_agree_where_they_must() {
+    let way = |twist, name: &str| straight("mm", 1.0, 0.0, twist, &format!("ply_intersection = \"{name}\""));
+    alike("untwisted plies", &way(0.0, "tilted"), &way(0.0, "perpendicular"), 0.02, 0.08);
+    alike("twisted plies", &way(12.0, "tilted"), &way(12.0, "perpendicular"), 0.03, 0.12);
+}
+
+/// The direction in which a ply lies that starts at `angle`.
+fn ply(place: &Place, angle: f64) -> Vec3A {
+    let (sin, cos) = (f64::from(place.phase) + angle).sin_cos();
+    place.normal * cos as f32 + place.tangent.cross(place.normal) * sin as f32
+}
+
+/// The angle between a ply direction at one place and at another, about the tangent.
+fn turn(from: &Place, to: &Place) -> f64 {
+    let (a, b) = (ply(from, 0.0), ply(to, 0.0));
+    f64::from(a.cross(b).dot(to.tangent)).atan2(f64::from(a.dot(b)))
+}
+
+/// A closed curve that winds in space, so that a carried frame does not come back as it left.
+fn loop_in_space(points: usize, wave: f64) -> Curve {
+    let at = |i: usize| {
+        let t = TAU * i as f64 / points as f64;
+        DVec3::new(20.0 * t.cos(), 14.0 * t.sin(), wave * (2.0 * t).sin() + 0.5 * wave * (3.0 * t).cos())
+    };
+    Curve { basis: Basis::CatmullRom, closed: true, points: (0..points).map(at).collect(), radii: None }
+}
+
+#[test]
+fn plies_are_continuous_along_a_yarn_and_across_its_seam() {
+    let mut worst: f64 = 0.0;
+    for basis in [Basis::CatmullRom, Basis::BSpline] {
+        for (points, wave, plies, rate, start) in
+            [(24, 0.0, 3, 0.21, 0.0), (40, 6.0, 3, 0.17, 1.0), (33, 9.0, 2, -0.4, 2.0), (50, 5.0, 1, 0.05, 3.0)]
+        {
+            let curve = loop_in_space(points, wave);
+            let radii = vec![1.0; curve.points.len()];
+            let symmetry = TAU / f64::from(plies);
+            let options = StrandOptions {
+                basis,
+                tolerance: 0.005,
+                longest_segment: 3.0,
+                ply_rate: rate,
+                symmetry,
+                phases: vec![start],
+            };
+            let strands = Strands::new(&[(curve, radii)], &options);
+            let count = strands.segments().len() as u32;
+            for segment in 0..count {
+                let next = (segment + 1) % count;
+                let (end, begin) = (strands.place(segment, 1.0), strands.place(next, 0.0));
+                assert!(end.centre.distance(begin.centre) < 1e-3, "segment {segment} of {count}");
+                assert!(end.tangent.dot(begin.tangent) > 1.0 - 1e-4, "segment {segment} of {count}");
+                let mut turned = turn(&end, &begin);
+                if next == 0 {
+                    // Over the seam the section need only come back onto itself.
+                    turned -= symmetry * (turned / symmetry).round();
+                }
+                worst = worst.max(turned.abs());
+                assert!(turned.abs() < 2e-3, "{plies} plies, rate {rate}: {turned} between {segment} and {next}");
+            }
+        }
+    }
+    eprintln!("largest jump of a ply: {worst:.1e} rad");
+}
+
+#[test]
+fn plies_turn_evenly_between_points() {
+    // The rate is radians per radius of yarn; closing the seam may change it by half a symmetry over the whole.
+    let curve = loop_in_space(30, 0.0);
+    let radii = vec![1.0; 30];
+    let options = StrandOptions {
+        basis: Basis::CatmullRom,
+        tolerance: 0.005,
+        longest_segment: 3.0,
+        ply_rate: 0.3,
+        symmetry: TAU / 3.0,
+        phases: vec![],
+    };
+    let strands = Strands::new(&[(curve, radii)], &options);
+    let mut total = 0.0;
+    for segment in 0..strands.segments().len() as u32 {
+        for step in 0..8 {
+            let place = |u: i32| strands.place(segment, u as f32 / 8.0);
+            total += turn(&place(step), &place(step + 1));
+        }
+    }
+    let wanted = 0.3 * strands.length();
+    eprintln!("{total:.3} rad of plies, {wanted:.3} wanted");
+    assert!((total - wanted).abs() < TAU / 6.0 + 0.1, "{total} and {wanted}");
+}
