@@ -110,7 +110,7 @@ struct SceneArgs {
     #[arg(long, value_name = "N")]
     height: Option<u32>,
     /// Render only these pixels (the last two exclusive).
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_delimiter = ',', num_args = 4)]
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_delimiter = ',')]
     crop: Option<Vec<u32>>,
     /// Most scattering events of a path.
     #[arg(long, value_name = "N")]
