@@ -204,11 +204,11 @@ fn wrong_options_are_refused() {
         (&["--mode", "cloth"][..], &["invalid value 'cloth' for '--mode", "yarn"][..]),
         (&["--model", "magic"], &["invalid value 'magic' for '--model", "aggregated", "two-stream"]),
         (&["--spp", "many"], &["invalid value 'many' for '--spp"]),
-        (&["--spp", "-1"], &["--spp"]),
+        (&["--spp", "-1"], &["unexpected argument '-1' found"]),
         (&["--spp", "0"], &["--spp 0:1:7: error: `spp` must be ", "found 0"]),
         (&["--time", "0"], &["error: `time` must be above 0, found 0"]),
         (&["--time", "nan"], &["error: `time` must be "]),
-        (&["--noise", "-1"], &["--noise"]),
+        (&["--noise=-1"], &["error: `noise` must be above 0, found -1"]),
         (&["--width", "0"], &["error: `width` must be from 1 to 65536, found 0"]),
         (&["--threads", "0"], &["error: `threads` must be from 1 to 4096, found 0"]),
         (&["--crop", "0,0,4"], &["--crop"]),
@@ -227,6 +227,14 @@ fn wrong_options_are_refused() {
     }
     refused_with(d, &["rendr", "s.toml"], &["unrecognized subcommand 'rendr'", "render"]);
     refused_with(d, &["render"], &["<SCENE>"]);
+}
+
+#[test]
+#[ignore = "a known gap: a scene without cloth and light renders a black picture with status 0"]
+fn an_empty_scene_is_refused() {
+    let directory = directory();
+    write(directory.path(), "empty.toml", "");
+    refused_with(directory.path(), &["render", "empty.toml", "-o", "o.exr"], &["empty.toml"]);
 }
 
 #[test]
