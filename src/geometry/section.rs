@@ -107,6 +107,17 @@ impl PlyCrossing {
 /// The plies a ray crosses, nearest first.
 pub type Crossings = ArrayVec<PlyCrossing, MAX_PLIES>;
 
+/// Which circle of a ply is meant: that of all its fibres, or that of their centres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlyParts {
+    /// All of each ply.
+    Whole,
+    /// Of each ply the core, which holds the fibres' centres.
+    Cores,
+    /// Of one ply the core, of the others all.
+    CoreOf(usize),
+}
+
 /// A ply where a ray passes it.
 struct Passage {
     /// Unit vector from the yarn's axis to the ply.
@@ -299,9 +310,9 @@ impl Section {
     /// The stretches of plies that lie ahead of a point inside the yarn, in a direction `w` of this frame.
     ///
     /// `start` is a point of the section that is `travel` farther along the yarn than the frame's origin. `visit` is
-    /// called with a ply's index and the distances (in the section) at which the way enters and leaves it. `core`
-    /// asks for the circle that holds the fibres' centres, else for the whole ply. As for rays, each ply is placed
-    /// where the way passes nearest to it.
+    /// called with a ply's index, the distances (in the section) at which the way enters and leaves it, and its signed
+    /// distance from the ply's axis. As for rays, each ply is placed where the way passes nearest to it, and moves on
+    /// from there.
     #[inline]
     pub fn chords_ahead(
         &self,
@@ -309,7 +320,7 @@ impl Section {
         start: Vec2,
         travel: f32,
         w: Vec3A,
-        core: Option<usize>,
+        parts: PlyParts,
         mut visit: impl FnMut(usize, f32, f32, f32),
     ) {
         let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
@@ -329,7 +340,11 @@ impl Section {
                 }
                 centre = self.ply_centre(ply, axis, travel + further);
             }
-            let radius = if core == Some(index) { ply.core_radius } else { ply.radius };
+            let radius = match parts {
+                PlyParts::Cores => ply.core_radius,
+                PlyParts::CoreOf(own) if own == index => ply.core_radius,
+                _ => ply.radius,
+            };
             // The centre moves on while the way goes past it.
             let drift = if further.abs() < MAX_LIGHT_TRAVEL {
                 slope * (shape.ply_rate * ply.distance * axis.perp() + (travel + further) * self.bend)
@@ -371,7 +386,7 @@ impl Section {
             fiber_tangent(ply, shape.ply_rate, centre, at.axis, Vec2::new(x, self.h))
         };
         let (a, b) = (end(enter), end(exit));
-        let nodes = f32x4::new([0.069_431_84, 0.330_009_48, 0.669_990_5, 0.930_568_16]);
+        let nodes = f32x4::new([0.069_431_84, 0.330_009_5, 0.669_990_5, 0.930_568_16]);
         let weights = f32x4::new([0.173_927_42, 0.326_072_58, 0.326_072_58, 0.173_927_42]);
         let tx = f32x4::splat(a.x) + nodes * f32x4::splat(b.x - a.x);
         let ty = f32x4::splat(a.y) + nodes * f32x4::splat(b.y - a.y);
@@ -529,7 +544,7 @@ mod tests {
     fn extreme_rays_stay_finite() {
         let shape = touching_yarn(3, 60, 0.4, 1.5, -1.5);
         let mut crossings = Crossings::new();
-        for theta in [std::f32::consts::FRAC_PI_2, 1.5707, -1.5707, 0.0] {
+        for theta in [std::f32::consts::FRAC_PI_2, 1.57, -1.57, 0.0] {
             for h in [-1.0, 1.0, 0.0, 0.999_999] {
                 let (origin, direction) = ray(theta, 0.3, h);
                 let section = Section::new(&place(), origin, direction, true);

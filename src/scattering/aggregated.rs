@@ -30,7 +30,7 @@ use super::{
 };
 use crate::{
     geometry::{
-        section::{Crossings, PlyCrossing, Section},
+        section::{Crossings, PlyCrossing, PlyParts, Section},
         yarn::{YarnShape, fiber_tangent},
     },
     math::{Rgb, frame::sin_cos, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -51,8 +51,9 @@ pub struct AggregatedYarn {
     plies: Vec<PlyOptics>,
     /// Expected energy of a node in each ply, for choosing between plies.
     node_gain: Vec<Rgb>,
-    /// Whether F follows the light's own way through the yarn; false only to compare with the bare model.
-    forward_follows_light: bool,
+    /// The model's plain form, as first specified for straight yarns: F by the camera's chord alone, neighbouring plies by
+    /// their cores. Only for comparison with reference values of that form.
+    plain: bool,
 }
 
 impl AggregatedYarn {
@@ -65,7 +66,7 @@ impl AggregatedYarn {
         let count = shape.plies.len();
         let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        Self { shape, plies, node_gain, forward_follows_light: true }
+        Self { shape, plies, node_gain, plain: false }
     }
 
     /// The yarn's geometry.
@@ -468,13 +469,21 @@ impl<'a> Vertex<'a> {
         let ramp = |t: f32| if t < cleared { 0.5 * t * t / cleared } else { t - 0.5 * cleared };
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
-        self.section.chords_ahead(shape, start, node.travel, w, Some(node.ply), |ply, from, to, offset| {
-            if ply == node.ply {
-                own += optics.rho * (optics.sigma * (ramp(to + optics.lead) - ramp(from + optics.lead)));
+        let plain = self.yarn.plain;
+        let parts = if plain { PlyParts::Cores } else { PlyParts::CoreOf(node.ply) };
+        self.section.chords_ahead(shape, start, node.travel, w, parts, |ply, from, to, offset| {
+            let passed = &self.yarn.plies[ply];
+            if ply == node.ply || plain {
+                let depth = passed.rho * (passed.sigma * (ramp(to + optics.lead) - ramp(from + optics.lead)));
+                if ply == node.ply {
+                    own += depth;
+                } else {
+                    others += depth;
+                }
             } else {
                 let other = &shape.plies[ply];
                 let full = 2.0 * (other.radius * other.radius - offset * offset).max(1e-8).sqrt();
-                others += self.yarn.plies[ply].rho * (other.fibers_on_chord(offset) * ((to - from) / full).min(1.0));
+                others += passed.rho * (other.fibers_on_chord(offset) * ((to - from) / full).min(1.0));
             }
         });
         let along = w.dot(node.tangent);
@@ -667,7 +676,7 @@ impl<'a> Vertex<'a> {
         let density = m * around;
         let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
         let mut value = forward.energy * density;
-        if self.yarn.forward_follows_light {
+        if !self.yarn.plain {
             value *= self.forward_gain(forward, w);
         }
         (value, pdf)
@@ -680,7 +689,7 @@ impl<'a> Vertex<'a> {
         let mut unscattered = forward.half_depth_unscattered;
         let start = Vec2::new(forward.middle, self.section.h);
         let travel = self.section.travel(forward.middle);
-        self.section.chords_ahead(&self.yarn.shape, start, travel, w, None, |ply, from, to, _| {
+        self.section.chords_ahead(&self.yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
             let optics = &self.yarn.plies[ply];
             let fibers = forward.scale * optics.sigma * (to - from);
             depth += optics.rho * fibers;
@@ -766,9 +775,16 @@ impl Forward {
         }
         let mut plain = 0.0;
         let start = Vec2::new(middle, section.h);
-        section.chords_ahead(&yarn.shape, start, section.travel(middle), -camera, None, |ply, from, to, _| {
-            plain += yarn.plies[ply].sigma * (to - from);
-        });
+        section.chords_ahead(
+            &yarn.shape,
+            start,
+            section.travel(middle),
+            -camera,
+            PlyParts::Whole,
+            |ply, from, to, _| {
+                plain += yarn.plies[ply].sigma * (to - from);
+            },
+        );
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
         Some(Self {
             frame: PlyFrame::of_ply(&yarn.shape, section, front, camera),
