@@ -440,7 +440,7 @@ mod tests {
         let mut crossings = Crossings::new();
         let mut seen = 0;
         for i in 0..600 {
-            let (theta, phi) = (-0.75 + 0.0025 * i as f32, 0.05 * i as f32);
+            let (theta, phi) = (-0.5 + 0.0016 * i as f32, 0.05 * i as f32);
             let h = -0.99 + 1.98 * ((i * 37 % 600) as f32) / 599.0;
             let (origin, direction) = ray(theta, phi, h);
             let section = Section::new(&place(), origin, direction, true);
