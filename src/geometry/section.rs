@@ -16,7 +16,7 @@ use super::yarn::{MAX_PLIES, PlyShape, YarnShape, fiber_tangent};
 use crate::math::frame::sin_cos;
 
 /// Slope along the yarn beyond which a ray counts as no steeper.
-const MAX_SLOPE: f32 = 3.0;
+const MAX_SLOPE: f32 = 1.0;
 /// How far along the yarn, in yarn radii, turning and bending are followed.
 const MAX_TRAVEL: f32 = 1.2;
 
