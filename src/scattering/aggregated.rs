@@ -157,7 +157,7 @@ struct Forward {
     half_depth: Rgb,
     half_depth_unscattered: f32,
     scale: f32,
-    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord.
+    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord, over the lobe's mean gain.
     norm: Rgb,
 }
 
@@ -677,26 +677,9 @@ impl<'a> Vertex<'a> {
         let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
         let mut value = forward.energy * density;
         if !self.yarn.plain {
-            value *= self.forward_gain(forward, w);
+            value *= forward.gain(self.yarn, self.section, w);
         }
         (value, pdf)
-    }
-
-    /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
-    #[inline]
-    fn forward_gain(&self, forward: &Forward, w: Vec3A) -> Rgb {
-        let mut depth = forward.half_depth;
-        let mut unscattered = forward.half_depth_unscattered;
-        let start = Vec2::new(forward.middle, self.section.h);
-        let travel = self.section.travel(forward.middle);
-        self.section.chords_ahead(&self.yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
-            let optics = &self.yarn.plies[ply];
-            let fibers = forward.scale * optics.sigma * (to - from);
-            depth += optics.rho * fibers;
-            unscattered += optics.rho_unscattered * fibers;
-        });
-        let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
-        (passed * forward.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
 }
 
@@ -786,7 +769,7 @@ impl Forward {
             },
         );
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
-        Some(Self {
+        let mut forward = Self {
             frame: PlyFrame::of_ply(&yarn.shape, section, front, camera),
             energy: energy / scattered,
             channel: normalised((energy * weight).to_array()),
@@ -797,7 +780,33 @@ impl Forward {
             half_depth_unscattered,
             scale,
             norm: Rgb::ONE / energy.max(Rgb::splat(1e-12)),
-        })
+        };
+        if !yarn.plain && energy.max_channel() > 1e-3 {
+            // The gain must not make or lose light: over its mean, by three-point Gauss-Hermite quadrature in azimuth.
+            let spread = sigma.iter().sum::<f32>() / 3.0;
+            let towards = |off: f32| forward.gain(yarn, section, forward.frame.direction(-forward.frame.sin, PI + off));
+            let reach = 3f32.sqrt() * spread;
+            let mean = (towards(reach) + towards(-reach)) * (1.0 / 6.0) + towards(0.0) * (2.0 / 3.0);
+            forward.norm = forward.norm / mean.max(Rgb::splat(1.0 / MAX_FORWARD_GAIN));
+        }
+        Some(forward)
+    }
+
+    /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
+    #[inline]
+    fn gain(&self, yarn: &AggregatedYarn, section: &Section, w: Vec3A) -> Rgb {
+        let mut depth = self.half_depth;
+        let mut unscattered = self.half_depth_unscattered;
+        let start = Vec2::new(self.middle, section.h);
+        let travel = section.travel(self.middle);
+        section.chords_ahead(&yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
+            let optics = &yarn.plies[ply];
+            let fibers = self.scale * optics.sigma * (to - from);
+            depth += optics.rho * fibers;
+            unscattered += optics.rho_unscattered * fibers;
+        });
+        let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
+        (passed * self.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
 }
 
