@@ -1,5 +1,45 @@
-//! x
+//! A renderer for knitted and woven cloth: yarns as curves, fibres by an analytic model.
+//!
+//! Cloth is fibres twisted into plies, plies into yarns, yarns knitted or woven. Here only yarns are geometry. Where a
+//! ray meets a yarn its plies are found in the cross-section, and a multi-level scattering model answers for the
+//! hundreds of fibres inside: Zhu et al., "A Practical and Hierarchical Yarn-based Shading Model for Cloth", EGSR
+//! 2023 ("the paper" everywhere in this code), with the departures that [`scattering`] names.
+//!
+//! # The way of a picture
+//! ```text
+//! scene.toml   --scene::document, scene::load-->  Scene     checked; millimetres, radians; no TOML, no Embree
+//! Scene        --trace::World------------------>  strands in Embree, a scattering model for each yarn
+//! camera ray   --trace------------------------->  Hit       place on a yarn, seen in its cross-section
+//! Hit          --geometry::section------------->  plies crossed, in order, with their fibres
+//! crossings    --scattering-------------------->  value, density, sampled direction of a vertex
+//! paths        --integrator-------------------->  radiance of one sample
+//! samples      --render, film------------------>  pixels    --render::picture, image-->  EXR, PNG, ...
+//! the run      --report, plan------------------>  statistics, metadata                  --cli-->  screen
+//! ```
+//! Only one thing looks back: during traversal Embree asks a filter whether a ray meets a ply or slips through. The
+//! filter lives in [`trace`], sees shapes and transparency only, and is a pure function of ray and hit.
+//!
+//! # The rooms, from ground to top
+//! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
+//! * [`ffi`]: Embree and OpenImageIO behind a safe face; the only `unsafe` code.
+//! * [`math`]: numbers, not yarns. [`image`]: pictures at rest.
+//! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
+//! * [`scattering`]: light at one crossing; pure functions, no rays, no files.
+//! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`integrator`]: light along a path.
+//! * [`film`]: what pixels have collected. [`render`]: the driver, and pictures from films.
+//! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was. [`cli`]: the program.
+//!
+//! # Conventions
+//! * Lengths are millimetres in a [`scene::Scene`], yarn radii in [`geometry::section`] and [`scattering`]. Angles are
+//!   radians everywhere but in files.
+//! * Right-handed, +y up. Directions point away from the place of scattering. "Camera" is the side from which a path
+//!   comes (the paper's r), "light" the side to which it goes (its i).
+//! * theta is measured from the plane across a fibre or yarn, phi around it; phi = 0 is back towards the camera.
+//! * Scattering values include the cosine towards the light and are per steradian.
+//! * `f32` for rays and directions, `f64` for set-up and sums.
+
 #![deny(unsafe_code)]
+
 pub mod cli;
 pub mod ffi;
 pub mod film;

@@ -10,7 +10,9 @@ use std::{
 use serde_json::Value;
 use yarnray::image::{self, Attribute};
 
-use crate::support::{SWATCH, bcc, directory, listing, program, project, read_json, render, weave_text, write, yarnray};
+use crate::support::{
+    SWATCH, bcc, directory, listing, program, project, read_json, render, weave_text, write, yarnray,
+};
 
 #[test]
 fn help_carries_examples() {
@@ -145,12 +147,14 @@ fn statistics_have_every_key_of_the_interface() {
     ] {
         assert!(number(path) > 0.0, "{path}");
     }
-    let parts: f64 = ["load", "generate", "build", "render", "write"].map(|p| number(&format!("/seconds/{p}"))).iter().sum();
+    let parts: f64 =
+        ["load", "generate", "build", "render", "write"].map(|p| number(&format!("/seconds/{p}"))).iter().sum();
     assert!(number("/seconds/total") >= 0.99 * parts, "{stats:#}");
     assert!(number("/mean_bounces") >= 1.0);
     assert!(number("/memory/scene_bytes") >= number("/memory/geometry_bytes") + number("/memory/bvh_bytes"));
     assert!(number("/memory/peak_rss_bytes") > number("/memory/scene_bytes"));
-    let names = |key: &str| -> BTreeSet<&str> { stats[key].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect() };
+    let names =
+        |key: &str| -> BTreeSet<&str> { stats[key].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect() };
     let (used, left_out) = (names("used"), names("left_out"));
     assert!(used.is_disjoint(&left_out), "{used:?} {left_out:?}");
     assert!(used.is_superset(&["ply_filter", "environment", "distant_light"].into()), "{used:?}");

@@ -14,7 +14,8 @@ fn read_npy(path: &Path) -> (Vec<usize>, Vec<f64>) {
     let text = std::str::from_utf8(&bytes[10..10 + header]).unwrap();
     assert!(text.contains("'<f4'") && text.contains("'fortran_order': False"), "{text}");
     let shape = text.split_once("'shape': (").unwrap().1.split_once(')').unwrap().0;
-    let shape: Vec<usize> = shape.split(',').map(str::trim).filter(|s| !s.is_empty()).map(|s| s.parse().unwrap()).collect();
+    let shape: Vec<usize> =
+        shape.split(',').map(str::trim).filter(|s| !s.is_empty()).map(|s| s.parse().unwrap()).collect();
     let values: Vec<f64> =
         bytes[10 + header..].as_chunks().0.iter().map(|c| f64::from(f32::from_le_bytes(*c))).collect();
     assert_eq!(values.len(), shape.iter().product::<usize>());
@@ -29,9 +30,14 @@ fn scene(truth: &Value, curves: &Path, sky: bool) -> String {
     let phases: Vec<f64> = truth["phases"].as_array().unwrap().iter().map(degrees).collect();
     let (x, y) = (7f64.to_radians().tan() * 100.0, (-4f64).to_radians().tan() * 100.0);
     let mut text = String::new();
-    writeln!(text, "render = {{ width = {}, height = {}, filter = \"box\" }}", camera["pixels"][0], camera["pixels"][1])
+    writeln!(
+        text,
+        "render = {{ width = {}, height = {}, filter = \"box\" }}",
+        camera["pixels"][0], camera["pixels"][1]
+    )
+    .unwrap();
+    writeln!(text, "[camera]\ntype = \"orthographic\"\nposition = [{x}, {y}, 100]\nsize = {}", camera["height"])
         .unwrap();
-    writeln!(text, "[camera]\ntype = \"orthographic\"\nposition = [{x}, {y}, 100]\nsize = {}", camera["height"]).unwrap();
     writeln!(text, "[fiber.f]\nr = {}\ntt = {}\nd = {}", material["a_r"], material["a_tt"], material["a_d"]).unwrap();
     for (key, name) in [("beta_r", "beta_R"), ("beta_tt", "beta_TT"), ("beta_n", "beta_N")] {
         writeln!(text, "{key} = {}", degrees(&material[name])).unwrap();
@@ -55,7 +61,8 @@ fn scene(truth: &Value, curves: &Path, sky: bool) -> String {
         text += "[[light]]\ntype = \"environment\"\nradiance = 1\n";
     } else {
         let towards = &truth["lights"]["front"]["direction"];
-        writeln!(text, "[[light]]\ntype = \"distant\"\ntowards = {towards}\nirradiance = 1\nangular_radius = 1").unwrap();
+        writeln!(text, "[[light]]\ntype = \"distant\"\ntowards = {towards}\nirradiance = 1\nangular_radius = 1")
+            .unwrap();
     }
     text
 }
@@ -66,8 +73,7 @@ fn boxes(pixels: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
     let mut out = Vec::new();
     for by in 0..height / 8 {
         for bx in 0..width / 8 {
-            let inside: Vec<[f64; 3]> =
-                (0..64).map(|i| pixels[(8 * by + i / 8) * width + 8 * bx + i % 8]).collect();
+            let inside: Vec<[f64; 3]> = (0..64).map(|i| pixels[(8 * by + i / 8) * width + 8 * bx + i % 8]).collect();
             out.push(crate::support::mean(&inside));
         }
     }
@@ -78,7 +84,8 @@ fn boxes(pixels: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
 fn a_weave_looks_as_its_fibres_do() {
     let Some(folder) = shared("oracle/fabric") else { return };
     let name = "weave50";
-    let truth: Value = serde_json::from_str(&std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap()).unwrap();
+    let truth: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap()).unwrap();
     let curves = folder.join(format!("{name}_yarns.txt")).canonicalize().unwrap();
     let (shape, values) = read_npy(&folder.join(format!("{name}_mean.npy")));
     let [3, height, width, 3] = shape[..] else { panic!("{shape:?}") };
@@ -96,7 +103,9 @@ fn a_weave_looks_as_its_fibres_do() {
         assert_eq!([ours.image.width, ours.image.height], [width, height]);
         let (ours, theirs) = (ours.colors(), picture_of(light));
         let on_cloth = |p: &[[f64; 3]]| -> [f64; 3] {
-            crate::support::mean(&p.iter().zip(&sharp).filter(|&(_, &s)| s > limit).map(|(c, _)| *c).collect::<Vec<_>>())
+            crate::support::mean(
+                &p.iter().zip(&sharp).filter(|&(_, &s)| s > limit).map(|(c, _)| *c).collect::<Vec<_>>(),
+            )
         };
         let (a, b) = (on_cloth(&ours), on_cloth(&theirs));
         let ratio: [f64; 3] = std::array::from_fn(|k| a[k] / b[k]);

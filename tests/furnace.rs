@@ -50,8 +50,7 @@ fn white(name: &str, source: &str, plies: u32, density: f64, extra: &str) -> Vec
     let picture = render_file(&write(directory.path(), "white.toml", scene), &[]);
     let alpha = picture.channel("A");
     let colors = picture.colors();
-    let covered: Vec<[f64; 3]> =
-        colors.iter().zip(alpha).filter(|&(_, &a)| a > 0.99).map(|(c, _)| *c).collect();
+    let covered: Vec<[f64; 3]> = colors.iter().zip(alpha).filter(|&(_, &a)| a > 0.99).map(|(c, _)| *c).collect();
     let variance = picture.channel("variance.R");
     // Standard error of the mean over some pixels.
     let error = |pixels: &dyn Fn(usize) -> bool| -> f64 {

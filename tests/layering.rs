@@ -244,7 +244,10 @@ fn rooms_use_what_the_table_says_and_nothing_else() {
     for (index, (room, allowed)) in ROOMS.iter().enumerate() {
         let found = used.remove(*room).unwrap_or_default();
         for (other, places) in &found {
-            assert!(order[..index].contains(&other.as_str()), "`{room}` uses `{other}`, which stands above it: {places:?}");
+            assert!(
+                order[..index].contains(&other.as_str()),
+                "`{room}` uses `{other}`, which stands above it: {places:?}"
+            );
             assert!(allowed.contains(&other.as_str()), "`{room}` must not use `{other}`: {places:?}");
         }
         for other in *allowed {

@@ -110,8 +110,8 @@ struct SceneArgs {
     #[arg(long, value_name = "N")]
     height: Option<u32>,
     /// Render only these pixels (the last two exclusive).
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_delimiter = ',')]
-    crop: Option<Vec<u32>>,
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop)]
+    crop: Option<[u32; 4]>,
     /// Most scattering events of a path.
     #[arg(long, value_name = "N")]
     max_bounces: Option<u32>,
@@ -130,6 +130,15 @@ struct SceneArgs {
     /// Let the camera frame what there is.
     #[arg(long)]
     frame: bool,
+}
+
+/// Reads four numbers with commas between them.
+fn crop(text: &str) -> Result<[u32; 4], String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    numbers
+        .ok()
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "expected four whole numbers, as in 300,200,460,320".to_owned())
 }
 
 fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValuesParser {
@@ -169,8 +178,8 @@ impl SceneArgs {
             set(key, value, shown);
         }
         if let Some(crop) = &self.crop {
-            let shown = crop.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
-            options.assignments.push(format!("render.crop=[{shown}]"));
+            let [x0, y0, x1, y1] = crop;
+            options.assignments.push(format!("render.crop=[{x0},{y0},{x1},{y1}]"));
         }
         load(path, &options)
     }

@@ -258,7 +258,7 @@ impl Strand {
         let total = lengths[lengths.len() - 1];
         let mean_radius = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
         let kept = options.tolerance <= 0.0 && chain.basis == options.basis;
-        let resampled = if kept || !(total > 0.0) {
+        let resampled = if kept || total <= 0.0 || total.is_nan() {
             Chain { basis: if kept { options.basis } else { Basis::CatmullRom }, points: chain.points }
         } else {
             resample(&chain, &lengths, curve.closed && curve.points.len() >= 3, mean_radius, options)

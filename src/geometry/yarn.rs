@@ -77,7 +77,7 @@ fn segment_area(u: f32) -> f32 {
         -0.050_174_303,
         0.088_978_99,
         -0.214_598_8,
-        1.570_796_3,
+        std::f32::consts::FRAC_PI_2,
     ];
     let poly = C[1..].iter().fold(C[0], |p, &c| p * a + c);
     let asin = std::f32::consts::FRAC_PI_2 - (1.0 - a).sqrt() * poly;

@@ -226,7 +226,7 @@ impl<'a> Integrator<'a> {
         path.throughput *= weight;
         path.bounces += 1;
         let largest = path.throughput.max_channel();
-        if !(largest > 0.0) || path.bounces >= self.max_bounces {
+        if largest <= 0.0 || path.bounces >= self.max_bounces {
             // At the limit the path still collects what its last ray meets: only its scattering ends.
             return largest > 0.0 && path.bounces == self.max_bounces;
         }
@@ -328,7 +328,7 @@ impl<'a> Integrator<'a> {
         let local = section.to_local(towards.direction);
         let direct = vertex.evaluate(local, towards.pdf * chance);
         let value = direct.lobes.sum();
-        if !(value.max_channel() > 0.0) {
+        if value.max_channel() <= 0.0 {
             return None;
         }
         let start = if u_start < direct.forward_share { section.point_on_ray(vertex.forward_start()) } else { node };

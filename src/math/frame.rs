@@ -19,7 +19,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     // Reduce to [-pi/4, pi/4] by quarter turns, pi/2 in three parts (Cody and Waite), then Taylor-like minimax
     // polynomials of single precision (coefficients as in the Cephes library, S. Moshier).
     let quarters = (x * std::f32::consts::FRAC_2_PI).round_ties_even();
-    let r = ((x - quarters * 1.570_312_5) - quarters * 4.837_512_97e-4) - quarters * 7.549_79e-8;
+    let r = ((x - quarters * 1.570_312_5) - quarters * 4.837_513e-4) - quarters * 7.549_79e-8;
     let r2 = r * r;
     let sin = r + r * r2 * (-0.166_666_55 + r2 * (0.008_332_161 - r2 * 1.951_529_6e-4));
     let cos = 1.0 - 0.5 * r2 + r2 * r2 * (0.041_666_646 + r2 * (-0.001_388_731_6 + r2 * 2.443_315_7e-5));

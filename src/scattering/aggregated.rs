@@ -30,7 +30,7 @@ use super::{
 };
 use crate::{
     geometry::{
-        section::{Crossings, PlyCrossing, Section},
+        section::{Crossings, PlyCrossing, PlyParts, Section},
         yarn::{YarnShape, fiber_tangent},
     },
     math::{Rgb, frame::sin_cos, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -51,8 +51,9 @@ pub struct AggregatedYarn {
     plies: Vec<PlyOptics>,
     /// Expected energy of a node in each ply, for choosing between plies.
     node_gain: Vec<Rgb>,
-    /// Whether F follows the light's own way through the yarn; false only to compare with the bare model.
-    forward_follows_light: bool,
+    /// The model's plain form, as first specified for straight yarns: F by the camera's chord alone, neighbouring plies by
+    /// their cores. Only for comparison with reference values of that form.
+    plain: bool,
 }
 
 impl AggregatedYarn {
@@ -65,7 +66,7 @@ impl AggregatedYarn {
         let count = shape.plies.len();
         let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        Self { shape, plies, node_gain, forward_follows_light: true }
+        Self { shape, plies, node_gain, plain: false }
     }
 
     /// The yarn's geometry.
@@ -156,7 +157,7 @@ struct Forward {
     half_depth: Rgb,
     half_depth_unscattered: f32,
     scale: f32,
-    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord.
+    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord, over the lobe's mean gain.
     norm: Rgb,
 }
 
@@ -468,13 +469,21 @@ impl<'a> Vertex<'a> {
         let ramp = |t: f32| if t < cleared { 0.5 * t * t / cleared } else { t - 0.5 * cleared };
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
-        self.section.chords_ahead(shape, start, node.travel, w, Some(node.ply), |ply, from, to, offset| {
-            if ply == node.ply {
-                own += optics.rho * (optics.sigma * (ramp(to + optics.lead) - ramp(from + optics.lead)));
+        let plain = self.yarn.plain;
+        let parts = if plain { PlyParts::Cores } else { PlyParts::CoreOf(node.ply) };
+        self.section.chords_ahead(shape, start, node.travel, w, parts, |ply, from, to, offset| {
+            let passed = &self.yarn.plies[ply];
+            if ply == node.ply || plain {
+                let depth = passed.rho * (passed.sigma * (ramp(to + optics.lead) - ramp(from + optics.lead)));
+                if ply == node.ply {
+                    own += depth;
+                } else {
+                    others += depth;
+                }
             } else {
                 let other = &shape.plies[ply];
                 let full = 2.0 * (other.radius * other.radius - offset * offset).max(1e-8).sqrt();
-                others += self.yarn.plies[ply].rho * (other.fibers_on_chord(offset) * ((to - from) / full).min(1.0));
+                others += passed.rho * (other.fibers_on_chord(offset) * ((to - from) / full).min(1.0));
             }
         });
         let along = w.dot(node.tangent);
@@ -667,27 +676,10 @@ impl<'a> Vertex<'a> {
         let density = m * around;
         let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
         let mut value = forward.energy * density;
-        if self.yarn.forward_follows_light {
-            value *= self.forward_gain(forward, w);
+        if !self.yarn.plain {
+            value *= forward.gain(self.yarn, self.section, w);
         }
         (value, pdf)
-    }
-
-    /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
-    #[inline]
-    fn forward_gain(&self, forward: &Forward, w: Vec3A) -> Rgb {
-        let mut depth = forward.half_depth;
-        let mut unscattered = forward.half_depth_unscattered;
-        let start = Vec2::new(forward.middle, self.section.h);
-        let travel = self.section.travel(forward.middle);
-        self.section.chords_ahead(&self.yarn.shape, start, travel, w, None, |ply, from, to, _| {
-            let optics = &self.yarn.plies[ply];
-            let fibers = forward.scale * optics.sigma * (to - from);
-            depth += optics.rho * fibers;
-            unscattered += optics.rho_unscattered * fibers;
-        });
-        let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
-        (passed * forward.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
 }
 
@@ -766,11 +758,18 @@ impl Forward {
         }
         let mut plain = 0.0;
         let start = Vec2::new(middle, section.h);
-        section.chords_ahead(&yarn.shape, start, section.travel(middle), -camera, None, |ply, from, to, _| {
-            plain += yarn.plies[ply].sigma * (to - from);
-        });
+        section.chords_ahead(
+            &yarn.shape,
+            start,
+            section.travel(middle),
+            -camera,
+            PlyParts::Whole,
+            |ply, from, to, _| {
+                plain += yarn.plies[ply].sigma * (to - from);
+            },
+        );
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
-        Some(Self {
+        let mut forward = Self {
             frame: PlyFrame::of_ply(&yarn.shape, section, front, camera),
             energy: energy / scattered,
             channel: normalised((energy * weight).to_array()),
@@ -781,7 +780,33 @@ impl Forward {
             half_depth_unscattered,
             scale,
             norm: Rgb::ONE / energy.max(Rgb::splat(1e-12)),
-        })
+        };
+        if !yarn.plain && energy.max_channel() > 1e-3 {
+            // The gain must not make or lose light: over its mean, by three-point Gauss-Hermite quadrature in azimuth.
+            let spread = sigma.iter().sum::<f32>() / 3.0;
+            let towards = |off: f32| forward.gain(yarn, section, forward.frame.direction(-forward.frame.sin, PI + off));
+            let reach = 3f32.sqrt() * spread;
+            let mean = (towards(reach) + towards(-reach)) * (1.0 / 6.0) + towards(0.0) * (2.0 / 3.0);
+            forward.norm = forward.norm / mean.max(Rgb::splat(1.0 / MAX_FORWARD_GAIN));
+        }
+        Some(forward)
+    }
+
+    /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
+    #[inline]
+    fn gain(&self, yarn: &AggregatedYarn, section: &Section, w: Vec3A) -> Rgb {
+        let mut depth = self.half_depth;
+        let mut unscattered = self.half_depth_unscattered;
+        let start = Vec2::new(self.middle, section.h);
+        let travel = section.travel(self.middle);
+        section.chords_ahead(&yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
+            let optics = &yarn.plies[ply];
+            let fibers = self.scale * optics.sigma * (to - from);
+            depth += optics.rho * fibers;
+            unscattered += optics.rho_unscattered * fibers;
+        });
+        let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
+        (passed * self.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
 }
 

@@ -24,8 +24,10 @@ pub const MIN_VARIANCE: f32 = 1e-8;
 const KAPPA_ASYMPTOTIC: f32 = 1e5;
 
 /// (pi / 2)^2 C(kappa)^2 = P / Q, fitted for 4e-6 over all kappa >= 0; C is the factor kappa / (pi I1(kappa) e^-kappa).
+#[allow(clippy::excessive_precision, reason = "the digits of the fit")]
 const P: [f32; 8] = [0.034_491_077, 0.053_869_43, 0.383_853_46, 0.899_761_1, 1.917_204_4, 2.669_632_8, 2.351_903, 1.0];
-const Q: [f32; 5] = [0.021_957_702, 0.017_794_89, 0.218_347_29, 0.351_789_56, 1.0];
+#[allow(clippy::excessive_precision, reason = "the digits of the fit")]
+const Q: [f32; 5] = [0.021_957_702, 0.017_794_89, 0.218_347_29, 0.351_789_57, 1.0];
 
 /// The sines and cosines of two latitudes.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,24 @@
-//! x
+//! Light at one crossing of a ray and a yarn: pure functions, no rays, no files.
+//!
+//! Every model answers the same three questions about a vertex: what it returns for light from a direction
+//! ([`Direct`]: value with the cosine, per steradian, each lobe weighted against direction sampling), where a path goes
+//! on ([`Continuation`]: value over density), and how much light passes without meeting a fibre (a number, grey). A
+//! value is over 1 minus that number, because the caller has already decided that the ray did meet a fibre.
+//!
+//! | paper | here |
+//! | --- | --- |
+//! | Eq. 2, fibres on a chord | [`crate::geometry::yarn::PlyShape::fibers_on_chord`] |
+//! | Eqs. 3 and 4, averaged lobes | [`lobes`] (the paper's models), [`medium`] (the chain of TT) |
+//! | Eqs. 5 and 6, one fibre | [`fiber`], with the kernel of [`kernel`] |
+//! | Eqs. 8 to 11 and 15, forward lobes | [`aggregated`], lobe F; [`lobes`], [`closed_forms`] as printed |
+//! | Eqs. 12 to 14, backward lobes and appendix A | [`aggregated`], lobe B; [`lobes`], [`closed_forms`] as printed |
+//! | Eqs. 7 and 13, sums of lobes | [`LobeValues`] |
+//!
+//! [`aggregated`] is the default. It keeps the paper's lobes (R, TT, D, F, B) and departs from it where explicit fibres
+//! say otherwise: normalised, reciprocal fibre lobes; single scattering along the camera's chord with the light's own way
+//! through the plies; multiple scattering that does not count single scattering again; light that meets no fibre.
+//! [`lobes`] has the paper's model as printed and in its most charitable reading, and a two-stream variant, to compare.
+
 pub mod aggregated;
 pub mod closed_forms;
 pub mod fiber;

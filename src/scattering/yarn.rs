@@ -26,6 +26,10 @@ pub enum YarnScatterer {
 
 /// One scattering at such a yarn.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "lives on the stack for one scattering; boxing would allocate in the hot path"
+)]
 pub enum YarnVertex<'a> {
     /// Of [`YarnScatterer::Aggregated`].
     Aggregated(Vertex<'a>),

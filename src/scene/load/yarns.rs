@@ -107,10 +107,12 @@ fn yarn(
         (n, _) => n.unwrap_or(1),
     };
     let Some(radius) = radius else {
-        table.error(
-            format!("missing key `radius` in {}", table.title()),
-            Some("outer radius of the yarn; the radii of a curve file win over it"),
-        );
+        if !table.has("radius") {
+            table.error(
+                format!("missing key `radius` in {}", table.title()),
+                Some("outer radius of the yarn; the radii of a curve file win over it"),
+            );
+        }
         table.finish();
         return None;
     };
