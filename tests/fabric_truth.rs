@@ -111,10 +111,10 @@ fn a_weave_looks_as_its_fibres_do() {
         let ratio: [f64; 3] = std::array::from_fn(|k| a[k] / b[k]);
         let (a, b) = (boxes(&ours, width), boxes(&theirs, width));
         let level = crate::support::mean(&b);
-        let errors = a.iter().zip(&b).flat_map(|(a, b)| {
-            let level = level;
-            (0..3).map(move |k| (a[k] - b[k]).abs() / (b[k] + 0.05 * level[k])).collect::<Vec<_>>()
-        });
+        let errors = a
+            .iter()
+            .zip(&b)
+            .flat_map(|(a, b)| (0..3).map(move |k| (a[k] - b[k]).abs() / (b[k] + 0.05 * level[k])).collect::<Vec<_>>());
         let error = errors.sum::<f64>() / (3 * a.len()) as f64;
         eprintln!("{name}, {label}: mean ratio {ratio:.3?}, mean relative error of 8 x 8 boxes {error:.4}");
         assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.08), "{label}: mean ratio {ratio:.3?}");

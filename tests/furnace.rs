@@ -61,8 +61,7 @@ fn white(name: &str, source: &str, plies: u32, density: f64, extra: &str) -> Vec
     let mut wrong = Vec::new();
     let mut check = |what: &str, mean: [f64; 3], error: f64| {
         eprintln!("{label}: {what} {:.4} +- {error:.4}", mean[0]);
-        // Three standard errors of noise beside the half percent.
-        if mean.iter().any(|m| (m - 1.0).abs() > ALLOWED + 3.0 * error) {
+        if mean.iter().any(|m| (m - 1.0).abs() > ALLOWED) {
             wrong.push(format!("{label}: {what} {mean:.4?} +- {error:.4}"));
         }
     };
