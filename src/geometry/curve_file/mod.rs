@@ -136,9 +136,16 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileErr
 }
 
 fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    let unreadable = |error| CurveFileError::new(Place::File, format!("cannot be read: {error}"));
-    let metadata =
-        fs::metadata(path).map_err(|error| unreadable(error).hint("is the path right, and may you read the file?"))?;
+    let unreadable = |error: std::io::Error| {
+        let problem = match error.kind() {
+            std::io::ErrorKind::NotFound => "no such file".to_owned(),
+            std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
+            _ => format!("cannot be read: {error}"),
+        };
+        CurveFileError::new(Place::File, problem)
+    };
+    let metadata = fs::metadata(path)
+        .map_err(|error| unreadable(error).hint("paths in a scene are relative to the file that names them"))?;
     // A pipe or a device may never end.
     if !metadata.is_file() {
         return Err(CurveFileError::new(Place::File, "expected a regular file, found a folder, pipe or device"));

@@ -63,18 +63,20 @@ pub(super) struct FabricPlan {
     source: Source,
 }
 
-/// Reads one `[[fabric]]`; `curves` takes the place of its file or generator.
+/// Reads one `[[fabric]]`. `names` are all yarns of the scene, also those with mistakes, which are told already;
+/// `curves` takes the place of the fabric's file or generator.
 pub(super) fn plan(
     table: Reader<'_>,
     context: &Context<'_>,
     yarns: &BTreeMap<String, Yarn>,
+    names: &[String],
     curves: Option<&Path>,
 ) -> Option<FabricPlan> {
     let yarn = table.required_string("yarn").map(str::to_owned);
     if let Some(name) = &yarn
-        && !yarns.contains_key(name)
+        && !names.contains(name)
     {
-        let (message, hint) = unknown_name("yarn", name, yarns.keys().map(String::as_str));
+        let (message, hint) = unknown_name("yarn", name, names.iter().map(String::as_str));
         table.error_at("yarn", message, Some(&hint));
     }
     let radius = table.f64("radius", Range::POSITIVE).map(|r| r * context.unit);

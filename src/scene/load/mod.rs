@@ -191,6 +191,7 @@ fn build(
         table.finish();
     }
     let yarns = yarns::read(&root, &context, tilted);
+    let yarn_names: Vec<String> = root.named_tables("yarn").into_iter().map(|(name, _)| name.to_owned()).collect();
     let fabric_tables = root.tables("fabric");
     if fabric_tables.is_empty() && options.curves.is_some() {
         root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
@@ -200,7 +201,7 @@ fn build(
         .enumerate()
         .map(|(i, table)| {
             let curves = if i == 0 { options.curves.as_deref() } else { None };
-            cloth::plan(table, &context, &yarns, curves)
+            cloth::plan(table, &context, &yarns, &yarn_names, curves)
         })
         .collect();
     let camera_plan = view::camera(&root, &context, options.frame);

@@ -136,17 +136,20 @@ fn yarn(
             );
         }
         let Some(n) = keys.fibers else {
-            place.error("missing key `fibers`: the number of fibres in a ply", None);
+            if !place.has("fibers") {
+                let message = format!("missing key `fibers` in {}", place.title());
+                place.error(message, Some("the number of fibres in a ply"));
+            }
             return;
         };
         let fiber_radius = match (keys.fiber_radius, keys.density) {
             (Some(r), _) => r / radius,
             (None, Some(d)) => ply_radius * (d / n.max(1) as f64).sqrt(),
             (None, None) => {
-                place.error(
-                    "missing key `fiber_radius`",
-                    Some("or give `density`, the share of the ply's section that fibres fill"),
-                );
+                if !place.has("fiber_radius") && !place.has("density") {
+                    let message = format!("missing key `fiber_radius` in {}", place.title());
+                    place.error(message, Some("or give `density`, the share of the ply's section that fibres fill"));
+                }
                 return;
             }
         };
@@ -163,7 +166,10 @@ fn yarn(
             );
         }
         let Some(fiber) = &keys.fiber else {
-            place.error("missing key `fiber`: the name of a [fiber.NAME] table", None);
+            if !place.has("fiber") {
+                let message = format!("missing key `fiber` in {}", place.title());
+                place.error(message, Some("the name of a [fiber.NAME] table"));
+            }
             return;
         };
         let Some(material) = fibers.get(fiber.as_str()) else {
