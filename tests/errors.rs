@@ -150,8 +150,8 @@ fn missing_files_are_named() {
     write(d, "s.toml", SWATCH);
     refused(d, &["render", "none.toml", "-o", "o.exr"], "none.toml: error: no such file\n");
     refused(d, &["render", ".", "-o", "o.exr"], ".: error: not a file\n");
-    refused_with(d, &["info", "none.bcc"], &["error: none.bcc: cannot be read: "]);
-    refused_with(d, &["render", "s.toml", "--curves", "none.bcc", "-o", "o.exr"], &["none.bcc: cannot be read: "]);
+    refused_with(d, &["info", "none.bcc"], &["error: none.bcc: no such file"]);
+    refused_with(d, &["render", "s.toml", "--curves", "none.bcc", "-o", "o.exr"], &["none.bcc: no such file"]);
     write(d, "what.xyz", "0 0 0\n");
     refused(
         d,

@@ -144,8 +144,7 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
         };
         CurveFileError::new(Place::File, problem)
     };
-    let metadata = fs::metadata(path)
-        .map_err(|error| unreadable(error).hint("paths in a scene are relative to the file that names them"))?;
+    let metadata = fs::metadata(path).map_err(|error| unreadable(error).hint("is the path right?"))?;
     // A pipe or a device may never end.
     if !metadata.is_file() {
         return Err(CurveFileError::new(Place::File, "expected a regular file, found a folder, pipe or device"));

@@ -405,7 +405,7 @@ fn black_empty_and_extreme_yarns_stay_finite_and_dark() {
             [(1, 1, 1e-6, 0.0), (1, 5000, 0.9, 1.57), (3, 10, 2.0, -1.5), (64, 3, 0.3, 0.4)]
         {
             let yarn = yarn(plies, fibers, density, twist, -twist, &m);
-            for theta in [0.0, 1.2, 1.570_795, -1.570_796_3] {
+            for theta in [0.0, 1.2, 1.57, -std::f32::consts::FRAC_PI_2] {
                 for h in [0.0, 0.5, 1.0, -1.0, 0.999_999] {
                     let section = section(theta, h, 0.3);
                     let mut crossings = Crossings::new();
