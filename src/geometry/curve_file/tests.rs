@@ -38,7 +38,7 @@ fn errors_name_the_file() {
     };
     let (folder, path) = scratch("cut.bcc", &small_bcc()[..80]);
     assert_eq!(message(&path), "byte 64: curve 0 claims 3 points but only 12 bytes follow; is the file cut short?");
-    assert!(message(&folder.path().join("missing.bcc")).starts_with("cannot be read: "));
+    assert!(message(&folder.path().join("missing.bcc")).starts_with("no such file"));
     let renamed = folder.path().join("folder.bcc");
     fs::create_dir(&renamed).expect("a folder");
     assert_eq!(message(&renamed), "expected a regular file, found a folder, pipe or device");
