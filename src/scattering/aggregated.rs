@@ -25,6 +25,7 @@ use super::{
     Continuation, Direct, LobeValues,
     fiber::FiberMaterial,
     kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
+    lobe::{LobeFrame, choose, normalised},
     medium::PlyOptics,
     mis_weight,
 };
@@ -114,7 +115,7 @@ struct Node {
 /// Multiply scattered light of the node's ply.
 #[derive(Clone, Copy, Debug)]
 struct Backward {
-    frame: PlyFrame,
+    frame: LobeFrame,
     /// cos and sin of the azimuth towards which it leans.
     lean_to: (f32, f32),
     /// Energy that leaves the node's ply, given the direction drawn.
@@ -145,7 +146,7 @@ struct Again {
 /// Light that passes as TT.
 #[derive(Clone, Copy, Debug)]
 struct Forward {
-    frame: PlyFrame,
+    frame: LobeFrame,
     energy: Rgb,
     /// Chance of each channel when sampling.
     channel: [f32; 3],
@@ -159,50 +160,6 @@ struct Forward {
     scale: f32,
     /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord, over the lobe's mean gain.
     norm: Rgb,
-}
-
-/// A ply's own frame: tangent, the camera's azimuth, and what completes them.
-#[derive(Clone, Copy, Debug)]
-struct PlyFrame {
-    x: Vec3A,
-    y: Vec3A,
-    z: Vec3A,
-    sin: f32,
-    cos: f32,
-}
-
-impl PlyFrame {
-    /// About the unit vector `tangent`, for a camera direction.
-    #[inline]
-    fn new(tangent: Vec3A, camera: Vec3A) -> Self {
-        let sin = tangent.dot(camera).clamp(-1.0, 1.0);
-        let across = camera - sin * tangent;
-        let cos = across.length();
-        let x = if cos > 1e-6 { across / cos } else { crate::math::frame::orthonormal_basis(tangent).0 };
-        Self { x, y: tangent.cross(x), z: tangent, sin, cos }
-    }
-
-    #[inline]
-    fn of_ply(shape: &YarnShape, section: &Section, crossing: &PlyCrossing, camera: Vec3A) -> Self {
-        let (w, c) = (shape.ply_rate, crossing.centre);
-        let bent = section.bent(section.travel(c.x));
-        Self::new((Vec3A::new(-w * c.y, w * c.x, 1.0) + bent).normalize(), camera)
-    }
-
-    /// Latitudes of the camera and of `w`, and the cosine of `w`'s latitude.
-    #[inline]
-    fn latitudes(&self, w: Vec3A) -> (Latitudes, f32) {
-        let sin = w.dot(self.z).clamp(-1.0, 1.0);
-        let cos = (1.0 - sin * sin).sqrt();
-        (Latitudes::new(self.sin, self.cos, sin, cos), cos)
-    }
-
-    #[inline]
-    fn direction(&self, sin: f32, phi: f32) -> Vec3A {
-        let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        let (s, c) = sin_cos(phi);
-        cos * (c * self.x + s * self.y) + sin * self.z
-    }
 }
 
 /// One place of scattering, for one camera direction: see the module's notes.
@@ -399,7 +356,7 @@ impl<'a> Vertex<'a> {
             1 => sample_sine(node.kappa_tt, node.sin, node.cos, u, stream),
             _ => sample_sine_diffuse(u),
         };
-        let frame = PlyFrame::new(node.tangent, self.camera);
+        let frame = LobeFrame::new(node.tangent, self.camera);
         let direction = frame.direction(sin, TAU * stream.next());
         let value = self.node_value(&node, direction);
         let escape = self.escape_chance(&node, optics, value.clear);
@@ -433,7 +390,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     fn backward_of(&self, crossing: &PlyCrossing, energy: Rgb, chance: f32) -> Backward {
         let optics = &self.yarn.plies[crossing.ply];
-        let frame = PlyFrame::of_ply(&self.yarn.shape, self.section, crossing, self.camera);
+        let frame = LobeFrame::of_ply(&self.yarn.shape, self.section, crossing, self.camera);
         let relative = if self.yarn.shape.plies.len() == 1 {
             crossing.offset / self.yarn.shape.plies[0].radius
         } else {
@@ -770,7 +727,7 @@ impl Forward {
         );
         let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
         let mut forward = Self {
-            frame: PlyFrame::of_ply(&yarn.shape, section, front, camera),
+            frame: LobeFrame::of_ply(&yarn.shape, section, front, camera),
             energy: energy / scattered,
             channel: normalised((energy * weight).to_array()),
             kappa: kappa_of_variance(events * optics.beta_tt_squared),
@@ -807,25 +764,6 @@ impl Forward {
         });
         let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
         (passed * self.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
-    }
-}
-
-/// Weights over their sum; zeros if there is nothing to choose.
-#[inline]
-fn normalised(w: [f32; 3]) -> [f32; 3] {
-    let total = w[0] + w[1] + w[2];
-    if total > 0.0 { w.map(|x| x / total) } else { [0.0; 3] }
-}
-
-/// Index chosen with the given chances, which sum to 1.
-#[inline]
-fn choose(chances: [f32; 3], u: f32) -> usize {
-    if u < chances[0] {
-        0
-    } else if u < chances[0] + chances[1] || chances[2] <= 0.0 {
-        if chances[1] > 0.0 { 1 } else { 0 }
-    } else {
-        2
     }
 }
 

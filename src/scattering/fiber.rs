@@ -139,21 +139,7 @@ impl FiberBcsdf {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    pub(crate) fn lossless() -> FiberMaterial {
-        FiberMaterial { r: [0.2; 3], tt: [0.5; 3], d: [0.3; 3], beta_r: 0.15, beta_tt: 0.12, beta_n: 0.35 }
-    }
-
-    fn sphere(n_theta: usize, n_phi: usize) -> impl Iterator<Item = (Vec3A, f64)> {
-        let dt = std::f64::consts::PI / n_theta as f64;
-        let dp = std::f64::consts::TAU / n_phi as f64;
-        (0..n_theta * n_phi).map(move |i| {
-            let theta = (i / n_phi) as f64 * dt + 0.5 * dt - std::f64::consts::FRAC_PI_2;
-            let phi = (i % n_phi) as f64 * dp + 0.5 * dp;
-            let (s, c) = theta.sin_cos();
-            (Vec3A::new((c * phi.cos()) as f32, (c * phi.sin()) as f32, s as f32), c * dt * dp)
-        })
-    }
+    use crate::scattering::testing::{lossless, sphere};
 
     #[test]
     fn a_white_fiber_keeps_all_light_from_every_side() {

@@ -30,9 +30,8 @@ use super::{
         thrice_back, two_stream,
     },
     fiber::FiberMaterial,
-    kernel::{
-        DIFFUSE, Latitudes, MIN_VARIANCE, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse,
-    },
+    kernel::{DIFFUSE, MIN_VARIANCE, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
+    lobe::{LobeFrame, choose, normalised},
     mis_weight,
 };
 use crate::{
@@ -42,7 +41,6 @@ use crate::{
     },
     math::{
         Rgb,
-        frame::{orthonormal_basis, sin_cos},
         sampler::Stream,
         special::{front_share_of_wrapped_normal, wrapped_normal},
         warp::normal,
@@ -275,51 +273,14 @@ impl ChordYarn {
     }
 }
 
-/// A tangent, the camera's azimuth about it, and what completes them.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    x: Vec3A,
-    y: Vec3A,
-    z: Vec3A,
-    sin: f32,
-    cos: f32,
-}
-
-impl Frame {
-    /// About the unit vector `tangent`, for a camera direction.
-    #[inline]
-    fn new(tangent: Vec3A, camera: Vec3A) -> Self {
-        let sin = tangent.dot(camera).clamp(-1.0, 1.0);
-        let across = camera - sin * tangent;
-        let cos = across.length();
-        let x = if cos > 1e-6 { across / cos } else { orthonormal_basis(tangent).0 };
-        Self { x, y: tangent.cross(x), z: tangent, sin, cos }
-    }
-
-    /// Latitudes of the camera and of `w`, and the cosine of `w`'s latitude.
-    #[inline]
-    fn latitudes(&self, w: Vec3A) -> (Latitudes, f32) {
-        let sin = w.dot(self.z).clamp(-1.0, 1.0);
-        let cos = (1.0 - sin * sin).sqrt();
-        (Latitudes::new(self.sin, self.cos, sin, cos), cos)
-    }
-
-    #[inline]
-    fn direction(&self, sin: f32, phi: f32) -> Vec3A {
-        let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        let (s, c) = sin_cos(phi);
-        cos * (c * self.x + s * self.y) + sin * self.z
-    }
-}
-
 /// One place of scattering, for one camera direction.
 #[derive(Clone, Debug)]
 pub struct ChordVertex<'a> {
     yarn: &'a ChordYarn,
-    /// Frame of the fibres at the front ply's surface, for R and D.
-    fiber: Frame,
-    /// Frame of the front ply, for F and B.
-    ply: Frame,
+    /// LobeFrame of the fibres at the front ply's surface, for R and D.
+    fiber: LobeFrame,
+    /// LobeFrame of the front ply, for F and B.
+    ply: LobeFrame,
     /// Energies over 1 - T0.
     energy: LobeValues,
     /// Chances of drawing R, D, F and B.
@@ -351,7 +312,7 @@ impl<'a> ChordVertex<'a> {
     ) -> Self {
         let camera = Vec3A::new((1.0 - section.sin * section.sin).max(0.0).sqrt(), 0.0, section.sin);
         let Some(front) = crossings.first() else {
-            let frame = Frame::new(Vec3A::Z, camera);
+            let frame = LobeFrame::new(Vec3A::Z, camera);
             return Self {
                 yarn,
                 fiber: frame,
@@ -382,8 +343,8 @@ impl<'a> ChordVertex<'a> {
         let first = -(f64::from(u[0]) * (-total).exp_m1()).ln_1p();
         Self {
             yarn,
-            fiber: Frame::new(front.tangent_at_entry(&yarn.shape, section), camera),
-            ply: Frame::new(Vec3A::new(-w * c.y, w * c.x, 1.0).normalize(), camera),
+            fiber: LobeFrame::new(front.tangent_at_entry(&yarn.shape, section), camera),
+            ply: LobeFrame::new(Vec3A::new(-w * c.y, w * c.x, 1.0).normalize(), camera),
             energy,
             chance: normalised([energy.r, energy.d, energy.f, energy.b].map(|e| e.weighted_mean(weight))),
             kappa_r: yarn.plies[front.ply].kappa_r,
@@ -525,25 +486,6 @@ fn depth_after(yarn: &ChordYarn, crossings: &[PlyCrossing], mut count: f64) -> f
 #[inline]
 fn even_azimuth(half: bool) -> f32 {
     if half { FRAC_1_PI } else { 0.5 * FRAC_1_PI }
-}
-
-/// Weights over their sum; zeros if there is nothing to choose.
-#[inline]
-fn normalised<const N: usize>(w: [f32; N]) -> [f32; N] {
-    let total: f32 = w.iter().sum();
-    if total > 0.0 { w.map(|x| x / total) } else { [0.0; N] }
-}
-
-/// Index chosen with the given chances, which sum to 1.
-#[inline]
-fn choose(chances: [f32; 3], u: f32) -> usize {
-    if u < chances[0] {
-        0
-    } else if u < chances[0] + chances[1] || chances[2] <= 0.0 {
-        if chances[1] > 0.0 { 1 } else { 0 }
-    } else {
-        2
-    }
 }
 
 #[cfg(test)]

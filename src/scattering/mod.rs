@@ -23,8 +23,11 @@ pub mod aggregated;
 pub mod closed_forms;
 pub mod fiber;
 pub mod kernel;
+mod lobe;
 pub mod lobes;
 pub mod medium;
+#[cfg(test)]
+mod testing;
 pub mod yarn;
 
 use glam::Vec3A;

@@ -4,52 +4,15 @@ use std::f64::consts::TAU as TAU64;
 
 use super::*;
 use crate::geometry::yarn::{PlyParameters, touching_plies};
-use crate::math::special::GAUSS_LEGENDRE_4;
-
-const SILK: ([f64; 3], [f64; 3], [f64; 3]) = ([0.2; 3], [0.1, 0.4, 0.25], [0.03, 0.35, 0.1]);
-
-fn material(albedo: ([f64; 3], [f64; 3], [f64; 3]), beta: [f64; 3]) -> FiberMaterial {
-    FiberMaterial { r: albedo.0, tt: albedo.1, d: albedo.2, beta_r: beta[0], beta_tt: beta[1], beta_n: beta[2] }
-}
-
-fn lossless() -> FiberMaterial {
-    material(([0.2; 3], [0.5; 3], [0.3; 3]), [0.15, 0.12, 0.35])
-}
+use crate::{
+    math::special::GAUSS_LEGENDRE_4,
+    scattering::testing::{SILK, lossless, material, section, silk, sphere},
+};
 
 fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64, m: &FiberMaterial) -> AggregatedYarn {
     let shape = crate::geometry::yarn::tests::touching_yarn(plies, fibers, density, ply_twist, fiber_twist);
     let count = shape.plies.len();
     AggregatedYarn::new(shape, &vec![m; count])
-}
-
-/// The section of a straight yarn along z, seen from latitude `theta` at azimuth 0.
-fn section(theta: f32, h: f32, phase: f32) -> Section {
-    Section {
-        x: Vec3A::X,
-        y: Vec3A::Y,
-        z: Vec3A::Z,
-        centre: Vec3A::ZERO,
-        radius: 1.0,
-        h,
-        enter: (1.0 - h * h).max(0.0).sqrt(),
-        sin: theta.sin(),
-        cos: theta.cos().max(1e-3),
-        slope: theta.tan().clamp(-1.0, 1.0),
-        bend: Vec2::ZERO,
-        tilted: true,
-        phase: Vec2::new(phase.cos(), phase.sin()),
-    }
-}
-
-fn sphere(n_theta: usize, n_phi: usize) -> impl Iterator<Item = (Vec3A, f32)> {
-    let dt = std::f32::consts::PI / n_theta as f32;
-    let dp = TAU / n_phi as f32;
-    (0..n_theta * n_phi).map(move |i| {
-        let theta = ((i / n_phi) as f32 + 0.5) * dt - std::f32::consts::FRAC_PI_2;
-        let phi = ((i % n_phi) as f32 + 0.5) * dp;
-        let (s, c) = theta.sin_cos();
-        (Vec3A::new(c * phi.cos(), c * phi.sin(), s), c * dt * dp)
-    })
 }
 
 /// What the model says without any drawing: (F, single scattering, B) for each direction, and T0.
@@ -121,13 +84,13 @@ fn quadrature_with(
 
 /// The model's energy in each component, per channel, and T0.
 fn energies(yarn: &AggregatedYarn, section: &Section) -> ([Rgb; 3], f32) {
-    let grid: Vec<(Vec3A, f32)> = sphere(240, 128).collect();
+    let grid: Vec<(Vec3A, f64)> = sphere(240, 128).collect();
     let directions: Vec<Vec3A> = grid.iter().map(|g| g.0).collect();
     let (values, t0) = quadrature(yarn, section, &directions);
     let mut sums = [Rgb::ZERO; 3];
     for (value, (_, dw)) in values.iter().zip(&grid) {
         for k in 0..3 {
-            sums[k] += value[k] * *dw;
+            sums[k] += value[k] * *dw as f32;
         }
     }
     (sums, t0)
@@ -229,7 +192,7 @@ fn white_fibers_keep_all_light() {
 fn drawn_vertices_average_to_the_quadrature() {
     // Mean of Vertex::evaluate over its own random node against quadrature, in a few directions.
     for (index, case) in CASES.into_iter().enumerate() {
-        let (yarn, section) = build(case, &material(SILK, [0.15, 0.12, 0.35]));
+        let (yarn, section) = build(case, &silk());
         let mut crossings = Crossings::new();
         section.crossings(yarn.shape(), &mut crossings);
         let t0 = yarn.transparency(&crossings);
@@ -273,7 +236,7 @@ fn drawn_vertices_average_to_the_quadrature() {
 #[test]
 fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_nothing() {
     for (index, case) in CASES.into_iter().enumerate() {
-        for (white, m) in [(true, lossless()), (false, material(SILK, [0.15, 0.12, 0.35]))] {
+        for (white, m) in [(true, lossless()), (false, silk())] {
             let (yarn, section) = build(case, &m);
             let mut crossings = Crossings::new();
             section.crossings(yarn.shape(), &mut crossings);
@@ -353,8 +316,8 @@ fn sample_densities_match_where_samples_fall() {
         let b = vertex.backward_value(&backward, vertex.node.unwrap().ply, w).1
             * (1.0 - vertex.forward_chance)
             * backward.chance;
-        expected[0][cell(w)] += f64::from(f * dw) * f64::from(n);
-        expected[1][cell(w)] += f64::from(b * dw) * f64::from(n);
+        expected[0][cell(w)] += f64::from(f) * dw * f64::from(n);
+        expected[1][cell(w)] += f64::from(b) * dw * f64::from(n);
     }
     for k in 0..2 {
         let (mut chi2, mut cells) = (0.0, 0.0);
@@ -372,7 +335,7 @@ fn sample_densities_match_where_samples_fall() {
 
 #[test]
 fn the_far_field_of_an_untwisted_ply_is_reciprocal() {
-    let m = material(SILK, [0.15, 0.12, 0.35]);
+    let m = silk();
     let yarn = yarn(1, 100, 0.3, 0.0, 0.0, &m);
     let far_field = |theta_o: f32, theta_i: f32, phi: f32| {
         let w = Vec3A::new(theta_i.cos() * phi.cos(), theta_i.cos() * phi.sin(), theta_i.sin());

@@ -1,0 +1,55 @@
+//! What the tests of the models share.
+
+use glam::{Vec2, Vec3A};
+
+use super::fiber::FiberMaterial;
+use crate::geometry::section::Section;
+
+/// Albedos of R, TT and D.
+pub(super) type Albedos = ([f64; 3], [f64; 3], [f64; 3]);
+
+/// Silk as Zhu et al. 2023 print it.
+pub(super) const SILK: Albedos = ([0.2; 3], [0.1, 0.4, 0.25], [0.03, 0.35, 0.1]);
+
+pub(super) fn material(albedo: Albedos, beta: [f64; 3]) -> FiberMaterial {
+    FiberMaterial { r: albedo.0, tt: albedo.1, d: albedo.2, beta_r: beta[0], beta_tt: beta[1], beta_n: beta[2] }
+}
+
+pub(super) fn silk() -> FiberMaterial {
+    material(SILK, [0.15, 0.12, 0.35])
+}
+
+pub(super) fn lossless() -> FiberMaterial {
+    material(([0.2; 3], [0.5; 3], [0.3; 3]), [0.15, 0.12, 0.35])
+}
+
+/// The section of a straight yarn along z, seen from latitude `theta` at azimuth 0.
+pub(super) fn section(theta: f32, h: f32, phase: f32) -> Section {
+    Section {
+        x: Vec3A::X,
+        y: Vec3A::Y,
+        z: Vec3A::Z,
+        centre: Vec3A::ZERO,
+        radius: 1.0,
+        h,
+        enter: (1.0 - h * h).max(0.0).sqrt(),
+        sin: theta.sin(),
+        cos: theta.cos().max(1e-3),
+        slope: theta.tan().clamp(-1.0, 1.0),
+        bend: Vec2::ZERO,
+        tilted: true,
+        phase: Vec2::new(phase.cos(), phase.sin()),
+    }
+}
+
+/// Directions over the sphere, about z, each with its solid angle.
+pub(super) fn sphere(n_theta: usize, n_phi: usize) -> impl Iterator<Item = (Vec3A, f64)> {
+    let dt = std::f64::consts::PI / n_theta as f64;
+    let dp = std::f64::consts::TAU / n_phi as f64;
+    (0..n_theta * n_phi).map(move |i| {
+        let theta = (i / n_phi) as f64 * dt + 0.5 * dt - std::f64::consts::FRAC_PI_2;
+        let phi = (i % n_phi) as f64 * dp + 0.5 * dp;
+        let (s, c) = theta.sin_cos();
+        (Vec3A::new((c * phi.cos()) as f32, (c * phi.sin()) as f32, s as f32), c * dt * dp)
+    })
+}
