@@ -4,7 +4,7 @@
 //! * meets no fibre at all (the unscattered share T0, a delta, [`AggregatedYarn::transparency`]),
 //! * passes all it meets as TT and leaves forward (lobe F),
 //! * or ends its chain at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
-//!   light. On the way there it is dimmed by the plies ahead ([`Vertex::optical_depth`]); what stays scatters on and
+//!   light. On the way there it is dimmed by the plies ahead (`optical_depth`); what stays scatters on and
 //!   leaves in the end as lobe B.
 //!
 //! F takes the place of the paper's forward lobes (Eqs. 8 to 11, 15), B of its backward lobes without the single

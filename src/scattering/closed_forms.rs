@@ -78,13 +78,13 @@ pub fn poisson_passed(loss: f64, n: f64) -> f64 {
     (-n * loss).exp()
 }
 
-/// E[a_1B] / a_B for a Poisson number of mean n.
+/// `E[a_1B] / a_B` for a Poisson number of mean n.
 pub fn poisson_once_back(loss: f64, n: f64) -> f64 {
     let e = loss * (2.0 - loss);
     if e > 0.0 { -(-n * e).exp_m1() / e } else { n }
 }
 
-/// E[a_3B] / a_B^3 for a Poisson number of mean n; relative error below 1e-10.
+/// `E[a_3B] / a_B^3` for a Poisson number of mean n; relative error below 1e-10.
 pub fn poisson_thrice_back(loss: f64, n: f64) -> f64 {
     let e = loss * (2.0 - loss);
     let q = (1.0 - loss) * (1.0 - loss);
