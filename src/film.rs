@@ -2,7 +2,7 @@
 
 use glam::Vec3A;
 
-use crate::{integrator::Sample, math::Rgb, scene::Layers};
+use crate::{integrator::Sample, scene::Layers};
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -197,20 +197,6 @@ impl Film {
         let pixels = f64::from(self.width) * f64::from(self.height);
         (counts().min().unwrap_or(0), total / pixels, counts().max().unwrap_or(0))
     }
-
-    /// Mean colour of the whole picture.
-    pub fn mean(&self) -> Rgb {
-        let mut sum = [0.0; 3];
-        for tile in &self.tiles {
-            for (color, &n) in tile.color.iter().zip(&tile.count) {
-                for k in 0..3 {
-                    sum[k] += color[k] / f64::from(n.max(1));
-                }
-            }
-        }
-        let pixels = f64::from(self.width) * f64::from(self.height);
-        Rgb::from(sum.map(|s| s / pixels))
-    }
 }
 
 /// Bits of x and y by turns.
@@ -229,6 +215,7 @@ fn morton(x: u32, y: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Rgb;
 
     #[test]
     fn pixels_are_found_again_and_average() {

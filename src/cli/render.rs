@@ -58,10 +58,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut scene = args.options.load(&args.scene)?;
     let outputs = outputs(args);
     let mut layered = false;
-    for path in outputs.iter().chain(&args.stats) {
-        if args.stats.as_ref() == Some(path) {
-            continue;
-        }
+    for path in &outputs {
         layered |= image::output::check_writable(path)? == Format::Exr;
     }
     if let Some(stats) = &args.stats {

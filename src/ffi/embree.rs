@@ -422,35 +422,6 @@ impl CommittedScene {
         }
         query.tfar == f32::NEG_INFINITY
     }
-
-    /// The nearest hit of any kind, with no filter: what a bare traversal costs.
-    #[inline]
-    pub fn intersect_bare(&self, ray: &Ray) -> Option<f32> {
-        let mut query = sys::RTCRayHit { ray: raw_ray(ray), hit: no_hit() };
-        // SAFETY: as in `intersect`; null arguments ask for the defaults.
-        unsafe { sys::rtcIntersect1(self.scene.raw, &mut query, ptr::null_mut()) };
-        (query.hit.geomID != sys::INVALID_ID).then_some(query.ray.tfar)
-    }
-
-    /// Whether anything is in the way, with no filter.
-    #[inline]
-    pub fn occluded_bare(&self, ray: &Ray) -> bool {
-        let mut query = raw_ray(ray);
-        // SAFETY: as in `intersect`; null arguments ask for the defaults.
-        unsafe { sys::rtcOccluded1(self.scene.raw, &mut query, ptr::null_mut()) };
-        query.tfar == f32::NEG_INFINITY
-    }
-
-    /// The lower and upper corner of everything, or `None` for an empty scene.
-    pub fn bounds(&self) -> Option<(Vec3A, Vec3A)> {
-        // SAFETY: plain floats, for which zero bits are valid; aligned by its generated type.
-        let mut bounds: sys::RTCBounds = unsafe { std::mem::zeroed() };
-        // SAFETY: the scene is committed.
-        unsafe { sys::rtcGetSceneBounds(self.scene.raw, &mut bounds) };
-        let low = Vec3A::new(bounds.lower_x, bounds.lower_y, bounds.lower_z);
-        let high = Vec3A::new(bounds.upper_x, bounds.upper_y, bounds.upper_z);
-        low.cmple(high).all().then_some((low, high))
-    }
 }
 
 #[inline]

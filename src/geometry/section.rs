@@ -13,7 +13,7 @@ use glam::{Vec2, Vec3A};
 use wide::f32x4;
 
 use super::yarn::{MAX_PLIES, PlyShape, YarnShape, fiber_tangent};
-use crate::math::frame::sin_cos;
+use crate::math::{frame::sin_cos, special::GAUSS_LEGENDRE_4};
 
 /// Slope along the yarn beyond which a ray counts as no steeper.
 const MAX_SLOPE: f32 = 1.0;
@@ -387,8 +387,8 @@ impl Section {
             fiber_tangent(ply, shape.ply_rate, centre, at.axis, Vec2::new(x, self.h))
         };
         let (a, b) = (end(enter), end(exit));
-        let nodes = f32x4::new([0.069_431_84, 0.330_009_5, 0.669_990_5, 0.930_568_16]);
-        let weights = f32x4::new([0.173_927_42, 0.326_072_58, 0.326_072_58, 0.173_927_42]);
+        let nodes = f32x4::new(GAUSS_LEGENDRE_4.map(|(node, _)| node as f32));
+        let weights = f32x4::new(GAUSS_LEGENDRE_4.map(|(_, weight)| weight as f32));
         let tx = f32x4::splat(a.x) + nodes * f32x4::splat(b.x - a.x);
         let ty = f32x4::splat(a.y) + nodes * f32x4::splat(b.y - a.y);
         let along = tx * f32x4::splat(self.cos) + f32x4::splat(self.sin);

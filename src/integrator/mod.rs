@@ -193,13 +193,7 @@ impl<'a> Integrator<'a> {
     fn add(&self, sample: &mut Sample, shares: Option<LobeValues>, light: Rgb) {
         sample.radiance += light;
         if let Some(shares) = shares {
-            let part = shares.scaled(light);
-            let lobes = &mut sample.lobes;
-            lobes.r += part.r;
-            lobes.tt += part.tt;
-            lobes.d += part.d;
-            lobes.f += part.f;
-            lobes.b += part.b;
+            sample.lobes += shares.scaled(light);
         }
     }
 
@@ -288,12 +282,7 @@ impl<'a> Integrator<'a> {
             match path.shares {
                 None => {
                     sample.radiance += found.sum();
-                    let lobes = &mut sample.lobes;
-                    lobes.r += found.r;
-                    lobes.tt += found.tt;
-                    lobes.d += found.d;
-                    lobes.f += found.f;
-                    lobes.b += found.b;
+                    sample.lobes += found;
                 }
                 Some(_) => self.add(sample, path.shares, found.sum()),
             }

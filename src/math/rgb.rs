@@ -113,13 +113,6 @@ impl Rgb {
     pub fn is_zero(self) -> bool {
         self.to_array() == [0.0; 3]
     }
-
-    /// Relative luminance, Rec.709.
-    #[inline]
-    pub fn luminance(self) -> f32 {
-        let [r, g, b] = self.to_array();
-        0.2126 * r + 0.7152 * g + 0.0722 * b
-    }
 }
 
 impl std::fmt::Debug for Rgb {

@@ -30,6 +30,8 @@ pub mod medium;
 mod testing;
 pub mod yarn;
 
+use std::ops::AddAssign;
+
 use glam::Vec3A;
 
 use crate::math::Rgb;
@@ -66,6 +68,17 @@ impl LobeValues {
     #[inline]
     pub fn scaled(self, by: Rgb) -> Self {
         Self { r: self.r * by, tt: self.tt * by, d: self.d * by, f: self.f * by, b: self.b * by }
+    }
+}
+
+impl AddAssign for LobeValues {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        self.r += other.r;
+        self.tt += other.tt;
+        self.d += other.d;
+        self.f += other.f;
+        self.b += other.b;
     }
 }
 

@@ -54,7 +54,7 @@ pub struct EnvironmentMap {
     /// Distribution of rows, and in each row of columns, by luminance and solid angle; each ends in 1.
     rows: Vec<f32>,
     columns: Vec<f32>,
-    /// Of each pixel: density per steradian at its row's middle, without 1 / sin.
+    /// Mean over the sphere and the channels.
     mean: f32,
     /// From the world to the image's frame.
     rotation: Mat3A,

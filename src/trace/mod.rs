@@ -44,8 +44,6 @@ pub struct World {
     scene: CommittedScene,
     device: Arc<Device>,
     weaves: Vec<Weave>,
-    /// Whether every yarn is filled, so that no gap can be met.
-    gapless: bool,
 }
 
 /// What making a [`World`] took.
@@ -101,8 +99,7 @@ impl World {
             )?;
         }
         let committed = builder.commit()?;
-        let gapless = weaves.iter().all(|w| w.yarn.shape().filled);
-        let world = Self { scene: committed, device, weaves, gapless };
+        let world = Self { scene: committed, device, weaves };
         Ok((world, BuildTimes { generate, build: started.elapsed() }))
     }
 
@@ -124,11 +121,6 @@ impl World {
     /// Embree's version.
     pub fn embree_version(&self) -> String {
         self.device.version()
-    }
-
-    /// Whether rays must be asked about gaps between plies.
-    pub fn needs_gap_filter(&self) -> bool {
-        !self.gapless
     }
 
     /// The nearest cloth on a ray. A ray that is not finite meets nothing.
@@ -156,11 +148,6 @@ impl World {
         }
         let mut filter = ShadowFilter::new(&self.weaves, ray, crossings);
         if self.scene.occluded(ray, &mut filter) { 0.0 } else { filter.passed() }
-    }
-
-    /// The bare traversal of the same scene, for measuring what filters and shading cost.
-    pub fn bare(&self) -> &CommittedScene {
-        &self.scene
     }
 
     /// Places where a yarn bends more tightly than its radius allows: weave, then the place.

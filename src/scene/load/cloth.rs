@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
 use super::{
     super::{Fabric, Yarn, transform_curves},
-    Context, Range, Reader, UNITS, counted, radians,
+    Context, Range, Reader, UNITS, radians,
 };
 use crate::{
     geometry::{
@@ -148,11 +148,11 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
         }
         Some(1) => {
             let s = Stockinette {
-                stitches: table.u64_or("stitches", 20, counted(1..=10_000)) as u32,
-                rows: table.u64_or("rows", 20, counted(1..=10_000)) as u32,
+                stitches: table.u64_or("stitches", 20, 1..=10_000) as u32,
+                rows: table.u64_or("rows", 20, 1..=10_000) as u32,
                 width: table.f64_or("stitch_width", Stockinette::WIDTH, Range::between(1.0, 100.0)),
                 height: table.f64_or("row_height", Stockinette::HEIGHT, Range::between(0.1, 100.0)),
-                points: table.u64_or("points", 32, counted(8..=1000)) as u32,
+                points: table.u64_or("points", 32, 8..=1000) as u32,
             };
             if u64::from(s.stitches) * u64::from(s.rows) * u64::from(s.points) > 1 << 26 {
                 table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
@@ -160,7 +160,7 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
             Some(Source::Stockinette(s))
         }
         Some(2) => Some(Source::Straight {
-            count: table.u64_or("count", 1, counted(1..=1_000_000)) as u32,
+            count: table.u64_or("count", 1, 1..=1_000_000) as u32,
             length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
             spacing: table
                 .f64("spacing", Range::POSITIVE)

@@ -243,7 +243,6 @@ fn build(
         let lowest = bounds(&fabrics).map_or(0.0, |(low, _)| low.y);
         Ground { height: height.unwrap_or(lowest) as f32, albedo: Rgb::from(plan.albedo) }
     });
-    let used: Vec<usize> = fabrics.iter().map(|f| f.yarn).collect();
     let mut scene = Scene {
         path: name.to_owned(),
         render,
@@ -258,14 +257,14 @@ fn build(
         fingerprint: String::new(),
         warnings,
     };
-    keep_used_yarns(&mut scene, &used);
+    keep_used_yarns(&mut scene);
     warn_about_precision(&mut scene);
     scene.fingerprint = settings::fingerprint(&scene);
     Some(scene)
 }
 
 /// Drops kinds of yarn that no fabric uses: libraries hold many.
-fn keep_used_yarns(scene: &mut Scene, used: &[usize]) {
+fn keep_used_yarns(scene: &mut Scene) {
     let mut kept = Vec::new();
     for fabric in &mut scene.fabrics {
         let place = kept.iter().position(|&y| y == fabric.yarn).unwrap_or_else(|| {
@@ -274,7 +273,6 @@ fn keep_used_yarns(scene: &mut Scene, used: &[usize]) {
         });
         fabric.yarn = place;
     }
-    debug_assert!(kept.iter().all(|y| used.contains(y)));
     let mut all: Vec<Option<super::Yarn>> = scene.yarns.drain(..).map(Some).collect();
     scene.yarns = kept.into_iter().filter_map(|y| all[y].take()).collect();
 }
@@ -290,11 +288,6 @@ fn warn_about_precision(scene: &mut Scene) {
              0.2 % of that yarn's radius"
         ));
     }
-}
-
-/// A range for counts of pixels and the like.
-const fn counted(range: std::ops::RangeInclusive<u64>) -> std::ops::RangeInclusive<u64> {
-    range
 }
 
 /// Angles in files are degrees.

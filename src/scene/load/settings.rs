@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{super::*, Range, Reader, counted};
+use super::{super::*, Range, Reader};
 use crate::image::png::ToneMap;
 
-const SIZE: std::ops::RangeInclusive<u64> = counted(1..=65_536);
+const SIZE: std::ops::RangeInclusive<u64> = 1..=65_536;
 
 /// The settings of `[render]`; `None` if one is wrong.
 pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
@@ -62,12 +62,12 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         height,
         crop,
         filter,
-        spp: table.u64_or("spp", 64, counted(1..=u64::from(u32::MAX))) as u32,
+        spp: table.u64_or("spp", 64, 1..=u64::from(u32::MAX)) as u32,
         time: table.f64("time", Range::above(0.0)),
         noise: table.f64("noise", Range::above(0.0)),
-        max_bounces: table.u64_or("max_bounces", 64, counted(0..=1_000_000)) as u32,
-        threads: table.u64("threads", counted(1..=4096)).map(|t| t as usize),
-        seed: table.u64_or("seed", 0, counted(0..=u64::from(u32::MAX))) as u32,
+        max_bounces: table.u64_or("max_bounces", 64, 0..=1_000_000) as u32,
+        threads: table.u64("threads", 1..=4096).map(|t| t as usize),
+        seed: table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32,
         compact_bvh: table.one_of_or("bvh", true, &[("compact", true), ("fast", false)]),
     })
 }

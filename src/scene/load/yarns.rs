@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
-use super::{super::Yarn, Context, Range, Reader, TWIST, counted, radians};
+use super::{super::Yarn, Context, Range, Reader, TWIST, radians};
 use crate::{
     geometry::yarn::{MAX_PLIES, PlyParameters, touching_plies},
     scattering::fiber::FiberMaterial,
@@ -68,7 +68,7 @@ impl PlyKeys {
             radius: table.f64("ply_radius", Range::POSITIVE).or(behind.and_then(|b| b.radius)),
             aspect: table.f64_or("ply_aspect", behind.map_or(1.0, |b| b.aspect), Range::above(0.0).and_at_most(1.0)),
             fiber: table.string("fiber").map(str::to_owned).or_else(|| behind.and_then(|b| b.fiber.clone())),
-            fibers: table.u64("fibers", counted(0..=1_000_000)).or(behind.and_then(|b| b.fibers)),
+            fibers: table.u64("fibers", 0..=1_000_000).or(behind.and_then(|b| b.fibers)),
             fiber_radius: fiber_radius.or(if own { None } else { behind.and_then(|b| b.fiber_radius) }),
             density: density.or(if own { None } else { behind.and_then(|b| b.density) }),
             fiber_twist: table.f64_or("fiber_twist", behind.map_or(0.0, |b| b.fiber_twist), TWIST),
@@ -89,7 +89,7 @@ fn yarn(
     let distance = table.f64("ply_distance", Range::at_least(0.0));
     let shared = PlyKeys::read(&table, None);
     let ply_tables = table.tables("ply");
-    let count = table.u64("plies", counted(1..=MAX_PLIES as u64));
+    let count = table.u64("plies", 1..=MAX_PLIES as u64);
     let count = match (count, ply_tables.len()) {
         (Some(n), m) if m > 0 && n != m as u64 => {
             table.error_at(
