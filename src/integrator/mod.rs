@@ -289,9 +289,7 @@ impl<'a> Integrator<'a> {
         }
 
         let Some(next) = vertex.sample([u_component, u_x, u_y], &mut stream) else { return (false, true) };
-        if path.shares.is_none() && path.bounces == 0 {
-            path.shares = Some(next.shares);
-        }
+        path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
         (self.survives(path, next.weight, u_roulette), true)
