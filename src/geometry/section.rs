@@ -100,7 +100,8 @@ impl PlyCrossing {
     /// Unit tangent of the fibres where the ray enters.
     pub fn tangent_at_entry(&self, shape: &YarnShape, section: &Section) -> Vec3A {
         let at = Vec2::new(self.enter, section.h);
-        fiber_tangent(&shape.plies[self.ply], shape.ply_rate, self.centre, self.axis, at).normalize()
+        let straight = fiber_tangent(&shape.plies[self.ply], shape.ply_rate, self.centre, self.axis, at);
+        (straight + section.bent(section.travel(at.x))).normalize()
     }
 }
 

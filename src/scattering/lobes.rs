@@ -337,14 +337,13 @@ impl<'a> ChordVertex<'a> {
         let weight = throughput.max(Rgb::splat(1e-20));
         let variance = |v: [f64; 3]| Rgb::from(v).max(Rgb::splat(MIN_VARIANCE));
 
-        let (w, c) = (yarn.shape.ply_rate, front.centre);
         // Where the camera's ray first meets a fibre: the light of R, D and B leaves from there.
         let total: f64 = crossings.iter().map(|c| yarn.fibers(c)).sum();
         let first = -(f64::from(u[0]) * (-total).exp_m1()).ln_1p();
         Self {
             yarn,
             fiber: LobeFrame::new(front.tangent_at_entry(&yarn.shape, section), camera),
-            ply: LobeFrame::new(Vec3A::new(-w * c.y, w * c.x, 1.0).normalize(), camera),
+            ply: LobeFrame::of_ply(&yarn.shape, section, front, camera),
             energy,
             chance: normalised([energy.r, energy.d, energy.f, energy.b].map(|e| e.weighted_mean(weight))),
             kappa_r: yarn.plies[front.ply].kappa_r,
