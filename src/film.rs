@@ -2,7 +2,10 @@
 
 use glam::Vec3A;
 
-use crate::{integrator::Sample, scene::Layers};
+use crate::{
+    integrator::{LightParts, Sample},
+    scene::Layers,
+};
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -25,7 +28,8 @@ pub struct Tile {
     alpha: Vec<f32>,
     depth: Vec<f32>,
     normal: Vec<[f32; 3]>,
-    lobes: Vec<[[f32; 3]; 5]>,
+    albedo: Vec<[f32; 3]>,
+    parts: Vec<[[f32; 3]; LightParts::COUNT]>,
 }
 
 impl Tile {
@@ -43,7 +47,8 @@ impl Tile {
             alpha: vec![0.0; n],
             depth: vec![0.0; sized(layers.depth)],
             normal: vec![[0.0; 3]; sized(layers.normal)],
-            lobes: vec![[[0.0; 3]; 5]; sized(layers.lobes)],
+            albedo: vec![[0.0; 3]; sized(layers.albedo)],
+            parts: vec![[[0.0; 3]; LightParts::COUNT]; sized(layers.lobes)],
         }
     }
 
@@ -68,8 +73,12 @@ impl Tile {
             let n: [f32; 3] = sample.normal.to_array();
             *normal = std::array::from_fn(|c| normal[c] + n[c]);
         }
-        if let Some(lobes) = self.lobes.get_mut(i) {
-            for (sum, value) in lobes.iter_mut().zip(sample.lobes.to_array()) {
+        if let Some(albedo) = self.albedo.get_mut(i) {
+            let a = sample.albedo.to_array();
+            *albedo = std::array::from_fn(|c| albedo[c] + a[c]);
+        }
+        if let Some(parts) = self.parts.get_mut(i) {
+            for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
                 let v = value.to_array();
                 *sum = std::array::from_fn(|c| sum[c] + v[c]);
             }
@@ -110,8 +119,10 @@ pub struct Pixel {
     pub depth: f32,
     /// Mean normal of it, of unit length.
     pub normal: [f32; 3],
-    /// Mean radiance of each lobe: R, TT, D, F, B.
-    pub lobes: [[f32; 3]; 5],
+    /// Mean albedo of what is seen first, black where nothing is.
+    pub albedo: [f32; 3],
+    /// Mean radiance of each of [`LightParts::to_array`].
+    pub parts: [[f32; 3]; LightParts::COUNT],
     /// Number of samples.
     pub samples: u32,
 }
@@ -178,7 +189,8 @@ impl Film {
             variance,
             depth: tile.depth.get(i).map_or(0.0, |d| if tile.alpha[i] > 0.0 { d / tile.alpha[i] } else { 0.0 }),
             normal,
-            lobes: tile.lobes.get(i).map_or([[0.0; 3]; 5], |l| l.map(|c| c.map(|v| v / samples as f32))),
+            albedo: tile.albedo.get(i).map_or([0.0; 3], |a| a.map(|v| v / samples as f32)),
+            parts: tile.parts.get(i).map_or_else(Default::default, |l| l.map(|c| c.map(|v| v / samples as f32))),
             samples,
         }
     }

@@ -59,6 +59,8 @@ impl Plan {
         );
         add("mis", any_light(&image), "the sky is sampled in two ways", "each light is found in one way only");
         add("ground", scene.ground.is_some(), "there is a floor", "no floor");
+        add("albedo_layer", scene.layers.albedo, "asked for", "no output holds it");
+        add("cryptomatte", scene.layers.cryptomatte, "asked for", "no output holds it");
         add("lobe_layers", scene.layers.lobes, "asked for", "no output holds them");
         add("depth_layer", scene.layers.depth, "asked for", "no output holds it");
         add("normal_layer", scene.layers.normal, "asked for", "no output holds it");

@@ -246,32 +246,6 @@ fn fingerprints_change_with_the_picture_only() {
 }
 
 #[test]
-fn lobes_add_up() {
-    let lobes = |p: &crate::support::Picture, i: usize, c: &str| -> f64 {
-        ["R", "TT", "D", "F", "B"].iter().map(|l| f64::from(p.channel(&format!("{l}.{c}"))[i])).sum()
-    };
-    let args = ["--spp", "16"];
-    let lit = render(SWATCH, &args);
-    for c in ["R", "G", "B"] {
-        for (i, &total) in lit.channel(c).iter().enumerate() {
-            let sum = lobes(&lit, i, c);
-            assert!(sum <= f64::from(total) * (1.0 + 1e-4) + 1e-5, "pixel {i}: lobes {sum}, beauty {total}");
-        }
-    }
-    // Under a black sky everything that is seen was scattered by cloth.
-    let dark = SWATCH.replace("radiance = [0.35, 0.4, 0.5]", "radiance = 0");
-    let dark = render(&dark, &args);
-    for c in ["R", "G", "B"] {
-        let mean = dark.channel(c).iter().map(|&v| f64::from(v)).sum::<f64>() / 1728.0;
-        assert!(mean > 0.0);
-        for (i, &total) in dark.channel(c).iter().enumerate() {
-            let sum = lobes(&dark, i, c);
-            assert!((sum - f64::from(total)).abs() < 1e-3 * mean, "pixel {i}: lobes {sum}, beauty {total}");
-        }
-    }
-}
-
-#[test]
 fn where_nothing_is_there_is_no_alpha() {
     let scene = SWATCH.replace("fov = 25", "fov = 25\nmargin = 0.25") + "\n";
     let picture = render(&scene, &["--set", "render.filter=box"]);

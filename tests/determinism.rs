@@ -9,7 +9,7 @@ fn bits(picture: &Picture) -> Vec<(String, Vec<u32>)> {
 #[test]
 fn any_number_of_threads_and_every_run_make_the_same_picture() {
     let one = bits(&render(SWATCH, &["--threads", "1"]));
-    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 1 + 15, "all layers");
+    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 3 + 1 + 13 * 3, "all layers");
     for threads in ["1", "2", "3"] {
         assert!(one == bits(&render(SWATCH, &["--threads", threads])), "{threads} threads");
     }

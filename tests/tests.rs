@@ -5,6 +5,8 @@
 
 // What the command line promises: help, info, statistics, outputs, stops, signals, metadata.
 mod cli;
+// What compositors get: parts that add up to the picture, precision and compression.
+mod compositing;
 // The same picture to the bit: threads, repeated runs, crops; and another one for another seed.
 mod determinism;
 // What bad input is answered with: whole messages, exit status 2, no output.

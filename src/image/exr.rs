@@ -1,4 +1,4 @@
-//! EXR files: many named channels in one part, written row by row and compressed by blocks of 16 rows (ZIP).
+//! EXR files: many named channels in one part, written row by row and compressed in blocks of rows.
 //!
 //! The crate `exr` compresses and decodes; what it does not offer is done here: no copy of the picture while writing,
 //! metadata in a fixed order, so that equal pictures are equal files, and limits before anything is allocated.
@@ -15,7 +15,9 @@ use exr::{
     math::Vec2,
     meta::{
         BlockDescription,
-        attribute::{AttributeValue, ChannelDescription, Compression, IntegerBounds, LineOrder, SampleType, Text},
+        attribute::{
+            AttributeValue, ChannelDescription, Compression as Method, IntegerBounds, LineOrder, SampleType, Text,
+        },
         header::Header,
     },
     prelude::f16,
@@ -27,14 +29,46 @@ use super::{Channel, Image, ImageError, check_size, output};
 /// The program, its version and its commit: the attribute `software` of every EXR written here.
 pub const SOFTWARE: &str = concat!("yarnray ", env!("CARGO_PKG_VERSION"), " (", env!("YARNRAY_COMMIT"), ")");
 
-/// Rows that are compressed together.
-const BLOCK_ROWS: usize = 16;
-
 /// Uncompressed bytes in work at a time while writing: enough for every core with ordinary pictures.
 const BATCH_BYTES: usize = 4 << 20;
 
+/// Rows in work at a time for each thread, so that starting the work costs little beside it.
+const BATCH_ROWS: usize = 32;
+
 /// Longest text that is read back from an attribute, in bytes.
 const TEXT_LIMIT: usize = 1 << 20;
+
+/// How rows are compressed; none of these loses anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Compression {
+    /// Deflate, row by row: what compositors read fastest.
+    #[default]
+    Zips,
+    /// Deflate over 16 rows: the smallest of smooth pictures.
+    Zip,
+    /// Wavelets over 32 rows: the smallest of noisy pictures.
+    Piz,
+    /// Run lengths, row by row.
+    Rle,
+    /// None.
+    None,
+}
+
+impl Compression {
+    /// Every compression with its name in scene files.
+    pub const NAMES: [(&'static str, Self); 5] =
+        [("zips", Self::Zips), ("zip", Self::Zip), ("piz", Self::Piz), ("rle", Self::Rle), ("none", Self::None)];
+
+    fn method(self) -> Method {
+        match self {
+            Self::Zips => Method::ZIP1,
+            Self::Zip => Method::ZIP16,
+            Self::Piz => Method::PIZ,
+            Self::Rle => Method::RLE,
+            Self::None => Method::Uncompressed,
+        }
+    }
+}
 
 /// How the samples of a channel are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,12 +125,22 @@ pub struct ExrLayout {
     pub channels: Vec<ChannelSpec>,
     /// Metadata. `software` is written as well, see [`SOFTWARE`].
     pub attributes: Vec<(String, Attribute)>,
+    /// How rows are compressed.
+    pub compression: Compression,
 }
 
 impl ExrLayout {
     /// A picture that fills its display window, without metadata.
     pub fn new(width: usize, height: usize, channels: Vec<ChannelSpec>) -> Self {
-        Self { width, height, origin: [0, 0], display_size: [width, height], channels, attributes: Vec::new() }
+        Self {
+            width,
+            height,
+            origin: [0, 0],
+            display_size: [width, height],
+            channels,
+            attributes: Vec::new(),
+            compression: Compression::default(),
+        }
     }
 }
 
@@ -109,12 +153,12 @@ pub enum Line<'a> {
     Whole(&'a mut [u32]),
 }
 
-/// Writes an EXR file of one part, compressed by ZIP over 16 rows.
+/// Writes an EXR file of one part.
 ///
 /// `row` is asked for every row once, from the top (the first row of the data window is 0), with one line for each
 /// channel of the layout, in that order. NaN and infinity are stored as they are.
 ///
-/// Memory: a few blocks of 16 rows, 12 MB at the peak for 768 x 576 pixels of 30 channels. Compression runs in the
+/// Memory: a few blocks of rows, 12 MB at the peak for 768 x 576 pixels of 30 channels. Compression runs in the
 /// thread pool of the caller; the file does not depend on the number of threads.
 ///
 /// # Errors
@@ -125,8 +169,10 @@ pub fn write(path: &Path, layout: &ExrLayout, mut row: impl FnMut(usize, &mut [L
     // Where the line of each channel of the file comes from.
     let mut order: Vec<usize> = (0..layout.channels.len()).collect();
     order.sort_by_key(|index| layout.channels[*index].name.as_bytes());
-    let block_bytes = header.channels.bytes_per_pixel * layout.width * BLOCK_ROWS;
-    let batch_size = (BATCH_BYTES / block_bytes.max(1)).clamp(1, rayon::current_num_threads());
+    let block_rows = header.compression.scan_lines_per_block();
+    let block_bytes = header.channels.bytes_per_pixel * layout.width * block_rows;
+    let batch_size =
+        (BATCH_BYTES / block_bytes.max(1)).clamp(1, rayon::current_num_threads() * BATCH_ROWS / block_rows);
     let mut rows = Rows::new(layout);
 
     output::write_file(path, |file| {
@@ -236,7 +282,7 @@ fn header(layout: &ExrLayout) -> Result<Header, String> {
     let mut channels: Vec<_> = channels.collect();
     channels.sort_by(|a, b| a.name.bytes().cmp(b.name.bytes()));
     let mut header = Header::new(text("unnamed"), (layout.width, layout.height), channels.into_iter().collect())
-        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing);
+        .with_encoding(layout.compression.method(), BlockDescription::ScanLines, LineOrder::Increasing);
     header.own_attributes.layer_name = None;
     header.own_attributes.software_name = Some(text(SOFTWARE));
     header.own_attributes.layer_position = Vec2(layout.origin[0], layout.origin[1]);
@@ -399,7 +445,7 @@ pub(super) fn read(path: &Path) -> Result<Image, ImageError> {
     // In exr 1.74, damaged DWA makes the process abort (it allocates what the file says) and damaged B44 panics.
     // The C++ library checks both.
     let trustful = |compression| {
-        use Compression::{B44, B44A, DWAA, DWAB};
+        use Method::{B44, B44A, DWAA, DWAB};
         matches!(compression, B44 | B44A | DWAA(_) | DWAB(_))
     };
     if let Some(header) = headers.iter().find(|header| trustful(header.compression)) {

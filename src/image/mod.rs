@@ -17,7 +17,7 @@ pub mod png;
 use std::{fs::File, io::Read as _, path::Path};
 
 pub use error::ImageError;
-pub use exr::Attribute;
+pub use exr::{Attribute, Compression};
 
 /// The largest picture that is read: pixels times channels. 2 GiB as floats, an environment of 16384 x 8192 in RGB.
 pub const SAMPLE_LIMIT: usize = 1 << 29;

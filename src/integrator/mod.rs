@@ -5,6 +5,10 @@
 //! scatters at a vertex of the yarn's model, and goes on from inside the yarn, whose own plies the model has already
 //! put in its way.
 
+mod parts;
+
+pub use parts::LightParts;
+
 use glam::{Vec2, Vec3A};
 
 use crate::{
@@ -12,7 +16,7 @@ use crate::{
     geometry::section::Crossings,
     math::{Rgb, frame::orthonormal_basis, sampler::Sampler, warp},
     scattering::{LobeValues, mis_weight, yarn::YarnVertex},
-    scene::{Ground, Light, Scene, light::Environment},
+    scene::{Fabric, Ground, Light, Scene, light::Environment},
     trace::{Hit, World},
 };
 
@@ -34,8 +38,23 @@ pub struct Sample {
     pub depth: f32,
     /// As `depth`.
     pub normal: Vec3A,
-    /// The radiance by the lobe of the first scattering at cloth; what came otherwise is in none.
-    pub lobes: LobeValues,
+    /// Albedo of what it first scattered at, 0 to 1.
+    pub albedo: Rgb,
+    /// The radiance by where it came from.
+    pub parts: LightParts,
+    /// The cloth at which it first scattered, if that comes first and is asked for.
+    pub cloth: Option<ClothId>,
+}
+
+/// A ply of a yarn of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ClothId {
+    /// Index of the fabric.
+    pub fabric: u32,
+    /// Index of the yarn within it.
+    pub yarn: u32,
+    /// Index of the ply within that.
+    pub ply: u32,
 }
 
 /// What was done, for the statistics.
@@ -77,6 +96,10 @@ pub struct Integrator<'a> {
     /// Lights for shadow rays: each with its chance, summed up.
     lights: Vec<(&'a Light, f32, f32)>,
     max_bounces: u32,
+    /// Albedo of one fibre of each ply of each fabric; empty if no layer holds it.
+    albedos: Vec<Vec<Rgb>>,
+    /// Whether samples name the cloth they meet.
+    identify: bool,
     /// View direction for depths.
     back: Vec3A,
 }
@@ -132,6 +155,12 @@ impl<'a> Integrator<'a> {
             skies,
             lights,
             max_bounces: scene.render.max_bounces,
+            albedos: if scene.layers.albedo {
+                scene.fabrics.iter().map(|f| ply_albedos(scene, f)).collect()
+            } else {
+                Vec::new()
+            },
+            identify: scene.layers.cryptomatte,
             back: Vec3A::from(scene.camera.back_f32()),
         }
     }
@@ -155,6 +184,7 @@ impl<'a> Integrator<'a> {
                         sample.alpha = 1.0;
                         sample.depth = (camera - point).dot(self.back);
                         sample.normal = Vec3A::Y;
+                        sample.albedo = ground.albedo;
                     }
                     self.scatter_at_ground(&ground, t, &mut path, &mut sample, scratch, counters)
                 }
@@ -172,7 +202,7 @@ impl<'a> Integrator<'a> {
                 }
                 _ => {
                     let light = self.sky(&path);
-                    self.add(&mut sample, path.shares, path.throughput * light);
+                    add(&mut sample, path.bounces, &path, path.throughput * light);
                     false
                 }
             };
@@ -186,15 +216,6 @@ impl<'a> Integrator<'a> {
             counters.events += cloth_events;
         }
         sample
-    }
-
-    /// Adds light to a sample, and to the lobes it belongs to.
-    #[inline]
-    fn add(&self, sample: &mut Sample, shares: Option<LobeValues>, light: Rgb) {
-        sample.radiance += light;
-        if let Some(shares) = shares {
-            sample.lobes += shares.scaled(light);
-        }
     }
 
     /// What a ray that meets nothing sees, weighed against shadow rays towards the same sky.
@@ -263,6 +284,13 @@ impl<'a> Integrator<'a> {
             && let Some(front) = scratch.crossings.first()
         {
             sample.normal = section.to_world(front.normal(section));
+            if let Some(plies) = self.albedos.get(hit.weave) {
+                sample.albedo = plies[front.ply];
+            }
+            if self.identify {
+                let yarn = self.world.weaves()[hit.weave].strands.yarn_of(hit.segment);
+                sample.cloth = Some(ClothId { fabric: hit.weave as u32, yarn: yarn as u32, ply: front.ply as u32 });
+            }
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
@@ -282,9 +310,9 @@ impl<'a> Integrator<'a> {
             match path.shares {
                 None => {
                     sample.radiance += found.sum();
-                    sample.lobes += found;
+                    sample.parts.add_lobes(path.bounces + 1, found);
                 }
-                Some(_) => self.add(sample, path.shares, found.sum()),
+                Some(_) => add(sample, path.bounces + 1, path, found.sum()),
             }
         }
 
@@ -365,7 +393,7 @@ impl<'a> Integrator<'a> {
                 counters.shadow += 1;
                 let passed = self.world.transmittance(&ray, &mut scratch.shadow_crossings);
                 let weight = mis_weight(towards.pdf * chance, cos * even) * cos * even * passed / chance;
-                self.add(sample, path.shares, path.throughput * ground.albedo * towards.weight * weight);
+                add(sample, path.bounces + 1, path, path.throughput * ground.albedo * towards.weight * weight);
             }
         }
         let w = warp::cosine_hemisphere(Vec2::new(x, y));
@@ -374,6 +402,19 @@ impl<'a> Integrator<'a> {
         path.pdf = (w.z * even).max(1e-9);
         self.survives(path, ground.albedo, u_roulette)
     }
+}
+
+/// Albedo of one fibre of each ply of a fabric's yarn.
+fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Rgb> {
+    let fibers = &scene.yarns[fabric.yarn].fibers;
+    fibers.iter().map(|(_, m)| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]))).collect()
+}
+
+/// Adds light that was scattered `events` times to a sample and to the part that it belongs to.
+#[inline]
+fn add(sample: &mut Sample, events: u32, path: &Path<'_>, light: Rgb) {
+    sample.radiance += light;
+    sample.parts.add(events, path.shares.as_ref(), light);
 }
 
 /// Where a ray meets the ground.

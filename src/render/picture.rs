@@ -9,11 +9,27 @@ use crate::{
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
         output::{self, Format},
     },
+    integrator::LightParts,
     scene::Scene,
 };
 
-/// Names of the lobe layers, in the order of [`crate::scattering::LobeValues::to_array`].
-pub const LOBE_NAMES: [&str; 5] = ["R", "TT", "D", "F", "B"];
+/// Names of the layers of light by where it came from, in the order of [`LightParts::to_array`]; together they are the
+/// picture.
+pub const PART_NAMES: [&str; LightParts::COUNT] = [
+    "emission",
+    "surface_direct",
+    "surface_indirect",
+    "R_direct",
+    "TT_direct",
+    "D_direct",
+    "F_direct",
+    "B_direct",
+    "R_indirect",
+    "TT_indirect",
+    "D_indirect",
+    "F_indirect",
+    "B_indirect",
+];
 
 /// Writes the picture in the format that the path's extension names.
 ///
@@ -43,16 +59,19 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
     };
     layer(layers.depth, "depth", &["Z"], Sample::F32);
     layer(layers.normal, "N", &["X", "Y", "Z"], Sample::F32);
+    layer(layers.albedo, "albedo", &["R", "G", "B"], Sample::F32);
     layer(layers.variance, "variance", &["R", "G", "B"], Sample::F32);
     layer(layers.samples, "samples", &["count"], Sample::U32);
-    for name in LOBE_NAMES {
-        layer(layers.lobes, name, &["R", "G", "B"], Sample::F32);
+    let precision = if scene.storage.half_lobes { Sample::F16 } else { Sample::F32 };
+    for name in PART_NAMES {
+        layer(layers.lobes, name, &["R", "G", "B"], precision);
     }
     let render = &scene.render;
     let mut layout = ExrLayout::new(film.width as usize, film.height as usize, channels);
     layout.origin = film.origin.map(|o| o as i32);
     layout.display_size = [render.width as usize, render.height as usize];
     layout.attributes = attributes.to_vec();
+    layout.compression = scene.storage.compression;
     exr::write(path, &layout, |y, lines| {
         for x in 0..film.width {
             let p = film.pixel(x, y as u32);
@@ -65,6 +84,9 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
             if layers.normal {
                 values.extend(p.normal);
             }
+            if layers.albedo {
+                values.extend(p.albedo);
+            }
             if layers.variance {
                 values.extend(p.variance);
             }
@@ -72,7 +94,7 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
                 values.push(0.0);
             }
             if layers.lobes {
-                values.extend(p.lobes.as_flattened());
+                values.extend(p.parts.as_flattened());
             }
             for (line, value) in lines.iter_mut().zip(values) {
                 match line {

@@ -22,7 +22,7 @@ use crate::{
         curve::{Basis, Curve},
         yarn::{PlyParameters, YarnShape},
     },
-    image::png::Display,
+    image::{Compression, png::Display},
     math::Rgb,
     scattering::fiber::FiberMaterial,
 };
@@ -121,23 +121,55 @@ pub struct RenderSettings {
 /// Layers of an EXR beside the picture and its alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layers {
-    /// R, TT, D, F and B of the first scattering, and what came without.
+    /// The light by where it came from: R, TT, D, F and B of its first scattering at cloth, direct and indirect; lights;
+    /// other surfaces.
     pub lobes: bool,
     /// Distance to the first yarn or ground along the view.
     pub depth: bool,
     /// Normal of the first ply.
     pub normal: bool,
+    /// Albedo of what is seen first.
+    pub albedo: bool,
     /// Variance of each pixel's mean.
     pub variance: bool,
     /// Number of samples.
     pub samples: bool,
+    /// Which fabric, yarn and ply cover each pixel, as Cryptomatte.
+    pub cryptomatte: bool,
 }
 
 impl Layers {
     /// All of them.
-    pub const ALL: Self = Self { lobes: true, depth: true, normal: true, variance: true, samples: true };
+    pub const ALL: Self = Self { cryptomatte: true, ..Self::DEFAULT };
+    /// Those of a scene that names none: all but Cryptomatte, whose channels are many.
+    pub const DEFAULT: Self = Self {
+        lobes: true,
+        depth: true,
+        normal: true,
+        albedo: true,
+        variance: true,
+        samples: true,
+        cryptomatte: false,
+    };
     /// None of them.
-    pub const NONE: Self = Self { lobes: false, depth: false, normal: false, variance: false, samples: false };
+    pub const NONE: Self = Self {
+        lobes: false,
+        depth: false,
+        normal: false,
+        albedo: false,
+        variance: false,
+        samples: false,
+        cryptomatte: false,
+    };
+}
+
+/// How EXR files are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Storage {
+    /// How rows are compressed.
+    pub compression: Compression,
+    /// Whether the layers of light by where it came from have 16 bits; all else has 32.
+    pub half_lobes: bool,
 }
 
 /// A kind of yarn.
@@ -210,6 +242,8 @@ pub struct Scene {
     pub display: Display,
     /// Layers of an EXR.
     pub layers: Layers,
+    /// How an EXR is stored.
+    pub storage: Storage,
     /// The view.
     pub camera: Camera,
     /// Kinds of yarn that fabrics use.

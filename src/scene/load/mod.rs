@@ -182,7 +182,7 @@ fn build(
 
     let render_table = root.table("render");
     let settings = settings::render(render_table.as_ref());
-    let (display, layers) = settings::output(root.table("output"));
+    let (display, layers, storage) = settings::output(root.table("output"));
     let tilted = render_table
         .as_ref()
         .is_none_or(|r| r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)]));
@@ -248,6 +248,7 @@ fn build(
         render,
         display,
         layers,
+        storage,
         camera,
         yarns: yarns.into_values().collect(),
         fabrics,

@@ -2,7 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{super::*, Range, Reader};
+use super::{
+    super::{diagnostic::shortened, *},
+    Range, Reader,
+};
 use crate::image::png::ToneMap;
 
 const SIZE: std::ops::RangeInclusive<u64> = 1..=65_536;
@@ -72,34 +75,47 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
     })
 }
 
+/// Layers by their names.
+type LayerNames = [(&'static str, fn(&mut Layers) -> &mut bool); 7];
+const LAYERS: LayerNames = [
+    ("lobes", |l| &mut l.lobes),
+    ("depth", |l| &mut l.depth),
+    ("normal", |l| &mut l.normal),
+    ("albedo", |l| &mut l.albedo),
+    ("variance", |l| &mut l.variance),
+    ("samples", |l| &mut l.samples),
+    ("cryptomatte", |l| &mut l.cryptomatte),
+];
+
 /// The settings of `[output]`.
-pub(super) fn output(table: Option<Reader<'_>>) -> (Display, Layers) {
-    let Some(table) = table else { return (Display::default(), Layers::ALL) };
+pub(super) fn output(table: Option<Reader<'_>>) -> (Display, Layers, Storage) {
+    let Some(table) = table else { return (Display::default(), Layers::DEFAULT, Storage::default()) };
     let display = Display {
         tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &[("srgb", ToneMap::Srgb), ("filmic", ToneMap::Filmic)]),
         exposure: table.f64_or("exposure", 0.0, Range::between(-100.0, 100.0)) as f32,
         alpha: table.bool_or("alpha", false),
     };
-    let mut layers = Layers::ALL;
+    let storage = Storage {
+        compression: table.one_of_or("compression", Compression::default(), &Compression::NAMES),
+        half_lobes: table.one_of_or("lobe_precision", false, &[("float", false), ("half", true)]),
+    };
+    let mut layers = Layers::DEFAULT;
     if table.has("layers") {
         layers = Layers::NONE;
         for (name, _) in table.strings("layers") {
-            match name {
-                "lobes" => layers.lobes = true,
-                "depth" => layers.depth = true,
-                "normal" => layers.normal = true,
-                "variance" => layers.variance = true,
-                "samples" => layers.samples = true,
-                _ => table.error_at(
+            match LAYERS.iter().find(|(known, _)| *known == name) {
+                Some((_, layer)) => *layer(&mut layers) = true,
+                None if name == "all" => layers = Layers::ALL,
+                None => table.error_at(
                     "layers",
-                    format!("unknown layer `{name}`"),
-                    Some("known are lobes, depth, normal, variance and samples"),
+                    format!("unknown layer `{}`", shortened(name)),
+                    Some(&format!("known are {} and all", LAYERS.map(|(known, _)| known).join(", "))),
                 ),
             }
         }
     }
     table.finish();
-    (display, layers)
+    (display, layers, storage)
 }
 
 /// FNV-1a over what is written to it.

@@ -1,0 +1,109 @@
+//! What compositors get.
+
+use yarnray::image::{self, Attribute};
+
+use crate::support::{Picture, SWATCH, directory, render, write, yarnray};
+
+/// The layers of light by where it came from.
+const PARTS: [&str; 13] = [
+    "emission",
+    "surface_direct",
+    "surface_indirect",
+    "R_direct",
+    "TT_direct",
+    "D_direct",
+    "F_direct",
+    "B_direct",
+    "R_indirect",
+    "TT_indirect",
+    "D_indirect",
+    "F_indirect",
+    "B_indirect",
+];
+
+/// The swatch above a floor, with the sky above the horizon.
+fn on_a_floor() -> String {
+    let view = "direction = [0.25, 0.12, 1.0]\nmargin = 0.25";
+    SWATCH.replace("direction = [0.25, -0.35, 1.0]", view) + "[ground]\nalbedo = [0.5, 0.4, 0.3]\n"
+}
+
+/// The largest difference between the picture and the sum of its parts, over the pixel's value and a hundredth.
+fn worst_sum(picture: &Picture) -> f64 {
+    let mut worst = 0.0_f64;
+    for c in ["R", "G", "B"] {
+        let parts = PARTS.map(|p| picture.channel(&format!("{p}.{c}")));
+        for (i, &total) in picture.channel(c).iter().enumerate() {
+            let sum: f64 = parts.iter().map(|p| f64::from(p[i])).sum();
+            worst = worst.max((sum - f64::from(total)).abs() / (f64::from(total) + 0.01));
+        }
+    }
+    worst
+}
+
+#[test]
+fn the_parts_of_light_add_up_to_the_picture() {
+    let picture = render(&on_a_floor(), &["--spp", "16"]);
+    let worst = worst_sum(&picture);
+    assert!(worst < 2e-6, "in single precision: {worst:e}");
+    for part in PARTS {
+        let sum: f32 = picture.channel(&format!("{part}.G")).iter().sum();
+        // A flat floor does not light itself.
+        assert_eq!(sum > 0.0, part != "surface_indirect", "{part}: {sum}");
+    }
+    let half = render(&on_a_floor(), &["--spp", "16", "--set", "output.lobe_precision=half"]);
+    let worst = worst_sum(&half);
+    // Half precision keeps eleven binary digits of every part.
+    assert!(worst > 2e-6 && worst < 6e-4, "in half precision: {worst:e}");
+    assert_eq!(half.channel("G"), picture.channel("G"));
+}
+
+#[test]
+fn direct_light_is_what_remains_with_one_scattering() {
+    let args = ["--spp", "16", "--set", "render.max_bounces=1"];
+    let once = render(&on_a_floor(), &args);
+    let all = render(&on_a_floor(), &["--spp", "16"]);
+    for part in PARTS {
+        let mean = |p: &Picture| p.channel(&format!("{part}.G")).iter().sum::<f32>() / 1728.0;
+        let (once, all) = (mean(&once), mean(&all));
+        if part.ends_with("_indirect") {
+            assert!(once == 0.0 && (all > 0.0 || part == "surface_indirect"), "{part}: {once} of {all}");
+        } else {
+            assert!((once - all).abs() < 1e-5 * all, "{part}: {once}, of {all}");
+        }
+    }
+}
+
+#[test]
+fn a_matte_floor_and_an_empty_sky_have_the_guides_they_should() {
+    let picture = render(&on_a_floor(), &["--spp", "4"]);
+    let albedo = ["R", "G", "B"].map(|c| picture.channel(&format!("albedo.{c}")));
+    let alpha = picture.channel("A");
+    assert!(albedo.iter().all(|c| c.iter().all(|v| (0.0..=1.0).contains(v))));
+    for i in 0..alpha.len() {
+        if alpha[i] == 0.0 {
+            assert_eq!(albedo.map(|c| c[i]), [0.0; 3], "nothing is there");
+        }
+    }
+    // One fibre of the wool, and the floor.
+    let near = |i: usize, want: [f32; 3]| (0..3).all(|c| (albedo[c][i] - want[c]).abs() < 1e-5);
+    assert!((0..alpha.len()).any(|i| near(i, [0.97, 0.94, 0.86])));
+    assert!((0..alpha.len()).any(|i| near(i, [0.5, 0.4, 0.3])));
+}
+
+#[test]
+fn every_compression_holds_the_same_picture() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let picture = |name: &str, args: &[&str]| {
+        let out = format!("{name}.exr");
+        let all = [&["render", "s.toml", "-q", "--spp", "1", "-o", &out], args].concat();
+        yarnray(directory.path(), &all).good();
+        image::read(&directory.path().join(out)).unwrap()
+    };
+    let plain = picture("plain", &[]);
+    for name in ["zips", "zip", "piz", "rle", "none"] {
+        let other = picture(name, &["--set", &format!("output.compression={name}")]);
+        assert!(other.channels == plain.channels, "{name}");
+        assert!(matches!(other.attribute("software"), Some(Attribute::Text(_))));
+    }
+}
