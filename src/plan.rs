@@ -26,6 +26,7 @@ impl Plan {
         let shapes: Vec<_> = scene.yarns.iter().map(super::scene::Yarn::shape).collect();
         let any_light = |test: &dyn Fn(&Light) -> bool| scene.lights.iter().any(test);
         let image = |l: &Light| matches!(l, Light::Environment(e) if e.image.is_some());
+        let area = |l: &Light| matches!(l, Light::Area(_));
         let mut features = Vec::new();
         let mut add = |name, used, yes, no| features.push(Feature { name, used, reason: if used { yes } else { no } });
         add("ply_filter", shapes.iter().any(|s| !s.filled), "plies leave gaps", "plies fill the yarn");
@@ -51,13 +52,26 @@ impl Plan {
             "no distant light",
         );
         add("point_light", any_light(&|l| matches!(l, Light::Point { .. })), "a light is a point", "no point light");
+        add("spot_light", any_light(&|l| matches!(l, Light::Spot { .. })), "a light is a spot", "no spot light");
+        add("area_lights", any_light(&area), "a light is a surface", "no light is a surface");
+        add(
+            "light_choice",
+            scene.lights.iter().filter(|l| l.needs_shadow_rays()).count() > 1,
+            "lights are chosen by power",
+            "no more than one light is sampled",
+        );
         add(
             "shadow_rays",
             any_light(&Light::needs_shadow_rays),
             "a light is sampled",
             "every light is found by sampled directions",
         );
-        add("mis", any_light(&image), "the sky is sampled in two ways", "each light is found in one way only");
+        add(
+            "mis",
+            any_light(&|l| image(l) || area(l)),
+            "a light is sampled in two ways",
+            "each light is found in one way only",
+        );
         add("ground", scene.ground.is_some(), "there is a floor", "no floor");
         add("albedo_layer", scene.layers.albedo, "asked for", "no output holds it");
         add("cryptomatte", scene.layers.cryptomatte, "asked for", "no output holds it");

@@ -21,6 +21,8 @@ mod fuzz;
 mod invariance;
 // Which room of the crate may use which, and what may stand in one room only.
 mod layering;
+// Lights of all kinds against closed forms and against each other.
+mod lights;
 // Every scene of the project, and real curve files.
 mod scenes;
 // Temporary directories, runs of the program, pictures: what the others share.

@@ -16,7 +16,10 @@ use crate::{
     geometry::section::Crossings,
     math::{Rgb, frame::orthonormal_basis, sampler::Sampler, warp},
     scattering::{LobeValues, mis_weight, yarn::YarnVertex},
-    scene::{Fabric, Ground, Light, Scene, light::Environment},
+    scene::{
+        Fabric, Ground, Light, Scene,
+        light::{AreaLight, Environment},
+    },
     trace::{Hit, World},
 };
 
@@ -93,6 +96,8 @@ pub struct Integrator<'a> {
     ground: Option<Ground>,
     /// The sky; several are added up.
     skies: Vec<(&'a Environment, f32)>,
+    /// Surfaces that shine, each with its chance of being chosen.
+    surfaces: Vec<(&'a AreaLight, f32)>,
     /// Lights for shadow rays: each with its chance, summed up.
     lights: Vec<(&'a Light, f32, f32)>,
     max_bounces: u32,
@@ -117,6 +122,8 @@ struct Path<'s> {
     throughput: Rgb,
     /// Density of the ray's direction, for weighing the sky against its shadow rays; infinite from the camera.
     pdf: f32,
+    /// Where that direction was drawn.
+    from: Vec3A,
     bounces: u32,
     passes: u32,
     /// Lobes of the first scattering at cloth to which what is found now belongs.
@@ -138,21 +145,22 @@ impl<'a> Integrator<'a> {
                 (light, chance, sum)
             })
             .collect();
-        let skies = scene
-            .lights
-            .iter()
-            .filter_map(|light| match light {
-                Light::Environment(sky) => {
-                    let chance = lights.iter().find(|(l, _, _)| std::ptr::eq(*l, light)).map_or(0.0, |(_, c, _)| *c);
-                    Some((sky, chance))
-                }
-                _ => None,
-            })
-            .collect();
+        let chance_of =
+            |light: &Light| lights.iter().find(|(l, _, _)| std::ptr::eq(*l, light)).map_or(0.0, |(_, c, _)| *c);
+        let mut skies = Vec::new();
+        let mut surfaces = Vec::new();
+        for light in &scene.lights {
+            match light {
+                Light::Environment(sky) => skies.push((sky, chance_of(light))),
+                Light::Area(surface) => surfaces.push((surface, chance_of(light))),
+                Light::Distant { .. } | Light::Point { .. } | Light::Spot { .. } => {}
+            }
+        }
         Self {
             world,
             ground: scene.ground,
             skies,
+            surfaces,
             lights,
             max_bounces: scene.render.max_bounces,
             albedos: if scene.layers.albedo {
@@ -168,15 +176,29 @@ impl<'a> Integrator<'a> {
     /// Follows one path from the camera.
     pub fn sample(&self, ray: Ray, sampler: &mut Sampler, scratch: &mut Scratch, counters: &mut Counters) -> Sample {
         let mut sample = Sample::default();
-        let mut path =
-            Path { ray, throughput: Rgb::ONE, pdf: f32::INFINITY, bounces: 0, passes: 0, shares: None, sampler };
         let camera = ray.origin;
+        let mut path = Path {
+            ray,
+            throughput: Rgb::ONE,
+            pdf: f32::INFINITY,
+            from: camera,
+            bounces: 0,
+            passes: 0,
+            shares: None,
+            sampler,
+        };
         counters.camera += 1;
         let mut cloth_events = 0;
         loop {
             let hit = self.world.intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;
+            if !self.surfaces.is_empty() {
+                let end = hit.as_ref().map_or(f32::INFINITY, |h| h.t).min(ground.map_or(f32::INFINITY, |g| g.1));
+                if self.shining_surfaces(&path, end, &mut sample) {
+                    break;
+                }
+            }
             let go_on = match (hit, ground) {
                 (hit, Some((ground, t))) if hit.is_none_or(|h| t < h.t) => {
                     if first {
@@ -233,6 +255,35 @@ impl<'a> Integrator<'a> {
             light += sky.radiance(path.ray.direction) * mis_weight(path.pdf, other);
         }
         light
+    }
+
+    /// Adds what comes from shining surfaces nearer than `end`, weighed against shadow rays towards them. Whether the
+    /// camera sees one, which hides what is behind it.
+    #[inline]
+    fn shining_surfaces(&self, path: &Path<'_>, end: f32, sample: &mut Sample) -> bool {
+        let met = |light: &AreaLight| {
+            let t = light.shape.intersect(path.ray.origin, path.ray.direction, light.two_sided);
+            t.filter(|&t| t < end)
+        };
+        if path.pdf == f32::INFINITY {
+            let seen = self.surfaces.iter().filter(|(light, _)| light.visible);
+            let nearest = seen.filter_map(|(light, _)| Some((met(light)?, light))).min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((t, light)) = nearest {
+                sample.alpha = 1.0;
+                let point = path.ray.origin + t * path.ray.direction;
+                sample.depth = (path.from - point).dot(self.back);
+                add(sample, path.bounces, path, path.throughput * light.radiance);
+            }
+            return nearest.is_some();
+        }
+        for &(light, chance) in &self.surfaces {
+            if met(light).is_some() {
+                let other = chance * light.shape.pdf(path.from, path.ray.direction, light.two_sided);
+                let weight = mis_weight(path.pdf, other);
+                add(sample, path.bounces, path, path.throughput * light.radiance * weight);
+            }
+        }
+        false
     }
 
     /// Whether a path may go on after a scattering event of weight `weight`.
@@ -320,6 +371,7 @@ impl<'a> Integrator<'a> {
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
+        path.from = path.ray.origin;
         (self.survives(path, next.weight, u_roulette), true)
     }
 
@@ -399,6 +451,7 @@ impl<'a> Integrator<'a> {
         let w = warp::cosine_hemisphere(Vec2::new(x, y));
         let (s, t) = orthonormal_basis(normal);
         path.ray = Ray::new(point, w.x * s + w.y * t + w.z * normal);
+        path.from = point;
         path.pdf = (w.z * even).max(1e-9);
         self.survives(path, ground.albedo, u_roulette)
     }

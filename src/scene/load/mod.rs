@@ -231,9 +231,7 @@ fn build(
         transform_curves(&mut fabric.curves, &DAffine3::from_translation(-middle));
     }
     for light in &mut lights {
-        if let Light::Point { position, .. } = light {
-            *position = (position.as_dvec3() - middle).as_vec3a();
-        }
+        light.translate(-middle);
     }
     let render = settings?;
     let aspect = f64::from(render.width) / f64::from(render.height);

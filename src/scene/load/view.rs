@@ -2,18 +2,22 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::{DVec3, Mat3A, Vec3A};
+use glam::{DVec2, DVec3, Mat3A, Vec3A};
 
 use super::{
     super::{
         Fabric,
         camera::{Camera, Projection},
         document::Value,
-        light::{Environment, EnvironmentMap, Light},
+        light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     },
     Context, Range, Reader, radians,
 };
-use crate::{image, math::Rgb, scene::diagnostic::Span};
+use crate::{
+    image,
+    math::{Rgb, frame::orthonormal_basis},
+    scene::diagnostic::Span,
+};
 
 /// A camera before the cloth is known.
 pub(super) struct CameraPlan {
@@ -114,7 +118,11 @@ pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<Lig
 
 fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
     let bright = Range::at_least(0.0);
-    let kind = table.required_one_of("type", &[("environment", 0), ("distant", 1), ("point", 2)]);
+    let kinds =
+        [("environment", 0), ("distant", 1), ("point", 2), ("spot", 3), ("rectangle", 4), ("disk", 5), ("sphere", 6)];
+    let kind = table.required_one_of("type", &kinds);
+    // Radiant intensity is per square of the scene's unit.
+    let intensity = || table.rgb_or("intensity", [1.0; 3], bright).map(|i| i * context.unit * context.unit);
     let plan = match kind {
         Some(0) => {
             let radiance = Rgb::from(table.rgb_or("radiance", [1.0; 3], bright));
@@ -145,18 +153,79 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
         }
         Some(2) => {
             let position = table.required_vec3("position", Range::FINITE);
-            // Radiant intensity is per square of the scene's unit.
-            let area = context.unit * context.unit;
-            let intensity = table.rgb_or("intensity", [1.0; 3], bright).map(|i| i * area);
+            let intensity = Rgb::from(intensity());
             position.map(|p| {
                 let position: Vec3A = context.position(p).as_vec3a();
-                LightPlan::Ready(Light::Point { position, intensity: Rgb::from(intensity) })
+                LightPlan::Ready(Light::Point { position, intensity })
             })
+        }
+        Some(3) => {
+            let aim = aim(&table, context);
+            let intensity = Rgb::from(intensity());
+            let angle = table.f64_or("angle", 30.0, Range::above(0.0).and_at_most(180.0));
+            let edge = table.f64_or("edge", 0.2 * angle, Range::at_least(0.0));
+            if edge > angle {
+                table.error_at("edge", format!("`edge` must be at most `angle`, {angle}"), None);
+            }
+            aim.map(|(position, axis)| {
+                let cos = |degrees: f64| radians(degrees).cos() as f32;
+                let (cos_inner, cos_outer) = (cos((angle - edge).max(0.0)), cos(angle));
+                LightPlan::Ready(Light::Spot { position, axis, intensity, cos_inner, cos_outer })
+            })
+        }
+        Some(kind @ 4..=6) => {
+            let radiance = Rgb::from(table.rgb_or("radiance", [1.0; 3], bright));
+            let visible = table.bool_or("visible", true);
+            let two_sided = kind != 6 && table.bool_or("two_sided", false);
+            let shape = match kind {
+                4 => rectangle(&table, context),
+                5 => {
+                    let aim = aim(&table, context);
+                    let radius = table.required_f64("radius", Range::POSITIVE).map(|r| (r * context.unit) as f32);
+                    aim.zip(radius).map(|((centre, normal), radius)| Shape::Disk { centre, normal, radius })
+                }
+                _ => {
+                    let position = table.required_vec3("position", Range::FINITE);
+                    let radius = table.required_f64("radius", Range::POSITIVE).map(|r| (r * context.unit) as f32);
+                    position
+                        .zip(radius)
+                        .map(|(p, radius)| Shape::Sphere { centre: context.position(p).as_vec3a(), radius })
+                }
+            };
+            shape.map(|shape| LightPlan::Ready(Light::Area(AreaLight { shape, radiance, two_sided, visible })))
         }
         _ => None,
     };
     table.finish();
     plan
+}
+
+/// `position` and the unit vector from there to `target`.
+fn aim(table: &Reader<'_>, context: &Context<'_>) -> Option<(Vec3A, Vec3A)> {
+    let position = table.required_vec3("position", Range::FINITE);
+    let target = context.position(table.vec3_or("target", [0.0; 3], Range::FINITE));
+    let position = context.position(position?);
+    let direction = (target - position).try_normalize();
+    if direction.is_none() {
+        table.error_at("position", "`position` and `target` of a light must differ", None);
+    }
+    direction.map(|d| (position.as_vec3a(), d.as_vec3a()))
+}
+
+/// A rectangle about `position` that faces `target`, its height along `up` as far as that is possible.
+fn rectangle(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
+    let aim = aim(table, context);
+    let up = Vec3A::from(table.vec3_or("up", [0.0, 1.0, 0.0], Range::FINITE).map(|v| v as f32));
+    if !table.has("size") {
+        table.error("missing key `size` in the light: width and height", Some("size = [40, 20]"));
+    }
+    let size = table.vec2("size", Range::POSITIVE).map(|s| DVec2::from(s) * context.unit);
+    let ((centre, normal), size) = aim.zip(size)?;
+    let size = size.as_vec2();
+    // One that looks straight up or down has no up of its own.
+    let x = up.cross(normal).try_normalize().unwrap_or_else(|| orthonormal_basis(normal).0);
+    let y = normal.cross(x);
+    Some(Shape::Rectangle { corner: centre - 0.5 * (size.x * x + size.y * y), x, y, size })
 }
 
 impl LightPlan {

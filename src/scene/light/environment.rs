@@ -1,37 +1,10 @@
-//! Lights: how to draw a direction towards one, with what density, and what it sends.
+//! The sky: one radiance, or an image in latitude and longitude with tables for importance sampling.
 
 use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Mat3A, Vec2, Vec3A};
 
-use crate::math::{
-    Rgb,
-    frame::{orthonormal_basis, sin_cos},
-    warp,
-};
-
-/// A light of the scene.
-#[derive(Clone, Debug)]
-pub enum Light {
-    /// Light from all directions, from infinitely far away.
-    Environment(Environment),
-    /// Parallel light, or light from a small disc of the sky. Only shadow rays find it: camera and bounced rays pass.
-    Distant {
-        /// Unit vector towards the light.
-        towards: Vec3A,
-        /// 1 - cos of the angular radius; 0 for parallel light.
-        one_minus_cos: f32,
-        /// Irradiance on a surface that faces it.
-        irradiance: Rgb,
-    },
-    /// Light from one point.
-    Point {
-        /// Where it is, millimetres about the scene's middle.
-        position: Vec3A,
-        /// Radiant intensity, per steradian, in radiance times square millimetres.
-        intensity: Rgb,
-    },
-}
+use crate::math::{Rgb, frame::sin_cos};
 
 /// The sky: one radiance, or an image in latitude and longitude.
 #[derive(Clone, Debug)]
@@ -60,73 +33,6 @@ pub struct EnvironmentMap {
     rotation: Mat3A,
 }
 
-/// A direction towards a light.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSample {
-    /// Unit vector towards the light.
-    pub direction: Vec3A,
-    /// How far a shadow ray must be free.
-    pub distance: f32,
-    /// Radiance over density.
-    pub weight: Rgb,
-    /// Density per steradian against which direction sampling is weighed; infinite where no other ray can find this light.
-    pub pdf: f32,
-}
-
-impl Light {
-    /// A measure of how much it lights the cloth, for choosing between lights: irradiance at the scene's middle.
-    pub fn power(&self) -> f32 {
-        match self {
-            Self::Environment(environment) => PI * environment.mean().mean(),
-            Self::Distant { irradiance, .. } => irradiance.mean(),
-            Self::Point { position, intensity } => intensity.mean() / position.length_squared().max(1e-6),
-        }
-    }
-
-    /// Whether shadow rays must look for it. An even sky is left to the sampled directions, which all end in it.
-    pub fn needs_shadow_rays(&self) -> bool {
-        match self {
-            Self::Environment(environment) => environment.image.is_some(),
-            Self::Distant { .. } | Self::Point { .. } => true,
-        }
-    }
-
-    /// Draws a direction from `at` towards the light.
-    #[inline]
-    pub fn sample(&self, at: Vec3A, u: Vec2) -> Option<LightSample> {
-        match self {
-            Self::Environment(environment) => {
-                let map = environment.image.as_ref()?;
-                let (direction, pdf) = map.sample(u)?;
-                let weight = environment.radiance * map.radiance(direction) / pdf;
-                Some(LightSample { direction, distance: f32::INFINITY, weight, pdf })
-            }
-            Self::Distant { towards, one_minus_cos, irradiance } => {
-                let direction = if *one_minus_cos > 0.0 {
-                    let (x, y) = orthonormal_basis(*towards);
-                    let w = warp::cone(u, *one_minus_cos);
-                    w.x * x + w.y * y + w.z * *towards
-                } else {
-                    *towards
-                };
-                Some(LightSample { direction, distance: f32::INFINITY, weight: *irradiance, pdf: f32::INFINITY })
-            }
-            Self::Point { position, intensity } => {
-                let way = *position - at;
-                let square = way.length_squared();
-                let distance = square.sqrt();
-                // A light within a yarn is seen from as near as single precision resolves, not from distance 0.
-                (distance > 0.0).then(|| LightSample {
-                    direction: way / distance,
-                    distance,
-                    weight: *intensity / square.max(1e-8),
-                    pdf: f32::INFINITY,
-                })
-            }
-        }
-    }
-}
-
 impl Environment {
     /// Mean radiance over all directions.
     pub fn mean(&self) -> Rgb {
@@ -145,7 +51,7 @@ impl Environment {
         }
     }
 
-    /// Density (1/steradian) with which [`Light::sample`] draws a direction; 0 if it never does.
+    /// Density (1/steradian) with which [`super::Light::sample`] draws a direction; 0 if it never does.
     #[inline]
     pub fn pdf(&self, direction: Vec3A) -> f32 {
         self.image.as_ref().map_or(0.0, |map| map.pdf(direction))
@@ -223,7 +129,7 @@ impl EnvironmentMap {
 
     /// The pixel in a direction. (Between pixels there is nothing: what is drawn is what is sampled.)
     #[inline]
-    fn radiance(&self, direction: Vec3A) -> Rgb {
+    pub(super) fn radiance(&self, direction: Vec3A) -> Rgb {
         let (x, y) = self.cell(direction);
         self.pixels[y * self.width + x].into()
     }
@@ -250,7 +156,8 @@ impl EnvironmentMap {
         (at(y), at(y + 1))
     }
 
-    fn sample(&self, u: Vec2) -> Option<(Vec3A, f32)> {
+    /// A direction and its density (1/steradian).
+    pub(super) fn sample(&self, u: Vec2) -> Option<(Vec3A, f32)> {
         let y = self.rows.partition_point(|&c| c <= u.y).min(self.height - 1);
         let row = &self.columns[y * self.width..(y + 1) * self.width];
         let x = row.partition_point(|&c| c <= u.x).min(self.width - 1);
@@ -328,16 +235,5 @@ mod tests {
                 assert!(d.is_finite() && pdf.is_finite());
             }
         }
-    }
-
-    #[test]
-    fn lights_send_what_they_say() {
-        let sun = Light::Distant { towards: Vec3A::Z, one_minus_cos: 1e-3, irradiance: Rgb::splat(2.0) };
-        let s = sun.sample(Vec3A::ZERO, Vec2::new(0.9, 0.2)).unwrap();
-        assert!(s.direction.z >= 1.0 - 1.001e-3 && s.pdf == f32::INFINITY && s.weight == Rgb::splat(2.0));
-        let lamp = Light::Point { position: Vec3A::new(0.0, 2.0, 0.0), intensity: Rgb::splat(8.0) };
-        let s = lamp.sample(Vec3A::ZERO, Vec2::ZERO).unwrap();
-        assert_eq!((s.distance, s.weight), (2.0, Rgb::splat(2.0)));
-        assert!(lamp.sample(Vec3A::new(0.0, 2.0, 0.0), Vec2::ZERO).is_none());
     }
 }

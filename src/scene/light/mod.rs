@@ -1,0 +1,252 @@
+//! Lights: how to draw a direction towards one, with what density, and what it sends.
+//!
+//! Units: surfaces and the sky have a radiance, distant lights the irradiance on a surface that faces them, points
+//! and spots a radiant intensity (in a scene file per square of its unit, here radiance times square millimetres).
+//! No light blocks another or casts a shadow; one that the camera sees hides from it what is behind.
+
+mod environment;
+mod shape;
+
+use std::f32::consts::PI;
+
+use glam::{DVec3, Vec2, Vec3A};
+
+pub use environment::{Environment, EnvironmentMap};
+pub use shape::Shape;
+
+use crate::math::{Rgb, frame::orthonormal_basis, warp};
+
+/// A light of the scene.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// Light from all directions, from infinitely far away.
+    Environment(Environment),
+    /// Parallel light, or light from a small disc of the sky. Only shadow rays find it: camera and bounced rays pass.
+    Distant {
+        /// Unit vector towards the light.
+        towards: Vec3A,
+        /// 1 - cos of the angular radius; 0 for parallel light.
+        one_minus_cos: f32,
+        /// Irradiance on a surface that faces it.
+        irradiance: Rgb,
+    },
+    /// Light from one point.
+    Point {
+        /// Where it is, millimetres about the scene's middle.
+        position: Vec3A,
+        /// Radiant intensity, per steradian, in radiance times square millimetres.
+        intensity: Rgb,
+    },
+    /// Light from one point into a cone.
+    Spot {
+        /// Where it is, millimetres about the scene's middle.
+        position: Vec3A,
+        /// Unit vector along its axis, away from it.
+        axis: Vec3A,
+        /// Radiant intensity on the axis, as of a point.
+        intensity: Rgb,
+        /// Cosine of the angle from the axis up to which it is as bright as on the axis.
+        cos_inner: f32,
+        /// Cosine of the angle at which it is dark.
+        cos_outer: f32,
+    },
+    /// Light from a surface, the same from all directions.
+    Area(AreaLight),
+}
+
+/// A surface that shines.
+#[derive(Clone, Copy, Debug)]
+pub struct AreaLight {
+    /// Where it is.
+    pub shape: Shape,
+    /// Its radiance.
+    pub radiance: Rgb,
+    /// Whether what is flat shines to both sides.
+    pub two_sided: bool,
+    /// Whether the camera sees it; it lights the cloth in any case.
+    pub visible: bool,
+}
+
+/// A direction towards a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit vector towards the light.
+    pub direction: Vec3A,
+    /// How far a shadow ray must be free.
+    pub distance: f32,
+    /// Radiance over density.
+    pub weight: Rgb,
+    /// Density per steradian against which direction sampling is weighed; infinite where no other ray can find this light.
+    pub pdf: f32,
+}
+
+/// The least share of a light's power that one which faces away is chosen by: it may still light some of the scene.
+const FACING_AWAY: f32 = 0.05;
+
+impl Light {
+    /// A measure of how much it lights the cloth, for choosing between lights: about the irradiance at the scene's
+    /// middle, and above 0 for every light that shines somewhere.
+    pub fn power(&self) -> f32 {
+        match self {
+            Self::Environment(environment) => PI * environment.mean().mean(),
+            Self::Distant { irradiance, .. } => irradiance.mean(),
+            Self::Point { position, intensity } => intensity.mean() / position.length_squared().max(1e-6),
+            Self::Spot { position, axis, intensity, cos_inner, cos_outer } => {
+                let towards_middle = (-*position).normalize_or(*axis);
+                let share = spot_share(axis.dot(towards_middle), *cos_inner, *cos_outer);
+                share.max(FACING_AWAY) * intensity.mean() / position.length_squared().max(1e-6)
+            }
+            Self::Area(light) => {
+                let (centre, area) = (light.shape.centre(), light.shape.area());
+                let cos = light.shape.normal().map_or(1.0, |n| {
+                    let cos = n.dot((-centre).normalize_or(n));
+                    if light.two_sided { cos.abs() } else { cos }
+                });
+                // That of a disk of the same area, which never exceeds pi times the radiance.
+                cos.max(FACING_AWAY) * light.radiance.mean() * area / (area / PI + centre.length_squared())
+            }
+        }
+    }
+
+    /// Whether shadow rays must look for it. An even sky is left to the sampled directions, which all end in it.
+    pub fn needs_shadow_rays(&self) -> bool {
+        match self {
+            Self::Environment(environment) => environment.image.is_some(),
+            Self::Distant { .. } | Self::Point { .. } | Self::Spot { .. } | Self::Area(_) => true,
+        }
+    }
+
+    /// Moves it. Lights at infinity stay.
+    pub fn translate(&mut self, by: DVec3) {
+        match self {
+            Self::Environment(_) | Self::Distant { .. } => {}
+            Self::Point { position, .. } | Self::Spot { position, .. } => {
+                *position = (position.as_dvec3() + by).as_vec3a();
+            }
+            Self::Area(light) => light.shape = light.shape.moved(by.as_vec3a()),
+        }
+    }
+
+    /// Draws a direction from `at` towards the light.
+    #[inline]
+    pub fn sample(&self, at: Vec3A, u: Vec2) -> Option<LightSample> {
+        match self {
+            Self::Environment(environment) => {
+                let map = environment.image.as_ref()?;
+                let (direction, pdf) = map.sample(u)?;
+                let weight = environment.radiance * map.radiance(direction) / pdf;
+                Some(LightSample { direction, distance: f32::INFINITY, weight, pdf })
+            }
+            Self::Distant { towards, one_minus_cos, irradiance } => {
+                let direction = if *one_minus_cos > 0.0 {
+                    let (x, y) = orthonormal_basis(*towards);
+                    let w = warp::cone(u, *one_minus_cos);
+                    w.x * x + w.y * y + w.z * *towards
+                } else {
+                    *towards
+                };
+                Some(LightSample { direction, distance: f32::INFINITY, weight: *irradiance, pdf: f32::INFINITY })
+            }
+            Self::Point { position, intensity } => from_point(*position - at, *intensity),
+            Self::Spot { position, axis, intensity, cos_inner, cos_outer } => {
+                let sample = from_point(*position - at, *intensity)?;
+                let share = spot_share(-sample.direction.dot(*axis), *cos_inner, *cos_outer);
+                (share > 0.0).then(|| LightSample { weight: sample.weight * share, ..sample })
+            }
+            Self::Area(light) => {
+                let sample = light.shape.sample(at, u, light.two_sided)?;
+                Some(LightSample {
+                    direction: sample.direction,
+                    distance: sample.distance,
+                    weight: light.radiance / sample.pdf,
+                    pdf: sample.pdf,
+                })
+            }
+        }
+    }
+}
+
+/// Light of an intensity over `way`.
+#[inline]
+fn from_point(way: Vec3A, intensity: Rgb) -> Option<LightSample> {
+    let square = way.length_squared();
+    let distance = square.sqrt();
+    // A light within a yarn is seen from as near as single precision resolves, not from distance 0.
+    (distance > 0.0).then(|| LightSample {
+        direction: way / distance,
+        distance,
+        weight: intensity / square.max(1e-8),
+        pdf: f32::INFINITY,
+    })
+}
+
+/// The share of its intensity that a spot sends at an angle from its axis: 1 inside, a smooth edge, 0 outside.
+#[inline]
+fn spot_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
+    if cos >= cos_inner {
+        return 1.0;
+    }
+    let t = ((cos - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_send_what_they_say() {
+        let sun = Light::Distant { towards: Vec3A::Z, one_minus_cos: 1e-3, irradiance: Rgb::splat(2.0) };
+        let s = sun.sample(Vec3A::ZERO, Vec2::new(0.9, 0.2)).unwrap();
+        assert!(s.direction.z >= 1.0 - 1.001e-3 && s.pdf == f32::INFINITY && s.weight == Rgb::splat(2.0));
+        let lamp = Light::Point { position: Vec3A::new(0.0, 2.0, 0.0), intensity: Rgb::splat(8.0) };
+        let s = lamp.sample(Vec3A::ZERO, Vec2::ZERO).unwrap();
+        assert_eq!((s.distance, s.weight), (2.0, Rgb::splat(2.0)));
+        assert!(lamp.sample(Vec3A::new(0.0, 2.0, 0.0), Vec2::ZERO).is_none());
+    }
+
+    #[test]
+    fn a_spot_is_full_inside_dark_outside_and_smooth_between() {
+        let angles = [0.3f32, 0.5];
+        let spot = Light::Spot {
+            position: Vec3A::new(0.0, 4.0, 0.0),
+            axis: Vec3A::NEG_Y,
+            intensity: Rgb::splat(16.0),
+            cos_inner: angles[0].cos(),
+            cos_outer: angles[1].cos(),
+        };
+        // Irradiance on the floor: I cos^3 / h^2, times the share of the angle.
+        let at = |angle: f32| {
+            let s = spot.sample(Vec3A::new(4.0 * angle.tan(), 0.0, 0.0), Vec2::ZERO);
+            s.map_or(0.0, |s| s.weight.mean() * s.direction.y / angle.cos().powi(3))
+        };
+        for i in 0..100 {
+            let angle = i as f32 * 0.01;
+            let value = at(angle);
+            match angle {
+                a if a < angles[0] - 1e-3 => assert!((value - 1.0).abs() < 1e-4, "{a}: {value}"),
+                a if a > angles[1] + 1e-3 => assert_eq!(value, 0.0, "{a}"),
+                a => {
+                    assert!((-1e-6..=1.0001).contains(&value), "{a}: {value}");
+                    assert!((at(a + 0.01) - value).abs() < 0.12 && at(a + 0.01) <= value + 1e-4, "{a}");
+                }
+            }
+        }
+        assert!(at(0.4) > 0.3 && at(0.4) < 0.7);
+    }
+
+    #[test]
+    fn every_light_that_shines_can_be_chosen() {
+        let disk = |normal, two_sided| {
+            let shape = Shape::Disk { centre: Vec3A::new(0.0, 10.0, 0.0), normal, radius: 2.0 };
+            Light::Area(AreaLight { shape, radiance: Rgb::ONE, two_sided, visible: true }).power()
+        };
+        let want = PI * 4.0 / 104.0;
+        assert!((disk(Vec3A::NEG_Y, false) / want - 1.0).abs() < 1e-5);
+        assert!(disk(Vec3A::Y, false) > 0.0 && disk(Vec3A::Y, false) < 0.1 * want);
+        assert_eq!(disk(Vec3A::Y, true), disk(Vec3A::NEG_Y, true));
+        let mut lamp = Light::Point { position: Vec3A::ZERO, intensity: Rgb::ONE };
+        lamp.translate(DVec3::new(1.0, 2.0, 3.0));
+        assert!(matches!(lamp, Light::Point { position, .. } if position == Vec3A::new(1.0, 2.0, 3.0)));
+    }
+}

@@ -1,0 +1,88 @@
+//! Lights of all kinds against closed forms and against each other.
+
+use crate::support::{Picture, SWATCH, mean, render};
+
+/// The middle of a floor of albedo 0.8 at y = 0, seen straight from above; `more` are tables of lights.
+fn floor(more: &str, spp: u32) -> Picture {
+    let scene = format!(
+        "render = {{ width = 16, height = 16, spp = {spp}, max_bounces = 1 }}\n\
+         camera = {{ type = \"orthographic\", position = [0, 500, 0], target = [0, 0, 0], up = [0, 0, -1], size = 0.01 }}\n\
+         ground = {{ height = 0, albedo = 0.8 }}\n{more}"
+    );
+    render(&scene, &[])
+}
+
+#[test]
+fn a_floor_has_the_irradiance_of_the_closed_forms() {
+    let pi = std::f64::consts::PI;
+    // Each light with its irradiance at the floor's middle.
+    let lights = [
+        (
+            "type = \"sphere\"\nposition = [0, 5, 3]\nradius = 1.5\nradiance = 2",
+            2.0 * pi * 2.25 / 34.0 * 5.0 / 34f64.sqrt(),
+        ),
+        ("type = \"disk\"\nposition = [0, 2, 0]\nradius = 1\nradiance = 3", 3.0 * pi * 1.0 / 5.0),
+        // A square of half side 1 at height 1: 4 times the form of one corner, (2 / sqrt 2) atan(1 / sqrt 2) of pi.
+        ("type = \"rectangle\"\nposition = [0, 1, 0]\nsize = [2, 2]", 4.0 * (0.5f64.sqrt() * (0.5f64.sqrt()).atan())),
+        ("type = \"spot\"\nposition = [0, 10, 0]\nangle = 20\nintensity = 50", 0.5),
+        ("type = \"point\"\nposition = [0, 3, 4]\nintensity = 50", 2.0 * 0.6),
+        ("type = \"distant\"\ntowards = [0, 1, 1]\nirradiance = 2", 2f64.sqrt()),
+    ];
+    let mut all = String::new();
+    let mut sum = 0.0;
+    for (light, irradiance) in lights {
+        // A camera that looks through the lights sees the floor all the same.
+        let hidden = if light.contains("radius") || light.contains("size") { "\nvisible = false\n" } else { "\n" };
+        let table = format!("[[light]]\n{light}{hidden}");
+        let got = floor(&table, 64).mean()[1];
+        let want = 0.8 / pi * irradiance;
+        assert!((got / want - 1.0).abs() < 0.015, "{light}: {got}, not {want}");
+        all += &table;
+        sum += want;
+    }
+    // All at once, chosen by power.
+    let got = floor(&all, 256).mean()[1];
+    assert!((got / sum - 1.0).abs() < 0.02, "all lights: {got}, not {sum}");
+}
+
+#[test]
+fn a_light_that_the_camera_sees_hides_the_floor() {
+    let light = |visible| {
+        format!(
+            "[[light]]\ntype = \"disk\"\ntwo_sided = true\nposition = [0, 2, 0]\nradius = 1\nradiance = 3\nvisible = {visible}"
+        )
+    };
+    let seen = floor(&light(true), 4);
+    assert!(seen.colors().iter().all(|c| (c[0] - 3.0).abs() < 1e-6));
+    assert!(seen.channel("depth.Z").iter().all(|d| (d - 498.0).abs() < 0.01));
+    assert!(floor(&light(false), 4).mean()[0] < 1.0);
+}
+
+#[test]
+fn cloth_under_a_ball_of_light_is_as_under_a_disc_of_the_sky() {
+    // The ball is found by shadow rays and by sampled directions, the disc by shadow rays only.
+    let angle = 25f64.to_radians();
+    let cloth = &SWATCH[..SWATCH.find("[[light]]").unwrap()];
+    let far = 5e4;
+    let ball = format!(
+        "{cloth}[[light]]\ntype = \"sphere\"\nposition = [0, {}, {}]\nradius = {}\nradiance = 2\n",
+        0.6 * far,
+        0.8 * far,
+        far * angle.sin()
+    );
+    let disc = format!(
+        "{cloth}[[light]]\ntype = \"distant\"\ntowards = [0, 0.6, 0.8]\nangular_radius = 25\nirradiance = {}\n",
+        4.0 * std::f64::consts::PI * (1.0 - angle.cos())
+    );
+    // Without what the camera sees of the ball itself.
+    let covered = |p: &Picture| {
+        let alpha = p.channel("A");
+        mean(&p.colors().into_iter().zip(alpha).filter(|(_, a)| **a > 0.999).map(|(c, _)| c).collect::<Vec<_>>())
+    };
+    let args = ["--spp", "128"];
+    let (ball, disc) = (render(&ball, &args), render(&disc, &args));
+    let (a, b) = (covered(&ball), covered(&disc));
+    for k in 0..3 {
+        assert!((a[k] / b[k] - 1.0).abs() < 0.01, "{a:?} {b:?}");
+    }
+}
