@@ -1,11 +1,15 @@
 //! What pixels have collected: sums owned by tiles, so that threads share nothing.
 
+mod matte;
+
 use glam::Vec3A;
 
 use crate::{
-    integrator::{LightParts, Sample},
+    integrator::{ClothId, LightParts, Sample},
     scene::Layers,
 };
+
+pub use matte::Matte;
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -30,6 +34,7 @@ pub struct Tile {
     normal: Vec<[f32; 3]>,
     albedo: Vec<[f32; 3]>,
     parts: Vec<[[f32; 3]; LightParts::COUNT]>,
+    matte: Matte,
 }
 
 impl Tile {
@@ -49,6 +54,7 @@ impl Tile {
             normal: vec![[0.0; 3]; sized(layers.normal)],
             albedo: vec![[0.0; 3]; sized(layers.albedo)],
             parts: vec![[[0.0; 3]; LightParts::COUNT]; sized(layers.lobes)],
+            matte: Matte::new(sized(layers.cryptomatte)),
         }
     }
 
@@ -76,6 +82,9 @@ impl Tile {
         if let Some(albedo) = self.albedo.get_mut(i) {
             let a = sample.albedo.to_array();
             *albedo = std::array::from_fn(|c| albedo[c] + a[c]);
+        }
+        if let Some(cloth) = sample.cloth {
+            self.matte.add(i, cloth, 1);
         }
         if let Some(parts) = self.parts.get_mut(i) {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
@@ -193,6 +202,12 @@ impl Film {
             parts: tile.parts.get(i).map_or_else(Default::default, |l| l.map(|c| c.map(|v| v / samples as f32))),
             samples,
         }
+    }
+
+    /// What covers a pixel and by how many samples, in the order of the ids; nothing if the scene asks for no matte.
+    pub fn covering(&self, x: u32, y: u32) -> &[(ClothId, u32)] {
+        let tile = &self.tiles[(y / TILE * self.columns + x / TILE) as usize];
+        tile.matte.counts(((y % TILE) * tile.width + x % TILE) as usize)
     }
 
     /// An estimate of the picture's relative mean square error: the mean over pixels and channels of the variance of

@@ -1,5 +1,7 @@
 //! What compositors get.
 
+use std::collections::BTreeMap;
+
 use yarnray::image::{self, Attribute};
 
 use crate::support::{Picture, SWATCH, directory, render, write, yarnray};
@@ -106,4 +108,86 @@ fn every_compression_holds_the_same_picture() {
         assert!(other.channels == plain.channels, "{name}");
         assert!(matches!(other.attribute("software"), Some(Attribute::Text(_))));
     }
+}
+
+/// A Cryptomatte layer, decoded by the words of the specification.
+struct Matte {
+    /// Names by the bits of their identifiers.
+    names: BTreeMap<u32, String>,
+    /// For each pixel what covers it, by name, and how much.
+    pixels: Vec<BTreeMap<String, f32>>,
+}
+
+fn matte(picture: &Picture, layer: &str) -> Matte {
+    let attributes = &picture.image.attributes;
+    let text = |name: &str| match picture.image.attribute(name) {
+        Some(Attribute::Text(text)) => text.as_str(),
+        other => panic!("{name}: {other:?}"),
+    };
+    let key = attributes
+        .iter()
+        .find_map(|(name, value)| {
+            let key = name.strip_prefix("cryptomatte/")?.strip_suffix("/name")?;
+            (*value == Attribute::Text(layer.into())).then_some(key)
+        })
+        .expect("the layer is announced");
+    assert!(key.len() == 7 && key.bytes().all(|b| b.is_ascii_hexdigit()), "{key}");
+    assert_eq!(text(&format!("cryptomatte/{key}/hash")), "MurmurHash3_32");
+    assert_eq!(text(&format!("cryptomatte/{key}/conversion")), "uint32_to_float32");
+    let manifest: BTreeMap<String, String> =
+        serde_json::from_str(text(&format!("cryptomatte/{key}/manifest"))).expect("a manifest");
+    let names: BTreeMap<u32, String> =
+        manifest.into_iter().map(|(name, id)| (u32::from_str_radix(&id, 16).unwrap(), name)).collect();
+    let channel = |pair: usize, part: &str| picture.channel(&format!("{layer}{pair:02}.{part}"));
+    let pixels = (0..picture.channel("R").len()).map(|i| {
+        let mut covered = BTreeMap::new();
+        let mut before = f32::INFINITY;
+        for (pair, id, coverage) in (0..3).flat_map(|pair| [(pair, "R", "G"), (pair, "B", "A")]) {
+            let (id, coverage) = (channel(pair, id)[i], channel(pair, coverage)[i]);
+            assert!((0.0..=before).contains(&coverage), "ranks go down");
+            before = coverage;
+            if coverage > 0.0 {
+                let name = names.get(&id.to_bits()).expect("the manifest has every name");
+                assert_eq!(covered.insert(name.clone(), coverage), None, "{name} is there twice");
+            } else {
+                assert_eq!(id, 0.0);
+            }
+        }
+        covered
+    });
+    let pixels = pixels.collect();
+    Matte { names, pixels }
+}
+
+#[test]
+fn mattes_tell_fabrics_yarns_and_plies_apart() {
+    let scene = SWATCH.replace("yarn = \"wool3\"\n", "name = \"front\"\nyarn = \"wool3\"\n")
+        + "[[fabric]]\nyarn = \"wool3\"\ntranslate = [0, 0, -4]\n\
+           source = { type = \"straight\", count = 12, length = 30, spacing = 2.5 }\n";
+    let picture = render(&scene, &["--spp", "16", "--set", "output.layers=cryptomatte"]);
+    let [fabric, yarn, ply] = ["CryptoFabric", "CryptoYarn", "CryptoPly"].map(|layer| matte(&picture, layer));
+    assert_eq!(
+        fabric.names.values().cloned().collect::<std::collections::BTreeSet<_>>(),
+        ["front", "wool3"].map(String::from).into()
+    );
+    assert!(yarn.names.values().any(|n| n == "front/yarn0"), "{:?}", yarn.names);
+    assert!(ply.names.values().any(|n| n == "wool3/yarn5/ply2"), "{:?}", ply.names);
+    let alpha = picture.channel("A");
+    let mut mixed = 0;
+    for (i, &covered) in alpha.iter().enumerate() {
+        let sum = |m: &Matte| m.pixels[i].values().sum::<f32>();
+        assert!((sum(&fabric) - covered).abs() < 1e-6, "pixel {i}");
+        // Six plies are kept; where there are no more, they make up their yarns.
+        if ply.pixels[i].len() < 6 {
+            for (level, of) in [(&fabric, &yarn), (&yarn, &ply)] {
+                let mut made: BTreeMap<String, f32> = BTreeMap::new();
+                for (name, coverage) in &of.pixels[i] {
+                    *made.entry(name.rsplit_once('/').unwrap().0.to_owned()).or_default() += coverage;
+                }
+                assert_eq!(made, level.pixels[i], "pixel {i}: coverages are sixteenths, so sums are exact");
+            }
+        }
+        mixed += usize::from(yarn.pixels[i].len() > 1);
+    }
+    assert!(mixed > 50, "edges hold several yarns: {mixed}");
 }

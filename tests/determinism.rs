@@ -8,10 +8,11 @@ fn bits(picture: &Picture) -> Vec<(String, Vec<u32>)> {
 
 #[test]
 fn any_number_of_threads_and_every_run_make_the_same_picture() {
-    let one = bits(&render(SWATCH, &["--threads", "1"]));
-    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 3 + 1 + 13 * 3, "all layers");
+    let args = |threads| ["--set", "output.layers=all", "--threads", threads];
+    let one = bits(&render(SWATCH, &args("1")));
+    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 3 + 1 + 13 * 3 + 3 * 12, "all layers");
     for threads in ["1", "2", "3"] {
-        assert!(one == bits(&render(SWATCH, &["--threads", threads])), "{threads} threads");
+        assert!(one == bits(&render(SWATCH, &args(threads))), "{threads} threads");
     }
 }
 
@@ -39,10 +40,10 @@ fn another_seed_makes_another_picture_of_the_same_brightness() {
 
 #[test]
 fn a_crop_is_a_part_of_the_whole() {
-    let whole = render(SWATCH, &[]);
+    let whole = render(SWATCH, &["--set", "output.layers=all"]);
     // Not along tiles, and across several of them.
     let [x0, y0, x1, y1] = [7, 3, 41, 22];
-    let crop = render(SWATCH, &["--crop", "7,3,41,22"]);
+    let crop = render(SWATCH, &["--set", "output.layers=all", "--crop", "7,3,41,22"]);
     assert_eq!([crop.image.width, crop.image.height], [x1 - x0, y1 - y0]);
     assert_eq!(crop.image.origin, [x0 as i32, y0 as i32]);
     assert_eq!(crop.image.display_size, [48, 36]);

@@ -36,7 +36,7 @@ const BATCH_BYTES: usize = 4 << 20;
 const BATCH_ROWS: usize = 32;
 
 /// Longest text that is read back from an attribute, in bytes.
-const TEXT_LIMIT: usize = 1 << 20;
+const TEXT_LIMIT: usize = 1 << 26;
 
 /// How rows are compressed; none of these loses anything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -8,6 +8,7 @@
 //! Colours are linear, with the primaries of Rec. 709, and associated with alpha wherever there is one.
 //! The top row comes first. What is rendered, and what a number means, is not this room's business.
 
+pub mod cryptomatte;
 pub mod error;
 pub mod exr;
 mod oiio;

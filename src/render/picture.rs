@@ -1,15 +1,18 @@
 //! From a film to files: layers, their names, and the story an EXR tells about itself.
 
-use std::path::Path;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use crate::{
     film::Film,
     image::{
-        ImageError,
+        ImageError, cryptomatte,
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
         output::{self, Format},
     },
-    integrator::LightParts,
+    integrator::{ClothId, LightParts},
     scene::Scene,
 };
 
@@ -66,11 +69,15 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
     for name in PART_NAMES {
         layer(layers.lobes, name, &["R", "G", "B"], precision);
     }
+    let mattes: Vec<MatteLayer> = if layers.cryptomatte { MatteLayer::all(scene, film) } else { Vec::new() };
+    channels.extend(mattes.iter().flat_map(|m| cryptomatte::channels(m.name)));
     let render = &scene.render;
     let mut layout = ExrLayout::new(film.width as usize, film.height as usize, channels);
     layout.origin = film.origin.map(|o| o as i32);
     layout.display_size = [render.width as usize, render.height as usize];
     layout.attributes = attributes.to_vec();
+    layout.attributes.extend(mattes.iter().flat_map(MatteLayer::attributes));
+    let mut covering = Vec::new();
     layout.compression = scene.storage.compression;
     exr::write(path, &layout, |y, lines| {
         for x in 0..film.width {
@@ -96,6 +103,9 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
             if layers.lobes {
                 values.extend(p.parts.as_flattened());
             }
+            for matte in &mattes {
+                values.extend(matte.ranks(film.covering(x, y as u32), p.samples, &mut covering));
+            }
             for (line, value) in lines.iter_mut().zip(values) {
                 match line {
                     Line::Float(line) => line[x as usize] = value,
@@ -104,4 +114,69 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
             }
         }
     })
+}
+
+/// What a matte tells apart.
+#[derive(Clone, Copy)]
+enum Level {
+    Fabric,
+    Yarn,
+    Ply,
+}
+
+/// One Cryptomatte layer, with the names that are in the picture.
+struct MatteLayer {
+    name: &'static str,
+    names: BTreeMap<ClothId, (String, u32)>,
+    level: Level,
+}
+
+impl MatteLayer {
+    /// The layers of a film: fabrics, yarns, plies.
+    fn all(scene: &Scene, film: &Film) -> Vec<Self> {
+        let pixels = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
+        let seen: BTreeSet<ClothId> = pixels.flat_map(|(x, y)| film.covering(x, y)).map(|(id, _)| *id).collect();
+        [("CryptoFabric", Level::Fabric), ("CryptoYarn", Level::Yarn), ("CryptoPly", Level::Ply)]
+            .map(|(name, level)| {
+                let named = |id: &ClothId| {
+                    let fabric = &scene.fabrics[id.fabric as usize].name;
+                    let text = match level {
+                        Level::Fabric => fabric.clone(),
+                        Level::Yarn => format!("{fabric}/yarn{}", id.yarn),
+                        Level::Ply => format!("{fabric}/yarn{}/ply{}", id.yarn, id.ply),
+                    };
+                    let hash = cryptomatte::id(&text);
+                    (level.of(*id), (text, hash))
+                };
+                Self { name, names: seen.iter().map(named).collect(), level }
+            })
+            .into()
+    }
+
+    fn attributes(&self) -> Vec<(String, Attribute)> {
+        cryptomatte::attributes(self.name, self.names.values().map(|(name, _)| name.as_str()))
+    }
+
+    /// The samples of a pixel, from what covers it.
+    fn ranks(
+        &self,
+        met: &[(ClothId, u32)],
+        samples: u32,
+        buffer: &mut Vec<(u32, u32)>,
+    ) -> [f32; 2 * cryptomatte::DEPTH] {
+        buffer.clear();
+        buffer.extend(met.iter().map(|(id, count)| (self.names[&self.level.of(*id)].1, *count)));
+        cryptomatte::rank(buffer, samples)
+    }
+}
+
+impl Level {
+    /// The id of what a ply is part of.
+    fn of(self, id: ClothId) -> ClothId {
+        match self {
+            Self::Fabric => ClothId { yarn: 0, ply: 0, ..id },
+            Self::Yarn => ClothId { ply: 0, ..id },
+            Self::Ply => id,
+        }
+    }
 }

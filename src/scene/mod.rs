@@ -199,6 +199,8 @@ impl Yarn {
 /// Curves of one kind of yarn.
 #[derive(Clone, Debug)]
 pub struct Fabric {
+    /// Its name, of which there is no other: given, or that of its yarn.
+    pub name: String,
     /// Where the curves came from, for messages.
     pub origin: String,
     /// Index into [`Scene::yarns`].

@@ -1,7 +1,7 @@
 //! `[[fabric]]`: curves from a file or a generator, and the yarn they are of.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashSet},
     f64::consts::TAU,
     path::{Path, PathBuf},
 };
@@ -56,6 +56,7 @@ enum Up {
 
 /// A fabric whose text is sound and whose curves are not read yet.
 pub(super) struct FabricPlan {
+    name: Option<String>,
     yarn: String,
     radius: Option<f64>,
     phases: Option<Vec<f64>>,
@@ -79,6 +80,10 @@ pub(super) fn plan(
         let (message, hint) = unknown_name("yarn", name, names.iter().map(String::as_str));
         table.error_at("yarn", message, Some(&hint));
     }
+    let name = table.string("name").map(str::to_owned);
+    if name.as_ref().is_some_and(|n| n.trim().is_empty()) {
+        table.error_at("name", "the name of a fabric cannot be empty", None);
+    }
     let radius = table.f64("radius", Range::POSITIVE).map(|r| r * context.unit);
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
@@ -98,7 +103,7 @@ pub(super) fn plan(
         }
     };
     table.finish();
-    Some(FabricPlan { yarn: yarn?, radius, phases, transform, source: source? })
+    Some(FabricPlan { name, yarn: yarn?, radius, phases, transform, source: source? })
 }
 
 fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Reader<'_>>) -> Source {
@@ -243,6 +248,7 @@ impl FabricPlan {
             _ => Basis::CatmullRom,
         };
         Some(Fabric {
+            name: self.name.unwrap_or(self.yarn),
             origin,
             yarn: place,
             curves,
@@ -251,5 +257,18 @@ impl FabricPlan {
             tolerance: detail.tolerance,
             longest_segment: detail.longest_segment,
         })
+    }
+}
+
+/// Numbers the fabrics whose name another one before them has.
+pub(super) fn tell_names_apart(fabrics: &mut [Fabric]) {
+    let mut taken: HashSet<String> = HashSet::new();
+    for fabric in fabrics {
+        let given = fabric.name.clone();
+        let mut number = 1;
+        while !taken.insert(fabric.name.clone()) {
+            number += 1;
+            fabric.name = format!("{given}_{number}");
+        }
     }
 }

@@ -224,6 +224,7 @@ fn build(
     if diagnostics.has_errors() {
         return None;
     }
+    cloth::tell_names_apart(&mut fabrics);
 
     // Single precision is kept for what is near: the middle of the cloth becomes the origin.
     let middle = bounds(&fabrics).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));

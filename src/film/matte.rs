@@ -1,0 +1,56 @@
+//! Which cloth covers each pixel: counts of samples, from which Cryptomatte layers are made.
+
+use crate::integrator::ClothId;
+
+/// For each pixel of a tile, how many samples met which ply.
+///
+/// Counts are whole numbers, kept in the order of their ids: the same samples make the same matte in whatever order
+/// they come, and in whatever shares they were taken. All ids are kept, however small, so that none that grows later
+/// has been forgotten.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Matte {
+    pixels: Vec<Vec<(ClothId, u32)>>,
+}
+
+impl Matte {
+    /// For so many pixels.
+    pub(super) fn new(pixels: usize) -> Self {
+        Self { pixels: vec![Vec::new(); pixels] }
+    }
+
+    /// Counts `samples` more at a pixel; does nothing in a matte without pixels, which nobody asked for.
+    #[inline]
+    pub fn add(&mut self, pixel: usize, id: ClothId, samples: u32) {
+        let Some(counts) = self.pixels.get_mut(pixel) else { return };
+        match counts.binary_search_by_key(&id, |(id, _)| *id) {
+            Ok(place) => counts[place].1 += samples,
+            Err(place) => counts.insert(place, (id, samples)),
+        }
+    }
+
+    /// What covers a pixel and by how many samples, in the order of the ids.
+    pub fn counts(&self, pixel: usize) -> &[(ClothId, u32)] {
+        self.pixels.get(pixel).map_or(&[], Vec::as_slice)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_do_not_depend_on_their_order() {
+        let id = |yarn, ply| ClothId { fabric: 0, yarn, ply };
+        let met = [id(3, 1), id(0, 0), id(3, 0), id(3, 1), id(0, 0), id(7, 2), id(3, 1)];
+        let mut forward = Matte::new(2);
+        let mut backward = Matte::new(2);
+        met.iter().for_each(|&m| forward.add(1, m, 1));
+        met.iter().rev().for_each(|&m| backward.add(1, m, 1));
+        assert_eq!(forward, backward);
+        assert_eq!(forward.counts(1), [(id(0, 0), 2), (id(3, 0), 1), (id(3, 1), 3), (id(7, 2), 1)]);
+        assert!(forward.counts(0).is_empty());
+        let mut none = Matte::default();
+        none.add(1, met[0], 1);
+        assert!(none.counts(1).is_empty());
+    }
+}
