@@ -8,7 +8,7 @@ use std::{
 use crate::support::project;
 
 /// Every room from the ground up, and exactly the rooms that it uses. `main.rs` and `lib.rs` are the roof.
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 14] = [
     ("ffi", &[]),
     ("math", &[]),
     ("image", &["ffi"]),
@@ -21,7 +21,8 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("render", &["film", "image", "integrator", "math", "scene", "trace"]),
     ("plan", &["image", "scene"]),
     ("report", &["geometry", "image", "plan", "render", "scene", "trace"]),
-    ("cli", &["ffi", "geometry", "image", "plan", "render", "report", "scene", "trace"]),
+    ("experiment", &["geometry", "image", "math", "scattering", "scene", "trace"]),
+    ("cli", &["experiment", "ffi", "geometry", "image", "plan", "render", "report", "scene", "trace"]),
 ];
 
 /// All that a room takes from the foreign libraries: kept small, so that Embree could be exchanged.

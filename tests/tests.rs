@@ -23,6 +23,8 @@ mod invariance;
 mod layering;
 // Lights of all kinds against closed forms and against each other.
 mod lights;
+// The virtual goniometer.
+mod scatter;
 // Every scene of the project, and real curve files.
 mod scenes;
 // Temporary directories, runs of the program, pictures: what the others share.

@@ -4,6 +4,7 @@
 
 mod info;
 mod render;
+mod scatter;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -30,6 +31,7 @@ const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml -o swatch.exr -o swatch.png
   yarnray render scenes/glove.toml --curves glove.bcc --spp 128 -o glove.png
   yarnray info scenes/swatch.toml
+  yarnray scatter silk1 -o silk1.png
 
 `yarnray COMMAND --help` has more for each command.";
 
@@ -39,6 +41,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Tell what a scene or curve file holds, and what a render of it uses and leaves out.
     Info(info::InfoArgs),
+    /// Measure how a fibre, ply or yarn scatters light.
+    Scatter(scatter::ScatterArgs),
 }
 
 /// What a command ends with besides success.
@@ -74,6 +78,7 @@ pub fn run() -> ExitCode {
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Scatter(args) => scatter::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

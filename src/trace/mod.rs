@@ -182,8 +182,8 @@ impl Weave {
     }
 }
 
-/// The yarn with the model that the scene asks for.
-fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
+/// A yarn with one of the models.
+pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
     let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
     let chord = |model| YarnScatterer::Chord(ChordYarn::new(yarn.shape(), &materials, model));
     match model {

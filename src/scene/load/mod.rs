@@ -4,6 +4,7 @@
 //! files and images read.
 
 mod cloth;
+mod definitions;
 mod settings;
 mod view;
 mod yarns;
@@ -14,6 +15,8 @@ use std::{
 };
 
 use glam::{DAffine3, DVec3};
+
+pub use definitions::{Definitions, load_definitions};
 
 use super::{
     Fabric, Ground, Light, Scene, bounds,

@@ -6,17 +6,30 @@ use super::{super::Yarn, Context, Range, Reader, TWIST, radians};
 use crate::{
     geometry::yarn::{MAX_PLIES, PlyParameters, touching_plies},
     scattering::fiber::FiberMaterial,
-    scene::diagnostic::unknown_name,
+    scene::diagnostic::{Sources, unknown_name},
 };
 
 /// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake.
 pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> BTreeMap<String, Yarn> {
-    let fibers: BTreeMap<&str, FiberMaterial> =
-        root.named_tables("fiber").into_iter().filter_map(|(name, table)| Some((name, fiber(table)?))).collect();
+    of_fibers(root, context, &fibers(root), tilted)
+}
+
+/// Reads every yarn, for fibres read before.
+pub(super) fn of_fibers(
+    root: &Reader<'_>,
+    context: &Context<'_>,
+    fibers: &BTreeMap<&str, FiberMaterial>,
+    tilted: bool,
+) -> BTreeMap<String, Yarn> {
     root.named_tables("yarn")
         .into_iter()
-        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, &fibers, tilted)?)))
+        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, fibers, tilted)?)))
         .collect()
+}
+
+/// Reads every fibre.
+pub(super) fn fibers<'a>(root: &Reader<'a>) -> BTreeMap<&'a str, FiberMaterial> {
+    root.named_tables("fiber").into_iter().filter_map(|(name, table)| Some((name, fiber(table)?))).collect()
 }
 
 fn fiber(table: Reader<'_>) -> Option<FiberMaterial> {
@@ -53,9 +66,16 @@ struct PlyKeys {
 }
 
 impl PlyKeys {
-    fn read(table: &Reader<'_>, behind: Option<&PlyKeys>) -> Self {
-        let fiber_radius = table.f64("fiber_radius", Range::POSITIVE);
-        let density = table.f64("density", Range::above(0.0).and_at_most(100.0));
+    fn read(table: &Reader<'_>, behind: Option<&PlyKeys>, sources: &Sources) -> Self {
+        let mut fiber_radius = table.f64("fiber_radius", Range::POSITIVE);
+        let mut density = table.f64("density", Range::above(0.0).and_at_most(100.0));
+        // An option of one takes the place of the other in a file.
+        let option = |key| table.span(key).is_some_and(|s| sources.is_option(s.source()));
+        match (option("fiber_radius"), option("density")) {
+            (true, false) => density = None,
+            (false, true) => fiber_radius = None,
+            _ => {}
+        }
         if fiber_radius.is_some() && density.is_some() {
             table.error_at(
                 "density",
@@ -87,7 +107,7 @@ fn yarn(
     let radius = table.f64("radius", Range::POSITIVE);
     let ply_twist = table.f64_or("ply_twist", 0.0, TWIST);
     let distance = table.f64("ply_distance", Range::at_least(0.0));
-    let shared = PlyKeys::read(&table, None);
+    let shared = PlyKeys::read(&table, None, context.sources);
     let ply_tables = table.tables("ply");
     let count = table.u64("plies", 1..=MAX_PLIES as u64);
     let count = match (count, ply_tables.len()) {
@@ -194,7 +214,7 @@ fn yarn(
         }
     } else {
         for (index, ply) in ply_tables.into_iter().enumerate() {
-            let keys = PlyKeys::read(&ply, Some(&shared));
+            let keys = PlyKeys::read(&ply, Some(&shared), context.sources);
             make(&keys, &ply, index);
             ply.finish();
         }

@@ -1,0 +1,433 @@
+//! `yarnray scatter`
+
+use std::{fmt::Write as _, path::PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, names, write_text};
+use crate::{
+    experiment::goniometer::{
+        self, Effort, LOBES, Mean, Measurement, Specimen, View,
+        picture::{self, SweepRow},
+        ply_alone,
+    },
+    image::output,
+    scene::{
+        Model, Yarn,
+        document::Value as Setting,
+        load::{Definitions, LoadOptions, load_definitions},
+    },
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray scatter silk1                                            a yarn of the built-in library
+  yarnray scatter scenes/yarns.toml --yarn silk1 --theta 40        of a file
+  yarnray scatter silk1 --offset 0.3 --phase 20 --json             one ray, for programs
+  yarnray scatter silk1 -o silk1.png -o silk1.svg -o silk1.csv     a map, a polar picture, a table
+  yarnray scatter silk1 --model aggregated --model printed         two models beside each other
+  yarnray scatter silk1 --light 0,150                              the value for light from one direction
+  yarnray scatter --fiber wool --theta 60                          a single fibre
+  yarnray scatter silk1 --sweep density=0.1..0.7:7 -o sweep.svg    over any parameter";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct ScatterArgs {
+    /// A scene or library file (.toml), or the name of a yarn of the built-in library.
+    #[arg(value_name = "FILE.toml|YARN", required_unless_present = "fiber")]
+    source: Option<String>,
+    /// Which yarn of the file; not needed if there is one only.
+    #[arg(long, value_name = "NAME", conflicts_with = "fiber")]
+    yarn: Option<String>,
+    /// Measure one of its plies alone, counted from 0.
+    #[arg(long, value_name = "K")]
+    ply: Option<usize>,
+    /// Measure a single fibre instead.
+    #[arg(long, value_name = "NAME", conflicts_with = "ply")]
+    fiber: Option<String>,
+    /// The yarn's model; repeated, all are shown. Default: aggregated.
+    #[arg(long, value_parser = names(&Model::NAMES))]
+    model: Vec<String>,
+    /// Angle of the camera's direction from the plane across the yarn, degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    theta: f64,
+    /// Where rays meet the yarn, -1 to 1 across it.
+    #[arg(long, value_name = "H", allow_hyphen_values = true, conflicts_with = "average")]
+    offset: Option<f64>,
+    /// Average over the width (the default).
+    #[arg(long)]
+    average: bool,
+    /// Azimuth of the first ply, degrees, 0 towards the camera. Default: averaged over all.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    phase: Option<f64>,
+    /// Also the value, with the cosine, for light from this latitude and azimuth, degrees (0,0 is the camera's side).
+    #[arg(long, value_name = "THETA,PHI", value_parser = pair, allow_hyphen_values = true)]
+    light: Option<(f64, f64)>,
+    /// Samples of the model.
+    #[arg(long, value_name = "N", default_value_t = 400_000)]
+    samples: u64,
+    /// Measure over a range of a parameter: `theta`, `offset`, `phase`, a key of the yarn or its fibre, or a dotted path.
+    #[arg(long, value_name = "KEY=A..B:N")]
+    sweep: Option<String>,
+    /// Override any key of the file by its dotted path (repeatable).
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Start of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
+    /// Where to write: .json (all), .csv (distribution or sweep), .png (map of the distribution), .svg (polar picture or
+    /// plot of the sweep). Repeatable.
+    #[arg(short, long = "out", value_name = "PATH")]
+    out: Vec<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Two numbers with a comma.
+fn pair(text: &str) -> Result<(f64, f64), String> {
+    let (a, b) = text.split_once(',').ok_or("expected two numbers, as in 10,150")?;
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or("expected two numbers");
+    Ok((number(a)?, number(b)?))
+}
+
+fn input(message: impl std::fmt::Display) -> Failure {
+    Failure::Input(format!("error: {message}"))
+}
+
+/// A range of a parameter.
+struct Sweep {
+    key: String,
+    values: Vec<f64>,
+}
+
+impl Sweep {
+    fn parse(text: &str) -> Result<Self, Failure> {
+        let wrong = || input(format!("--sweep {text}: expected KEY=A..B:N, as in density=0.1..0.7:7"));
+        let (key, rest) = text.split_once('=').ok_or_else(wrong)?;
+        let (from, rest) = rest.split_once("..").ok_or_else(wrong)?;
+        let (to, count) = rest.rsplit_once(':').ok_or_else(wrong)?;
+        let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+        let (from, to) = (number(from)?, number(to)?);
+        let count: u32 = count.trim().parse().map_err(|_| wrong())?;
+        if !(1..=1000).contains(&count) || key.trim().is_empty() {
+            return Err(input(format!("--sweep {text}: a range has 1 to 1000 values")));
+        }
+        let step = if count > 1 { (to - from) / f64::from(count - 1) } else { 0.0 };
+        let values = (0..count).map(|i| from + step * f64::from(i)).collect();
+        Ok(Self { key: key.trim().to_owned(), values })
+    }
+}
+
+/// One thing on the goniometer, seen from somewhere.
+struct Job {
+    definitions: Definitions,
+    view: View,
+}
+
+/// What one job gave, by name.
+struct Found {
+    all: Vec<(String, Measurement)>,
+    values: Option<[[Mean; 3]; 5]>,
+    title: String,
+}
+
+impl ScatterArgs {
+    fn file(&self) -> Option<PathBuf> {
+        self.source
+            .as_ref()
+            .filter(|s| std::path::Path::new(s).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")))
+            .map(PathBuf::from)
+    }
+
+    fn models(&self) -> Vec<Model> {
+        let find = |name: &String| Model::NAMES.iter().find(|(n, _)| n == name).map(|(_, m)| *m);
+        let given: Vec<Model> = self.model.iter().filter_map(find).collect();
+        if given.is_empty() { vec![Model::Aggregated] } else { given }
+    }
+
+    fn load(&self, extra: Option<(String, Setting, String)>) -> Result<Definitions, Failure> {
+        let options = LoadOptions {
+            assignments: self.set.clone(),
+            settings: extra.into_iter().collect(),
+            ..LoadOptions::default()
+        };
+        Ok(load_definitions(self.file().as_deref(), &options)?)
+    }
+
+    fn yarn<'a>(&self, definitions: &'a Definitions) -> Result<&'a Yarn, Failure> {
+        let name = match (&self.yarn, &self.source) {
+            (Some(name), _) => name.clone(),
+            (None, Some(name)) if self.file().is_none() => name.clone(),
+            _ => {
+                let mut all = definitions.yarns.keys();
+                match (all.next(), all.next()) {
+                    (Some(one), None) => one.clone(),
+                    (None, _) => return Err(input("the file describes no yarn")),
+                    _ => {
+                        let list: Vec<_> = definitions.yarns.keys().map(String::as_str).collect();
+                        return Err(input(format!("which yarn? --yarn takes one of {}", list.join(", "))));
+                    }
+                }
+            }
+        };
+        Ok(definitions.yarn(&name)?)
+    }
+
+    fn view(&self) -> Result<View, Failure> {
+        let view = View { theta: self.theta.to_radians(), offset: self.offset, phase: self.phase.map(f64::to_radians) };
+        check(&view)?;
+        Ok(view)
+    }
+
+    /// The job for one value of the sweep.
+    fn swept(&self, sweep: &Sweep, at: f64) -> Result<Job, Failure> {
+        let mut view = self.view()?;
+        match sweep.key.as_str() {
+            "theta" => view.theta = at.to_radians(),
+            "offset" => view.offset = Some(at),
+            "phase" => view.phase = Some(at.to_radians()),
+            _ => {
+                let path = self.path_of(&sweep.key)?;
+                let whole = matches!(path.rsplit('.').next(), Some("fibers" | "plies"));
+                let value = if whole { Setting::Integer(at.round() as i64) } else { Setting::Float(at) };
+                let shown = if whole { at.round() } else { at };
+                let label = format!("--sweep {}={shown}", sweep.key);
+                return Ok(Job { definitions: self.load(Some((path, value, label)))?, view });
+            }
+        }
+        check(&view)?;
+        Ok(Job { definitions: self.load(None)?, view })
+    }
+
+    /// The dotted path that a short key stands for: of the yarn, or of the fibre it is made of.
+    fn path_of(&self, key: &str) -> Result<String, Failure> {
+        if key.contains('.') {
+            return Ok(key.to_owned());
+        }
+        let of_fiber = matches!(key, "r" | "tt" | "d" | "beta_r" | "beta_tt" | "beta_n");
+        if let Some(fiber) = &self.fiber {
+            return Ok(format!("fiber.{fiber}.{key}"));
+        }
+        let definitions = self.load(None)?;
+        let yarn = self.yarn(&definitions)?;
+        Ok(if of_fiber { format!("fiber.{}.{key}", yarn.fibers[0].0) } else { format!("yarn.{}.{key}", yarn.name) })
+    }
+
+    fn measure(&self, job: &Job) -> Result<Found, Failure> {
+        let effort = Effort { paths: self.samples, seed: self.seed };
+        let light = self.light.map(|(t, p)| (t.to_radians(), p.to_radians()));
+        let value_effort = Effort { paths: effort.paths.min(100_000), ..effort };
+        let values = |s: &Specimen<'_>| light.map(|l| goniometer::value(s, &job.view, l, value_effort));
+        if let Some(name) = &self.fiber {
+            let specimen = Specimen::Fiber(job.definitions.fiber(name)?);
+            let all = vec![("fiber".to_owned(), goniometer::measure(&specimen, &job.view, effort))];
+            return Ok(Found { all, values: values(&specimen), title: format!("fibre {name}") });
+        }
+        let whole = self.yarn(&job.definitions)?;
+        let yarn = match self.ply {
+            None => whole.clone(),
+            Some(k) if k < whole.plies.len() => ply_alone(whole, k),
+            Some(k) => {
+                let n = whole.plies.len();
+                return Err(input(format!("--ply {k}: `{}` has {n} plies, counted from 0", whole.name)));
+            }
+        };
+        let mut all = Vec::new();
+        let mut at_light = None;
+        for model in self.models() {
+            let specimen = Specimen::Yarn(&yarn, model);
+            all.push((model.name().to_owned(), goniometer::measure(&specimen, &job.view, effort)));
+            at_light = at_light.or_else(|| values(&specimen));
+        }
+        Ok(Found { all, values: at_light, title: format!("yarn {}", yarn.name) })
+    }
+}
+
+fn check(view: &View) -> Result<(), Failure> {
+    if view.theta.is_nan() || view.theta.abs() >= std::f64::consts::FRAC_PI_2 {
+        return Err(input(format!("theta {}: expected an angle between -90 and 90 degrees", view.theta.to_degrees())));
+    }
+    if view.offset.is_some_and(|h| !(-1.0..=1.0).contains(&h)) {
+        return Err(input(format!("offset {}: expected a number from -1 to 1", view.offset.unwrap_or_default())));
+    }
+    if view.phase.is_some_and(|p| !p.is_finite()) {
+        return Err(input("phase: expected an angle"));
+    }
+    Ok(())
+}
+
+pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
+    for path in &args.out {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        if !matches!(extension.as_str(), "json" | "csv" | "svg" | "png") {
+            return Err(input(format!("{}: expected the extension .json, .csv, .svg or .png", path.display())));
+        }
+        if extension == "png" && args.sweep.is_some() {
+            return Err(input(format!("{}: a sweep is written as .json, .csv or .svg", path.display())));
+        }
+        output::check_target(path)?;
+    }
+    if args.samples == 0 {
+        return Err(input("--samples 0: expected at least 1"));
+    }
+    match &args.sweep {
+        Some(text) => run_sweep(args, &Sweep::parse(text)?),
+        None => run_one(args),
+    }
+}
+
+fn extension_is(path: &std::path::Path, what: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(what))
+}
+
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).expect("numbers and text become JSON") + "\n"
+}
+
+fn run_one(args: &ScatterArgs) -> Result<(), Failure> {
+    let job = Job { definitions: args.load(None)?, view: args.view()? };
+    let found = args.measure(&job)?;
+    let mut report = report_json(args, &job, &found);
+    let shown: Vec<(&str, &Measurement)> = found.all.iter().map(|(n, m)| (n.as_str(), m)).collect();
+    for path in &args.out {
+        if extension_is(path, "png") {
+            picture::write_map(path, &shown.iter().map(|(_, m)| *m).collect::<Vec<_>>())?;
+        } else if extension_is(path, "csv") {
+            write_text(path, &picture::distribution_csv(&shown))?;
+        } else if extension_is(path, "svg") {
+            let title = format!("{}, theta {}: share per radian of azimuth", found.title, args.theta);
+            write_text(path, &picture::polar_svg(&title, &shown))?;
+        } else {
+            let mut whole = report.clone();
+            for (name, m) in &shown {
+                whole["distribution"][*name] = m.distribution_json();
+            }
+            write_text(path, &pretty(&whole))?;
+        }
+    }
+    if args.json {
+        report["wrote"] = json!(args.out.iter().map(|p| p.display().to_string()).collect::<Vec<_>>());
+        print!("{}", pretty(&report));
+    } else {
+        print!("{}", report_text(args, &found));
+        for path in &args.out {
+            println!("wrote {}", path.display());
+        }
+    }
+    Ok(())
+}
+
+fn report_json(args: &ScatterArgs, job: &Job, found: &Found) -> Value {
+    let (first_name, first) = &found.all[0];
+    let mut report = first.to_json();
+    report["yarn"] = json!(found.title.split_once(' ').map_or("", |(_, name)| name));
+    report["model"] = json!(first_name);
+    report["theta"] = json!(args.theta);
+    report["offset"] = json!(job.view.offset);
+    report["phase"] = json!(args.phase);
+    if let (Some(values), Some((theta, phi))) = (&found.values, args.light) {
+        let by_lobe = LOBES.iter().zip(values).map(|(n, v)| ((*n).to_owned(), json!(v.map(|m| m.mean))));
+        report["value"] = json!({"light": [theta, phi], "lobes": Value::Object(by_lobe.collect())});
+    }
+    if found.all.len() > 1 {
+        let others = found.all[1..].iter().map(|(n, m)| (n.clone(), m.to_json()));
+        report["others"] = Value::Object(others.collect());
+    }
+    report
+}
+
+fn report_text(args: &ScatterArgs, found: &Found) -> String {
+    let mut text = format!(
+        "{}, theta {} degrees, {}\n",
+        found.title,
+        args.theta,
+        args.offset.map_or("averaged over the width".to_owned(), |h| format!("offset {h}"))
+    );
+    let line = |text: &mut String, name: &str, m: &[Mean; 3]| {
+        let _ = writeln!(
+            text,
+            "  {name:14} {:.4} {:.4} {:.4}   +- {:.4} {:.4} {:.4}",
+            m[0].mean, m[1].mean, m[2].mean, m[0].se, m[1].se, m[2].se
+        );
+    };
+    for (name, m) in &found.all {
+        let _ = writeln!(text, "{name} ({} samples)", m.paths);
+        line(&mut text, "backward", &m.scattered.backward);
+        line(&mut text, "forward", &m.scattered.forward);
+        let _ = writeln!(text, "  {:14} {:.4}   +- {:.4}", "unscattered", m.unscattered.mean, m.unscattered.se);
+        for (lobe, half) in LOBES.iter().zip(m.lobes.iter().flatten()) {
+            let sum: [f64; 3] = std::array::from_fn(|c| half.forward[c].mean + half.backward[c].mean);
+            if sum.iter().any(|s| *s > 0.0) {
+                let _ = writeln!(
+                    text,
+                    "  {lobe:3} back        {:.4} {:.4} {:.4}   forward {:.4} {:.4} {:.4}",
+                    half.backward[0].mean,
+                    half.backward[1].mean,
+                    half.backward[2].mean,
+                    half.forward[0].mean,
+                    half.forward[1].mean,
+                    half.forward[2].mean
+                );
+            }
+        }
+    }
+    if let (Some(values), Some((theta, phi))) = (&found.values, args.light) {
+        let _ = writeln!(text, "value for light from ({theta}, {phi}), 1/sr, by {}", found.all[0].0);
+        for (lobe, v) in LOBES.iter().zip(values) {
+            line(&mut text, lobe, v);
+        }
+    }
+    text
+}
+
+fn run_sweep(args: &ScatterArgs, sweep: &Sweep) -> Result<(), Failure> {
+    let mut rows = Vec::new();
+    let mut names: Vec<String> = Vec::new();
+    let mut title = String::new();
+    // Everything is read before anything is measured.
+    let jobs = sweep.values.iter().map(|&at| args.swept(sweep, at)).collect::<Result<Vec<_>, _>>()?;
+    for (job, &at) in jobs.iter().zip(&sweep.values) {
+        let found = args.measure(job)?;
+        names = found.all.iter().map(|(n, _)| n.clone()).collect();
+        rows.push(SweepRow { at, energies: found.all.iter().map(|(_, m)| m.energies()).collect() });
+        title = found.title;
+    }
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let csv = picture::sweep_csv(&sweep.key, &names, &rows);
+    let as_json = || {
+        let rows: Vec<Value> = rows
+            .iter()
+            .map(|row| {
+                let mut out = json!({ "at": row.at });
+                for (name, (reflected, transmitted)) in names.iter().zip(&row.energies) {
+                    out[*name] = json!({
+                        "reflected": reflected.map(|m| m.mean), "reflected_se": reflected.map(|m| m.se),
+                        "transmitted": transmitted.map(|m| m.mean), "transmitted_se": transmitted.map(|m| m.se),
+                    });
+                }
+                out
+            })
+            .collect();
+        pretty(&json!({"specimen": title, "key": sweep.key, "rows": rows}))
+    };
+    for path in &args.out {
+        let text = if extension_is(path, "csv") {
+            csv.clone()
+        } else if extension_is(path, "svg") {
+            picture::sweep_svg(&format!("{title}: energy over {}", sweep.key), &sweep.key, &names, &rows)
+        } else {
+            as_json()
+        };
+        write_text(path, &text)?;
+    }
+    if args.json {
+        print!("{}", as_json());
+    } else {
+        print!("{csv}");
+        for path in &args.out {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(())
+}

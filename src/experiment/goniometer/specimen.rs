@@ -1,0 +1,154 @@
+//! What can be put on the goniometer.
+
+use glam::Vec3A;
+
+use super::{Outcome, View};
+use crate::{
+    geometry::{
+        section::{Crossings, Place, Section},
+        yarn::PlyParameters,
+    },
+    math::{Rgb, sampler::Sampler},
+    scattering::{
+        LobeValues,
+        fiber::{FiberBcsdf, FiberMaterial},
+        yarn::YarnScatterer,
+    },
+    scene::{Model, Yarn},
+    trace::scatterer,
+};
+
+/// What is measured.
+#[derive(Clone, Copy, Debug)]
+pub enum Specimen<'a> {
+    /// One fibre.
+    Fiber(&'a FiberMaterial),
+    /// A yarn with one of the models.
+    Yarn(&'a Yarn, Model),
+}
+
+/// The specimen ready for rays.
+pub(crate) enum Prepared {
+    /// The whole BCSDF and those of R, TT and D alone.
+    Fiber(FiberBcsdf, [FiberBcsdf; 3]),
+    Yarn(YarnScatterer),
+}
+
+/// A yarn that is one ply of another, as thick as the ply is wide.
+pub fn ply_alone(yarn: &Yarn, ply: usize) -> Yarn {
+    let of = &yarn.plies[ply];
+    // The longer semi-axis of an ellipse becomes the yarn's radius.
+    let scale = of.aspect.sqrt() / of.radius;
+    Yarn {
+        name: format!("{} ply {ply}", yarn.name),
+        radius: yarn.radius / scale,
+        plies: vec![PlyParameters {
+            radius: of.radius * scale,
+            distance: 0.0,
+            angle: 0.0,
+            fiber_radius: of.fiber_radius * scale,
+            ..of.clone()
+        }],
+        ply_twist: 0.0,
+        fibers: vec![yarn.fibers[ply].clone()],
+        ..yarn.clone()
+    }
+}
+
+impl Specimen<'_> {
+    pub(crate) fn prepare(&self) -> Prepared {
+        match self {
+            Self::Fiber(material) => {
+                let black = FiberMaterial { r: [0.0; 3], tt: [0.0; 3], d: [0.0; 3], ..(*material).clone() };
+                let alone = [
+                    FiberMaterial { r: material.r, ..black.clone() },
+                    FiberMaterial { tt: material.tt, ..black.clone() },
+                    FiberMaterial { d: material.d, ..black },
+                ];
+                Prepared::Fiber(FiberBcsdf::new(material), alone.map(|m| FiberBcsdf::new(&m)))
+            }
+            Self::Yarn(yarn, model) => Prepared::Yarn(scatterer(yarn, *model)),
+        }
+    }
+}
+
+/// A straight yarn along z, seen from `theta` at azimuth 0: the section where a ray of offset `h` meets it.
+pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> Section {
+    let place = Place {
+        centre: Vec3A::ZERO,
+        tangent: Vec3A::Z,
+        curvature: Vec3A::ZERO,
+        radius: 1.0,
+        normal: Vec3A::X,
+        phase: phase as f32,
+    };
+    let towards = Vec3A::new(theta.cos() as f32, 0.0, theta.sin() as f32);
+    Section::new(&place, Vec3A::new(0.0, h, 0.0), -towards, tilted)
+}
+
+impl Prepared {
+    fn section(&self, yarn: &YarnScatterer, view: &View, sampler: &mut Sampler) -> Section {
+        let [u_offset, u_phase, _, _] = sampler.next4();
+        let h = view.offset.map_or(2.0 * u_offset - 1.0, |h| h as f32);
+        let phase = view.phase.unwrap_or(f64::from(u_phase) * std::f64::consts::TAU);
+        straight_section(view.theta, h, phase, yarn.shape().tilted)
+    }
+
+    /// One ray: what passes, and where the rest goes.
+    pub(crate) fn draw(&self, view: &View, sampler: &mut Sampler) -> Outcome {
+        match self {
+            Self::Fiber(bcsdf, alone) => {
+                let (sin, cos) = (view.theta.sin() as f32, view.theta.cos() as f32);
+                let u = sampler.next4();
+                let mut stream = sampler.stream(sampler.position());
+                let scattered = bcsdf.sample(sin, cos, Rgb::ONE, u, &mut stream).map(|sample| {
+                    let [r, tt, d] = std::array::from_fn(|i| alone[i].evaluate(sin, cos, sample.wi, Rgb::ONE).0);
+                    let lobes = LobeValues { r, tt, d, ..LobeValues::default() };
+                    (sample.wi, lobes.scaled(Rgb::splat(1.0 / sample.pdf)))
+                });
+                Outcome { unscattered: 0.0, scattered }
+            }
+            Self::Yarn(yarn) => {
+                let section = self.section(yarn, view, sampler);
+                let mut crossings = Crossings::new();
+                section.crossings(yarn.shape(), &mut crossings);
+                let unscattered = yarn.transparency(&crossings);
+                if unscattered >= 1.0 {
+                    return Outcome { unscattered, scattered: None };
+                }
+                let u = sampler.next4();
+                let [u0, u1, u2, _] = sampler.next4();
+                let mut stream = sampler.stream(sampler.position());
+                let vertex = yarn.vertex(&section, &crossings, unscattered, Rgb::ONE, u, &mut stream);
+                let scattered = vertex
+                    .sample([u0, u1, u2], &mut stream)
+                    .map(|next| (next.direction, next.shares.scaled(next.weight * (1.0 - unscattered))));
+                Outcome { unscattered, scattered }
+            }
+        }
+    }
+
+    /// One drawn answer for light from `w`.
+    pub(crate) fn value(&self, view: &View, w: Vec3A, sampler: &mut Sampler) -> LobeValues {
+        match self {
+            Self::Fiber(_, alone) => {
+                let (sin, cos) = (view.theta.sin() as f32, view.theta.cos() as f32);
+                let [r, tt, d] = std::array::from_fn(|i| alone[i].evaluate(sin, cos, w, Rgb::ONE).0);
+                LobeValues { r, tt, d, ..LobeValues::default() }
+            }
+            Self::Yarn(yarn) => {
+                let section = self.section(yarn, view, sampler);
+                let mut crossings = Crossings::new();
+                section.crossings(yarn.shape(), &mut crossings);
+                let unscattered = yarn.transparency(&crossings);
+                if unscattered >= 1.0 {
+                    return LobeValues::default();
+                }
+                let u = sampler.next4();
+                let mut stream = sampler.stream(sampler.position());
+                let vertex = yarn.vertex(&section, &crossings, unscattered, Rgb::ONE, u, &mut stream);
+                vertex.evaluate(w, f32::INFINITY).lobes.scaled(Rgb::splat(1.0 - unscattered))
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Fibres and yarns alone: what a goniometer needs of a scene or library file.
+
+use std::{collections::BTreeMap, path::Path};
+
+use super::{
+    super::{
+        Yarn,
+        diagnostic::{Diagnostics, Sources, unknown_name},
+        document::Document,
+        reader::Reader,
+    },
+    Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns,
+};
+use crate::scattering::fiber::FiberMaterial;
+
+/// The library that travels inside the program.
+const BUILT_IN: &str = include_str!("../../../scenes/yarns.toml");
+/// What messages call it.
+const BUILT_IN_NAME: &str = "the built-in library";
+
+/// What a file says of fibres and yarns.
+#[derive(Clone, Debug)]
+pub struct Definitions {
+    /// Fibres by name.
+    pub fibers: BTreeMap<String, FiberMaterial>,
+    /// Yarns by name.
+    pub yarns: BTreeMap<String, Yarn>,
+}
+
+impl Definitions {
+    /// A yarn by name.
+    ///
+    /// # Errors
+    /// There is none of this name; the message names the nearest.
+    pub fn yarn(&self, name: &str) -> Result<&Yarn, LoadError> {
+        find(&self.yarns, "yarn", name)
+    }
+
+    /// A fibre by name.
+    ///
+    /// # Errors
+    /// There is none of this name; the message names the nearest.
+    pub fn fiber(&self, name: &str) -> Result<&FiberMaterial, LoadError> {
+        find(&self.fibers, "fiber", name)
+    }
+}
+
+fn find<'a, T>(all: &'a BTreeMap<String, T>, kind: &str, name: &str) -> Result<&'a T, LoadError> {
+    all.get(name).ok_or_else(|| {
+        let (message, hint) = unknown_name(kind, name, all.keys().map(String::as_str));
+        LoadError(format!("error: {message}\n  = help: {hint}\n"))
+    })
+}
+
+/// Reads the fibres and yarns of a scene or library file, or of the library inside the program if there is no `path`.
+/// All else in the file is passed over.
+///
+/// # Errors
+/// Everything that is wrong with them, as text for the user.
+pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<Definitions, LoadError> {
+    let mut sources = Sources::new();
+    let diagnostics = Diagnostics::new();
+    let (name, text) = match path {
+        None => (BUILT_IN_NAME.to_owned(), BUILT_IN.to_owned()),
+        Some(path) => {
+            let name = path.display().to_string();
+            let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
+            (name, text)
+        }
+    };
+    let definitions = Document::parse(&name, &text, &mut sources, &diagnostics).and_then(|mut document| {
+        merge_libraries(&mut document, &mut sources, &diagnostics);
+        for (key, value, label) in &options.settings {
+            document.set(key, value.clone(), label, &mut sources, &diagnostics);
+        }
+        for assignment in &options.assignments {
+            document.apply_option(assignment, &mut sources, &diagnostics);
+        }
+        if diagnostics.has_errors() {
+            return None;
+        }
+        let root = Reader::new(&document, &diagnostics);
+        let unit = root.one_of_or("unit", 1.0, &UNITS);
+        let context = Context { sources: &sources, diagnostics: &diagnostics, unit };
+        let fibers = yarns::fibers(&root);
+        let yarns = yarns::of_fibers(&root, &context, &fibers, true);
+        Some(Definitions { fibers: fibers.into_iter().map(|(name, m)| (name.to_owned(), m)).collect(), yarns })
+    });
+    match definitions {
+        Some(definitions) if !diagnostics.has_errors() => Ok(definitions),
+        _ => Err(LoadError(diagnostics.render(&sources))),
+    }
+}

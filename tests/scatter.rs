@@ -1,0 +1,65 @@
+//! `yarnray scatter`: its promises to scripts.
+
+use crate::support::{directory, listing, read_json, yarnray};
+
+#[test]
+fn scatter_prints_the_agreed_json() {
+    let directory = directory();
+    let run = yarnray(directory.path(), &["scatter", "silk1", "--theta", "30", "--samples", "4000", "--json"]).good();
+    let report: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(report["yarn"], "silk1");
+    assert_eq!(report["model"], "aggregated");
+    assert_eq!(report["theta"], 30.0);
+    assert!(report["offset"].is_null());
+    let number = |v: &serde_json::Value| v.as_f64().unwrap();
+    for channel in 0..3 {
+        let of = |half: &str| number(&report[half][channel]);
+        let lobes: f64 = ["R", "TT", "D", "F", "B"]
+            .iter()
+            .flat_map(|l| ["forward", "backward"].map(|half| number(&report["lobes"][l][half][channel])))
+            .sum();
+        assert!((of("forward") + of("backward") - lobes).abs() < 1e-9);
+        assert!(of("forward") + of("backward") + number(&report["unscattered"]) < 1.01);
+        assert!(number(&report["forward_se"][channel]) > 0.0);
+    }
+}
+
+#[test]
+fn scatter_writes_every_format_and_sweeps_any_key() {
+    let directory = directory();
+    let outs = ["-o", "a.png", "-o", "a.svg", "-o", "a.csv", "-o", "a.json"];
+    let args = ["scatter", "knitting", "--samples", "2000", "--offset", "0.2", "--phase", "10", "--light", "0,170"];
+    yarnray(directory.path(), &[&args[..], &outs[..]].concat()).good();
+    assert_eq!(listing(directory.path()), ["a.csv", "a.json", "a.png", "a.svg"]);
+    let json = read_json(&directory.path().join("a.json"));
+    assert_eq!(json["distribution"]["aggregated"]["value"].as_array().unwrap().len(), 36);
+    assert!(json["value"]["lobes"]["F"][1].as_f64().unwrap() > 0.0);
+
+    for (key, rows) in [("density=0.1..0.5:3", 3), ("theta=0..60:2", 2), ("fibers=10..40:4", 4), ("beta_n=10..60:2", 2)]
+    {
+        let run = yarnray(directory.path(), &["scatter", "knitting", "--samples", "500", "--sweep", key]).good();
+        assert_eq!(run.stdout.lines().count(), rows + 1, "{key}: {}", run.stdout);
+    }
+}
+
+#[test]
+fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
+    let directory = directory();
+    for (args, word) in [
+        (&["scatter", "silk"][..], "did you mean \"silk1\"?"),
+        (&["scatter", "silk1", "--theta", "90"], "between -90 and 90"),
+        (&["scatter", "silk1", "--offset", "1.1"], "from -1 to 1"),
+        (&["scatter", "silk1", "--ply", "3"], "3 plies"),
+        (&["scatter", "silk1", "--sweep", "density=0.1"], "KEY=A..B:N"),
+        (&["scatter", "silk1", "--sweep", "nonsense=1..2:2"], "unknown key `nonsense`"),
+        (&["scatter", "silk1", "--sweep", "density=0..1:2"], "density"),
+        (&["scatter", "silk1", "-o", "x.exr"], ".json, .csv, .svg or .png"),
+        (&["scatter", "absent.toml"], "no such file"),
+        (&["scatter", "--fiber", "wol"], "did you mean \"wool\"?"),
+    ] {
+        let run = yarnray(directory.path(), args);
+        assert_eq!(run.status, Some(2), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{args:?}: {}", run.stderr);
+    }
+    assert_eq!(listing(directory.path()), [""; 0]);
+}
