@@ -1,4 +1,8 @@
 //! What pixels have collected: sums owned by tiles, so that threads share nothing.
+//!
+//! All sums are exact ([`crate::math::exact`]): films of different samples of a picture, from threads, resumed runs or
+//! other machines, add up to the film of all of them, to the bit. A pixel takes 108 bytes (count, colour, squares,
+//! alpha), with depth, normal, albedo and the parts of light 484: twice what sums of floats would take.
 
 mod matte;
 
@@ -6,6 +10,7 @@ use glam::Vec3A;
 
 use crate::{
     integrator::{ClothId, LightParts, Sample},
+    math::exact::{Exact, NarrowSum, SquareSum, Sum},
     scene::Layers,
 };
 
@@ -25,94 +30,213 @@ pub struct Tile {
     pub width: u32,
     /// As `width`.
     pub height: u32,
-    count: Vec<u32>,
-    /// Sums of radiance and of its squares.
-    color: Vec<[f64; 3]>,
-    square: Vec<[f64; 3]>,
-    alpha: Vec<f32>,
-    depth: Vec<f32>,
-    normal: Vec<[f32; 3]>,
-    albedo: Vec<[f32; 3]>,
-    parts: Vec<[[f32; 3]; LightParts::COUNT]>,
+    /// The sample that comes next for the even and the odd pixels, by (x + y) mod 2: the same but for adaptive
+    /// sampling.
+    pub next: [u32; 2],
+    sums: Sums,
     matte: Matte,
+}
+
+/// Sums over the samples of each pixel. Layers that are not asked for are empty.
+#[derive(Clone, Debug, PartialEq)]
+struct Sums {
+    count: Vec<u32>,
+    color: Vec<[Sum; 3]>,
+    square: Vec<[SquareSum; 3]>,
+    alpha: Vec<NarrowSum>,
+    depth: Vec<Sum>,
+    normal: Vec<[NarrowSum; 3]>,
+    albedo: Vec<[NarrowSum; 3]>,
+    parts: Vec<[[NarrowSum; 3]; LightParts::COUNT]>,
+}
+
+/// Does the same with every vector of sums.
+macro_rules! for_all_sums {
+    ($sums:expr, $do:ident $(, $more:expr)*) => {{
+        let Sums { count, color, square, alpha, depth, normal, albedo, parts } = $sums;
+        $do(count $(, $more)*);
+        $do(color $(, $more)*);
+        $do(square $(, $more)*);
+        $do(alpha $(, $more)*);
+        $do(depth $(, $more)*);
+        $do(normal $(, $more)*);
+        $do(albedo $(, $more)*);
+        $do(parts $(, $more)*);
+    }};
+}
+
+impl Sums {
+    fn new(n: usize, layers: Layers) -> Self {
+        let sized = |wanted: bool| if wanted { n } else { 0 };
+        Self {
+            count: vec![0; n],
+            color: vec![Default::default(); n],
+            square: vec![Default::default(); n],
+            alpha: vec![Default::default(); n],
+            depth: vec![Default::default(); sized(layers.depth)],
+            normal: vec![Default::default(); sized(layers.normal)],
+            albedo: vec![Default::default(); sized(layers.albedo)],
+            parts: vec![Default::default(); sized(layers.lobes)],
+        }
+    }
 }
 
 impl Tile {
     fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers) -> Self {
         let n = (width * height) as usize;
-        let sized = |wanted: bool| if wanted { n } else { 0 };
-        Self {
-            x,
-            y,
-            width,
-            height,
-            count: vec![0; n],
-            color: vec![[0.0; 3]; n],
-            square: vec![[0.0; 3]; n],
-            alpha: vec![0.0; n],
-            depth: vec![0.0; sized(layers.depth)],
-            normal: vec![[0.0; 3]; sized(layers.normal)],
-            albedo: vec![[0.0; 3]; sized(layers.albedo)],
-            parts: vec![[[0.0; 3]; LightParts::COUNT]; sized(layers.lobes)],
-            matte: Matte::new(sized(layers.cryptomatte)),
-        }
+        let matte = Matte::new(if layers.cryptomatte { n } else { 0 });
+        Self { x, y, width, height, next: [0; 2], sums: Sums::new(n, layers), matte }
     }
 
-    /// Adds a sample to a pixel, given from the tile's corner. A sample that is not finite is refused.
+    /// Adds a sample to a pixel, given from the tile's corner. A sample that is not finite, or brighter than
+    /// [`Sum::LIMIT`], is refused.
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, sample: &Sample) -> bool {
-        if !sample.radiance.is_finite() {
+        let radiance = sample.radiance.to_array();
+        // NaN compares as false.
+        if !radiance.iter().all(|v| v.abs() < Sum::LIMIT) {
             return false;
         }
         let i = (y * self.width + x) as usize;
-        self.count[i] += 1;
-        for (c, v) in sample.radiance.to_array().into_iter().enumerate() {
-            let v = f64::from(v);
-            self.color[i][c] += v;
-            self.square[i][c] += v * v;
+        let sums = &mut self.sums;
+        sums.count[i] += 1;
+        for (c, v) in radiance.into_iter().enumerate() {
+            sums.color[i][c].add(v);
+            sums.square[i][c].add_square_of(v);
         }
-        self.alpha[i] += sample.alpha;
-        if let Some(depth) = self.depth.get_mut(i) {
-            *depth += sample.depth;
+        sums.alpha[i].add(sample.alpha);
+        if let Some(depth) = sums.depth.get_mut(i) {
+            depth.add(sample.depth);
         }
-        if let Some(normal) = self.normal.get_mut(i) {
-            let n: [f32; 3] = sample.normal.to_array();
-            *normal = std::array::from_fn(|c| normal[c] + n[c]);
+        if let Some(normal) = sums.normal.get_mut(i) {
+            add_color(normal, sample.normal.to_array());
         }
-        if let Some(albedo) = self.albedo.get_mut(i) {
-            let a = sample.albedo.to_array();
-            *albedo = std::array::from_fn(|c| albedo[c] + a[c]);
+        if let Some(albedo) = sums.albedo.get_mut(i) {
+            add_color(albedo, sample.albedo.to_array());
         }
         if let Some(cloth) = sample.cloth {
             self.matte.add(i, cloth, 1);
         }
-        if let Some(parts) = self.parts.get_mut(i) {
+        if let Some(parts) = sums.parts.get_mut(i) {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
-                let v = value.to_array();
-                *sum = std::array::from_fn(|c| sum[c] + v[c]);
+                add_color(sum, value.to_array());
             }
         }
         true
     }
 
-    /// Sum over the tile's pixels and channels of the variance of the mean over (mean^2 + 0.01), and their number.
-    fn relative_error(&self) -> (f64, f64) {
-        let mut sum = 0.0;
-        let mut n = 0.0;
-        for ((&count, color), square) in self.count.iter().zip(&self.color).zip(&self.square) {
+    /// Number of samples, mean and variance of the mean of a pixel's channels.
+    #[inline]
+    fn moments(&self, i: usize) -> (u32, [f64; 3], [f64; 3]) {
+        let count = self.sums.count[i];
+        let n = f64::from(count.max(1));
+        let mean = self.sums.color[i].map(|c| c.value() / n);
+        let variance = std::array::from_fn(|k| {
             if count < 2 {
-                continue;
+                return 0.0;
             }
-            let c = f64::from(count);
-            for k in 0..3 {
-                let mean = color[k] / c;
-                let variance = ((square[k] / c - mean * mean).max(0.0)) / (c - 1.0);
-                sum += variance / (mean * mean + 0.01);
-                n += 1.0;
+            (self.sums.square[i][k].value() / n - mean[k] * mean[k]).max(0.0) / (n - 1.0)
+        });
+        (count, mean, variance)
+    }
+
+    /// The mean over a pixel's channels of the variance of the mean over (mean^2 + 0.01), if it has two samples.
+    fn relative_variance(&self, i: usize) -> Option<f64> {
+        let (count, mean, variance) = self.moments(i);
+        (count >= 2).then(|| (0..3).map(|k| variance[k] / (mean[k] * mean[k] + NOISE_OFFSET)).sum::<f64>() / 3.0)
+    }
+
+    /// Adds the tile's share to an estimate of noise.
+    fn add_noise(&self, sums: &mut NoiseSums) {
+        for row in 0..self.height as usize {
+            let mut left = None;
+            for x in 0..self.width as usize {
+                let here = self.relative_variance(row * self.width as usize + x);
+                if let Some(here) = here {
+                    sums.sum += here;
+                    sums.pixels += 1.0;
+                }
+                // Pairs side by side, each pixel in one of them.
+                match (x % 2, left, here) {
+                    (1, Some(left), Some(here)) => {
+                        let difference: f64 = left - here;
+                        sums.differences += difference * difference;
+                        sums.paired += 2.0;
+                    }
+                    _ => left = here,
+                }
             }
         }
-        (sum, n)
     }
+
+    /// Least bytes of a pixel in [`Self::save`]; Cryptomatte adds 16 for each ply that covers it.
+    pub fn bytes_per_pixel(layers: Layers) -> usize {
+        let mut bytes = if layers.cryptomatte { size_of::<u32>() } else { 0 };
+        for_all_sums!(&Sums::new(1, layers), add_bytes, &mut bytes);
+        bytes
+    }
+
+    /// Appends all sums to a file's bytes.
+    pub fn save(&self, out: &mut Vec<u8>) {
+        for_all_sums!(&self.sums, save_all, out);
+        self.matte.save(out);
+    }
+
+    /// Takes back what [`Self::save`] wrote for a tile of this size and these layers: `None` if it is something else.
+    pub fn load(&mut self, mut bytes: &[u8]) -> Option<()> {
+        let mut expected = 0;
+        for_all_sums!(&self.sums, add_bytes, &mut expected);
+        if bytes.len() < expected {
+            return None;
+        }
+        for_all_sums!(&mut self.sums, load_all, &mut bytes);
+        self.matte.load(bytes)
+    }
+}
+
+#[inline]
+fn add_color(sum: &mut [NarrowSum; 3], value: [f32; 3]) {
+    sum.iter_mut().zip(value).for_each(|(sum, v)| sum.add(v));
+}
+
+fn add_bytes<T: Exact>(sums: &[T], bytes: &mut usize) {
+    *bytes += sums.len() * T::BYTES;
+}
+
+fn save_all<T: Exact>(sums: &[T], out: &mut Vec<u8>) {
+    sums.iter().for_each(|s| s.save(out));
+}
+
+fn load_all<T: Exact>(sums: &mut [T], bytes: &mut &[u8]) {
+    for sum in sums {
+        let (one, rest) = bytes.split_at(T::BYTES);
+        *sum = T::load(one);
+        *bytes = rest;
+    }
+}
+
+/// What is added to the squared mean in relative errors, so that black pixels do not count without end.
+const NOISE_OFFSET: f64 = 0.01;
+
+/// Sums of an estimate of noise.
+#[derive(Default)]
+struct NoiseSums {
+    sum: f64,
+    pixels: f64,
+    differences: f64,
+    paired: f64,
+}
+
+/// An estimate of a picture's relative mean square error: the mean over pixels and channels of the variance of the
+/// mean over (mean^2 + 0.01).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// The estimate.
+    pub estimate: f64,
+    /// Ends of its interval of 95 %.
+    pub low: f64,
+    /// As `low`.
+    pub high: f64,
 }
 
 /// A pixel as it stands in the picture.
@@ -174,32 +298,38 @@ impl Film {
         self.order.iter().filter_map(|&i| slots[i as usize].take()).collect()
     }
 
+    /// The tiles, row by row.
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
+    }
+
+    /// As [`Self::tiles`], to be changed.
+    pub fn tiles_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
+    }
+
     /// The pixel in a column and row of what is rendered.
     pub fn pixel(&self, x: u32, y: u32) -> Pixel {
         let tile = &self.tiles[(y / TILE * self.columns + x / TILE) as usize];
         let i = ((y % TILE) * tile.width + x % TILE) as usize;
-        let samples = tile.count[i];
+        let (samples, mean, variance) = tile.moments(i);
         if samples == 0 {
             return Pixel::default();
         }
+        let sums = &tile.sums;
         let n = f64::from(samples);
-        let mean = tile.color[i].map(|c| c / n);
-        let variance = std::array::from_fn(|k| {
-            if samples < 2 {
-                return 0.0;
-            }
-            ((tile.square[i][k] / n - mean[k] * mean[k]).max(0.0) / (n - 1.0)) as f32
-        });
-        let alpha = tile.alpha[i] / samples as f32;
-        let normal = tile.normal.get(i).map_or([0.0; 3], |&v| Vec3A::from(v).normalize_or_zero().to_array());
+        let color = |sum: &[NarrowSum; 3]| sum.map(|v| (v.value() / n) as f32);
+        let alpha = sums.alpha[i].value();
+        let depth = |sum: &Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
+        let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
         Pixel {
             color: mean.map(|c| c as f32),
-            alpha,
-            variance,
-            depth: tile.depth.get(i).map_or(0.0, |d| if tile.alpha[i] > 0.0 { d / tile.alpha[i] } else { 0.0 }),
-            normal,
-            albedo: tile.albedo.get(i).map_or([0.0; 3], |a| a.map(|v| v / samples as f32)),
-            parts: tile.parts.get(i).map_or_else(Default::default, |l| l.map(|c| c.map(|v| v / samples as f32))),
+            alpha: (alpha / n) as f32,
+            variance: variance.map(|v| v as f32),
+            depth: sums.depth.get(i).map_or(0.0, depth),
+            normal: sums.normal.get(i).map_or([0.0; 3], normal),
+            albedo: sums.albedo.get(i).map_or([0.0; 3], color),
+            parts: sums.parts.get(i).map_or_else(Default::default, |p| std::array::from_fn(|k| color(&p[k]))),
             samples,
         }
     }
@@ -210,16 +340,27 @@ impl Film {
         tile.matte.counts(((y % TILE) * tile.width + x % TILE) as usize)
     }
 
-    /// An estimate of the picture's relative mean square error: the mean over pixels and channels of the variance of
-    /// the mean over (mean^2 + 0.01); `None` before two samples a pixel.
-    pub fn relative_error(&self) -> Option<f64> {
-        let (sum, n) = self.tiles.iter().map(Tile::relative_error).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        (n > 0.0).then(|| sum / n)
+    /// How far the picture is from its limit, as far as its own samples tell; `None` before two samples a pixel.
+    ///
+    /// The interval comes from the differences of neighbours: two pixels side by side see nearly the same, so that the
+    /// difference of their variances tells how well each is known. Edges make it wider, never narrower. It knows
+    /// nothing of light that no sample has found yet.
+    pub fn noise(&self) -> Option<Noise> {
+        let mut sums = NoiseSums::default();
+        self.tiles.iter().for_each(|tile| tile.add_noise(&mut sums));
+        let NoiseSums { sum, pixels, differences, paired } = sums;
+        (pixels > 0.0).then(|| {
+            let estimate = sum / pixels;
+            // Pixels without a neighbour are as well known as the others.
+            let variance = if paired > 0.0 { differences * pixels / paired } else { sum * sum };
+            let reach = 1.96 * variance.sqrt() / pixels;
+            Noise { estimate, low: (estimate - reach).max(0.0), high: estimate + reach }
+        })
     }
 
     /// Least, mean and most samples of a pixel.
     pub fn samples(&self) -> (u32, f64, u32) {
-        let counts = || self.tiles.iter().flat_map(|t| &t.count).copied();
+        let counts = || self.tiles.iter().flat_map(|t| &t.sums.count).copied();
         let total: f64 = counts().map(f64::from).sum();
         let pixels = f64::from(self.width) * f64::from(self.height);
         (counts().min().unwrap_or(0), total / pixels, counts().max().unwrap_or(0))
@@ -270,7 +411,8 @@ mod tests {
             }
         }
         assert_eq!(film.samples(), (4, 4.0, 4));
-        assert!(film.relative_error().is_some());
+        let noise = film.noise().unwrap();
+        assert!(0.0 < noise.low && noise.low < noise.estimate && noise.estimate < noise.high, "{noise:?}");
     }
 
     #[test]

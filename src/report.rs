@@ -107,7 +107,7 @@ impl RunRecord<'_> {
                 "given_points": scene.fabrics.iter().map(crate::scene::Fabric::control_points).sum::<usize>(),
                 "length_mm": strands().map(crate::geometry::strand::Strands::length).sum::<f64>(),
             },
-            "noise": {"rel_mse_estimate": film.relative_error()},
+            "noise": {"rel_mse_estimate": film.noise().map(|n| n.estimate)},
             "used": plan.names(true),
             "left_out": plan.names(false),
         })
@@ -131,7 +131,7 @@ impl RunRecord<'_> {
             ("yarnray.embree".to_owned(), text(&self.world.embree_version())),
             ("yarnray.command".to_owned(), text(command_line)),
         ];
-        if let Some(noise) = self.rendered.film.relative_error() {
+        if let Some(noise) = self.rendered.film.noise().map(|n| n.estimate) {
             out.push(("yarnray.rel_mse_estimate".to_owned(), Attribute::Double(noise)));
         }
         out

@@ -17,7 +17,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("scene", &["ffi", "geometry", "image", "math", "scattering"]),
     ("trace", &["ffi", "geometry", "scattering", "scene"]),
     ("integrator", &["ffi", "geometry", "math", "scattering", "scene", "trace"]),
-    ("film", &["integrator", "scene"]),
+    ("film", &["integrator", "math", "scene"]),
     ("render", &["film", "image", "integrator", "math", "scene", "trace"]),
     ("plan", &["image", "scene"]),
     ("report", &["geometry", "image", "plan", "render", "scene", "trace"]),

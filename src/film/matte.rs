@@ -32,6 +32,33 @@ impl Matte {
     pub fn counts(&self, pixel: usize) -> &[(ClothId, u32)] {
         self.pixels.get(pixel).map_or(&[], Vec::as_slice)
     }
+
+    /// Appends the counts to a file's bytes.
+    pub(super) fn save(&self, out: &mut Vec<u8>) {
+        for counts in &self.pixels {
+            out.extend((counts.len() as u32).to_le_bytes());
+            for (id, count) in counts {
+                out.extend([id.fabric, id.yarn, id.ply, *count].map(u32::to_le_bytes).as_flattened());
+            }
+        }
+    }
+
+    /// Takes back what [`Self::save`] wrote for so many pixels: `None` if it is something else.
+    pub(super) fn load(&mut self, bytes: &[u8]) -> Option<()> {
+        let (words, []) = bytes.as_chunks::<4>() else { return None };
+        let mut words = words.iter().map(|w| u32::from_le_bytes(*w));
+        for counts in &mut self.pixels {
+            counts.clear();
+            for _ in 0..words.next()? {
+                let mut word = || words.next();
+                counts.push((ClothId { fabric: word()?, yarn: word()?, ply: word()? }, word()?));
+            }
+            if !counts.is_sorted_by_key(|(id, _)| *id) {
+                return None;
+            }
+        }
+        words.next().is_none().then_some(())
+    }
 }
 
 #[cfg(test)]
@@ -52,5 +79,13 @@ mod tests {
         let mut none = Matte::default();
         none.add(1, met[0], 1);
         assert!(none.counts(1).is_empty());
+        let mut bytes = Vec::new();
+        forward.save(&mut bytes);
+        let mut again = Matte::new(2);
+        assert_eq!(again.load(&bytes), Some(()));
+        assert_eq!(again, forward);
+        assert_eq!(again.load(&bytes[..bytes.len() - 4]), None);
+        bytes.extend([0; 4]);
+        assert_eq!(again.load(&bytes), None);
     }
 }

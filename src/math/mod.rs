@@ -1,7 +1,8 @@
-//! Numbers, not yarns: colours in one register, frames, special functions, sample points.
+//! Numbers, not yarns: colours in one register, frames, special functions, sample points, exact sums.
 //!
 //! Knows nothing of curves, light or files. `f32` serves rays and directions, `f64` tables and sums.
 
+pub mod exact;
 pub mod frame;
 pub mod rgb;
 pub mod sampler;

@@ -121,8 +121,11 @@ pub fn render(scene: &Scene, world: &World, interrupt: &AtomicBool, mut progress
             break Stop::Time;
         }
         done = end;
-        let noise =
-            if settings.noise.is_some() && done >= WARM_UP.min(settings.spp) { film.relative_error() } else { None };
+        let noise = if settings.noise.is_some() && done >= WARM_UP.min(settings.spp) {
+            film.noise().map(|n| n.estimate)
+        } else {
+            None
+        };
         let by_time = settings.time.map_or(0.0, |t| elapsed.as_secs_f64() / t);
         let share = (f64::from(done) / f64::from(settings.spp)).max(by_time).min(1.0);
         progress(Progress { spp: done, spp_end: settings.spp, share, elapsed, noise });
