@@ -9,7 +9,7 @@ use crate::{
     plan::Plan,
     render::Rendered,
     scene::Scene,
-    trace::{BuildTimes, World},
+    trace::{BuildTimes, Threads, World},
 };
 
 /// Seconds of each phase.
@@ -57,7 +57,14 @@ impl RunRecord<'_> {
         let film = &self.rendered.film;
         let counters = &self.rendered.counters;
         let (spp_min, spp_mean, spp_max) = film.samples();
-        let strands = || self.world.weaves().iter().map(|w| &w.strands);
+        let threads = self.world.threads();
+        let yarns = || {
+            threads.iter().filter_map(|t| match t {
+                Threads::Yarns(weave) => Some(&weave.strands),
+                Threads::Fibers(_) => None,
+            })
+        };
+        let fibers = threads.iter().filter(|t| matches!(t, Threads::Fibers(_))).map(Threads::count).sum::<usize>();
         let plan = Plan::new(scene);
         let geometry = self.world.geometry_bytes();
         let bvh = self.world.bvh_bytes();
@@ -100,12 +107,12 @@ impl RunRecord<'_> {
                 "peak_rss_bytes": peak_rss_bytes(),
             },
             "curves": {
-                "yarns": strands().map(crate::geometry::strand::Strands::yarns).sum::<usize>(),
-                "fibers": 0,
-                "control_points": strands().map(|s| s.points().len()).sum::<usize>(),
-                "segments": strands().map(|s| s.segments().len()).sum::<usize>(),
+                "yarns": yarns().map(crate::geometry::strand::Strands::yarns).sum::<usize>(),
+                "fibers": fibers,
+                "control_points": threads.iter().map(|t| t.curves().1.len()).sum::<usize>(),
+                "segments": threads.iter().map(|t| t.curves().2.len()).sum::<usize>(),
                 "given_points": scene.fabrics.iter().map(crate::scene::Fabric::control_points).sum::<usize>(),
-                "length_mm": strands().map(crate::geometry::strand::Strands::length).sum::<f64>(),
+                "length_mm": yarns().map(crate::geometry::strand::Strands::length).sum::<f64>(),
             },
             "noise": {"rel_mse_estimate": film.noise().map(|n| n.estimate)},
             "used": plan.names(true),

@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 use super::{Failure, SceneArgs, bytes_in_words};
 use crate::{
     geometry::{
-        curve::{Basis, CurveSet},
+        curve::{Basis, Curve, CurveSet},
         curve_file::{self, ReadOptions},
     },
     plan::Plan,
-    scene::Scene,
+    scene::{Fabric, Scene, Thread},
     trace::World,
 };
 
@@ -63,14 +63,7 @@ fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
     let all = || set.curves.iter().flat_map(|c| &c.points);
     let low = all().copied().reduce(DVec3::min).unwrap_or_default();
     let high = all().copied().reduce(DVec3::max).unwrap_or_default();
-    let length: f64 = set
-        .curves
-        .iter()
-        .map(|c| {
-            let closing = if c.closed { c.points[c.points.len() - 1].distance(c.points[0]) } else { 0.0 };
-            closing + c.points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
-        })
-        .sum();
+    let length: f64 = set.curves.iter().map(Curve::polygon_length).sum();
     let basis = match set.curves.first().map(|c| c.basis) {
         Some(Basis::CatmullRom) => "catmull-rom",
         Some(Basis::BSpline) => "b-spline",
@@ -99,6 +92,11 @@ fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
     (report, text)
 }
 
+/// Length of a fabric's curves, millimetres, from point to point.
+fn length(fabric: &Fabric) -> f64 {
+    fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
+}
+
 fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
     // Building is the surest estimate, and takes less time than any picture.
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -110,12 +108,16 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
     let fabrics: Vec<Value> = scene
         .fabrics
         .iter()
-        .zip(world.weaves())
-        .map(|(f, w)| {
+        .enumerate()
+        .map(|(index, f)| {
+            let (kind, number, name) = match f.thread {
+                Thread::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
+                Thread::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
+            };
             json!({
-                "source": f.origin, "yarn": scene.yarns[f.yarn].name, "yarns": w.strands.yarns(),
-                "given_points": f.control_points(), "segments": w.strands.segments().len(),
-                "length_mm": w.strands.length(), "tight_bends": w.strands.tight_bends().len(),
+                "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
+                "segments": world.of_fabric(index).map(|t| t.curves().2.len()).sum::<usize>(),
+                "length_mm": length(f), "tight_bends": world.tight_bends().filter(|(at, _)| *at == index).count(),
             })
         })
         .collect();
@@ -142,19 +144,21 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
         render.mode.name(),
         render.model.name()
     );
-    for (f, w) in scene.fabrics.iter().zip(world.weaves()) {
-        let yarn = &scene.yarns[f.yarn];
-        let plies = &yarn.plies;
+    for (index, f) in scene.fabrics.iter().enumerate() {
+        let what = match f.thread {
+            Thread::Yarn(yarn) => {
+                let yarn = &scene.yarns[yarn];
+                format!("yarns of `{}` ({} plies of {} fibres)", yarn.name, yarn.plies.len(), yarn.plies[0].fibers)
+            }
+            Thread::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
+        };
         text += &format!(
-            "  fabric    {}: {} yarns of `{}` ({} plies of {} fibres), {:.1} m, {} points given, {} segments made\n",
+            "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments made\n",
             f.origin,
-            w.strands.yarns(),
-            yarn.name,
-            plies.len(),
-            plies[0].fibers,
-            w.strands.length() / 1000.0,
+            f.curves.len(),
+            length(f) / 1000.0,
             f.control_points(),
-            w.strands.segments().len()
+            world.of_fabric(index).map(|t| t.curves().2.len()).sum::<usize>()
         );
     }
     text += &format!(

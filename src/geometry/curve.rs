@@ -26,6 +26,17 @@ pub struct Curve {
     pub radii: Option<Vec<f64>>,
 }
 
+impl Curve {
+    /// Length from point to point, and back to the first if the curve is closed.
+    pub fn polygon_length(&self) -> f64 {
+        let closing = match (self.points.first(), self.points.last()) {
+            (Some(first), Some(last)) if self.closed => last.distance(*first),
+            _ => 0.0,
+        };
+        closing + self.points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
+    }
+}
+
 /// The curves of one file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CurveSet {

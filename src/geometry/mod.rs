@@ -6,4 +6,5 @@ pub mod generate;
 pub mod section;
 mod spline;
 pub mod strand;
+pub mod tube;
 pub mod yarn;

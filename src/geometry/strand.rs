@@ -179,15 +179,15 @@ impl Strands {
 }
 
 /// A curve as a chain of segments that can be evaluated.
-struct Chain {
+pub(super) struct Chain {
     basis: Basis,
-    points: Vec<DVec4>,
+    pub(super) points: Vec<DVec4>,
 }
 
 impl Chain {
     /// Adds the points that the ends need: closed curves repeat theirs, open Catmull-Rom curves reach their end
     /// points (a mirrored point beyond), B-splines with too few points repeat their ends.
-    fn new(curve: &Curve, radii: &[f64]) -> Self {
+    pub(super) fn new(curve: &Curve, radii: &[f64]) -> Self {
         let mut given: Vec<DVec4> = curve.points.iter().zip(radii).map(|(p, &r)| p.extend(r)).collect();
         // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
         if curve.basis != Basis::BSpline {

@@ -3,8 +3,9 @@
 //! A path tracer with next event estimation and multiple importance sampling. The one special thing is cloth: a ray
 //! that meets a yarn is let through with the chance that it meets no fibre (which is no scattering event), else it
 //! scatters at a vertex of the yarn's model, and goes on from inside the yarn, whose own plies the model has already
-//! put in its way.
+//! put in its way. An explicit fibre scatters at its surface ([`fiber`]).
 
+mod fiber;
 mod parts;
 
 pub use parts::LightParts;
@@ -13,14 +14,14 @@ use glam::{Vec2, Vec3A};
 
 use crate::{
     ffi::embree::Ray,
-    geometry::section::Crossings,
+    geometry::section::{Crossings, Section},
     math::{Rgb, frame::orthonormal_basis, sampler::Sampler, warp},
     scattering::{LobeValues, mis_weight, yarn::YarnVertex},
     scene::{
-        Fabric, Ground, Light, Scene,
+        Fabric, Ground, Light, Scene, Thread,
         light::{AreaLight, Environment},
     },
-    trace::{Hit, World},
+    trace::{Hit, HitPlace, Threads, Weave, World},
 };
 
 /// Scattering events before paths may end by chance.
@@ -211,13 +212,24 @@ impl<'a> Integrator<'a> {
                     self.scatter_at_ground(&ground, t, &mut path, &mut sample, scratch, counters)
                 }
                 (Some(hit), _) => {
-                    let (go_on, scattered) = self.scatter_at_yarn(&hit, &mut path, &mut sample, scratch, counters);
+                    let (go_on, scattered) = match (&hit.place, &self.world.threads()[hit.threads]) {
+                        (HitPlace::Yarn(section), Threads::Yarns(weave)) => {
+                            self.scatter_at_yarn(&hit, section, weave, &mut path, &mut sample, scratch, counters)
+                        }
+                        (HitPlace::Fiber(place), Threads::Fibers(fleece)) => {
+                            self.scatter_at_fiber(&hit, place, fleece, &mut path, &mut sample, scratch, counters)
+                        }
+                        _ => unreachable!("a hit is of the kind of what it hit"),
+                    };
                     if scattered {
                         cloth_events += 1;
                         if first {
                             sample.alpha = 1.0;
-                            let point = hit.section.centre + hit.section.radius * hit.normal;
-                            sample.depth = (camera - point).dot(self.back);
+                            let (centre, radius) = match &hit.place {
+                                HitPlace::Yarn(section) => (section.centre, section.radius),
+                                HitPlace::Fiber(place) => (place.centre, place.radius),
+                            };
+                            sample.depth = (camera - centre - radius * hit.normal).dot(self.back);
                         }
                     }
                     go_on
@@ -308,16 +320,18 @@ impl<'a> Integrator<'a> {
 
     /// Scatters at a yarn or passes it. Returns whether the path goes on, and whether it scattered.
     #[inline]
+    #[allow(clippy::too_many_arguments, reason = "a path, what it met, and the worker's own memory")]
     fn scatter_at_yarn(
         &self,
         hit: &Hit,
+        section: &Section,
+        weave: &Weave,
         path: &mut Path<'_>,
         sample: &mut Sample,
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> (bool, bool) {
-        let section = &hit.section;
-        let yarn = &self.world.weaves()[hit.weave].yarn;
+        let yarn = &weave.yarn;
         section.crossings(yarn.shape(), &mut scratch.crossings);
         let unscattered = yarn.transparency(&scratch.crossings);
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
@@ -335,13 +349,7 @@ impl<'a> Integrator<'a> {
             && let Some(front) = scratch.crossings.first()
         {
             sample.normal = section.to_world(front.normal(section));
-            if let Some(plies) = self.albedos.get(hit.weave) {
-                sample.albedo = plies[front.ply];
-            }
-            if self.identify {
-                let yarn = self.world.weaves()[hit.weave].strands.yarn_of(hit.segment);
-                sample.cloth = Some(ClothId { fabric: hit.weave as u32, yarn: yarn as u32, ply: front.ply as u32 });
-            }
+            self.describe(sample, weave.fabric, weave.first_ply + front.ply, || weave.strands.yarn_of(hit.segment));
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
@@ -350,7 +358,7 @@ impl<'a> Integrator<'a> {
 
         if let Some((direct, light)) = self.light_at_yarn(
             &vertex,
-            hit,
+            section,
             u_light_choice,
             Vec2::new(u_light_x, u_light_y),
             stream.next(),
@@ -375,13 +383,24 @@ impl<'a> Integrator<'a> {
         (self.survives(path, next.weight, u_roulette), true)
     }
 
+    /// Notes of what cloth a camera path met first.
+    #[inline]
+    fn describe(&self, sample: &mut Sample, fabric: usize, ply: usize, yarn: impl FnOnce() -> usize) {
+        if let Some(plies) = self.albedos.get(fabric) {
+            sample.albedo = plies[ply];
+        }
+        if self.identify {
+            sample.cloth = Some(ClothId { fabric: fabric as u32, yarn: yarn() as u32, ply: ply as u32 });
+        }
+    }
+
     /// Draws a light and a direction towards it: the lobes' values and the light that arrives, 0 or more.
     #[inline]
     #[allow(clippy::too_many_arguments, reason = "random numbers are drawn by the caller, in a fixed order")]
     fn light_at_yarn(
         &self,
         vertex: &YarnVertex<'_>,
-        hit: &Hit,
+        section: &Section,
         u_choice: f32,
         u: Vec2,
         u_start: f32,
@@ -389,7 +408,6 @@ impl<'a> Integrator<'a> {
         counters: &mut Counters,
     ) -> Option<(LobeValues, Rgb)> {
         let &(light, chance, _) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())?;
-        let section = &hit.section;
         let node = section.point_on_ray(vertex.node_start());
         let towards = light.sample(node, u)?;
         let local = section.to_local(towards.direction);
@@ -457,9 +475,12 @@ impl<'a> Integrator<'a> {
     }
 }
 
-/// Albedo of one fibre of each ply of a fabric's yarn.
+/// Albedo of one fibre of each ply of a fabric's yarn, or of the one fibre it is made of.
 fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Rgb> {
-    let fibers = &scene.yarns[fabric.yarn].fibers;
+    let fibers = match fabric.thread {
+        Thread::Yarn(yarn) => &scene.yarns[yarn].fibers[..],
+        Thread::Fiber(fiber) => std::slice::from_ref(&scene.fibers[fiber]),
+    };
     fibers.iter().map(|(_, m)| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]))).collect()
 }
 

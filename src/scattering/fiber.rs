@@ -8,6 +8,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::Vec3A;
 
+use super::LobeValues;
 use super::kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel_scalar, sample_sine, sample_sine_diffuse};
 use crate::math::{
     Rgb,
@@ -66,6 +67,8 @@ pub struct FiberSample {
     pub weight: Rgb,
     /// Density per steradian.
     pub pdf: f32,
+    /// The value of each lobe there, 1/steradian.
+    pub lobes: LobeValues,
 }
 
 impl FiberBcsdf {
@@ -82,11 +85,11 @@ impl FiberBcsdf {
         }
     }
 
-    /// S cos(theta_i) in 1/steradian and the density of [`Self::sample`] at `wi`. Frame: z along the fibre, the
+    /// S cos(theta_i) of R, TT and D in 1/steradian and the density of [`Self::sample`] at `wi`. Frame: z along the fibre, the
     /// camera's direction at azimuth 0 with sine and cosine of its latitude given. `throughput` weighs the channels
     /// in the choice of a lobe and must be the same in both calls.
     #[inline]
-    pub fn evaluate(&self, sin_o: f32, cos_o: f32, wi: Vec3A, throughput: Rgb) -> (Rgb, f32) {
+    pub fn evaluate(&self, sin_o: f32, cos_o: f32, wi: Vec3A, throughput: Rgb) -> (LobeValues, f32) {
         let sin_i = wi.z;
         let cos_i = (1.0 - sin_i * sin_i).max(0.0).sqrt();
         let at = Latitudes::new(sin_o, cos_o, sin_i, cos_i);
@@ -97,7 +100,8 @@ impl FiberBcsdf {
         let d = DIFFUSE * cos_i * (0.5 * FRAC_1_PI);
         let tt = m_tt * cos_i * n_tt;
         let [p_r, p_tt, p_d] = self.lobe_shares(throughput);
-        (self.r * r + self.tt * tt + self.d * d, p_r * r + p_tt * tt + p_d * d)
+        let lobes = LobeValues { r: self.r * r, tt: self.tt * tt, d: self.d * d, ..LobeValues::default() };
+        (lobes, p_r * r + p_tt * tt + p_d * d)
     }
 
     fn lobe_shares(&self, throughput: Rgb) -> [f32; 3] {
@@ -131,8 +135,8 @@ impl FiberBcsdf {
         let cos_i = (1.0 - sin_i * sin_i).max(0.0).sqrt();
         let (s, c) = sin_cos(phi);
         let wi = Vec3A::new(cos_i * c, cos_i * s, sin_i);
-        let (value, pdf) = self.evaluate(sin_o, cos_o, wi, throughput);
-        (pdf > 0.0).then(|| FiberSample { wi, weight: value / pdf, pdf })
+        let (lobes, pdf) = self.evaluate(sin_o, cos_o, wi, throughput);
+        (pdf > 0.0).then(|| FiberSample { wi, weight: lobes.sum() / pdf, pdf, lobes })
     }
 }
 
@@ -151,7 +155,7 @@ mod tests {
                 let (mut energy, mut density) = (0.0, 0.0);
                 for (wi, dw) in sphere(600, 400) {
                     let (value, pdf) = bcsdf.evaluate(s, c, wi, Rgb::ONE);
-                    energy += f64::from(value.mean()) * dw;
+                    energy += f64::from(value.sum().mean()) * dw;
                     density += f64::from(pdf) * dw;
                 }
                 assert!((energy - 1.0).abs() < 1e-3, "theta {theta}: energy {energy}");
@@ -174,7 +178,7 @@ mod tests {
             let phi = 0.06 * i as f32;
             let s = |theta_o: f32, theta_i: f32, phi: f32| {
                 let wi = Vec3A::new(theta_i.cos() * phi.cos(), theta_i.cos() * phi.sin(), theta_i.sin());
-                bcsdf.evaluate(theta_o.sin(), theta_o.cos(), wi, Rgb::ONE).0.mean() / theta_i.cos()
+                bcsdf.evaluate(theta_o.sin(), theta_o.cos(), wi, Rgb::ONE).0.sum().mean() / theta_i.cos()
             };
             let (there, back) = (s(a, b, phi), s(b, a, -phi));
             assert!((there / back - 1.0).abs() < 1e-4, "{there} {back}");

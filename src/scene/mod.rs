@@ -196,15 +196,24 @@ impl Yarn {
     }
 }
 
-/// Curves of one kind of yarn.
+/// What a fabric's curves are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Thread {
+    /// Yarns: index into [`Scene::yarns`].
+    Yarn(usize),
+    /// Single fibres, explicit in every mode: index into [`Scene::fibers`].
+    Fiber(usize),
+}
+
+/// Curves of one kind of yarn or fibre.
 #[derive(Clone, Debug)]
 pub struct Fabric {
     /// Its name, of which there is no other: given, or that of its yarn.
     pub name: String,
     /// Where the curves came from, for messages.
     pub origin: String,
-    /// Index into [`Scene::yarns`].
-    pub yarn: usize,
+    /// What they are.
+    pub thread: Thread,
     /// Curves and their radii, millimetres, about the scene's middle.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
@@ -250,6 +259,8 @@ pub struct Scene {
     pub camera: Camera,
     /// Kinds of yarn that fabrics use.
     pub yarns: Vec<Yarn>,
+    /// Fibres that fabrics use by themselves: name and material.
+    pub fibers: Vec<(String, FiberMaterial)>,
     /// The cloth.
     pub fabrics: Vec<Fabric>,
     /// The lights.

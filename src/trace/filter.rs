@@ -1,6 +1,6 @@
 //! What Embree asks during traversal.
 
-use super::{Weave, section_at};
+use super::{Threads, Weave, section_at};
 use crate::{
     ffi::embree::{HitFilter, RawHit, Ray},
     geometry::section::{Crossings, Section},
@@ -17,27 +17,27 @@ fn leaves(ray: &Ray, hit: &RawHit) -> bool {
 
 /// Lets rays through between the plies.
 pub(super) struct GapFilter<'a> {
-    weaves: &'a [Weave],
+    threads: &'a [Threads],
     ray: &'a Ray,
     /// The hit accepted last and its section: mostly the one that stands in the end.
     last: Option<(RawHit, Section)>,
 }
 
 impl<'a> GapFilter<'a> {
-    pub(super) fn new(weaves: &'a [Weave], ray: &'a Ray) -> Self {
-        Self { weaves, ray, last: None }
+    pub(super) fn new(threads: &'a [Threads], ray: &'a Ray) -> Self {
+        Self { threads, ray, last: None }
     }
 
     /// The section at a hit: the one made when it was accepted, or made anew.
     #[inline]
-    pub(super) fn section(&self, hit: &RawHit) -> Section {
+    pub(super) fn section(&self, weave: &Weave, hit: &RawHit) -> Section {
         match &self.last {
             Some((last, section))
                 if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u =>
             {
                 *section
             }
-            _ => section_at(&self.weaves[hit.geometry as usize], self.ray, hit),
+            _ => section_at(weave, self.ray, hit),
         }
     }
 }
@@ -48,7 +48,7 @@ impl HitFilter for GapFilter<'_> {
         if leaves(self.ray, hit) {
             return false;
         }
-        let weave = &self.weaves[hit.geometry as usize];
+        let Threads::Yarns(weave) = &self.threads[hit.geometry as usize] else { return true };
         let shape = weave.yarn.shape();
         if shape.filled {
             return true;
@@ -67,7 +67,7 @@ const REMEMBERED: usize = 8;
 
 /// Multiplies what each yarn on a shadow ray lets pass; one hit counts once, however often Embree offers it.
 pub(super) struct ShadowFilter<'a> {
-    weaves: &'a [Weave],
+    threads: &'a [Threads],
     ray: &'a Ray,
     crossings: &'a mut Crossings,
     passed: f32,
@@ -76,8 +76,8 @@ pub(super) struct ShadowFilter<'a> {
 }
 
 impl<'a> ShadowFilter<'a> {
-    pub(super) fn new(weaves: &'a [Weave], ray: &'a Ray, crossings: &'a mut Crossings) -> Self {
-        Self { weaves, ray, crossings, passed: 1.0, seen: [(u32::MAX, 0, 0.0); REMEMBERED], next: 0 }
+    pub(super) fn new(threads: &'a [Threads], ray: &'a Ray, crossings: &'a mut Crossings) -> Self {
+        Self { threads, ray, crossings, passed: 1.0, seen: [(u32::MAX, 0, 0.0); REMEMBERED], next: 0 }
     }
 
     /// The share of light that all hits so far let pass.
@@ -107,7 +107,7 @@ impl HitFilter for ShadowFilter<'_> {
         if leaves(self.ray, hit) {
             return false;
         }
-        let weave = &self.weaves[hit.geometry as usize];
+        let Threads::Yarns(weave) = &self.threads[hit.geometry as usize] else { return true };
         let section = section_at(weave, self.ray, hit);
         section.crossings(weave.yarn.shape(), self.crossings);
         if self.crossings.is_empty() {

@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, EmbreeError, RawHit, Ray, SceneBuilder},
@@ -19,23 +19,54 @@ use crate::{
         curve::Basis,
         section::{Crossings, Section},
         strand::{StrandOptions, Strands, TightBend},
+        tube::{TubePlace, Tubes},
     },
     scattering::{
         aggregated::AggregatedYarn,
+        fiber::FiberBcsdf,
         lobes::{ChordModel, ChordYarn},
         yarn::YarnScatterer,
     },
-    scene::{Fabric, Model, Scene, Yarn},
+    scene::{Fabric, Model, Scene, Thread, Yarn},
 };
 use filter::{GapFilter, ShadowFilter};
 
 /// Curves of one kind of yarn with all that its rays need.
 #[derive(Debug)]
 pub struct Weave {
+    /// The fabric of the scene that it belongs to.
+    pub fabric: usize,
+    /// Which ply of the scene's yarn the first ply of `yarn` is: not 0 where each ply is a curve of its own.
+    pub first_ply: usize,
     /// Control points, frames and phases.
     pub strands: Strands,
     /// Cross-section and scattering.
     pub yarn: YarnScatterer,
+}
+
+/// Explicit fibres of one material.
+#[derive(Debug)]
+pub struct Fleece {
+    /// The fabric of the scene that they belong to.
+    pub fabric: usize,
+    /// The ply of the scene's yarn that they belong to.
+    pub ply: usize,
+    /// The first fibre of each yarn; none where fibres are no part of a yarn.
+    pub first_tubes: Vec<u32>,
+    /// The fibres.
+    pub tubes: Tubes,
+    /// How each of them scatters.
+    pub fiber: FiberBcsdf,
+}
+
+/// What one geometry of Embree stands for.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "there are few of them, and rays look at them all the time")]
+pub enum Threads {
+    /// Yarns (or plies, each as a yarn of one ply) with a model for the fibres inside.
+    Yarns(Weave),
+    /// Fibres.
+    Fibers(Fleece),
 }
 
 /// The scene's cloth, ready for rays.
@@ -43,7 +74,7 @@ pub struct Weave {
 pub struct World {
     scene: CommittedScene,
     device: Arc<Device>,
-    weaves: Vec<Weave>,
+    threads: Vec<Threads>,
 }
 
 /// What making a [`World`] took.
@@ -60,14 +91,23 @@ pub struct BuildTimes {
 pub struct Hit {
     /// Distance along the ray.
     pub t: f32,
-    /// Index of the weave.
-    pub weave: usize,
+    /// Index into [`World::threads`].
+    pub threads: usize,
     /// Segment within it.
     pub segment: u32,
-    /// Outward unit normal of the yarn.
+    /// Outward unit normal of the yarn or fibre.
     pub normal: Vec3A,
-    /// The yarn's cross-section as this ray sees it.
-    pub section: Section,
+    /// What was met.
+    pub place: HitPlace,
+}
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug)]
+pub enum HitPlace {
+    /// A yarn: its cross-section as this ray sees it.
+    Yarn(Section),
+    /// A fibre.
+    Fiber(TubePlace),
 }
 
 impl World {
@@ -77,40 +117,50 @@ impl World {
     /// What Embree says, mostly that memory is short.
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), EmbreeError> {
         let started = Instant::now();
-        let weaves: Vec<Weave> = scene
-            .fabrics
-            .iter()
-            .map(|fabric| Weave::new(fabric, &scene.yarns[fabric.yarn], scene.render.model))
-            .collect();
+        let mut threads_made = Vec::new();
+        for (index, fabric) in scene.fabrics.iter().enumerate() {
+            threads_made.push(match fabric.thread {
+                Thread::Yarn(yarn) => Threads::Yarns(Weave::new(index, fabric, &scene.yarns[yarn], scene.render.model)),
+                Thread::Fiber(fiber) => Threads::Fibers(Fleece {
+                    fabric: index,
+                    ply: 0,
+                    first_tubes: Vec::new(),
+                    tubes: Tubes::new(&fabric.curves),
+                    fiber: FiberBcsdf::new(&scene.fibers[fiber].1),
+                }),
+            });
+        }
         let generate = started.elapsed();
         let started = Instant::now();
         let device = Device::new(threads)?;
         let layout = if scene.render.compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;
-        for weave in &weaves {
-            let basis = match weave.strands.basis() {
+        for threads in &threads_made {
+            let (basis, points, segments) = threads.curves();
+            let basis = match basis {
                 Basis::BSpline => CurveBasis::BSpline,
                 Basis::CatmullRom | Basis::Linear => CurveBasis::CatmullRom,
             };
-            builder.add_round_curves(
-                basis,
-                Arc::clone(weave.strands.points()),
-                Arc::clone(weave.strands.segments()),
-            )?;
+            builder.add_round_curves(basis, Arc::clone(points), Arc::clone(segments))?;
         }
         let committed = builder.commit()?;
-        let world = Self { scene: committed, device, weaves };
+        let world = Self { scene: committed, device, threads: threads_made };
         Ok((world, BuildTimes { generate, build: started.elapsed() }))
     }
 
-    /// The cloth, one entry for each fabric of the scene.
-    pub fn weaves(&self) -> &[Weave] {
-        &self.weaves
+    /// The cloth, one entry for each geometry of Embree.
+    pub fn threads(&self) -> &[Threads] {
+        &self.threads
+    }
+
+    /// The cloth of one fabric of the scene.
+    pub fn of_fabric(&self, fabric: usize) -> impl Iterator<Item = &Threads> {
+        self.threads.iter().filter(move |threads| threads.fabric() == fabric)
     }
 
     /// Bytes of control points, indices and what is kept for each point.
     pub fn geometry_bytes(&self) -> u64 {
-        self.weaves.iter().map(|w| w.strands.bytes()).sum()
+        self.threads.iter().map(Threads::bytes).sum()
     }
 
     /// Bytes that Embree reports for its BVH.
@@ -129,15 +179,15 @@ impl World {
         if !ray.is_finite() {
             return None;
         }
-        let mut filter = GapFilter::new(&self.weaves, ray);
+        let mut filter = GapFilter::new(&self.threads, ray);
         let raw = self.scene.intersect(ray, &mut filter)?;
-        Some(Hit {
-            t: raw.t,
-            weave: raw.geometry as usize,
-            segment: raw.segment,
-            normal: raw.normal.normalize_or(-ray.direction),
-            section: filter.section(&raw),
-        })
+        let threads = raw.geometry as usize;
+        let place = match &self.threads[threads] {
+            Threads::Yarns(weave) => HitPlace::Yarn(filter.section(weave, &raw)),
+            Threads::Fibers(fleece) => HitPlace::Fiber(fleece.tubes.place(raw.segment, raw.u)),
+        };
+        let normal = raw.normal.normalize_or(-ray.direction);
+        Some(Hit { t: raw.t, threads, segment: raw.segment, normal, place })
     }
 
     /// The share of light that comes through along a ray: 0 or the product of what each yarn lets pass.
@@ -146,13 +196,19 @@ impl World {
         if !ray.is_finite() {
             return 0.0;
         }
-        let mut filter = ShadowFilter::new(&self.weaves, ray, crossings);
+        let mut filter = ShadowFilter::new(&self.threads, ray, crossings);
         if self.scene.occluded(ray, &mut filter) { 0.0 } else { filter.passed() }
     }
 
-    /// Places where a yarn bends more tightly than its radius allows: weave, then the place.
+    /// Places where a yarn bends more tightly than its radius allows: the scene's fabric, then the place.
     pub fn tight_bends(&self) -> impl Iterator<Item = (usize, &TightBend)> {
-        self.weaves.iter().enumerate().flat_map(|(i, w)| w.strands.tight_bends().iter().map(move |b| (i, b)))
+        self.threads.iter().flat_map(|threads| {
+            let bends = match threads {
+                Threads::Yarns(weave) => weave.strands.tight_bends(),
+                Threads::Fibers(_) => &[],
+            };
+            bends.iter().map(move |bend| (threads.fabric(), bend))
+        })
     }
 }
 
@@ -163,8 +219,49 @@ fn section_at(weave: &Weave, ray: &Ray, raw: &RawHit) -> Section {
     Section::new(&place, ray.origin, ray.direction, weave.yarn.shape().tilted)
 }
 
+impl Fleece {
+    /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
+    pub fn yarn_of(&self, segment: u32) -> usize {
+        let tube = self.tubes.tube_of(segment);
+        if self.first_tubes.is_empty() { tube } else { self.first_tubes.partition_point(|&f| f as usize <= tube) - 1 }
+    }
+}
+
+impl Threads {
+    /// The fabric of the scene that they belong to.
+    pub fn fabric(&self) -> usize {
+        match self {
+            Self::Yarns(w) => w.fabric,
+            Self::Fibers(f) => f.fabric,
+        }
+    }
+
+    /// Basis, control points with radii, and the first of the four points of each segment.
+    pub fn curves(&self) -> (Basis, &Arc<[Vec4]>, &Arc<[u32]>) {
+        match self {
+            Self::Yarns(w) => (w.strands.basis(), w.strands.points(), w.strands.segments()),
+            Self::Fibers(f) => (f.tubes.basis(), f.tubes.points(), f.tubes.segments()),
+        }
+    }
+
+    /// Number of yarns or fibres.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Yarns(w) => w.strands.yarns(),
+            Self::Fibers(f) => f.tubes.count(),
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Yarns(w) => w.strands.bytes(),
+            Self::Fibers(f) => f.tubes.bytes(),
+        }
+    }
+}
+
 impl Weave {
-    fn new(fabric: &Fabric, yarn: &Yarn, model: Model) -> Self {
+    fn new(index: usize, fabric: &Fabric, yarn: &Yarn, model: Model) -> Self {
         let scatterer = scatterer(yarn, model);
         let shape = scatterer.shape();
         let strands = Strands::new(
@@ -178,7 +275,7 @@ impl Weave {
                 phases: fabric.phases.clone(),
             },
         );
-        Self { strands, yarn: scatterer }
+        Self { fabric: index, first_ply: 0, strands, yarn: scatterer }
     }
 }
 

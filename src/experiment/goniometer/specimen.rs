@@ -29,8 +29,7 @@ pub enum Specimen<'a> {
 
 /// The specimen ready for rays.
 pub(crate) enum Prepared {
-    /// The whole BCSDF and those of R, TT and D alone.
-    Fiber(FiberBcsdf, [FiberBcsdf; 3]),
+    Fiber(FiberBcsdf),
     Yarn(YarnScatterer),
 }
 
@@ -58,15 +57,7 @@ pub fn ply_alone(yarn: &Yarn, ply: usize) -> Yarn {
 impl Specimen<'_> {
     pub(crate) fn prepare(&self) -> Prepared {
         match self {
-            Self::Fiber(material) => {
-                let black = FiberMaterial { r: [0.0; 3], tt: [0.0; 3], d: [0.0; 3], ..(*material).clone() };
-                let alone = [
-                    FiberMaterial { r: material.r, ..black.clone() },
-                    FiberMaterial { tt: material.tt, ..black.clone() },
-                    FiberMaterial { d: material.d, ..black },
-                ];
-                Prepared::Fiber(FiberBcsdf::new(material), alone.map(|m| FiberBcsdf::new(&m)))
-            }
+            Self::Fiber(material) => Prepared::Fiber(FiberBcsdf::new(material)),
             Self::Yarn(yarn, model) => Prepared::Yarn(scatterer(yarn, *model)),
         }
     }
@@ -97,15 +88,13 @@ impl Prepared {
     /// One ray: what passes, and where the rest goes.
     pub(crate) fn draw(&self, view: &View, sampler: &mut Sampler) -> Outcome {
         match self {
-            Self::Fiber(bcsdf, alone) => {
+            Self::Fiber(bcsdf) => {
                 let (sin, cos) = (view.theta.sin() as f32, view.theta.cos() as f32);
                 let u = sampler.next4();
                 let mut stream = sampler.stream(sampler.position());
-                let scattered = bcsdf.sample(sin, cos, Rgb::ONE, u, &mut stream).map(|sample| {
-                    let [r, tt, d] = std::array::from_fn(|i| alone[i].evaluate(sin, cos, sample.wi, Rgb::ONE).0);
-                    let lobes = LobeValues { r, tt, d, ..LobeValues::default() };
-                    (sample.wi, lobes.scaled(Rgb::splat(1.0 / sample.pdf)))
-                });
+                let scattered = bcsdf
+                    .sample(sin, cos, Rgb::ONE, u, &mut stream)
+                    .map(|sample| (sample.wi, sample.lobes.scaled(Rgb::splat(1.0 / sample.pdf))));
                 Outcome { unscattered: 0.0, scattered }
             }
             Self::Yarn(yarn) => {
@@ -131,11 +120,7 @@ impl Prepared {
     /// One drawn answer for light from `w`.
     pub(crate) fn value(&self, view: &View, w: Vec3A, sampler: &mut Sampler) -> LobeValues {
         match self {
-            Self::Fiber(_, alone) => {
-                let (sin, cos) = (view.theta.sin() as f32, view.theta.cos() as f32);
-                let [r, tt, d] = std::array::from_fn(|i| alone[i].evaluate(sin, cos, w, Rgb::ONE).0);
-                LobeValues { r, tt, d, ..LobeValues::default() }
-            }
+            Self::Fiber(bcsdf) => bcsdf.evaluate(view.theta.sin() as f32, view.theta.cos() as f32, w, Rgb::ONE).0,
             Self::Yarn(yarn) => {
                 let section = self.section(yarn, view, sampler);
                 let mut crossings = Crossings::new();

@@ -1,7 +1,7 @@
 //! `[[fabric]]`: curves from a file or a generator, and the yarn they are of.
 
 use std::{
-    collections::{BTreeMap, HashSet},
+    collections::HashSet,
     f64::consts::TAU,
     path::{Path, PathBuf},
 };
@@ -9,8 +9,9 @@ use std::{
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
 use super::{
-    super::{Fabric, Yarn, transform_curves},
+    super::{Fabric, Thread, Yarn, transform_curves},
     Context, Range, Reader, UNITS, radians,
+    yarns::Library,
 };
 use crate::{
     geometry::{
@@ -21,6 +22,9 @@ use crate::{
     math::sampler::Stream,
     scene::diagnostic::{Span, unknown_name},
 };
+
+/// Radius, millimetres, of a fibre whose file and fabric give none: that of fine wool and of cotton.
+const FIBER_RADIUS: f64 = 0.01;
 
 /// How finely curves are resampled, for all fabrics.
 pub(super) struct Detail {
@@ -54,37 +58,58 @@ enum Up {
     Z,
 }
 
+/// What the curves of a fabric are, by name.
+enum ThreadName {
+    Yarn(String),
+    Fiber(String),
+}
+
+impl ThreadName {
+    fn into_name(self) -> String {
+        match self {
+            Self::Yarn(name) | Self::Fiber(name) => name,
+        }
+    }
+}
+
 /// A fabric whose text is sound and whose curves are not read yet.
 pub(super) struct FabricPlan {
     name: Option<String>,
-    yarn: String,
+    thread: ThreadName,
     radius: Option<f64>,
     phases: Option<Vec<f64>>,
+    seed: u32,
     transform: DAffine3,
     source: Source,
 }
 
-/// Reads one `[[fabric]]`. `names` are all yarns of the scene, also those with mistakes, which are told already;
-/// `curves` takes the place of the fabric's file or generator.
+/// Reads one `[[fabric]]`; `curves` takes the place of the fabric's file or generator.
 pub(super) fn plan(
     table: Reader<'_>,
     context: &Context<'_>,
-    yarns: &BTreeMap<String, Yarn>,
-    names: &[String],
+    library: &Library,
     curves: Option<&Path>,
 ) -> Option<FabricPlan> {
-    let yarn = table.required_string("yarn").map(str::to_owned);
-    if let Some(name) = &yarn
-        && !names.contains(name)
-    {
-        let (message, hint) = unknown_name("yarn", name, names.iter().map(String::as_str));
-        table.error_at("yarn", message, Some(&hint));
+    let fiber = table.string("fiber").map(str::to_owned);
+    let yarn = if fiber.is_some() { table.string("yarn") } else { table.required_string("yarn") }.map(str::to_owned);
+    for (key, name, names) in [("yarn", &yarn, &library.yarn_names), ("fiber", &fiber, &library.fiber_names)] {
+        if let Some(name) = name
+            && !names.contains(name)
+        {
+            let (message, hint) = unknown_name(key, name, names.iter().map(String::as_str));
+            table.error_at(key, message, Some(&hint));
+        }
+    }
+    if yarn.is_some() && fiber.is_some() {
+        let hint = "`yarn` if its curves are yarns, `fiber` if each is a single fibre";
+        table.error_at("fiber", "give `yarn` or `fiber`, not both", Some(hint));
     }
     let name = table.string("name").map(str::to_owned);
     if name.as_ref().is_some_and(|n| n.trim().is_empty()) {
         table.error_at("name", "the name of a fabric cannot be empty", None);
     }
     let radius = table.f64("radius", Range::POSITIVE).map(|r| r * context.unit);
+    let seed = table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32;
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
     let [rx, ry, rz] = table.vec3_or("rotate", [0.0; 3], Range::FINITE).map(radians);
@@ -92,7 +117,7 @@ pub(super) fn plan(
     let rotation = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
     let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), rotation, translate);
     let source = match table.table("source") {
-        Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| yarns.get(y)), curves),
+        Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| library.yarns.get(y)), curves),
         None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),
         None => {
             table.error(
@@ -103,7 +128,8 @@ pub(super) fn plan(
         }
     };
     table.finish();
-    Some(FabricPlan { name, yarn: yarn?, radius, phases, transform, source: source? })
+    let thread = fiber.map(ThreadName::Fiber).or(yarn.map(ThreadName::Yarn))?;
+    Some(FabricPlan { name, thread, radius, phases, seed, transform, source: source? })
 }
 
 fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Reader<'_>>) -> Source {
@@ -187,14 +213,18 @@ impl FabricPlan {
         self,
         index: usize,
         context: &Context<'_>,
-        yarns: &BTreeMap<String, Yarn>,
-        seed: u32,
+        library: &Library,
         detail: &Detail,
         warnings: &mut Vec<String>,
     ) -> Option<Fabric> {
-        let place = yarns.keys().position(|name| *name == self.yarn)?;
-        let yarn = &yarns[&self.yarn];
-        let radius = self.radius.unwrap_or(yarn.radius);
+        let (thread, own_radius) = match &self.thread {
+            ThreadName::Yarn(name) => {
+                let place = library.yarns.keys().position(|n| n == name)?;
+                (Thread::Yarn(place), library.yarns[name].radius)
+            }
+            ThreadName::Fiber(name) => (Thread::Fiber(library.fibers.keys().position(|n| n == name)?), FIBER_RADIUS),
+        };
+        let radius = self.radius.unwrap_or(own_radius);
         let with_radii = |curves: Vec<Curve>, own: bool, scale: f64| -> Vec<(Curve, Vec<f64>)> {
             curves
                 .into_iter()
@@ -240,7 +270,7 @@ impl FabricPlan {
         };
         transform_curves(&mut curves, &self.transform);
         let phases = self.phases.unwrap_or_else(|| {
-            let mut stream = Stream::new(seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
+            let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
             curves.iter().map(|_| TAU * f64::from(stream.next())).collect()
         });
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -248,9 +278,9 @@ impl FabricPlan {
             _ => Basis::CatmullRom,
         };
         Some(Fabric {
-            name: self.name.unwrap_or(self.yarn),
+            name: self.name.unwrap_or_else(|| self.thread.into_name()),
             origin,
-            yarn: place,
+            thread,
             curves,
             phases,
             basis: detail.basis.unwrap_or(of_file),

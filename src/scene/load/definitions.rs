@@ -82,9 +82,8 @@ pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<De
         let root = Reader::new(&document, &diagnostics);
         let unit = root.one_of_or("unit", 1.0, &UNITS);
         let context = Context { sources: &sources, diagnostics: &diagnostics, unit };
-        let fibers = yarns::fibers(&root);
-        let yarns = yarns::of_fibers(&root, &context, &fibers, true);
-        Some(Definitions { fibers: fibers.into_iter().map(|(name, m)| (name.to_owned(), m)).collect(), yarns })
+        let library = yarns::read(&root, &context, true);
+        Some(Definitions { fibers: library.fibers, yarns: library.yarns })
     });
     match definitions {
         Some(definitions) if !diagnostics.has_errors() => Ok(definitions),

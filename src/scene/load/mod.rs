@@ -19,7 +19,7 @@ use glam::{DAffine3, DVec3};
 pub use definitions::{Definitions, load_definitions};
 
 use super::{
-    Fabric, Ground, Light, Scene, bounds,
+    Fabric, Ground, Light, Scene, Thread, bounds,
     diagnostic::{Diagnostic, Diagnostics, Sources, Span},
     document::{Document, MAX_FILE_BYTES, Value},
     reader::{Range, Reader},
@@ -193,8 +193,7 @@ fn build(
     if let Some(table) = render_table {
         table.finish();
     }
-    let yarns = yarns::read(&root, &context, tilted);
-    let yarn_names: Vec<String> = root.named_tables("yarn").into_iter().map(|(name, _)| name.to_owned()).collect();
+    let library = yarns::read(&root, &context, tilted);
     let fabric_tables = root.tables("fabric");
     if fabric_tables.is_empty() && options.curves.is_some() {
         root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
@@ -204,7 +203,7 @@ fn build(
         .enumerate()
         .map(|(i, table)| {
             let curves = if i == 0 { options.curves.as_deref() } else { None };
-            cloth::plan(table, &context, &yarns, &yarn_names, curves)
+            cloth::plan(table, &context, &library, curves)
         })
         .collect();
     let camera_plan = view::camera(&root, &context, options.frame);
@@ -221,7 +220,7 @@ fn build(
         .into_iter()
         .flatten()
         .enumerate()
-        .filter_map(|(i, plan)| plan.make(i, &context, &yarns, settings.as_ref()?.seed, &detail, &mut warnings))
+        .filter_map(|(i, plan)| plan.make(i, &context, &library, &detail, &mut warnings))
         .collect();
     let mut lights: Vec<Light> = light_plans.into_iter().flatten().filter_map(|l| l.make(&context)).collect();
     if diagnostics.has_errors() {
@@ -252,7 +251,8 @@ fn build(
         layers,
         storage,
         camera,
-        yarns: yarns.into_values().collect(),
+        yarns: library.yarns.into_values().collect(),
+        fibers: library.fibers.into_iter().collect(),
         fabrics,
         lights,
         ground,
@@ -260,24 +260,29 @@ fn build(
         fingerprint: String::new(),
         warnings,
     };
-    keep_used_yarns(&mut scene);
+    keep_used(&mut scene);
     warn_about_precision(&mut scene);
     scene.fingerprint = settings::fingerprint(&scene);
     Some(scene)
 }
 
-/// Drops kinds of yarn that no fabric uses: libraries hold many.
-fn keep_used_yarns(scene: &mut Scene) {
-    let mut kept = Vec::new();
-    for fabric in &mut scene.fabrics {
-        let place = kept.iter().position(|&y| y == fabric.yarn).unwrap_or_else(|| {
-            kept.push(fabric.yarn);
+/// Drops kinds of yarn and fibre that no fabric uses: libraries hold many.
+fn keep_used(scene: &mut Scene) {
+    let (mut yarns, mut fibers) = (Vec::new(), Vec::new());
+    let place_in = |kept: &mut Vec<usize>, index: usize| {
+        kept.iter().position(|&k| k == index).unwrap_or_else(|| {
+            kept.push(index);
             kept.len() - 1
-        });
-        fabric.yarn = place;
+        })
+    };
+    for fabric in &mut scene.fabrics {
+        fabric.thread = match fabric.thread {
+            Thread::Yarn(yarn) => Thread::Yarn(place_in(&mut yarns, yarn)),
+            Thread::Fiber(fiber) => Thread::Fiber(place_in(&mut fibers, fiber)),
+        };
     }
-    let mut all: Vec<Option<super::Yarn>> = scene.yarns.drain(..).map(Some).collect();
-    scene.yarns = kept.into_iter().filter_map(|y| all[y].take()).collect();
+    scene.yarns = yarns.into_iter().map(|y| scene.yarns[y].clone()).collect();
+    scene.fibers = fibers.into_iter().map(|f| scene.fibers[f].clone()).collect();
 }
 
 /// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.

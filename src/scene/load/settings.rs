@@ -141,7 +141,7 @@ pub(super) fn fingerprint(scene: &Scene) -> String {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
     let r = &scene.render;
     let same = (r.mode, r.model, r.width, r.height, r.crop, r.filter, r.max_bounces, r.seed);
-    let written = write!(hash, "{same:?} {:?} {:?} {:?}", scene.camera, scene.yarns, scene.ground);
+    let written = write!(hash, "{same:?} {:?} {:?} {:?} {:?}", scene.camera, scene.yarns, scene.fibers, scene.ground);
     debug_assert!(written.is_ok(), "hashing cannot fail");
     for light in &scene.lights {
         if let Light::Environment(light::Environment { radiance, image: Some(map), visible }) = light {
@@ -156,8 +156,8 @@ pub(super) fn fingerprint(scene: &Scene) -> String {
     for fabric in &scene.fabrics {
         let _ = write!(
             hash,
-            "{} {:?} {:?} {} {}",
-            fabric.yarn, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment
+            "{:?} {:?} {:?} {} {}",
+            fabric.thread, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment
         );
         for (curve, radii) in &fabric.curves {
             let _ = write!(hash, "{:?} {}", curve.basis, curve.closed);

@@ -10,26 +10,31 @@ use crate::{
 };
 
 /// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake.
-pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> BTreeMap<String, Yarn> {
-    of_fibers(root, context, &fibers(root), tilted)
-}
-
-/// Reads every yarn, for fibres read before.
-pub(super) fn of_fibers(
-    root: &Reader<'_>,
-    context: &Context<'_>,
-    fibers: &BTreeMap<&str, FiberMaterial>,
-    tilted: bool,
-) -> BTreeMap<String, Yarn> {
-    root.named_tables("yarn")
+pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> Library {
+    let fibers: BTreeMap<String, FiberMaterial> = root
+        .named_tables("fiber")
         .into_iter()
-        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, fibers, tilted)?)))
-        .collect()
+        .filter_map(|(name, table)| Some((name.to_owned(), fiber(table)?)))
+        .collect();
+    let yarns = root
+        .named_tables("yarn")
+        .into_iter()
+        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, &fibers, tilted)?)))
+        .collect();
+    let names = |key| root.named_tables(key).into_iter().map(|(name, _)| name.to_owned()).collect();
+    Library { yarns, fibers, yarn_names: names("yarn"), fiber_names: names("fiber") }
 }
 
-/// Reads every fibre.
-pub(super) fn fibers<'a>(root: &Reader<'a>) -> BTreeMap<&'a str, FiberMaterial> {
-    root.named_tables("fiber").into_iter().filter_map(|(name, table)| Some((name, fiber(table)?))).collect()
+/// Every yarn and fibre that a scene may name.
+pub(super) struct Library {
+    /// Those without mistakes.
+    pub(super) yarns: BTreeMap<String, Yarn>,
+    /// As `yarns`.
+    pub(super) fibers: BTreeMap<String, FiberMaterial>,
+    /// All names, also of those with mistakes, which are told already.
+    pub(super) yarn_names: Vec<String>,
+    /// As `yarn_names`.
+    pub(super) fiber_names: Vec<String>,
 }
 
 fn fiber(table: Reader<'_>) -> Option<FiberMaterial> {
@@ -101,7 +106,7 @@ fn yarn(
     name: &str,
     table: Reader<'_>,
     context: &Context<'_>,
-    fibers: &BTreeMap<&str, FiberMaterial>,
+    fibers: &BTreeMap<String, FiberMaterial>,
     tilted: bool,
 ) -> Option<Yarn> {
     let radius = table.f64("radius", Range::POSITIVE);
@@ -193,7 +198,7 @@ fn yarn(
             return;
         };
         let Some(material) = fibers.get(fiber.as_str()) else {
-            let (message, hint) = unknown_name("fiber", fiber, fibers.keys().copied());
+            let (message, hint) = unknown_name("fiber", fiber, fibers.keys().map(String::as_str));
             place.error_at("fiber", message, Some(&hint));
             return;
         };
