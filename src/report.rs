@@ -1,4 +1,8 @@
-//! What a run was: one record, written as statistics or as the metadata of a picture.
+//! What a run was: one record, written as statistics or as the metadata of a picture; and what was found by comparing
+//! pictures, as text, JSON and pages.
+
+pub mod compare;
+pub mod page;
 
 use std::time::Duration;
 

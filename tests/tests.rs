@@ -9,6 +9,8 @@ mod cli;
 mod compositing;
 // The same picture to the bit: threads, repeated runs, crops; and another one for another seed.
 mod determinism;
+// Two pictures against each other: metrics, masks, thresholds, maps and pages.
+mod compare;
 // What bad input is answered with: whole messages, exit status 2, no output.
 mod errors;
 // Pictures against explicit fibres, where the truths lie beside the project.

@@ -2,6 +2,7 @@
 //!
 //! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted.
 
+mod compare;
 mod info;
 mod render;
 mod scatter;
@@ -39,6 +40,8 @@ const EXAMPLES: &str = "Examples:
 enum Command {
     /// Render a scene.
     Render(render::RenderArgs),
+    /// Compare two pictures: how far one is from the other, and where.
+    Compare(compare::CompareArgs),
     /// Tell what a scene or curve file holds, and what a render of it uses and leaves out.
     Info(info::InfoArgs),
     /// Measure how a fibre, ply or yarn scatters light.
@@ -50,6 +53,8 @@ enum Command {
 enum Failure {
     /// Bad usage or input: exit status 2.
     Input(String),
+    /// The work was done and a check failed: exit status 1.
+    Check(String),
     /// Interrupted; what there was is saved: exit status 130.
     Interrupted,
 }
@@ -77,6 +82,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Scatter(args) => scatter::run(&args),
     };
@@ -85,6 +91,10 @@ pub fn run() -> ExitCode {
         Err(Failure::Input(message)) => {
             eprintln!("{message}");
             ExitCode::from(2)
+        }
+        Err(Failure::Check(message)) => {
+            eprintln!("{message}");
+            ExitCode::from(1)
         }
         Err(Failure::Interrupted) => ExitCode::from(130),
     }

@@ -11,6 +11,7 @@
 pub mod cryptomatte;
 pub mod error;
 pub mod exr;
+pub mod metric;
 mod oiio;
 pub mod output;
 pub mod png;

@@ -122,6 +122,25 @@ pub fn write(
     })
 }
 
+/// The bytes of a PNG file of `width` x `height` pixels, three bytes each, the top row first.
+///
+/// # Panics
+/// If the bytes are not that many, or the size is zero or beyond 32 bits.
+pub fn encode(width: usize, height: usize, bytes: &[u8]) -> Vec<u8> {
+    let number = |value| u32::try_from(value).expect("a size of 32 bits");
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, number(width), number(height));
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(bytes)?;
+        writer.finish()
+    });
+    written.expect("a picture of this size can be written to memory");
+    out
+}
+
 /// Reads a PNG of any kind: channels Y or R, G, B, and A with which they are associated; linear.
 pub(super) fn read(path: &Path) -> Result<Image, ImageError> {
     let failed = |error: png::DecodingError| ImageError::Read {
