@@ -43,6 +43,7 @@ impl Plan {
             "rays follow plies along the yarn",
             "the section is perpendicular",
         );
+        add("depth_of_field", scene.camera.lens.is_some(), "the camera has a lens", "the camera is a pinhole");
         add("environment", any_light(&|l| matches!(l, Light::Environment(_))), "the sky shines", "no sky");
         add("environment_image", any_light(&image), "the sky has an image", "no light has an image");
         add(

@@ -86,3 +86,33 @@ fn cloth_under_a_ball_of_light_is_as_under_a_disc_of_the_sky() {
         assert!((a[k] / b[k] - 1.0).abs() < 0.01, "{a:?} {b:?}");
     }
 }
+
+#[test]
+fn a_light_out_of_focus_is_a_disc_as_wide_as_its_circle_of_confusion() {
+    let bulb = |lens: &str| {
+        let scene = format!(
+            "render = {{ width = 120, height = 90, spp = 64, filter = \"box\" }}\n\
+             camera = {{ type = \"perspective\", position = [0, 0, 0], target = [0, 0, -1], fov = 40{lens} }}\n\
+             [[light]]\ntype = \"sphere\"\nposition = [0, 0, -100]\nradius = 1.5\n"
+        );
+        let alpha = render(&scene, &[]).channel("A").iter().map(|&a| f64::from(a)).collect::<Vec<_>>();
+        let row: f64 = alpha.chunks(120).map(|row| if row.iter().any(|&a| a > 0.0) { 1.0 } else { 0.0 }).sum();
+        (alpha.iter().sum::<f64>(), row)
+    };
+    let pixels = 90.0 / (2.0 * 20f64.to_radians().tan());
+    let (sharp, width) = bulb("");
+    assert!((sharp / (std::f64::consts::PI * (0.015 * pixels).powi(2)) - 1.0).abs() < 0.03, "{sharp}");
+    assert!((width - 0.03 * pixels).abs() < 2.0, "{width}");
+    let (same, width) = bulb(", aperture = 10, focus_distance = 100");
+    assert!((same / sharp - 1.0).abs() < 0.03 && (width - 0.03 * pixels).abs() < 2.0, "{same} {width}");
+    // Opening over distance, once as seen from the light and once from the sharp plane.
+    for (lens, opening) in [
+        (", aperture = 10, focus_distance = 40", 10.0),
+        (", f_number = 4, focus = [7, 3, -40]", 3.0 / 20f64.to_radians().tan()),
+    ] {
+        let (blurred, width) = bulb(lens);
+        let circle = opening * (1.0 / 40.0 - 1.0 / 100.0) * pixels;
+        assert!((width - circle - 0.03 * pixels).abs() < 2.5, "{lens}: {width}, not {circle}");
+        assert!((blurred / sharp - 1.0).abs() < 0.05, "{lens}: {blurred}, not {sharp}");
+    }
+}

@@ -160,10 +160,10 @@ fn render_tile(
             let (px, py) = (tile.x + x, tile.y + y);
             for index in samples.clone() {
                 let mut sampler = Sampler::new(seed, px, py, index);
-                let [u, v, _, _] = sampler.next4();
+                let [u, v, lens_u, lens_v] = sampler.next4();
                 let offset = Vec2::new(filter_offset(settings.filter, u), filter_offset(settings.filter, v));
                 let point = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
-                let ray = scene.camera.ray(point, settings.width, settings.height);
+                let ray = scene.camera.ray(point, Vec2::new(lens_u, lens_v), settings.width, settings.height);
                 let sample = integrator.sample(ray, &mut sampler, scratch, &mut counters);
                 if !tile.add(x, y, &sample) {
                     counters.invalid += 1;

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec3A};
 
-use crate::ffi::embree::Ray;
+use crate::{ffi::embree::Ray, math::warp};
 
 /// How far the view opens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +11,15 @@ pub enum Projection {
     Perspective(f64),
     /// Height of the picture, millimetres.
     Orthographic(f64),
+}
+
+/// A thin lens: what lies at the distance of focus is sharp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of its opening, millimetres.
+    pub radius: f64,
+    /// Distance along the view, from the camera, of the plane that is sharp, millimetres.
+    pub focus: f64,
 }
 
 /// A camera: where it stands and what it sees. Right-handed, +y up, looking along -z unless told otherwise.
@@ -26,6 +35,8 @@ pub struct Camera {
     pub back: DVec3,
     /// How far the view opens.
     pub projection: Projection,
+    /// The lens; `None` for a pinhole, which sees everything sharply.
+    pub lens: Option<Lens>,
 }
 
 impl Camera {
@@ -33,7 +44,7 @@ impl Camera {
     pub fn looking_at(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Option<Self> {
         let back = (position - target).try_normalize()?;
         let right = up.cross(back).try_normalize()?;
-        Some(Self { position, right, up: back.cross(right), back, projection })
+        Some(Self { position, right, up: back.cross(right), back, projection, lens: None })
     }
 
     /// Moves the camera so that all of `points` (position and radius) are in a picture of the given aspect (width over
@@ -78,9 +89,10 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of a picture, in pixels from its upper left corner.
+    /// The ray through a point of a picture, in pixels from its upper left corner; `lens` are two uniform numbers for
+    /// where it passes the lens, if there is one.
     #[inline]
-    pub fn ray(&self, point: Vec2, width: u32, height: u32) -> Ray {
+    pub fn ray(&self, point: Vec2, lens: Vec2, width: u32, height: u32) -> Ray {
         let (w, h) = (f64::from(width), f64::from(height));
         let x = (2.0 * f64::from(point.x) - w) / h;
         let y = 1.0 - 2.0 * f64::from(point.y) / h;
@@ -94,6 +106,16 @@ impl Camera {
                 // millionth, far below a pixel, does not.
                 let tilt = 1e-6 * (self.right + 0.6 * self.up);
                 (self.position + 0.5 * size * (x * self.right + y * self.up), (tilt - self.back).normalize())
+            }
+        };
+        let (origin, direction) = match self.lens {
+            None => (origin, direction),
+            Some(Lens { radius, focus }) => {
+                // All rays of a point of the picture meet where the one through the lens's middle meets the sharp plane.
+                let sharp = focus / -direction.dot(self.back) * direction;
+                let on_lens = radius * warp::disc(lens).as_dvec2();
+                let offset = on_lens.x * self.right + on_lens.y * self.up;
+                (origin + offset, (sharp - offset).normalize())
             }
         };
         Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()))
@@ -148,12 +170,46 @@ mod tests {
         let camera =
             Camera::looking_at(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0))
                 .unwrap();
-        let middle = camera.ray(Vec2::new(50.0, 25.0), 100, 50);
+        let middle = camera.ray(Vec2::new(50.0, 25.0), Vec2::ZERO, 100, 50);
         assert!((middle.direction - Vec3A::NEG_Z).length() < 1e-6);
-        let corner = camera.ray(Vec2::ZERO, 100, 50).direction;
+        let corner = camera.ray(Vec2::ZERO, Vec2::ZERO, 100, 50).direction;
         assert!(corner.x < 0.0 && corner.y > 0.0, "the first pixel is at the upper left");
         assert!((corner.y / -corner.z - 0.5f32.tan()).abs() < 1e-5);
         assert!(Camera::looking_at(DVec3::ZERO, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
         assert!(Camera::looking_at(DVec3::Y, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
+    }
+
+    #[test]
+    fn a_lens_blurs_by_its_circle_of_confusion() {
+        let (radius, focus) = (1.5, 40.0);
+        for projection in [Projection::Perspective(0.8), Projection::Orthographic(20.0)] {
+            let pinhole = Camera::looking_at(DVec3::new(3.0, -2.0, 10.0), DVec3::ZERO, DVec3::Y, projection).unwrap();
+            let camera = Camera { lens: Some(Lens { radius, focus }), ..pinhole };
+            let pixel = Vec2::new(11.0, 20.0);
+            // Where a ray is at a depth, across the view.
+            let at = |ray: Ray, depth: f64| {
+                let (o, d) = (ray.origin.as_dvec3() - pinhole.position, ray.direction.as_dvec3());
+                let p = o + (-depth - o.dot(pinhole.back)) / d.dot(pinhole.back) * d;
+                glam::DVec2::new(p.dot(pinhole.right), p.dot(pinhole.up))
+            };
+            let middle = pinhole.ray(pixel, Vec2::ZERO, 64, 48);
+            for depth in [10.0, 40.0, 90.0] {
+                let (mut widest, mut mean) = (0f64, glam::DVec2::ZERO);
+                let n = 64;
+                for i in 0..n * n {
+                    let u = (Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32;
+                    let off = at(camera.ray(pixel, u, 64, 48), depth) - at(middle, depth);
+                    widest = widest.max(off.length());
+                    mean += off / f64::from(n * n);
+                }
+                // Similar triangles between lens and sharp plane.
+                let want = radius * (depth / focus - 1.0).abs();
+                assert!(
+                    (widest - want).abs() < 0.02 * want + 1e-4,
+                    "{projection:?}, depth {depth}: {widest}, not {want}"
+                );
+                assert!(mean.length() < 0.01 * want + 1e-4, "the blur is centred");
+            }
+        }
     }
 }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Mat3A, Vec3A};
 use super::{
     super::{
         Fabric,
-        camera::{Camera, Projection},
+        camera::{Camera, Lens, Projection},
         document::Value,
         light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     },
@@ -24,10 +24,30 @@ pub(super) struct CameraPlan {
     camera: Camera,
     /// Margin, if the camera is to frame the cloth.
     frame: Option<f64>,
+    lens: Option<LensPlan>,
+}
+
+/// A lens before it is known where the cloth is.
+struct LensPlan {
+    /// Radius of the opening, millimetres.
+    radius: f64,
+    focus: Focus,
+}
+
+/// What is sharp; in the scene's own place.
+enum Focus {
+    /// The middle of the cloth.
+    Cloth,
+    /// What is so far away along the view, millimetres.
+    Distance(f64),
+    /// The plane through a point.
+    Point(DVec3),
 }
 
 const DEFAULT_FOV: f64 = 30.0;
 const DEFAULT_MARGIN: f64 = 0.04;
+/// Height of a full-frame sensor, millimetres.
+const DEFAULT_SENSOR: f64 = 24.0;
 
 fn default_camera(direction: DVec3, up: DVec3, projection: Projection) -> Option<Camera> {
     Camera::looking_at(direction, DVec3::ZERO, up, projection)
@@ -37,7 +57,11 @@ fn default_camera(direction: DVec3, up: DVec3, projection: Projection) -> Option
 pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraPlan> {
     let framing = |direction: DVec3| {
         let projection = Projection::Perspective(radians(DEFAULT_FOV));
-        Some(CameraPlan { camera: default_camera(direction, DVec3::Y, projection)?, frame: Some(DEFAULT_MARGIN) })
+        Some(CameraPlan {
+            camera: default_camera(direction, DVec3::Y, projection)?,
+            frame: Some(DEFAULT_MARGIN),
+            lens: None,
+        })
     };
     let Some(node) = root.node("camera") else { return framing(DVec3::Z) };
     if let Value::String(word) = &node.value {
@@ -63,7 +87,10 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
         let flat = table.one_of_or("projection", false, &[("perspective", false), ("orthographic", true)]);
         let projection = if flat { Projection::Orthographic(1.0) } else { fov(&table) };
         match default_camera(direction, up, projection) {
-            Some(camera) => Some(CameraPlan { camera, frame: Some(margin) }),
+            Some(camera) => {
+                let lens = lens(&table, context, projection, Focus::Cloth);
+                Some(CameraPlan { camera, frame: Some(margin), lens })
+            }
             None => {
                 table.error("`direction` and `up` of the camera must not be parallel or zero", None);
                 None
@@ -82,17 +109,52 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
             if made.is_none() {
                 table.error_at("position", "`position` and `target` must differ, and not along `up`", None);
             }
-            made.map(|camera| CameraPlan { camera, frame: frame.then_some(DEFAULT_MARGIN) })
+            let focus = if frame { Focus::Cloth } else { Focus::Point(context.position(target)) };
+            let lens = lens(&table, context, projection, focus);
+            made.map(|camera| CameraPlan { camera, frame: frame.then_some(DEFAULT_MARGIN), lens })
         })
     };
     table.finish();
     plan
 }
 
+/// The lens, if the camera has `aperture` or `f_number`; `otherwise` is sharp if the camera does not say.
+fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, otherwise: Focus) -> Option<LensPlan> {
+    let aperture = table.f64("aperture", Range::at_least(0.0)).map(|a| a * context.unit);
+    let f_number = table.f64("f_number", Range::above(0.0));
+    // A size in the world of cameras, whatever the scene's unit.
+    let sensor = table.f64_or("sensor_height", DEFAULT_SENSOR, Range::POSITIVE);
+    let distance = table.f64("focus_distance", Range::POSITIVE).map(|d| d * context.unit);
+    let point = table.vec3("focus", Range::FINITE).map(|p| context.position(p));
+    if aperture.is_some() && f_number.is_some() {
+        table.error_at("f_number", "give `aperture` or `f_number`, not both", None);
+    }
+    if distance.is_some() && point.is_some() {
+        table.error_at("focus_distance", "give `focus` or `focus_distance`, not both", None);
+    }
+    let diameter = match (aperture, f_number, projection) {
+        (Some(aperture), _, _) => aperture,
+        (None, Some(number), Projection::Perspective(angle)) => 0.5 * sensor / (0.5 * angle).tan() / number,
+        (None, Some(_), Projection::Orthographic(_)) => {
+            let hint = "give the opening's diameter: aperture = 4";
+            table.error_at("f_number", "an orthographic camera has no focal length, hence no f-number", Some(hint));
+            return None;
+        }
+        (None, None, _) => {
+            if let Some(key) = ["focus", "focus_distance"].into_iter().find(|key| table.has(key)) {
+                table.warning_at(key, format!("`{key}` does nothing without `aperture` or `f_number`"), None);
+            }
+            return None;
+        }
+    };
+    let focus = distance.map(Focus::Distance).or(point.map(Focus::Point)).unwrap_or(otherwise);
+    (diameter > 0.0).then_some(LensPlan { radius: 0.5 * diameter, focus })
+}
+
 impl CameraPlan {
     /// The camera for cloth that lies about `middle`.
     pub(super) fn make(self, fabrics: &[Fabric], middle: DVec3, aspect: f64) -> Camera {
-        match self.frame {
+        let mut camera = match self.frame {
             None => Camera { position: self.camera.position - middle, ..self.camera },
             Some(margin) => {
                 let points = fabrics
@@ -101,7 +163,18 @@ impl CameraPlan {
                     .flat_map(|(curve, radii)| curve.points.iter().zip(radii.iter().copied()));
                 self.camera.framing(points, aspect, margin)
             }
-        }
+        };
+        camera.lens = self.lens.map(|LensPlan { radius, focus }| {
+            let along_view = |point: DVec3| (camera.position - point).dot(camera.back);
+            let focus = match focus {
+                Focus::Cloth => along_view(DVec3::ZERO),
+                Focus::Distance(distance) => distance,
+                Focus::Point(point) => along_view(point - middle),
+            };
+            // What lies behind the camera can not be sharp.
+            Lens { radius, focus: focus.max(1e-6) }
+        });
+        camera
     }
 }
 
