@@ -3,6 +3,8 @@
 pub mod curve;
 pub mod curve_file;
 pub mod generate;
+pub mod mesh;
+pub mod obj;
 pub mod section;
 mod spline;
 pub mod strand;

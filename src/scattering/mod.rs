@@ -26,6 +26,7 @@ pub mod kernel;
 mod lobe;
 pub mod lobes;
 pub mod medium;
+pub mod surface;
 #[cfg(test)]
 mod testing;
 pub mod yarn;
