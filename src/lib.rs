@@ -21,7 +21,7 @@
 //!
 //! # The rooms, from ground to top
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
-//! * [`ffi`]: Embree and OpenImageIO behind a safe face; the only `unsafe` code.
+//! * [`ffi`]: Embree, OpenImageIO and Open Image Denoise behind a safe face; the only `unsafe` code.
 //! * [`math`]: numbers, not yarns. [`image`]: pictures at rest.
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files.

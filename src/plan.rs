@@ -79,6 +79,7 @@ impl Plan {
         add("lobe_layers", scene.layers.lobes, "asked for", "no output holds them");
         add("depth_layer", scene.layers.depth, "asked for", "no output holds it");
         add("normal_layer", scene.layers.normal, "asked for", "no output holds it");
+        add("denoiser", scene.denoise, "asked for", "nobody asks for a denoised picture: not loaded");
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
         add("textures", false, "", "no texture in the scene");
         add("meshes", false, "", "no mesh in the scene");

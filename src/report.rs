@@ -25,6 +25,8 @@ pub struct Phases {
     pub made: BuildTimes,
     /// Samples.
     pub render: Duration,
+    /// The denoised picture.
+    pub denoise: Duration,
     /// Output files.
     pub write: Duration,
     /// From the start of the program.
@@ -98,6 +100,7 @@ impl RunRecord<'_> {
                 "generate": seconds(self.phases.made.generate),
                 "build": seconds(self.phases.made.build),
                 "render": seconds(self.phases.render),
+                "denoise": seconds(self.phases.denoise),
                 "write": seconds(self.phases.write),
                 "total": seconds(self.phases.total),
             },

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use yarnray::image::{self, Attribute};
 
-use crate::support::{Picture, SWATCH, directory, render, write, yarnray};
+use crate::support::{Picture, SWATCH, directory, listing, program, read_json, render, write, yarnray};
 
 /// The layers of light by where it came from.
 const PARTS: [&str; 13] = [
@@ -190,4 +190,55 @@ fn mattes_tell_fabrics_yarns_and_plies_apart() {
         mixed += usize::from(yarn.pixels[i].len() > 1);
     }
     assert!(mixed > 50, "edges hold several yarns: {mixed}");
+}
+
+#[test]
+fn a_denoised_picture_is_a_layer_or_a_file_of_its_own() {
+    let directory = directory();
+    let path = directory.path();
+    write(path, "s.toml", SWATCH);
+    let args = ["render", "s.toml", "-q", "--spp", "4", "-o", "a.exr", "-o", "a.png", "--stats", "a.json"];
+    yarnray(path, &args).good();
+    let plain = image::read(&path.join("a.exr")).unwrap();
+    let noise = read_json(&path.join("a.json"))["noise"]["rel_mse_estimate"].clone();
+    let png = std::fs::read(path.join("a.png")).unwrap();
+    let run = yarnray(path, &[&args[..], &["--denoise"]].concat());
+    if run.status == Some(2) && run.stderr.contains("cannot be loaded") {
+        eprintln!("skipped: Open Image Denoise is not installed");
+        return;
+    }
+    run.good();
+    assert_eq!(listing(path), ["a.denoised.png", "a.exr", "a.json", "a.png", "s.toml"]);
+    let both = image::read(&path.join("a.exr")).unwrap();
+    assert!(
+        matches!(both.attribute("yarnray.denoised"), Some(Attribute::Text(by)) if by.starts_with("Open Image Denoise 2."))
+    );
+    for channel in &plain.channels {
+        assert!(both.channel(&channel.name) == Some(&channel.samples), "{} changes", channel.name);
+    }
+    let denoised = both.layer_rgb("denoised").expect("the layer");
+    let mean = |c: &[f32]| c.iter().sum::<f32>() / c.len() as f32;
+    for (clean, noisy) in denoised.iter().zip(plain.rgb().unwrap()) {
+        assert!((mean(clean) / mean(noisy) - 1.0).abs() < 0.05 && *clean != noisy);
+    }
+    assert_eq!(
+        read_json(&path.join("a.json"))["noise"]["rel_mse_estimate"],
+        noise,
+        "figures are of the rendered picture"
+    );
+    assert_eq!(std::fs::read(path.join("a.png")).unwrap(), png);
+}
+
+#[test]
+fn where_there_is_no_denoiser_a_message_says_how_to_get_it() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let mut command = program(directory.path());
+    command.env("OIDN_DIR", directory.path()).args(["render", "s.toml", "-o", "a.exr", "--set", "output.denoise=true"]);
+    let output = command.output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.starts_with("error: denoising needs Open Image Denoise 2, which cannot be loaded ("), "{message}");
+    assert!(message.contains("set OIDN_DIR to its folder"), "{message}");
+    assert_eq!(listing(directory.path()), ["s.toml"]);
 }

@@ -18,7 +18,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("trace", &["ffi", "geometry", "scattering", "scene"]),
     ("integrator", &["ffi", "geometry", "math", "scattering", "scene", "trace"]),
     ("film", &["integrator", "math", "scene"]),
-    ("render", &["film", "image", "integrator", "math", "scene", "trace"]),
+    ("render", &["ffi", "film", "image", "integrator", "math", "scene", "trace"]),
     ("plan", &["image", "scene"]),
     ("report", &["geometry", "image", "plan", "render", "scene", "trace"]),
     ("experiment", &["geometry", "image", "math", "scattering", "scene", "trace"]),
@@ -26,10 +26,11 @@ const ROOMS: [(&str, &[&str]); 14] = [
 ];
 
 /// All that a room takes from the foreign libraries: kept small, so that Embree could be exchanged.
-const FROM_FFI: [(&str, &[&str]); 5] = [
-    ("cli", &["ffi::embree::EmbreeError"]),
+const FROM_FFI: [(&str, &[&str]); 6] = [
+    ("cli", &["ffi::embree::EmbreeError", "ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
     ("image", &["ffi::oiio", "ffi::oiio::OiioError", "ffi::oiio::is_loaded"]),
     ("integrator", &["ffi::embree::Ray"]),
+    ("render", &["ffi::oidn::Denoiser", "ffi::oidn::Guides", "ffi::oidn::OidnError"]),
     ("scene", &["ffi::embree::Ray"]),
     (
         "trace",

@@ -77,6 +77,12 @@ impl From<crate::ffi::embree::EmbreeError> for Failure {
     }
 }
 
+impl From<crate::ffi::oidn::OidnError> for Failure {
+    fn from(error: crate::ffi::oidn::OidnError) -> Self {
+        Self::Input(format!("error: {error}"))
+    }
+}
+
 /// Runs the program with the process's arguments.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();

@@ -12,8 +12,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::{Failure, SceneArgs, bytes_in_words, write_text};
 use crate::{
+    ffi::oidn::Denoiser,
     image::{self, output::Format, png::ToneMap},
-    render::{self, Progress, Rendered, Stop, picture},
+    render::{self, Progress, Rendered, Stop, denoise::Denoised, picture},
     report::{Phases, RunRecord},
     scene::{Layers, Scene},
     trace::World,
@@ -34,6 +35,9 @@ pub(super) struct RenderArgs {
     /// Where to write; the extension names the format (.exr, .png, .hdr, .tif, ...). Repeatable. Default: out/SCENE.exr
     #[arg(short, long = "out", value_name = "PATH")]
     out: Vec<PathBuf>,
+    /// Add a denoised picture, by Open Image Denoise: a layer of an EXR, else a file of its own (x.denoised.png).
+    #[arg(long)]
+    denoise: bool,
     /// Curve of the picture for a screen.
     #[arg(long, value_parser = ["srgb", "filmic"])]
     tone_map: Option<String>,
@@ -64,6 +68,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if let Some(stats) = &args.stats {
         image::output::check_target(stats)?;
     }
+    scene.denoise |= args.denoise;
     if !layered {
         scene.layers = Layers::NONE;
     }
@@ -84,19 +89,32 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
     pool.install(|| {
         let (world, made) = World::new(&scene, threads)?;
         warn(args, &scene, &world);
+        let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         let interrupt = interrupt_flag();
         let bar = bar(args);
         let rendered = render::render(&scene, &world, &interrupt, |p| show(&bar, args, p));
         bar.finish_and_clear();
 
-        let mut phases = Phases { load, made, render: rendered.elapsed, ..Phases::default() };
+        let denoising = Instant::now();
+        let denoised = denoiser.map(|d| Denoised::new(&d, &rendered.film)).transpose();
+        let denoise = denoising.elapsed();
+        let mut phases = Phases { denoise, load, made, render: rendered.elapsed, ..Phases::default() };
         let writing = Instant::now();
         let command = std::env::args().collect::<Vec<_>>().join(" ");
         let record = |phases| RunRecord { scene: &scene, world: &world, rendered: &rendered, phases, threads };
         let attributes = record(phases).attributes(&command);
+        // What was rendered is kept even if the denoiser fails.
+        let clean = denoised.as_ref().ok().and_then(Option::as_ref);
+        let mut written = Vec::new();
         for path in &outputs {
-            picture::write(path, &scene, &rendered.film, &attributes)?;
+            picture::write(path, &scene, &rendered.film, clean, &attributes)?;
+            written.push(path.clone());
+            if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path)) {
+                picture::write_denoised(&path, &scene, &rendered.film, clean)?;
+                written.push(path);
+            }
         }
+        denoised?;
         phases.write = writing.elapsed();
         phases.total = started.elapsed();
         if let Some(path) = &args.stats {
@@ -104,7 +122,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
             write_text(path, &(text + "\n"))?;
         }
         if !args.quiet {
-            summary(args, &world, &rendered, &phases, &outputs);
+            summary(args, &world, &rendered, &phases, &written);
         }
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })

@@ -7,5 +7,6 @@
 #![allow(unsafe_code, reason = "calling C is unsafe; this folder is where it is checked")]
 
 pub mod embree;
+pub mod oidn;
 #[cfg(feature = "oiio")]
 pub mod oiio;

@@ -164,7 +164,7 @@ impl<'a> Integrator<'a> {
             surfaces,
             lights,
             max_bounces: scene.render.max_bounces,
-            albedos: if scene.layers.albedo {
+            albedos: if scene.collected().albedo {
                 scene.fabrics.iter().map(|f| ply_albedos(scene, f)).collect()
             } else {
                 Vec::new()

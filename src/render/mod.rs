@@ -3,6 +3,7 @@
 //! A wave takes every pixel from one number of samples to another. Tiles own their pixels, and a sample depends on
 //! (seed, pixel, sample number) only, so that the picture is the same to the bit for any number of threads.
 
+pub mod denoise;
 pub mod picture;
 
 use std::{
@@ -87,7 +88,7 @@ pub struct Rendered {
 pub fn render(scene: &Scene, world: &World, interrupt: &AtomicBool, mut progress: impl FnMut(Progress)) -> Rendered {
     let settings = &scene.render;
     let integrator = Integrator::new(scene, world);
-    let mut film = Film::new(settings.crop, scene.layers);
+    let mut film = Film::new(settings.crop, scene.collected());
     let mut counters = Counters::default();
     let started = Instant::now();
     let deadline = settings.time.map(|t| started + Duration::from_secs_f64(t.min(1e9)));

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use crate::{
@@ -15,6 +15,8 @@ use crate::{
     integrator::{ClothId, LightParts},
     scene::Scene,
 };
+
+use super::denoise::Denoised;
 
 /// Names of the layers of light by where it came from, in the order of [`LightParts::to_array`]; together they are the
 /// picture.
@@ -36,13 +38,20 @@ pub const PART_NAMES: [&str; LightParts::COUNT] = [
 
 /// Writes the picture in the format that the path's extension names.
 ///
-/// An EXR gets all layers of the scene and `attributes`; other formats get the colours.
+/// An EXR gets all layers of the scene and `attributes`, and a denoised picture as the layer `denoised`; other formats get
+/// the colours. A denoised picture in such a format is a file of its own ([`write_denoised`]).
 ///
 /// # Errors
 /// What stands in the way of the file; then nothing is left of it.
-pub fn write(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Attribute)]) -> Result<(), ImageError> {
+pub fn write(
+    path: &Path,
+    scene: &Scene,
+    film: &Film,
+    denoised: Option<&Denoised>,
+    attributes: &[(String, Attribute)],
+) -> Result<(), ImageError> {
     if Format::of(path)? == Format::Exr {
-        return write_exr(path, scene, film, attributes);
+        return write_exr(path, scene, film, denoised, attributes);
     }
     output::write_colors(path, film.width as usize, film.height as usize, &scene.display, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {
@@ -52,7 +61,35 @@ pub fn write(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
     })
 }
 
-fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Attribute)]) -> Result<(), ImageError> {
+/// The name of the denoised picture that belongs to `path`, where that is not an EXR: `a.denoised.png` for `a.png`.
+pub fn denoised_path(path: &Path) -> Option<PathBuf> {
+    if Format::of(path).ok()? == Format::Exr {
+        return None;
+    }
+    let extension = path.extension()?.to_string_lossy();
+    Some(path.with_extension(format!("denoised.{extension}")))
+}
+
+/// Writes a denoised picture as a file of its own.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_denoised(path: &Path, scene: &Scene, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
+    output::write_colors(path, film.width as usize, film.height as usize, &scene.display, |y, row| {
+        for (x, out) in row.iter_mut().enumerate() {
+            let [r, g, b] = denoised.pixel(x as u32, y as u32);
+            *out = [r, g, b, film.pixel(x as u32, y as u32).alpha];
+        }
+    })
+}
+
+fn write_exr(
+    path: &Path,
+    scene: &Scene,
+    film: &Film,
+    denoised: Option<&Denoised>,
+    attributes: &[(String, Attribute)],
+) -> Result<(), ImageError> {
     let layers = scene.layers;
     let mut channels: Vec<ChannelSpec> = ["R", "G", "B", "A"].map(|n| ChannelSpec::new(n, Sample::F32)).into();
     let mut layer = |wanted: bool, name: &str, parts: &[&str], sample: Sample| {
@@ -69,6 +106,7 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
     for name in PART_NAMES {
         layer(layers.lobes, name, &["R", "G", "B"], precision);
     }
+    layer(denoised.is_some(), "denoised", &["R", "G", "B"], Sample::F32);
     let mattes: Vec<MatteLayer> = if layers.cryptomatte { MatteLayer::all(scene, film) } else { Vec::new() };
     channels.extend(mattes.iter().flat_map(|m| cryptomatte::channels(m.name)));
     let render = &scene.render;
@@ -76,6 +114,9 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
     layout.origin = film.origin.map(|o| o as i32);
     layout.display_size = [render.width as usize, render.height as usize];
     layout.attributes = attributes.to_vec();
+    if let Some(denoised) = denoised {
+        layout.attributes.push(("yarnray.denoised".to_owned(), Attribute::Text(denoised.by.clone())));
+    }
     layout.attributes.extend(mattes.iter().flat_map(MatteLayer::attributes));
     let mut covering = Vec::new();
     layout.compression = scene.storage.compression;
@@ -103,6 +144,7 @@ fn write_exr(path: &Path, scene: &Scene, film: &Film, attributes: &[(String, Att
             if layers.lobes {
                 values.extend(p.parts.as_flattened());
             }
+            values.extend(denoised.into_iter().flat_map(|d| d.pixel(x, y as u32)));
             for matte in &mattes {
                 values.extend(matte.ranks(film.covering(x, y as u32), p.samples, &mut covering));
             }

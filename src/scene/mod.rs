@@ -138,6 +138,12 @@ pub struct Layers {
     pub cryptomatte: bool,
 }
 
+impl Default for Layers {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 impl Layers {
     /// All of them.
     pub const ALL: Self = Self { cryptomatte: true, ..Self::DEFAULT };
@@ -255,6 +261,8 @@ pub struct Scene {
     pub layers: Layers,
     /// How an EXR is stored.
     pub storage: Storage,
+    /// Whether a denoised picture is made as well.
+    pub denoise: bool,
     /// The view.
     pub camera: Camera,
     /// Kinds of yarn that fabrics use.
@@ -276,6 +284,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The layers that a film must collect: those of the EXR, and what guides a denoiser.
+    pub fn collected(&self) -> Layers {
+        Layers { albedo: self.layers.albedo || self.denoise, normal: self.layers.normal || self.denoise, ..self.layers }
+    }
+
     /// The box around all control points, with their radii; `None` without cloth.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds(&self.fabrics)

@@ -185,7 +185,7 @@ fn build(
 
     let render_table = root.table("render");
     let settings = settings::render(render_table.as_ref());
-    let (display, layers, storage) = settings::output(root.table("output"));
+    let output = settings::output(root.table("output"));
     let tilted = render_table
         .as_ref()
         .is_none_or(|r| r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)]));
@@ -247,9 +247,10 @@ fn build(
     let mut scene = Scene {
         path: name.to_owned(),
         render,
-        display,
-        layers,
-        storage,
+        display: output.display,
+        layers: output.layers,
+        storage: output.storage,
+        denoise: output.denoise,
         camera,
         yarns: library.yarns.into_values().collect(),
         fibers: library.fibers.into_iter().collect(),

@@ -87,9 +87,18 @@ const LAYERS: LayerNames = [
     ("cryptomatte", |l| &mut l.cryptomatte),
 ];
 
+/// What `[output]` says.
+#[derive(Default)]
+pub(super) struct Output {
+    pub(super) display: Display,
+    pub(super) layers: Layers,
+    pub(super) storage: Storage,
+    pub(super) denoise: bool,
+}
+
 /// The settings of `[output]`.
-pub(super) fn output(table: Option<Reader<'_>>) -> (Display, Layers, Storage) {
-    let Some(table) = table else { return (Display::default(), Layers::DEFAULT, Storage::default()) };
+pub(super) fn output(table: Option<Reader<'_>>) -> Output {
+    let Some(table) = table else { return Output::default() };
     let display = Display {
         tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &[("srgb", ToneMap::Srgb), ("filmic", ToneMap::Filmic)]),
         exposure: table.f64_or("exposure", 0.0, Range::between(-100.0, 100.0)) as f32,
@@ -114,8 +123,9 @@ pub(super) fn output(table: Option<Reader<'_>>) -> (Display, Layers, Storage) {
             }
         }
     }
+    let denoise = table.bool_or("denoise", false);
     table.finish();
-    (display, layers, storage)
+    Output { display, layers, storage, denoise }
 }
 
 /// FNV-1a over what is written to it.
