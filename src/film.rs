@@ -416,6 +416,30 @@ mod tests {
     }
 
     #[test]
+    fn tiles_come_back_from_their_bytes() {
+        let layers = Layers { cryptomatte: true, ..Layers::DEFAULT };
+        assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 108);
+        assert_eq!(Tile::bytes_per_pixel(layers), 488);
+        let mut tile = Tile::new(0, 0, 3, 2, layers);
+        let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
+        for x in 0..3 {
+            let radiance = Rgb::splat(0.3 + x as f32);
+            tile.add(x, 1, &Sample { radiance, alpha: 1.0, depth: -2.5, normal: Vec3A::X, cloth, ..Sample::default() });
+        }
+        let mut bytes = Vec::new();
+        tile.save(&mut bytes);
+        assert_eq!(bytes.len(), 6 * 488 + 3 * 16);
+        let mut again = Tile::new(0, 0, 3, 2, layers);
+        assert_eq!(again.load(&bytes), Some(()));
+        assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));
+        for cut in [0, 5, bytes.len() - 1] {
+            assert_eq!(again.load(&bytes[..cut]), None);
+        }
+        bytes.push(0);
+        assert_eq!(again.load(&bytes), None);
+    }
+
+    #[test]
     fn every_tile_is_rendered_once() {
         let mut film = Film::new([0, 0, 100, 33], Layers::NONE);
         let mut seen: Vec<(u32, u32)> = film.tiles_in_order().iter().map(|t| (t.x, t.y)).collect();

@@ -14,7 +14,11 @@ use super::{Failure, SceneArgs, bytes_in_words, write_text};
 use crate::{
     ffi::oidn::Denoiser,
     image::{self, output::Format, png::ToneMap},
-    render::{self, Progress, Rendered, Stop, denoise::Denoised, picture},
+    render::{
+        self, Progress, Rendered, Stop,
+        denoise::Denoised,
+        picture::{self, Frame},
+    },
     report::{Phases, RunRecord},
     scene::{Layers, Scene},
     trace::World,
@@ -106,11 +110,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
         // What was rendered is kept even if the denoiser fails.
         let clean = denoised.as_ref().ok().and_then(Option::as_ref);
         let mut written = Vec::new();
+        let frame = Frame::new(&scene);
         for path in &outputs {
-            picture::write(path, &scene, &rendered.film, clean, &attributes)?;
+            picture::write(path, &frame, &rendered.film, clean, &attributes)?;
             written.push(path.clone());
             if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path)) {
-                picture::write_denoised(&path, &scene, &rendered.film, clean)?;
+                picture::write_denoised(&path, &frame, &rendered.film, clean)?;
                 written.push(path);
             }
         }

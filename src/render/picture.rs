@@ -11,9 +11,10 @@ use crate::{
         ImageError, cryptomatte,
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
         output::{self, Format},
+        png::Display,
     },
     integrator::{ClothId, LightParts},
-    scene::Scene,
+    scene::{Layers, Scene, Storage},
 };
 
 use super::denoise::Denoised;
@@ -36,24 +37,55 @@ pub const PART_NAMES: [&str; LightParts::COUNT] = [
     "B_indirect",
 ];
 
+/// What must be known of a scene to write its picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Size of the whole picture.
+    pub width: u32,
+    /// As `width`.
+    pub height: u32,
+    /// Layers of an EXR.
+    pub layers: Layers,
+    /// How an EXR is stored.
+    pub storage: Storage,
+    /// How pictures for a screen are made.
+    pub display: Display,
+    /// Names of the fabrics, for Cryptomatte.
+    pub fabrics: Vec<String>,
+}
+
+impl Frame {
+    /// Of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            width: scene.render.width,
+            height: scene.render.height,
+            layers: scene.layers,
+            storage: scene.storage,
+            display: scene.display,
+            fabrics: scene.fabrics.iter().map(|f| f.name.clone()).collect(),
+        }
+    }
+}
+
 /// Writes the picture in the format that the path's extension names.
 ///
-/// An EXR gets all layers of the scene and `attributes`, and a denoised picture as the layer `denoised`; other formats get
+/// An EXR gets all layers of the frame and `attributes`, and a denoised picture as the layer `denoised`; other formats get
 /// the colours. A denoised picture in such a format is a file of its own ([`write_denoised`]).
 ///
 /// # Errors
 /// What stands in the way of the file; then nothing is left of it.
 pub fn write(
     path: &Path,
-    scene: &Scene,
+    frame: &Frame,
     film: &Film,
     denoised: Option<&Denoised>,
     attributes: &[(String, Attribute)],
 ) -> Result<(), ImageError> {
     if Format::of(path)? == Format::Exr {
-        return write_exr(path, scene, film, denoised, attributes);
+        return write_exr(path, frame, film, denoised, attributes);
     }
-    output::write_colors(path, film.width as usize, film.height as usize, &scene.display, |y, row| {
+    output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {
             let p = film.pixel(x as u32, y as u32);
             *out = [p.color[0], p.color[1], p.color[2], p.alpha];
@@ -74,8 +106,8 @@ pub fn denoised_path(path: &Path) -> Option<PathBuf> {
 ///
 /// # Errors
 /// As [`write`].
-pub fn write_denoised(path: &Path, scene: &Scene, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
-    output::write_colors(path, film.width as usize, film.height as usize, &scene.display, |y, row| {
+pub fn write_denoised(path: &Path, frame: &Frame, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
+    output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {
             let [r, g, b] = denoised.pixel(x as u32, y as u32);
             *out = [r, g, b, film.pixel(x as u32, y as u32).alpha];
@@ -85,12 +117,12 @@ pub fn write_denoised(path: &Path, scene: &Scene, film: &Film, denoised: &Denois
 
 fn write_exr(
     path: &Path,
-    scene: &Scene,
+    frame: &Frame,
     film: &Film,
     denoised: Option<&Denoised>,
     attributes: &[(String, Attribute)],
 ) -> Result<(), ImageError> {
-    let layers = scene.layers;
+    let layers = frame.layers;
     let mut channels: Vec<ChannelSpec> = ["R", "G", "B", "A"].map(|n| ChannelSpec::new(n, Sample::F32)).into();
     let mut layer = |wanted: bool, name: &str, parts: &[&str], sample: Sample| {
         if wanted {
@@ -102,24 +134,23 @@ fn write_exr(
     layer(layers.albedo, "albedo", &["R", "G", "B"], Sample::F32);
     layer(layers.variance, "variance", &["R", "G", "B"], Sample::F32);
     layer(layers.samples, "samples", &["count"], Sample::U32);
-    let precision = if scene.storage.half_lobes { Sample::F16 } else { Sample::F32 };
+    let precision = if frame.storage.half_lobes { Sample::F16 } else { Sample::F32 };
     for name in PART_NAMES {
         layer(layers.lobes, name, &["R", "G", "B"], precision);
     }
     layer(denoised.is_some(), "denoised", &["R", "G", "B"], Sample::F32);
-    let mattes: Vec<MatteLayer> = if layers.cryptomatte { MatteLayer::all(scene, film) } else { Vec::new() };
+    let mattes: Vec<MatteLayer> = if layers.cryptomatte { MatteLayer::all(frame, film) } else { Vec::new() };
     channels.extend(mattes.iter().flat_map(|m| cryptomatte::channels(m.name)));
-    let render = &scene.render;
     let mut layout = ExrLayout::new(film.width as usize, film.height as usize, channels);
     layout.origin = film.origin.map(|o| o as i32);
-    layout.display_size = [render.width as usize, render.height as usize];
+    layout.display_size = [frame.width as usize, frame.height as usize];
     layout.attributes = attributes.to_vec();
     if let Some(denoised) = denoised {
         layout.attributes.push(("yarnray.denoised".to_owned(), Attribute::Text(denoised.by.clone())));
     }
     layout.attributes.extend(mattes.iter().flat_map(MatteLayer::attributes));
     let mut covering = Vec::new();
-    layout.compression = scene.storage.compression;
+    layout.compression = frame.storage.compression;
     exr::write(path, &layout, |y, lines| {
         for x in 0..film.width {
             let p = film.pixel(x, y as u32);
@@ -175,13 +206,13 @@ struct MatteLayer {
 
 impl MatteLayer {
     /// The layers of a film: fabrics, yarns, plies.
-    fn all(scene: &Scene, film: &Film) -> Vec<Self> {
+    fn all(frame: &Frame, film: &Film) -> Vec<Self> {
         let pixels = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
         let seen: BTreeSet<ClothId> = pixels.flat_map(|(x, y)| film.covering(x, y)).map(|(id, _)| *id).collect();
         [("CryptoFabric", Level::Fabric), ("CryptoYarn", Level::Yarn), ("CryptoPly", Level::Ply)]
             .map(|(name, level)| {
                 let named = |id: &ClothId| {
-                    let fabric = &scene.fabrics[id.fabric as usize].name;
+                    let fabric = &frame.fabrics[id.fabric as usize];
                     let text = match level {
                         Level::Fabric => fabric.clone(),
                         Level::Yarn => format!("{fabric}/yarn{}", id.yarn),

@@ -8,6 +8,7 @@
 pub mod camera;
 pub mod diagnostic;
 pub mod document;
+pub mod identity;
 pub mod light;
 pub mod load;
 pub mod reader;
@@ -277,6 +278,8 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// What was subtracted from all positions, millimetres.
     pub middle: DVec3,
+    /// Every key that changes the picture, with its value: [`identity::identity`].
+    pub identity: Vec<(String, String)>,
     /// A fingerprint of everything that changes the picture.
     pub fingerprint: String,
     /// What the user should know and what did not stop the scene from loading.

@@ -22,6 +22,7 @@ use super::{
     Fabric, Ground, Light, Scene, Thread, bounds,
     diagnostic::{Diagnostic, Diagnostics, Sources, Span},
     document::{Document, MAX_FILE_BYTES, Value},
+    identity,
     reader::{Range, Reader},
     transform_curves,
 };
@@ -258,12 +259,14 @@ fn build(
         lights,
         ground,
         middle,
+        identity: Vec::new(),
         fingerprint: String::new(),
         warnings,
     };
     keep_used(&mut scene);
     warn_about_precision(&mut scene);
-    scene.fingerprint = settings::fingerprint(&scene);
+    scene.identity = identity::identity(&scene);
+    scene.fingerprint = identity::fingerprint(&scene.identity);
     Some(scene)
 }
 

@@ -1,6 +1,4 @@
-//! `[render]` and `[output]`, and the fingerprint of a scene.
-
-use std::fmt::Write as _;
+//! `[render]` and `[output]`.
 
 use super::{
     super::{diagnostic::shortened, *},
@@ -126,57 +124,4 @@ pub(super) fn output(table: Option<Reader<'_>>) -> Output {
     let denoise = table.bool_or("denoise", false);
     table.finish();
     Output { display, layers, storage, denoise }
-}
-
-/// FNV-1a over what is written to it.
-struct Fnv(u64);
-
-impl Fnv {
-    fn bytes(&mut self, bytes: &[u8]) {
-        for &b in bytes {
-            self.0 = (self.0 ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    }
-}
-
-impl std::fmt::Write for Fnv {
-    fn write_str(&mut self, s: &str) -> std::fmt::Result {
-        self.bytes(s.as_bytes());
-        Ok(())
-    }
-}
-
-/// A fingerprint of everything that changes the picture: not of samples, time, threads or outputs.
-pub(super) fn fingerprint(scene: &Scene) -> String {
-    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    let r = &scene.render;
-    let same = (r.mode, r.model, r.width, r.height, r.crop, r.filter, r.max_bounces, r.seed);
-    let written = write!(hash, "{same:?} {:?} {:?} {:?} {:?}", scene.camera, scene.yarns, scene.fibers, scene.ground);
-    debug_assert!(written.is_ok(), "hashing cannot fail");
-    for light in &scene.lights {
-        if let Light::Environment(light::Environment { radiance, image: Some(map), visible }) = light {
-            let _ = write!(hash, "image {radiance:?} {visible} {:?}", map.rotation());
-            for value in map.pixels().as_flattened() {
-                hash.bytes(&value.to_bits().to_le_bytes());
-            }
-        } else {
-            let _ = write!(hash, "{light:?}");
-        }
-    }
-    for fabric in &scene.fabrics {
-        let _ = write!(
-            hash,
-            "{:?} {:?} {:?} {} {}",
-            fabric.thread, fabric.phases, fabric.basis, fabric.tolerance, fabric.longest_segment
-        );
-        for (curve, radii) in &fabric.curves {
-            let _ = write!(hash, "{:?} {}", curve.basis, curve.closed);
-            for (p, r) in curve.points.iter().zip(radii) {
-                for v in [p.x, p.y, p.z, *r] {
-                    hash.bytes(&v.to_bits().to_le_bytes());
-                }
-            }
-        }
-    }
-    format!("{:016x}", hash.0)
 }
