@@ -82,7 +82,13 @@ impl Plan {
         add("denoiser", scene.denoise, "asked for", "nobody asks for a denoised picture: not loaded");
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
         add("textures", false, "", "no texture in the scene");
-        add("meshes", false, "", "no mesh in the scene");
+        add("meshes", !scene.objects.is_empty(), "the scene has a mesh", "no mesh in the scene");
+        add(
+            "coated_surfaces",
+            scene.materials.iter().any(|m| m.surface.is_coated()),
+            "a surface has a coat",
+            "no surface has a coat",
+        );
         Self { features }
     }
 

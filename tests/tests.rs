@@ -27,6 +27,8 @@ mod layering;
 mod lights;
 // The virtual goniometer.
 mod scatter;
+// Meshes and the materials of surfaces.
+mod meshes;
 // Every scene of the project, and real curve files.
 mod scenes;
 // Temporary directories, runs of the program, pictures: what the others share.

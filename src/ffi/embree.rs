@@ -161,6 +161,9 @@ pub struct SceneBuilder {
     buffers: Vec<Buffers>,
 }
 
+/// What Embree reads in place.
+type Buffers = Box<dyn Any + Send + Sync>;
+
 #[derive(Debug)]
 struct Handle {
     raw: sys::RTCScene,
@@ -172,12 +175,6 @@ impl Drop for Handle {
         // SAFETY: made by rtcNewScene, released once, before its device.
         unsafe { sys::rtcReleaseScene(self.raw) };
     }
-}
-
-#[derive(Debug)]
-struct Buffers {
-    _points: Arc<[Vec4]>,
-    _segments: Arc<[u32]>,
 }
 
 impl SceneBuilder {
@@ -251,7 +248,53 @@ impl SceneBuilder {
         if let Some(error) = last_error(device, "adding curves") {
             return Err(error);
         }
-        self.buffers.push(Buffers { _points: points, _segments: segments });
+        self.buffers.push(Box::new((points, segments)));
+        Ok(id)
+    }
+
+    /// Adds triangles, each of three indices of points, and returns their geometry id as [`Self::add_round_curves`]
+    /// does. Embree reads both in place.
+    ///
+    /// # Panics
+    /// If a triangle names a point that is not there.
+    pub fn add_triangles(&mut self, points: Arc<[Vec3A]>, triangles: Arc<[[u32; 3]]>) -> Result<u32, EmbreeError> {
+        assert!(
+            triangles.iter().flatten().all(|&i| (i as usize) < points.len()),
+            "a triangle names a point that is not there"
+        );
+        let id = self.buffers.len() as u32;
+        let device = self.scene.device.handle;
+        // SAFETY: as for curves; a Vec3A is three floats in 16 bytes, all of which may be read.
+        unsafe {
+            let geometry = sys::rtcNewGeometry(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE);
+            sys::rtcSetSharedGeometryBuffer(
+                geometry,
+                sys::RTC_BUFFER_TYPE_VERTEX,
+                0,
+                sys::RTC_FORMAT_FLOAT3,
+                points.as_ptr().cast(),
+                0,
+                size_of::<Vec3A>(),
+                points.len(),
+            );
+            sys::rtcSetSharedGeometryBuffer(
+                geometry,
+                sys::RTC_BUFFER_TYPE_INDEX,
+                0,
+                sys::RTC_FORMAT_UINT3,
+                triangles.as_ptr().cast(),
+                0,
+                size_of::<[u32; 3]>(),
+                triangles.len(),
+            );
+            sys::rtcCommitGeometry(geometry);
+            sys::rtcAttachGeometryByID(self.scene.raw, geometry, id);
+            sys::rtcReleaseGeometry(geometry);
+        }
+        if let Some(error) = last_error(device, "adding triangles") {
+            return Err(error);
+        }
+        self.buffers.push(Box::new((points, triangles)));
         Ok(id)
     }
 
@@ -291,18 +334,20 @@ impl Ray {
     }
 }
 
-/// A point where a ray meets the outside or the inside of a curve's tube.
+/// A point where a ray meets the outside or the inside of a curve's tube, or a triangle from either side.
 #[derive(Clone, Copy, Debug)]
 pub struct RawHit {
     /// Distance along the ray in lengths of its direction.
     pub t: f32,
     /// Outward normal, not of unit length.
     pub normal: Vec3A,
-    /// Position along the segment, 0 to 1.
+    /// Position along the segment, 0 to 1; in a triangle the weight of its second corner.
     pub u: f32,
-    /// The segment's index within its geometry.
+    /// In a triangle the weight of its third corner.
+    pub v: f32,
+    /// The index of segment or triangle within its geometry.
     pub segment: u32,
-    /// The geometry, as returned by [`SceneBuilder::add_round_curves`].
+    /// The geometry, as returned by [`SceneBuilder::add_round_curves`] or [`SceneBuilder::add_triangles`].
     pub geometry: u32,
 }
 
@@ -350,6 +395,7 @@ unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilter
             t: ray.tfar,
             normal: Vec3A::new(hit.Ng_x, hit.Ng_y, hit.Ng_z),
             u: hit.u,
+            v: hit.v,
             segment: hit.primID,
             geometry: hit.geomID,
         };
@@ -398,6 +444,7 @@ impl CommittedScene {
             t: query.ray.tfar,
             normal: Vec3A::new(hit.Ng_x, hit.Ng_y, hit.Ng_z),
             u: hit.u,
+            v: hit.v,
             segment: hit.primID,
             geometry: hit.geomID,
         })
@@ -507,6 +554,23 @@ mod tests {
         assert!((hit.t - 0.75).abs() < 1e-3, "hit at {}", hit.t);
         assert!(hit.normal.y > 0.0, "the normal points outward");
         assert!(scene.occluded(&ray, &mut accept));
+    }
+
+    #[test]
+    fn triangles_are_met_from_both_sides() {
+        let device = Device::new(1).unwrap();
+        let points: Arc<[Vec3A]> = [Vec3A::ZERO, Vec3A::X, Vec3A::Y].into();
+        let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
+        assert_eq!(builder.add_triangles(points, [[0, 1, 2]].into()), Ok(0));
+        let scene = builder.commit().unwrap();
+        let mut filter = Counting { guard: 0, calls: 0, accept: true };
+        for (from, towards) in [(5.0, Vec3A::NEG_Z), (-5.0, Vec3A::Z)] {
+            let hit = scene.intersect(&Ray::new(Vec3A::new(0.25, 0.5, from), towards), &mut filter).unwrap();
+            assert!((hit.t - 5.0).abs() < 1e-5 && (hit.u - 0.25).abs() < 1e-5 && (hit.v - 0.5).abs() < 1e-5);
+            assert!(hit.normal.z > 0.0, "counter-clockwise is outside");
+        }
+        assert_eq!(filter.calls, 2);
+        assert!(scene.intersect(&Ray::new(Vec3A::new(0.7, 0.7, 5.0), Vec3A::NEG_Z), &mut filter).is_none());
     }
 
     #[test]

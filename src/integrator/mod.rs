@@ -7,6 +7,7 @@
 
 mod fiber;
 mod parts;
+mod surface;
 
 pub use parts::LightParts;
 
@@ -15,13 +16,13 @@ use glam::{Vec2, Vec3A};
 use crate::{
     ffi::embree::Ray,
     geometry::section::{Crossings, Section},
-    math::{Rgb, frame::orthonormal_basis, sampler::Sampler, warp},
+    math::{Rgb, sampler::Sampler},
     scattering::{LobeValues, mis_weight, yarn::YarnVertex},
     scene::{
-        Fabric, Ground, Light, Scene, Thread,
+        Fabric, Ground, Light, Material, Scene, Thread,
         light::{AreaLight, Environment},
     },
-    trace::{Hit, HitPlace, Threads, Weave, World},
+    trace::{Hit, HitPlace, SurfacePlace, Threads, Weave, World},
 };
 
 /// Scattering events before paths may end by chance.
@@ -95,6 +96,7 @@ impl Counters {
 pub struct Integrator<'a> {
     world: &'a World,
     ground: Option<Ground>,
+    materials: &'a [Material],
     /// The sky; several are added up.
     skies: Vec<(&'a Environment, f32)>,
     /// Surfaces that shine, each with its chance of being chosen.
@@ -160,6 +162,7 @@ impl<'a> Integrator<'a> {
         Self {
             world,
             ground: scene.ground,
+            materials: &scene.materials,
             skies,
             surfaces,
             lights,
@@ -202,14 +205,11 @@ impl<'a> Integrator<'a> {
             }
             let go_on = match (hit, ground) {
                 (hit, Some((ground, t))) if hit.is_none_or(|h| t < h.t) => {
-                    if first {
-                        let point = path.ray.origin + t * path.ray.direction;
-                        sample.alpha = 1.0;
-                        sample.depth = (camera - point).dot(self.back);
-                        sample.normal = Vec3A::Y;
-                        sample.albedo = ground.albedo;
-                    }
-                    self.scatter_at_ground(&ground, t, &mut path, &mut sample, scratch, counters)
+                    let place = on_ground(&ground, &path.ray, t);
+                    self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
+                }
+                (Some(Hit { t, place: HitPlace::Surface(place), .. }), _) => {
+                    self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
                 }
                 (Some(hit), _) => {
                     let (go_on, scattered) = match (&hit.place, &self.world.threads()[hit.threads]) {
@@ -228,6 +228,7 @@ impl<'a> Integrator<'a> {
                             let (centre, radius) = match &hit.place {
                                 HitPlace::Yarn(section) => (section.centre, section.radius),
                                 HitPlace::Fiber(place) => (place.centre, place.radius),
+                                HitPlace::Surface(place) => (place.point, 0.0),
                             };
                             sample.depth = (camera - centre - radius * hit.normal).dot(self.back);
                         }
@@ -298,9 +299,10 @@ impl<'a> Integrator<'a> {
         false
     }
 
-    /// Whether a path may go on after a scattering event of weight `weight`.
+    /// Whether a path may go on, along its new ray, after a scattering event of weight `weight`.
     #[inline]
     fn survives(&self, path: &mut Path<'_>, weight: Rgb, u: f32) -> bool {
+        path.from = path.ray.origin;
         path.throughput *= weight;
         path.bounces += 1;
         let largest = path.throughput.max_channel();
@@ -379,7 +381,6 @@ impl<'a> Integrator<'a> {
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
-        path.from = path.ray.origin;
         (self.survives(path, next.weight, u_roulette), true)
     }
 
@@ -432,47 +433,6 @@ impl<'a> Integrator<'a> {
         }
         self.world.transmittance(ray, &mut scratch.shadow_crossings)
     }
-
-    /// Scatters at the diffuse ground.
-    fn scatter_at_ground(
-        &self,
-        ground: &Ground,
-        t: f32,
-        path: &mut Path<'_>,
-        sample: &mut Sample,
-        scratch: &mut Scratch,
-        counters: &mut Counters,
-    ) -> bool {
-        if path.bounces >= self.max_bounces {
-            return false;
-        }
-        let [u_choice, light_x, light_y, u_roulette] = path.sampler.next4();
-        let [x, y, _, _] = path.sampler.next4();
-        let side = if path.ray.direction.y < 0.0 { 1.0 } else { -1.0 };
-        let normal = Vec3A::new(0.0, side, 0.0);
-        let mut point = path.ray.origin + t * path.ray.direction;
-        point.y = ground.height + side * 1e-5 * (1.0 + ground.height.abs().max(t));
-        let even = std::f32::consts::FRAC_1_PI;
-        if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())
-            && let Some(towards) = light.sample(point, Vec2::new(light_x, light_y))
-        {
-            let cos = towards.direction.dot(normal);
-            if cos > 0.0 {
-                let mut ray = Ray::new(point, towards.direction);
-                ray.t_far = towards.distance;
-                counters.shadow += 1;
-                let passed = self.world.transmittance(&ray, &mut scratch.shadow_crossings);
-                let weight = mis_weight(towards.pdf * chance, cos * even) * cos * even * passed / chance;
-                add(sample, path.bounces + 1, path, path.throughput * ground.albedo * towards.weight * weight);
-            }
-        }
-        let w = warp::cosine_hemisphere(Vec2::new(x, y));
-        let (s, t) = orthonormal_basis(normal);
-        path.ray = Ray::new(point, w.x * s + w.y * t + w.z * normal);
-        path.from = point;
-        path.pdf = (w.z * even).max(1e-9);
-        self.survives(path, ground.albedo, u_roulette)
-    }
 }
 
 /// Albedo of one fibre of each ply of a fabric's yarn, or of the one fibre it is made of.
@@ -489,6 +449,15 @@ fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Rgb> {
 fn add(sample: &mut Sample, events: u32, path: &Path<'_>, light: Rgb) {
     sample.radiance += light;
     sample.parts.add(events, path.shares.as_ref(), light);
+}
+
+/// The place where a ray meets the ground at the distance `t`.
+#[inline]
+fn on_ground(ground: &Ground, ray: &Ray, t: f32) -> SurfacePlace {
+    let mut point = ray.origin + t * ray.direction;
+    point.y = ground.height;
+    let normal = if ray.direction.y < 0.0 { Vec3A::Y } else { Vec3A::NEG_Y };
+    SurfacePlace { point, normal, shading: normal, uv: Vec2::ZERO, uv_per_length: 0.0, material: ground.material }
 }
 
 /// Where a ray meets the ground.

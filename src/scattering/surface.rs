@@ -63,6 +63,11 @@ impl SurfaceMaterial {
         Self { albedo, coat: Some(Box::new(Coat::new(roughness * roughness, eta))) }
     }
 
+    /// Whether it has a coat.
+    pub fn is_coated(&self) -> bool {
+        self.coat.is_some()
+    }
+
     /// The albedo of the diffuse part.
     pub fn albedo(&self) -> Rgb {
         self.albedo

@@ -5,7 +5,7 @@
 
 use std::fmt::{Debug, Write as _};
 
-use super::{Fabric, Light, Scene, Thread, light::Environment};
+use super::{Fabric, Light, Object, Scene, Thread, light::Environment};
 
 /// Values longer than this are told by their hash.
 const LONGEST_VALUE: usize = 120;
@@ -68,6 +68,12 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
             _ => add(format!("light.{i}"), light),
         }
     }
+    for (i, material) in scene.materials.iter().enumerate() {
+        add(format!("material.{i}"), material);
+    }
+    for (i, object) in scene.objects.iter().enumerate() {
+        add(format!("mesh.{i}"), &(object.material, triangles(object)));
+    }
     add("ground".to_owned(), &scene.ground);
     out
 }
@@ -111,6 +117,16 @@ fn curves(fabric: &Fabric) -> String {
             bytes.extend([p.x, p.y, p.z, *r].map(f64::to_le_bytes).as_flattened());
         }
     }
+    hashed(&bytes)
+}
+
+/// A hash of a mesh.
+fn triangles(object: &Object) -> String {
+    let mesh = &object.mesh;
+    let mut bytes = format!("{} {}", mesh.normals.len(), mesh.uvs.len()).into_bytes();
+    let vectors = mesh.points.iter().chain(&mesh.normals).flat_map(|p| p.to_array());
+    bytes.extend(vectors.chain(mesh.uvs.iter().flat_map(|uv| uv.to_array())).flat_map(f64::to_le_bytes));
+    bytes.extend(mesh.triangles.as_flattened().iter().flat_map(|i| i.to_le_bytes()));
     hashed(&bytes)
 }
 

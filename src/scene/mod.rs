@@ -21,11 +21,11 @@ pub use light::Light;
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        mesh::Mesh,
         yarn::{PlyParameters, YarnShape},
     },
     image::{Compression, png::Display},
-    math::Rgb,
-    scattering::fiber::FiberMaterial,
+    scattering::{fiber::FiberMaterial, surface::SurfaceMaterial},
 };
 
 /// How yarns are represented.
@@ -240,13 +240,31 @@ impl Fabric {
     }
 }
 
-/// A diffuse floor.
+/// A floor.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground {
     /// Its y, millimetres.
     pub height: f32,
-    /// Albedo.
-    pub albedo: Rgb,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// What the ground and meshes are made of.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// How it scatters.
+    pub surface: SurfaceMaterial,
+}
+
+/// A mesh of the scene.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Its file or shape, for messages.
+    pub origin: String,
+    /// The triangles, millimetres, about the scene's middle.
+    pub mesh: Mesh,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
 }
 
 /// A checked scene: millimetres, radians, origin at the middle of the cloth.
@@ -272,6 +290,10 @@ pub struct Scene {
     pub fibers: Vec<(String, FiberMaterial)>,
     /// The cloth.
     pub fabrics: Vec<Fabric>,
+    /// What stands beside it.
+    pub objects: Vec<Object>,
+    /// Materials of ground and objects.
+    pub materials: Vec<Material>,
     /// The lights.
     pub lights: Vec<Light>,
     /// The floor.

@@ -404,6 +404,17 @@ impl<'a> Reader<'a> {
         self.all(elements, |element| self.number(key, element, range, EXPECTED))
     }
 
+    /// Pairs of numbers: an array of arrays of two.
+    pub fn pairs(&self, key: &str, range: Range) -> Option<Vec<[f64; 2]>> {
+        const EXPECTED: &str = "an array of pairs of numbers";
+        let node = self.node(key)?;
+        let Value::Array(elements) = &node.value else {
+            self.wrong_type(key, EXPECTED, node);
+            return None;
+        };
+        self.all(elements, |element| self.array(key, element, range, EXPECTED))
+    }
+
     fn array<const COUNT: usize>(&self, key: &str, node: &Node, range: Range, expected: &str) -> Option<[f64; COUNT]> {
         let Value::Array(elements) = &node.value else {
             self.wrong_type(key, expected, node);

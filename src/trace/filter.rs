@@ -45,10 +45,12 @@ impl<'a> GapFilter<'a> {
 impl HitFilter for GapFilter<'_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
+        // Meshes count from both sides.
+        let Some(threads) = self.threads.get(hit.geometry as usize) else { return true };
         if leaves(self.ray, hit) {
             return false;
         }
-        let Threads::Yarns(weave) = &self.threads[hit.geometry as usize] else { return true };
+        let Threads::Yarns(weave) = threads else { return true };
         let shape = weave.yarn.shape();
         if shape.filled {
             return true;
@@ -104,10 +106,11 @@ impl<'a> ShadowFilter<'a> {
 impl HitFilter for ShadowFilter<'_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
+        let Some(threads) = self.threads.get(hit.geometry as usize) else { return true };
         if leaves(self.ray, hit) {
             return false;
         }
-        let Threads::Yarns(weave) = &self.threads[hit.geometry as usize] else { return true };
+        let Threads::Yarns(weave) = threads else { return true };
         let section = section_at(weave, self.ray, hit);
         section.crossings(weave.yarn.shape(), self.crossings);
         if self.crossings.is_empty() {

@@ -1,10 +1,11 @@
-//! Rays against the cloth: curves in Embree, the filters that let rays through gaps, and what a hit is.
+//! Rays against cloth and meshes: curves and triangles in Embree, the filters that let rays through gaps, and what a hit is.
 //!
 //! Both filters are pure functions of ray and hit (the shadow filter also of the hits it has seen, by which repeats
 //! are told), allocate nothing and may be called in any order. Exit hits never count: Embree as built by Debian does
 //! not cull the back faces of curves, and a ray born inside a yarn must leave it.
 
 mod filter;
+mod mesh;
 
 use std::{
     sync::Arc,
@@ -30,6 +31,8 @@ use crate::{
     scene::{Fabric, Model, Scene, Thread, Yarn},
 };
 use filter::{GapFilter, ShadowFilter};
+pub use mesh::SurfacePlace;
+use mesh::TriangleMesh;
 
 /// Curves of one kind of yarn with all that its rays need.
 #[derive(Debug)]
@@ -75,6 +78,8 @@ pub struct World {
     scene: CommittedScene,
     device: Arc<Device>,
     threads: Vec<Threads>,
+    /// Their geometries in Embree come after those of the cloth.
+    meshes: Vec<TriangleMesh>,
 }
 
 /// What making a [`World`] took.
@@ -86,16 +91,16 @@ pub struct BuildTimes {
     pub build: Duration,
 }
 
-/// A place where a ray meets cloth and does not slip between plies.
+/// A place where a ray meets cloth and does not slip between plies, or meets a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
     /// Distance along the ray.
     pub t: f32,
-    /// Index into [`World::threads`].
+    /// Index into [`World::threads`]; no index of it where a mesh was met.
     pub threads: usize,
-    /// Segment within it.
+    /// Segment or triangle within it.
     pub segment: u32,
-    /// Outward unit normal of the yarn or fibre.
+    /// Outward unit normal of the yarn, fibre or triangle.
     pub normal: Vec3A,
     /// What was met.
     pub place: HitPlace,
@@ -108,6 +113,8 @@ pub enum HitPlace {
     Yarn(Section),
     /// A fibre.
     Fiber(TubePlace),
+    /// A mesh.
+    Surface(SurfacePlace),
 }
 
 impl World {
@@ -130,6 +137,7 @@ impl World {
                 }),
             });
         }
+        let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
         let started = Instant::now();
         let device = Device::new(threads)?;
@@ -143,8 +151,11 @@ impl World {
             };
             builder.add_round_curves(basis, Arc::clone(points), Arc::clone(segments))?;
         }
+        for mesh in &meshes {
+            builder.add_triangles(Arc::clone(&mesh.points), Arc::clone(&mesh.triangles))?;
+        }
         let committed = builder.commit()?;
-        let world = Self { scene: committed, device, threads: threads_made };
+        let world = Self { scene: committed, device, threads: threads_made, meshes };
         Ok((world, BuildTimes { generate, build: started.elapsed() }))
     }
 
@@ -158,9 +169,10 @@ impl World {
         self.threads.iter().filter(move |threads| threads.fabric() == fabric)
     }
 
-    /// Bytes of control points, indices and what is kept for each point.
+    /// Bytes of control points, indices and what is kept for each point, of cloth and meshes.
     pub fn geometry_bytes(&self) -> u64 {
-        self.threads.iter().map(Threads::bytes).sum()
+        let meshes: u64 = self.meshes.iter().map(TriangleMesh::bytes).sum();
+        meshes + self.threads.iter().map(Threads::bytes).sum::<u64>()
     }
 
     /// Bytes that Embree reports for its BVH.
@@ -173,7 +185,7 @@ impl World {
         self.device.version()
     }
 
-    /// The nearest cloth on a ray. A ray that is not finite meets nothing.
+    /// The nearest cloth or mesh on a ray. A ray that is not finite meets nothing.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         if !ray.is_finite() {
@@ -182,9 +194,10 @@ impl World {
         let mut filter = GapFilter::new(&self.threads, ray);
         let raw = self.scene.intersect(ray, &mut filter)?;
         let threads = raw.geometry as usize;
-        let place = match &self.threads[threads] {
-            Threads::Yarns(weave) => HitPlace::Yarn(filter.section(weave, &raw)),
-            Threads::Fibers(fleece) => HitPlace::Fiber(fleece.tubes.place(raw.segment, raw.u)),
+        let place = match self.threads.get(threads) {
+            Some(Threads::Yarns(weave)) => HitPlace::Yarn(filter.section(weave, &raw)),
+            Some(Threads::Fibers(fleece)) => HitPlace::Fiber(fleece.tubes.place(raw.segment, raw.u)),
+            None => HitPlace::Surface(self.meshes[threads - self.threads.len()].place(ray, &raw)),
         };
         let normal = raw.normal.normalize_or(-ray.direction);
         Some(Hit { t: raw.t, threads, segment: raw.segment, normal, place })

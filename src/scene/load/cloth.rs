@@ -6,11 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
+use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
     super::{Fabric, Thread, Yarn, transform_curves},
-    Context, Range, Reader, UNITS, radians,
+    Context, Range, Reader, UNITS, placement, radians,
     yarns::Library,
 };
 use crate::{
@@ -111,11 +111,7 @@ pub(super) fn plan(
     let radius = table.f64("radius", Range::POSITIVE).map(|r| r * context.unit);
     let seed = table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32;
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
-    let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
-    let [rx, ry, rz] = table.vec3_or("rotate", [0.0; 3], Range::FINITE).map(radians);
-    let translate = context.position(table.vec3_or("translate", [0.0; 3], Range::FINITE));
-    let rotation = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
-    let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), rotation, translate);
+    let transform = placement(&table, context);
     let source = match table.table("source") {
         Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| library.yarns.get(y)), curves),
         None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),

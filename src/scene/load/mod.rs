@@ -5,6 +5,7 @@
 
 mod cloth;
 mod definitions;
+mod mesh;
 mod settings;
 mod view;
 mod yarns;
@@ -14,19 +15,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 pub use definitions::{Definitions, load_definitions};
 
 use super::{
-    Fabric, Ground, Light, Scene, Thread, bounds,
+    Fabric, Ground, Light, Object, Scene, Thread, bounds,
     diagnostic::{Diagnostic, Diagnostics, Sources, Span},
     document::{Document, MAX_FILE_BYTES, Value},
     identity,
     reader::{Range, Reader},
     transform_curves,
 };
-use crate::math::Rgb;
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -207,9 +207,11 @@ fn build(
             cloth::plan(table, &context, &library, curves)
         })
         .collect();
+    let materials = mesh::materials(&root);
+    let mesh_plans = mesh::meshes(&root, &context, &materials);
     let camera_plan = view::camera(&root, &context, options.frame);
     let light_plans = view::lights(&root, &context);
-    let ground_plan = view::ground(&root, &context);
+    let ground_plan = view::ground(&root, &context, &materials);
     root.finish();
     if diagnostics.has_errors() {
         return None;
@@ -223,6 +225,9 @@ fn build(
         .enumerate()
         .filter_map(|(i, plan)| plan.make(i, &context, &library, &detail, &mut warnings))
         .collect();
+    let mut made = Vec::new();
+    let mut objects: Vec<Object> =
+        mesh_plans.into_iter().flatten().filter_map(|plan| plan.make(&context, &mut made)).collect();
     let mut lights: Vec<Light> = light_plans.into_iter().flatten().filter_map(|l| l.make(&context)).collect();
     if diagnostics.has_errors() {
         return None;
@@ -230,20 +235,26 @@ fn build(
     cloth::tell_names_apart(&mut fabrics);
 
     // Single precision is kept for what is near: the middle of the cloth becomes the origin.
-    let middle = bounds(&fabrics).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    let around =
+        |objects: &[Object]| objects.iter().filter_map(|o| o.mesh.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let middle = bounds(&fabrics).or(around(&objects)).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
     for fabric in &mut fabrics {
         transform_curves(&mut fabric.curves, &DAffine3::from_translation(-middle));
+    }
+    for object in &mut objects {
+        object.mesh.transform(&DAffine3::from_translation(-middle));
     }
     for light in &mut lights {
         light.translate(-middle);
     }
     let render = settings?;
     let aspect = f64::from(render.width) / f64::from(render.height);
-    let camera = camera_plan?.make(&fabrics, middle, aspect);
+    let camera = camera_plan?.make(&fabrics, &objects, middle, aspect);
     let ground = ground_plan.map(|plan| {
         let height = plan.height.map(|h| h * unit - middle.y);
-        let lowest = bounds(&fabrics).map_or(0.0, |(low, _)| low.y);
-        Ground { height: height.unwrap_or(lowest) as f32, albedo: Rgb::from(plan.albedo) }
+        let lowest = [bounds(&fabrics), around(&objects)].into_iter().flatten().map(|(low, _)| low.y);
+        let lowest = lowest.reduce(f64::min).unwrap_or(0.0);
+        Ground { height: height.unwrap_or(lowest) as f32, material: plan.material.make(&mut made) }
     });
     let mut scene = Scene {
         path: name.to_owned(),
@@ -256,6 +267,8 @@ fn build(
         yarns: library.yarns.into_values().collect(),
         fibers: library.fibers.into_iter().collect(),
         fabrics,
+        objects,
+        materials: made.into_iter().map(|(_, material)| material).collect(),
         lights,
         ground,
         middle,
@@ -300,6 +313,15 @@ fn warn_about_precision(scene: &mut Scene) {
              0.2 % of that yarn's radius"
         ));
     }
+}
+
+/// `scale`, `rotate` (about x, then y, then z) and `translate` of a table.
+fn placement(table: &Reader<'_>, context: &Context<'_>) -> DAffine3 {
+    let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
+    let [rx, ry, rz] = table.vec3_or("rotate", [0.0; 3], Range::FINITE).map(radians);
+    let translate = context.position(table.vec3_or("translate", [0.0; 3], Range::FINITE));
+    let rotation = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
+    DAffine3::from_scale_rotation_translation(DVec3::splat(scale), rotation, translate)
 }
 
 /// Angles in files are degrees.

@@ -6,12 +6,14 @@ use glam::{DVec2, DVec3, Mat3A, Vec3A};
 
 use super::{
     super::{
-        Fabric,
+        Fabric, Object,
         camera::{Camera, Lens, Projection},
         document::Value,
         light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     },
-    Context, Range, Reader, radians,
+    Context, Range, Reader,
+    mesh::{MaterialPlan, Materials, material_of},
+    radians,
 };
 use crate::{
     image,
@@ -152,10 +154,14 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
 }
 
 impl CameraPlan {
-    /// The camera for cloth that lies about `middle`.
-    pub(super) fn make(self, fabrics: &[Fabric], middle: DVec3, aspect: f64) -> Camera {
+    /// The camera for cloth that lies about `middle`; without any, for objects.
+    pub(super) fn make(self, fabrics: &[Fabric], objects: &[Object], middle: DVec3, aspect: f64) -> Camera {
         let mut camera = match self.frame {
             None => Camera { position: self.camera.position - middle, ..self.camera },
+            Some(margin) if fabrics.is_empty() => {
+                let points = objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0));
+                self.camera.framing(points, aspect, margin)
+            }
             Some(margin) => {
                 let points = fabrics
                     .iter()
@@ -329,11 +335,11 @@ impl LightPlan {
 pub(super) struct GroundPlan {
     /// In scene units; `None` for right below the cloth.
     pub(super) height: Option<f64>,
-    pub(super) albedo: [f64; 3],
+    pub(super) material: MaterialPlan,
 }
 
 /// Reads `[ground]`.
-pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>) -> Option<GroundPlan> {
+pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<GroundPlan> {
     let table = root.table("ground")?;
     let auto = match table.node("height") {
         None => true,
@@ -351,7 +357,7 @@ pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>) -> Option<GroundP
         },
     };
     let height = if auto { None } else { table.f64("height", Range::FINITE) };
-    let albedo = table.rgb_or("albedo", [0.5; 3], Range::UNIT);
+    let material = material_of(&table, materials);
     table.finish();
-    Some(GroundPlan { height, albedo })
+    Some(GroundPlan { height, material: material? })
 }

@@ -1,0 +1,65 @@
+//! Scattering at what is no cloth: the ground and meshes.
+
+use glam::{Vec2, Vec3A};
+
+use super::{Counters, Integrator, Path, Sample, Scratch, add};
+use crate::{ffi::embree::Ray, math::frame::orthonormal_basis, scattering::mis_weight, trace::SurfacePlace};
+
+/// How far off a surface rays start, in units of the larger of their distance and place, which single precision rounds.
+const OFFSET: f32 = 1e-5;
+
+impl Integrator<'_> {
+    /// Scatters at a surface met at the distance `t`. Returns whether the path goes on.
+    pub(super) fn scatter_at_surface(
+        &self,
+        place: &SurfacePlace,
+        t: f32,
+        path: &mut Path<'_>,
+        sample: &mut Sample,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> bool {
+        let material = &self.materials[place.material];
+        let albedo = material.surface.albedo();
+        if path.bounces == 0 {
+            sample.alpha = 1.0;
+            sample.depth = (path.from - place.point).dot(self.back);
+            sample.normal = place.shading;
+            sample.albedo = albedo;
+        }
+        if path.bounces >= self.max_bounces {
+            return false;
+        }
+        let [u_choice, light_x, light_y, u_roulette] = path.sampler.next4();
+        let [x, y, u_part, _] = path.sampler.next4();
+        // Both flat and shading normal are on the camera's side.
+        let normal = place.shading;
+        let (tangent, bitangent) = orthonormal_basis(normal);
+        let to_local = |v: Vec3A| Vec3A::new(v.dot(tangent), v.dot(bitangent), v.dot(normal));
+        let wo = to_local(-path.ray.direction);
+        let start = place.point + OFFSET * (1.0 + place.point.abs().max_element().max(t)) * place.normal;
+
+        if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())
+            && let Some(towards) = light.sample(start, Vec2::new(light_x, light_y))
+            && towards.direction.dot(place.normal) > 0.0
+        {
+            let (value, pdf) = material.surface.evaluate(albedo, wo, to_local(towards.direction));
+            if value.max_channel() > 0.0 {
+                let mut ray = Ray::new(start, towards.direction);
+                ray.t_far = towards.distance;
+                counters.shadow += 1;
+                let passed = self.shadow(&ray, scratch);
+                let weight = mis_weight(towards.pdf * chance, pdf) * passed / chance;
+                add(sample, path.bounces + 1, path, path.throughput * value * towards.weight * weight);
+            }
+        }
+        let Some(next) = material.surface.sample(albedo, wo, [u_part, x, y]) else { return false };
+        let direction = next.wi.x * tangent + next.wi.y * bitangent + next.wi.z * normal;
+        if direction.dot(place.normal) <= 0.0 {
+            return false;
+        }
+        path.ray = Ray::new(start, direction);
+        path.pdf = next.pdf;
+        self.survives(path, next.weight, u_roulette)
+    }
+}

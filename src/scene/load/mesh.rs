@@ -1,0 +1,209 @@
+//! `[[mesh]]` and `[material.NAME]`: what stands beside the cloth or under it.
+
+use std::{collections::BTreeMap, path::PathBuf};
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::{
+    super::{Material, Object},
+    Context, Range, Reader, UNITS, placement,
+};
+use crate::{
+    geometry::{mesh::Mesh, obj},
+    math::Rgb,
+    scattering::surface::SurfaceMaterial,
+    scene::diagnostic::{Span, unknown_name},
+};
+
+/// A material as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct MaterialPlan {
+    albedo: [f64; 3],
+    /// Roughness and refractive index of a coat.
+    coat: Option<(f64, f64)>,
+}
+
+/// Every `[material.NAME]`; `None` for one with mistakes.
+pub(super) type Materials = BTreeMap<String, Option<MaterialPlan>>;
+
+/// Reads every material, also those that the scene does not use.
+pub(super) fn materials(root: &Reader<'_>) -> Materials {
+    root.named_tables("material").into_iter().map(|(name, table)| (name.to_owned(), material(table))).collect()
+}
+
+fn material(table: Reader<'_>) -> Option<MaterialPlan> {
+    let kind = table.one_of_or("type", 0, &[("diffuse", 0), ("coated", 1)]);
+    let albedo = table.rgb_or("albedo", [0.5; 3], Range::UNIT);
+    let coat = (kind == 1).then(|| {
+        // A perfectly smooth coat would be a mirror, in which no light of no size is ever found.
+        let roughness = table.f64_or("roughness", 0.3, Range::between(0.03, 1.0));
+        (roughness, table.f64_or("ior", 1.5, Range::between(1.01, 4.0)))
+    });
+    table.finish();
+    Some(MaterialPlan { albedo, coat })
+}
+
+/// The material that a table names under `material`, or a diffuse one of its `albedo`.
+pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<MaterialPlan> {
+    let albedo = table.rgb("albedo", Range::UNIT);
+    let Some(name) = table.string("material") else {
+        return Some(MaterialPlan { albedo: albedo.unwrap_or([0.5; 3]), coat: None });
+    };
+    if albedo.is_some() {
+        table.error_at("albedo", "give `material` or `albedo`, not both", None);
+    }
+    match materials.get(name) {
+        Some(material) => material.clone(),
+        None => {
+            let (message, hint) = unknown_name("material", name, materials.keys().map(String::as_str));
+            table.error_at("material", message, Some(&hint));
+            None
+        }
+    }
+}
+
+impl MaterialPlan {
+    /// Adds it to the scene's materials, if it is not there yet, and gives its place.
+    pub(super) fn make(self, made: &mut Vec<(Self, Material)>) -> usize {
+        if let Some(place) = made.iter().position(|(plan, _)| *plan == self) {
+            return place;
+        }
+        let albedo = Rgb::from(self.albedo);
+        let surface = match self.coat {
+            None => SurfaceMaterial::diffuse(albedo),
+            Some((roughness, ior)) => SurfaceMaterial::coated(albedo, roughness as f32, ior as f32),
+        };
+        let material = Material { surface };
+        made.push((self, material));
+        made.len() - 1
+    }
+}
+
+enum Source {
+    File { path: PathBuf, span: Span, scale: f64, z_up: bool },
+    Shape(&'static str, Mesh),
+}
+
+/// A mesh whose text is sound and whose file is not read yet.
+pub(super) struct MeshPlan {
+    source: Source,
+    smooth: bool,
+    transform: DAffine3,
+    material: MaterialPlan,
+}
+
+/// Reads every `[[mesh]]`.
+pub(super) fn meshes(root: &Reader<'_>, context: &Context<'_>, materials: &Materials) -> Vec<Option<MeshPlan>> {
+    root.tables("mesh").into_iter().map(|table| mesh(table, context, materials)).collect()
+}
+
+fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<MeshPlan> {
+    let transform = placement(&table, context);
+    let material = material_of(&table, materials);
+    let mut smooth = false;
+    let source = match (table.string("path"), table.has("shape")) {
+        (Some(_), true) => {
+            table.error_at("shape", "give `path` or `shape`, not both", None);
+            None
+        }
+        (Some(path), false) => {
+            let span = table.span("path").unwrap_or(table.header());
+            let scale = table.one_of("unit", &UNITS).unwrap_or(context.unit);
+            let z_up = table.one_of_or("up", false, &[("y", false), ("z", true)]);
+            smooth = table.bool_or("smooth", false);
+            Some(Source::File { path: context.resolve(path, span), span, scale, z_up })
+        }
+        (None, true) => shape(&table, context),
+        (None, false) => {
+            if !table.has("path") {
+                let hint =
+                    "path = \"body.obj\", or shape = \"sphere\", \"cylinder\", \"box\", \"plane\" or \"revolution\"";
+                table.error("missing key `path` or `shape` in the mesh", Some(hint));
+            }
+            None
+        }
+    };
+    table.finish();
+    Some(MeshPlan { source: source?, smooth, transform, material: material? })
+}
+
+fn shape(table: &Reader<'_>, context: &Context<'_>) -> Option<Source> {
+    let kinds = ["sphere", "cylinder", "box", "plane", "revolution"].map(|name| (name, name));
+    let kind = table.one_of("shape", &kinds)?;
+    let length = |key: &str| table.required_f64(key, Range::POSITIVE).map(|l| l * context.unit);
+    let segments = |otherwise| table.u64_or("segments", otherwise, 3..=4096) as u32;
+    let mesh = match kind {
+        "sphere" => {
+            let (radius, segments) = (length("radius"), segments(128));
+            Mesh::sphere(radius?, segments)
+        }
+        "cylinder" => {
+            let (radius, height, segments) = (length("radius"), length("height"), segments(128));
+            Mesh::cylinder(radius?, height?, segments)
+        }
+        "box" => {
+            let size = table.required_vec3("size", Range::POSITIVE);
+            Mesh::cuboid(context.position(size?))
+        }
+        "plane" => {
+            let size = table.vec2("size", Range::POSITIVE);
+            if size.is_none() && !table.has("size") {
+                table.error("missing key `size` in the mesh", Some("size = [200, 100], along x and z"));
+            }
+            Mesh::plane(DVec2::from(size?) * context.unit)
+        }
+        _ => {
+            let (profile, segments) = (profile(table, context), segments(128));
+            Mesh::revolution(&profile?, segments)
+        }
+    };
+    Some(Source::Shape(kind, mesh))
+}
+
+/// Radius and height, from the bottom up.
+fn profile(table: &Reader<'_>, context: &Context<'_>) -> Option<Vec<DVec2>> {
+    const HINT: &str = "profile = [[60, 0], [75, 80], [0, 120]]: radius and height, from the bottom up";
+    if !table.has("profile") {
+        table.error("missing key `profile` in the mesh", Some(HINT));
+    }
+    let points = table.pairs("profile", Range::FINITE)?;
+    let points: Vec<DVec2> = points.into_iter().map(|p| DVec2::from(p) * context.unit).collect();
+    let wrong = if points.len() < 2 {
+        "a profile has at least two points"
+    } else if points.iter().any(|p| p.x < 0.0) {
+        "the radius of a profile must be at least 0"
+    } else if points.windows(2).any(|w| w[0] == w[1]) {
+        "two points of the profile fall together"
+    } else {
+        return Some(points);
+    };
+    table.error_at("profile", wrong, Some(HINT));
+    None
+}
+
+impl MeshPlan {
+    /// Reads the file, if there is one, and puts the mesh in its place.
+    pub(super) fn make(self, context: &Context<'_>, materials: &mut Vec<(MaterialPlan, Material)>) -> Option<Object> {
+        let (origin, mut mesh) = match self.source {
+            Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
+            Source::File { path, span, scale, z_up } => {
+                let mut mesh = match obj::read(&path) {
+                    Ok(mesh) => mesh,
+                    Err(error) => {
+                        context.error(span, error.to_string(), None);
+                        return None;
+                    }
+                };
+                let up =
+                    if z_up { DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DAffine3::IDENTITY };
+                mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));
+                if self.smooth && mesh.normals.is_empty() {
+                    mesh.smooth();
+                }
+                (path.display().to_string(), mesh)
+            }
+        };
+        mesh.transform(&self.transform);
+        Some(Object { origin, mesh, material: self.material.make(materials) })
+    }
+}
