@@ -242,3 +242,24 @@ fn where_there_is_no_denoiser_a_message_says_how_to_get_it() {
     assert!(message.contains("set OIDN_DIR to its folder"), "{message}");
     assert_eq!(listing(directory.path()), ["s.toml"]);
 }
+
+#[test]
+fn a_viewer_sees_the_picture_and_a_missing_one_is_no_harm() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let viewer = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut listener.accept().unwrap().0, &mut bytes).unwrap();
+        bytes
+    });
+    let args = ["render", "s.toml", "--spp", "2", "-o", "a.exr", "--display", &address];
+    let run = yarnray(directory.path(), &args).good();
+    assert!(!run.stderr.contains("viewer"), "{}", run.stderr);
+    let bytes = viewer.join().unwrap();
+    assert!(bytes.len() > 48 * 36 * 16 && bytes.windows(6).any(|w| w == b"s.toml"), "{} bytes", bytes.len());
+    // The listener is gone with its thread.
+    let run = yarnray(directory.path(), &args).good();
+    assert!(run.stderr.contains(&format!("warning: the viewer at {address}: ")), "{}", run.stderr);
+}

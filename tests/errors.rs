@@ -220,6 +220,8 @@ fn wrong_options_are_refused() {
         (&["--set", "light.9.radiance=3"], &["--set light.9.radiance=3", "error: "]),
         (&["--set", "render.spp=\"x\""], &["error: `spp`: expected an integer, found a string"]),
         (&["--tone-map", "sepia"], &["invalid value 'sepia' for '--tone-map", "filmic"]),
+        (&["--display", "localhost"], &["invalid value 'localhost' for '--display", "HOST:PORT"]),
+        (&["--display", "localhost:port"], &["--display", "as in localhost:14158"]),
         (&["--nonsense"], &["unexpected argument '--nonsense' found"]),
     ] {
         let all = [&["render", "s.toml", "-o", "o.exr"], args].concat();

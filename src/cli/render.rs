@@ -17,6 +17,7 @@ use crate::{
     render::{
         self, Progress, Rendered, Stop,
         denoise::Denoised,
+        live::LiveView,
         picture::{self, Frame},
     },
     report::{Phases, RunRecord},
@@ -42,6 +43,9 @@ pub(super) struct RenderArgs {
     /// Add a denoised picture, by Open Image Denoise: a layer of an EXR, else a file of its own (x.denoised.png).
     #[arg(long)]
     denoise: bool,
+    /// Show the picture while it is made, in a running tev (its own address is 127.0.0.1:14158).
+    #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
+    display: Option<String>,
     /// Curve of the picture for a screen.
     #[arg(long, value_parser = ["srgb", "filmic"])]
     tone_map: Option<String>,
@@ -96,8 +100,19 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         let interrupt = interrupt_flag();
         let bar = bar(args);
-        let rendered = render::render(&scene, &world, &interrupt, |p| show(&bar, args, p));
+        let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
+        let rendered = render::render(&scene, &world, &interrupt, |p| {
+            show(&bar, args, &p);
+            if let Some(live) = &mut live {
+                live.show(p.film);
+            }
+        });
         bar.finish_and_clear();
+        if let (Some(problem), Some(address)) = (live.and_then(|l| l.finish(&rendered.film)), &args.display)
+            && !args.quiet
+        {
+            eprintln!("warning: the viewer at {address}: {problem}");
+        }
 
         let denoising = Instant::now();
         let denoised = denoiser.map(|d| Denoised::new(&d, &rendered.film)).transpose();
@@ -131,6 +146,15 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
         }
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })
+}
+
+/// An address as the option wants it; who is there is found out later.
+fn host_and_port(text: &str) -> Result<String, String> {
+    let port =
+        text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
+    port.filter(|p| *p > 0)
+        .map(|_| text.to_owned())
+        .ok_or_else(|| "expected HOST:PORT, as in localhost:14158".to_owned())
 }
 
 fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
@@ -186,7 +210,7 @@ fn bar(args: &RenderArgs) -> ProgressBar {
     bar
 }
 
-fn show(bar: &ProgressBar, args: &RenderArgs, p: Progress) {
+fn show(bar: &ProgressBar, args: &RenderArgs, p: &Progress<'_>) {
     let noise = p.noise.map_or(String::new(), |n| format!(", noise {n:.2e}"));
     bar.set_position((p.share * 1000.0) as u64);
     bar.set_message(format!("{} of {} spp{noise}", p.spp, p.spp_end));

@@ -4,6 +4,7 @@
 //! (seed, pixel, sample number) only, so that the picture is the same to the bit for any number of threads.
 
 pub mod denoise;
+pub mod live;
 pub mod picture;
 
 use std::{
@@ -57,7 +58,9 @@ impl Stop {
 
 /// Where a render stands, for a progress display.
 #[derive(Clone, Copy, Debug)]
-pub struct Progress {
+pub struct Progress<'a> {
+    /// What pixels have collected so far.
+    pub film: &'a Film,
     /// Samples per pixel taken so far, and at most to take.
     pub spp: u32,
     /// As `spp`.
@@ -85,7 +88,12 @@ pub struct Rendered {
 
 /// Renders in the calling thread's rayon pool. `interrupt` ends the render after the tiles in work; `progress` is
 /// called after every wave.
-pub fn render(scene: &Scene, world: &World, interrupt: &AtomicBool, mut progress: impl FnMut(Progress)) -> Rendered {
+pub fn render(
+    scene: &Scene,
+    world: &World,
+    interrupt: &AtomicBool,
+    mut progress: impl FnMut(Progress<'_>),
+) -> Rendered {
     let settings = &scene.render;
     let integrator = Integrator::new(scene, world);
     let mut film = Film::new(settings.crop, scene.collected());
@@ -129,7 +137,7 @@ pub fn render(scene: &Scene, world: &World, interrupt: &AtomicBool, mut progress
         };
         let by_time = settings.time.map_or(0.0, |t| elapsed.as_secs_f64() / t);
         let share = (f64::from(done) / f64::from(settings.spp)).max(by_time).min(1.0);
-        progress(Progress { spp: done, spp_end: settings.spp, share, elapsed, noise });
+        progress(Progress { film: &film, spp: done, spp_end: settings.spp, share, elapsed, noise });
         if done >= settings.spp {
             break Stop::Samples;
         }
