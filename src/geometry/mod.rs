@@ -2,6 +2,7 @@
 
 pub mod curve;
 pub mod curve_file;
+pub mod fiber;
 pub mod generate;
 pub mod mesh;
 pub mod obj;

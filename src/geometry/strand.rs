@@ -155,6 +155,53 @@ impl Strands {
         self.first_segments.partition_point(|&first| first <= segment) - 1
     }
 
+    /// The segments of one yarn.
+    pub fn segments_of(&self, yarn: usize) -> std::ops::Range<u32> {
+        self.first_segments[yarn]..self.first_segments[yarn + 1]
+    }
+
+    /// Length of one yarn in scene units, from step to step.
+    pub fn length_of(&self, yarn: usize) -> f64 {
+        const STEPS: u8 = 4;
+        let centre = |segment, k| self.place(segment, f32::from(k) / f32::from(STEPS)).centre;
+        self.segments_of(yarn)
+            .flat_map(|segment| (0..STEPS).map(move |k| (segment, k)))
+            .map(|(segment, k)| f64::from(centre(segment, k).distance(centre(segment, k + 1))))
+            .sum()
+    }
+
+    /// Mean radius of one yarn's control points.
+    pub fn mean_radius_of(&self, yarn: usize) -> f64 {
+        let segments = self.segments_of(yarn);
+        let n = segments.len().max(1) as f64;
+        segments.map(|s| f64::from(self.points[self.segments[s as usize] as usize + 1].w)).sum::<f64>() / n
+    }
+
+    /// Lets the plies' phase follow directions given at every knot of every yarn (one more than its segments), instead of
+    /// turning at an even rate.
+    pub fn align(&mut self, axes: &[Vec<Vec3A>]) {
+        for (yarn, axes) in axes.iter().enumerate() {
+            let segments = self.segments_of(yarn);
+            let Some(first) = segments.clone().next() else { continue };
+            let first = self.segments[first as usize] as usize;
+            let angles: Vec<f32> = (0..=segments.len())
+                .map(|knot| {
+                    let (segment, u) = if knot < segments.len() { (knot, 0.0) } else { (knot - 1, 1.0) };
+                    let place = self.place(segments.start + segment as u32, u);
+                    let axis = axes[knot];
+                    axis.dot(place.tangent.cross(place.normal)).atan2(axis.dot(place.normal))
+                })
+                .collect();
+            for (knot, &angle) in angles.iter().enumerate() {
+                let next = angles.get(knot + 1).copied().unwrap_or(angle);
+                let growth = next - angle;
+                let frame = &mut self.frames[first + 1 + knot];
+                frame.phase = angle;
+                frame.growth = growth - TAU as f32 * (growth / TAU as f32).round();
+            }
+        }
+    }
+
     /// Everything a ray needs to know at `u` (0 to 1) of a segment.
     #[inline]
     pub fn place(&self, segment: u32, u: f32) -> Place {

@@ -1,0 +1,303 @@
+//! Explicit fibres and plies of a yarn: the curves that the aggregated model answers for.
+//!
+//! Where fibres lie in a ply follows Zhao, Luan and Bala, "Fitting Procedural Yarn Models for Realistic Cloth
+//! Rendering", SIGGRAPH 2016: a distribution over the section, a helix, migration towards the axis and back, all on
+//! elliptical plies that wind around the yarn ([`Placement::Measured`]); or the packing that the aggregated model
+//! assumes, discs that do not overlap, even over the section ([`Placement::Regular`]), so that an error of the model can
+//! be told from a difference of the geometry. Fibres that leave the ply are in [`flyaway`].
+//!
+//! Everything is a function of (seed, yarn, ply, fibre). A fibre of a closed yarn begins and ends at the seam, where the
+//! yarn is cut: fibres of real yarn end too.
+
+pub mod flyaway;
+pub mod packing;
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, Vec3, Vec3A, Vec4};
+use rayon::prelude::*;
+
+use super::{
+    curve::{Basis, Curve},
+    section::Place,
+    strand::Strands,
+    tube::{Tubes, spline_through},
+    yarn::{PlyParameters, PlyShape, YarnShape},
+};
+use crate::math::sampler::{Stream, hash2};
+
+/// Where the fibres of a ply lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Placement {
+    /// Discs that do not overlap, at random and even over the ply; rigid along it.
+    Regular,
+    /// As measured by Zhao et al. 2016.
+    Measured(Distribution),
+}
+
+/// The distribution of fibres over a ply's section, and their migration (Zhao et al. 2016, Eqs. 2 to 4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distribution {
+    /// Acceptance is (1 - 2 epsilon) ((e - e^R) / (e - 1))^beta + epsilon at the distance R from the axis.
+    pub epsilon: f64,
+    /// As `epsilon`: 0 is even, more crowds fibres at the axis.
+    pub beta: f64,
+    /// A migrating fibre's distance from the axis lies between these multiples of its own.
+    pub migration: [f64; 2],
+    /// Turns of migration for each turn of the fibre around the ply.
+    pub migration_rate: f64,
+    /// How far a fibre wanders off its helix, standard deviation in fibre radii.
+    pub jitter: f64,
+}
+
+/// How finely curves follow the helices: the farthest they may lie from them, in fibre radii.
+pub const TOLERANCE: f64 = 0.02;
+/// Largest turn of a fibre or ply between two points, radians: beyond, the spline's error is no longer of fourth order.
+const LARGEST_TURN: f64 = 0.8;
+
+/// A yarn at even steps: what the curves wound around it are made from.
+struct Guide {
+    places: Vec<Place>,
+    /// Arc length from the yarn's start, in yarn radii.
+    along: Vec<f64>,
+    /// The yarn's first segment, and the steps on each.
+    first: u32,
+    steps: usize,
+}
+
+/// Points that a guide has on each segment of a yarn whose segments are `length` yarn radii long: the same number for
+/// all, so that the size of the result is known before it is made.
+fn steps_per_segment(length: f64, step: f64) -> usize {
+    ((length / step).ceil()).clamp(1.0, 4096.0) as usize
+}
+
+/// The longest step in yarn radii with which a cubic spline follows curves that turn at `rate` (radians per yarn radius)
+/// at `distance` from their axis to within `tolerance` (both in yarn radii).
+///
+/// A uniform cubic spline through a circle of radius r at steps of angle a misses it by r a^4 / 384.
+fn step_for(rate: f64, distance: f64, tolerance: f64) -> f64 {
+    let turn = (384.0 * tolerance / distance.max(1e-9)).powf(0.25).min(LARGEST_TURN);
+    turn / rate.abs().max(1e-9)
+}
+
+impl Guide {
+    fn new(strands: &Strands, yarn: usize, steps: usize) -> Self {
+        let segments = strands.segments_of(yarn);
+        let n = segments.len() * steps + 1;
+        let (mut places, mut along) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut distance = 0.0;
+        for (i, segment) in segments.clone().enumerate() {
+            for k in usize::from(i > 0)..=steps {
+                let place = strands.place(segment, k as f32 / steps as f32);
+                if let Some(before) = places.last().map(|p: &Place| p.centre) {
+                    distance += f64::from((place.centre - before).length()) / f64::from(place.radius.max(1e-20));
+                }
+                places.push(place);
+                along.push(distance);
+            }
+        }
+        Self { places, along, first: segments.start, steps }
+    }
+
+    /// The place after so many yarn radii along the yarn.
+    fn place_at(&self, strands: &Strands, along: f64) -> Place {
+        let last = self.along.len() - 1;
+        let i = self.along.partition_point(|&a| a <= along).clamp(1, last) - 1;
+        let span = self.along[i + 1] - self.along[i];
+        let t = if span > 0.0 { ((along - self.along[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let step = i as f64 + t;
+        let segment = (i / self.steps) as u32;
+        strands.place(self.first + segment, (step / self.steps as f64 - f64::from(segment)) as f32)
+    }
+
+    /// The point at `at` (yarn radii) of the section at a step.
+    #[inline]
+    fn point(&self, step: usize, at: DVec2) -> Vec3 {
+        let p = &self.places[step];
+        let across = p.tangent.cross(p.normal);
+        (p.centre + p.radius * (at.x as f32 * p.normal + at.y as f32 * across)).into()
+    }
+}
+
+/// The plies of a yarn, wound around its strands.
+pub struct Plies<'a> {
+    strands: &'a Strands,
+    plies: &'a [PlyParameters],
+    shape: &'a YarnShape,
+    /// Steps on each segment of each yarn.
+    steps: Vec<usize>,
+    seed: u32,
+}
+
+impl<'a> Plies<'a> {
+    /// For `strands` whose phases belong to `shape`, made of `plies`. Fibres are random by `seed`.
+    pub fn new(strands: &'a Strands, plies: &'a [PlyParameters], shape: &'a YarnShape, seed: u32) -> Self {
+        let step = plies
+            .iter()
+            .zip(&shape.plies)
+            .map(|(p, s)| {
+                let tolerance = TOLERANCE * p.fiber_radius;
+                let own = f64::from(s.fiber_rate).abs().max(f64::from(shape.ply_rate - s.fiber_rate).abs());
+                step_for(own, p.radius, tolerance).min(step_for(f64::from(shape.ply_rate), p.distance, tolerance))
+            })
+            .fold(f64::MAX, f64::min);
+        let steps = (0..strands.yarns())
+            .map(|yarn| {
+                let segments = strands.segments_of(yarn);
+                let radii = strands.length_of(yarn) / strands.mean_radius_of(yarn);
+                steps_per_segment(radii / segments.len().max(1) as f64, step)
+            })
+            .collect();
+        Self { strands, plies, shape, steps, seed }
+    }
+
+    /// Points of one curve along a yarn.
+    fn points_along(&self, yarn: usize) -> usize {
+        self.strands.segments_of(yarn).len() * self.steps[yarn] + 1
+    }
+
+    /// Control points and segments of all fibres together, before any is made.
+    pub fn fiber_counts(&self) -> (u64, u64) {
+        let fibers: u64 = self.plies.iter().map(|p| u64::from(p.fibers)).sum();
+        self.counts(fibers)
+    }
+
+    /// As [`Self::fiber_counts`], for one curve of each ply.
+    pub fn ply_counts(&self) -> (u64, u64) {
+        self.counts(self.plies.len() as u64)
+    }
+
+    fn counts(&self, curves: u64) -> (u64, u64) {
+        let knots: u64 = (0..self.strands.yarns()).map(|yarn| self.points_along(yarn) as u64).sum();
+        let yarns = self.strands.yarns() as u64;
+        (curves * (knots + 2 * yarns), curves * (knots - yarns))
+    }
+
+    /// Direction from the yarn's axis to a ply at a step, in the section.
+    #[inline]
+    fn axis(&self, place: &Place, ply: &PlyShape) -> DVec2 {
+        let turned = DVec2::from_angle(f64::from(place.phase));
+        turned.rotate(ply.direction.as_dvec2())
+    }
+
+    /// The fibres of one ply in all yarns, and the first of each yarn.
+    pub fn fibers(&self, ply: usize, placement: Placement) -> (Tubes, Vec<u32>) {
+        let per_yarn: Vec<Vec<Vec<Vec4>>> =
+            (0..self.strands.yarns()).into_par_iter().map(|yarn| self.fibers_of(yarn, ply, placement)).collect();
+        let mut first = Vec::with_capacity(per_yarn.len());
+        let mut all = Vec::with_capacity(per_yarn.iter().map(Vec::len).sum());
+        for fibers in per_yarn {
+            first.push(all.len() as u32);
+            all.extend(fibers);
+        }
+        (Tubes::from_chains(Basis::BSpline, &all), first)
+    }
+
+    fn fibers_of(&self, yarn: usize, ply: usize, placement: Placement) -> Vec<Vec<Vec4>> {
+        let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
+        let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
+        let mut stream = Stream::new(hash2(hash2(self.seed, yarn as u32), ply as u32));
+        let start = TAU * f64::from(stream.next());
+        let core = f64::from(shape.core_radius);
+        let own_rate = f64::from(shape.fiber_rate - self.shape.ply_rate);
+        let radius = parameters.fiber_radius as f32;
+        let regular = match placement {
+            Placement::Regular => packing::hard_discs(parameters.fibers, parameters.fiber_radius / core, &mut stream),
+            Placement::Measured(_) => Vec::new(),
+        };
+        let mut knots = Vec::with_capacity(guide.places.len());
+        (0..parameters.fibers as usize)
+            .map(|fiber| {
+                let wander: Box<dyn Fn(f64) -> DVec2> = match placement {
+                    Placement::Regular => {
+                        let at = core * regular[fiber];
+                        Box::new(move |_| at)
+                    }
+                    Placement::Measured(d) => d.wanderer(core, parameters.fiber_radius, own_rate, &mut stream),
+                };
+                knots.clear();
+                knots.extend((0..guide.places.len()).map(|step| {
+                    let place = &guide.places[step];
+                    let along = guide.along[step];
+                    // On the circle that the ply's section becomes; then in the ply's own axes, then in the yarn's.
+                    let q = DVec2::from_angle(start + own_rate * along).rotate(wander(along));
+                    let axis = self.axis(place, shape);
+                    let in_ply = q / shape.stretch.as_dvec2();
+                    guide.point(step, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
+                }));
+                spline_through(&knots, |step| guide.places[step].radius * radius)
+            })
+            .collect()
+    }
+
+    /// One curve for each yarn along the middle of a ply, as wide as the ply, and at each of its points the direction
+    /// from the yarn's axis.
+    pub fn ply_curves(&self, ply: usize) -> Vec<(Curve, Vec<f64>, Vec<Vec3A>)> {
+        let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
+        let wide = (parameters.radius / parameters.aspect.sqrt()) as f32;
+        (0..self.strands.yarns())
+            .into_par_iter()
+            .map(|yarn| {
+                let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
+                let (mut knots, mut axes) = (Vec::new(), Vec::new());
+                for (step, place) in guide.places.iter().enumerate() {
+                    let axis = self.axis(place, shape);
+                    knots.push(guide.point(step, f64::from(shape.distance) * axis));
+                    let across = place.tangent.cross(place.normal);
+                    axes.push(axis.x as f32 * place.normal + axis.y as f32 * across);
+                }
+                let points = spline_through(&knots, |step| guide.places[step].radius * wide);
+                let curve = Curve {
+                    basis: Basis::BSpline,
+                    closed: false,
+                    points: points.iter().map(|p| p.truncate().as_dvec3()).collect(),
+                    radii: None,
+                };
+                (curve, points.iter().map(|p| f64::from(p.w)).collect(), axes)
+            })
+            .collect()
+    }
+}
+
+impl Distribution {
+    /// A fibre drawn from the distribution: where it is in the ply's circle (yarn radii) after so many yarn radii, before
+    /// the ply's own turning. `core` is the radius within which its centre stays.
+    fn wanderer(&self, core: f64, fiber_radius: f64, rate: f64, stream: &mut Stream) -> Box<dyn Fn(f64) -> DVec2> {
+        let d = *self;
+        let e = std::f64::consts::E;
+        let mut own = 0.0;
+        // The chance of refusal is below 1 - epsilon / 2 at the very edge only; a thousand tries never fail in practice.
+        for _ in 0..1000 {
+            own = f64::from(stream.next()).sqrt();
+            let accept = (1.0 - 2.0 * d.epsilon) * ((e - own.exp()) / (e - 1.0)).max(0.0).powf(d.beta) + d.epsilon;
+            if f64::from(stream.next()) < accept {
+                break;
+            }
+        }
+        let angle = TAU * f64::from(stream.next());
+        let start = TAU * f64::from(stream.next());
+        let jitter: [[f64; 2]; 4] = std::array::from_fn(|_| {
+            // Four waves of incommensurable length make a wandering without a visible period.
+            [TAU * f64::from(stream.next()), 0.5 + 2.0 * f64::from(stream.next())]
+        });
+        let [least, most] = d.migration;
+        let amplitude = d.jitter * fiber_radius / 2f64.sqrt();
+        Box::new(move |along| {
+            let turned = rate.abs() * along;
+            let migrated = least + (most - least) * 0.5 * ((d.migration_rate * turned + start).cos() + 1.0);
+            let mut at = DVec2::from_angle(angle) * (own * migrated * core);
+            if amplitude > 0.0 {
+                let wave = |k: usize| (jitter[k][1] * turned.max(0.3 * along) + jitter[k][0]).sin();
+                at += amplitude * DVec2::new(wave(0) + wave(1), wave(2) + wave(3));
+                let reach = at.length();
+                if reach > core {
+                    at *= core / reach;
+                }
+            }
+            at
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

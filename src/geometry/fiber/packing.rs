@@ -1,0 +1,184 @@
+//! Discs at random in a circle that do not overlap.
+
+use glam::DVec2;
+
+use crate::math::sampler::Stream;
+
+/// Area fraction (of fibres in the ply) up to which [`hard_discs`] finds packings without overlap for any number.
+pub const DENSEST: f64 = 0.78;
+
+/// Centres of `count` discs of radius `radius` in a ply, in units of the core radius, within which the centres lie: even
+/// over the core as far as discs that do not overlap can be. Where they do not fit they overlap as little as possible.
+///
+/// Random points are pushed apart until no two overlap, then shaken: a random walk of many steps for each disc in which
+/// steps that would overlap are refused, whose distribution is that of hard discs in equilibrium.
+pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
+    let n = count as usize;
+    let mut centres: Vec<DVec2> = (0..n)
+        .map(|_| {
+            let r = f64::from(stream.next()).sqrt();
+            r * DVec2::from_angle(std::f64::consts::TAU * f64::from(stream.next()))
+        })
+        .collect();
+    if n < 2 {
+        return centres;
+    }
+    let diameter = 2.0 * radius;
+    push_apart(&mut centres, diameter);
+    shake(&mut centres, diameter, stream);
+    centres
+}
+
+/// A grid of cells as wide as a disc.
+struct Grid {
+    cells: Vec<Vec<u32>>,
+    side: i32,
+    inverse: f64,
+}
+
+impl Grid {
+    fn new(centres: &[DVec2], diameter: f64) -> Self {
+        // No finer than a few discs to a cell, however thin they are.
+        let width = diameter.max(2.0 / (centres.len() as f64).sqrt().max(1.0));
+        let side = (2.0 / width).ceil() as i32 + 2;
+        let mut grid = Self { cells: vec![Vec::new(); (side * side) as usize], side, inverse: 1.0 / width };
+        for (i, &c) in centres.iter().enumerate() {
+            let cell = grid.cell(c);
+            grid.cells[cell].push(i as u32);
+        }
+        grid
+    }
+
+    fn place(&self, at: DVec2) -> (i32, i32) {
+        let k = |v: f64| (((v + 1.0) * self.inverse) as i32).clamp(0, self.side - 1);
+        (k(at.x), k(at.y))
+    }
+
+    fn cell(&self, at: DVec2) -> usize {
+        let (x, y) = self.place(at);
+        (y * self.side + x) as usize
+    }
+
+    fn near(&self, at: DVec2) -> impl Iterator<Item = usize> + '_ {
+        let (x, y) = self.place(at);
+        let range = |v: i32| (v - 1).max(0)..=(v + 1).min(self.side - 1);
+        range(y)
+            .flat_map(move |y| range(x).map(move |x| (y * self.side + x) as usize))
+            .flat_map(|cell| self.cells[cell].iter().map(|&i| i as usize))
+    }
+
+    fn move_disc(&mut self, disc: usize, from: DVec2, to: DVec2) {
+        let (a, b) = (self.cell(from), self.cell(to));
+        if a != b {
+            self.cells[a].retain(|&i| i as usize != disc);
+            self.cells[b].push(disc as u32);
+        }
+    }
+}
+
+/// Moves overlapping discs apart, each pair by half of what it overlaps, until none does or nothing more is gained.
+fn push_apart(centres: &mut [DVec2], diameter: f64) {
+    // A little farther than needed, or the last of them would take for ever.
+    let wanted = diameter * 1.005;
+    for round in 0..3000 {
+        let grid = Grid::new(centres, wanted);
+        let mut worst = 0.0f64;
+        let mut moves = vec![DVec2::ZERO; centres.len()];
+        for (i, &c) in centres.iter().enumerate() {
+            for j in grid.near(c) {
+                if j == i {
+                    continue;
+                }
+                let between = c - centres[j];
+                let distance = between.length();
+                if distance < wanted {
+                    let direction = if distance > 1e-12 { between / distance } else { DVec2::from_angle(i as f64) };
+                    moves[i] += 0.5 * (wanted - distance) * direction;
+                    worst = worst.max(1.0 - distance / diameter);
+                }
+            }
+        }
+        if worst <= 0.0 && round > 0 {
+            break;
+        }
+        for (c, m) in centres.iter_mut().zip(moves) {
+            *c = (*c + m).clamp_length_max(1.0);
+        }
+    }
+}
+
+/// Steps of the random walk for each disc.
+const SHAKES: usize = 200;
+
+fn shake(centres: &mut [DVec2], diameter: f64, stream: &mut Stream) {
+    let mut grid = Grid::new(centres, diameter);
+    let n = centres.len() as f64;
+    // A step about as long as the room that a disc has.
+    let spacing = (std::f64::consts::PI / n).sqrt();
+    let reach = (spacing - diameter).max(0.05 * diameter).max(0.02 * spacing);
+    for _ in 0..SHAKES {
+        for i in 0..centres.len() {
+            let step = DVec2::new(f64::from(stream.next()) - 0.5, f64::from(stream.next()) - 0.5);
+            let from = centres[i];
+            let to = from + 2.0 * reach * step;
+            if to.length_squared() > 1.0 {
+                continue;
+            }
+            // Where discs overlap from the start a step is taken if it makes no overlap worse.
+            let free = grid.near(to).filter(|&j| j != i).all(|j| {
+                let there = to.distance_squared(centres[j]);
+                there >= diameter * diameter || there >= from.distance_squared(centres[j])
+            });
+            if free {
+                grid.move_disc(i, from, to);
+                centres[i] = to;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn discs_do_not_overlap_and_fill_the_core_evenly() {
+        for (count, density) in [(2u32, 0.3f64), (33, 0.25), (70, 0.5), (150, 0.7), (1000, 0.6)] {
+            let fiber = (density / f64::from(count)).sqrt();
+            let radius = fiber / (1.0 - fiber);
+            let (mut inner, mut total) = (0.0, 0.0);
+            for seed in 0..(3000 / count).clamp(3, 40) {
+                let discs = hard_discs(count, radius, &mut Stream::new(seed));
+                assert_eq!(discs.len(), count as usize);
+                for (i, a) in discs.iter().enumerate() {
+                    assert!(a.length() <= 1.0 + 1e-12);
+                    for b in &discs[..i] {
+                        let gap = a.distance(*b) / (2.0 * radius);
+                        assert!(gap > 0.999_99, "{count} discs at {density}: {gap}");
+                    }
+                }
+                inner += discs.iter().filter(|d| d.length_squared() < 0.5).count() as f64;
+                total += f64::from(count);
+            }
+            // Half of the core's area holds about half of the centres; discs line up at the wall when dense.
+            let share = inner / total;
+            assert!((0.36..0.56).contains(&share), "{count} discs at {density}: {share}");
+        }
+    }
+
+    #[test]
+    fn too_many_discs_overlap_and_do_not_hang() {
+        for (count, radius) in [(50, 0.5), (3, 10.0), (0, 0.1), (1, 2.0), (400, 1e-9)] {
+            let discs = hard_discs(count, radius, &mut Stream::new(7));
+            assert_eq!(discs.len(), count as usize);
+            assert!(discs.iter().all(|d| d.is_finite() && d.length() <= 1.0 + 1e-12));
+        }
+    }
+
+    #[test]
+    fn a_seed_gives_one_packing() {
+        let make = |seed| hard_discs(40, 0.08, &mut Stream::new(seed));
+        assert_eq!(make(5), make(5));
+        assert_ne!(make(5), make(6));
+    }
+}

@@ -1,0 +1,221 @@
+use std::f64::consts::TAU;
+
+use glam::{DVec3, Vec3A};
+
+use super::{flyaway::Flyaways, *};
+use crate::geometry::{
+    curve::Curve,
+    strand::StrandOptions,
+    yarn::{tests::touching_yarn, touching_plies},
+};
+
+fn plies(count: u32, fibers: u32, density: f64, twist: f64) -> Vec<PlyParameters> {
+    let (radius, distance) = touching_plies(count);
+    (0..count)
+        .map(|k| PlyParameters {
+            radius,
+            aspect: 1.0,
+            distance,
+            angle: TAU * f64::from(k) / f64::from(count),
+            fibers,
+            fiber_radius: radius * (density / f64::from(fibers)).sqrt(),
+            fiber_twist: twist,
+        })
+        .collect()
+}
+
+/// A yarn of radius 0.5 bent to an arch.
+fn arch(shape: &YarnShape) -> Strands {
+    let points = (0..40)
+        .map(|i| {
+            let t = f64::from(i) / 39.0 * 2.0;
+            DVec3::new(6.0 * t.cos(), 6.0 * t.sin(), 0.4 * t)
+        })
+        .collect();
+    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None };
+    let options = StrandOptions {
+        basis: Basis::BSpline,
+        tolerance: 0.002,
+        longest_segment: 1.5,
+        ply_rate: f64::from(shape.ply_rate),
+        symmetry: shape.symmetry,
+        phases: vec![0.3],
+    };
+    Strands::new(&[(curve, vec![0.5; 40])], &options)
+}
+
+/// Where a point lies in the section of the nearest place of a yarn: the place, and the point in yarn radii from it.
+fn locate(strands: &Strands, point: Vec3A) -> (Place, DVec2) {
+    let place = strands
+        .segments_of(0)
+        .flat_map(|s| (0..64).map(move |k| (s, k as f32 / 64.0)))
+        .map(|(s, u)| strands.place(s, u))
+        .min_by(|a, b| (a.centre - point).length().total_cmp(&(b.centre - point).length()))
+        .unwrap();
+    let off = (point - place.centre) / place.radius;
+    let across = place.tangent.cross(place.normal);
+    (place, DVec2::new(f64::from(off.dot(place.normal)), f64::from(off.dot(across))))
+}
+
+#[test]
+fn fibers_stay_in_their_ply_and_turn_as_the_model_says() {
+    let (twist, count) = (-19f64.to_radians(), 33);
+    let shape = touching_yarn(3, count, 0.4, 13f64.to_radians(), twist);
+    let parameters = plies(3, count, 0.4, twist);
+    let strands = arch(&shape);
+    let made = Plies::new(&strands, &parameters, &shape, 1);
+    let (tubes, first) = made.fibers(1, Placement::Regular);
+    assert_eq!((tubes.count(), first.as_slice()), (count as usize, &[0][..]));
+    let (points, segments) = made.fiber_counts();
+    assert_eq!(points, 3 * tubes.points().len() as u64);
+    assert_eq!(segments, 3 * tubes.segments().len() as u64);
+    let ply = &shape.plies[1];
+    for segment in (0..tubes.segments().len() as u32).step_by(17) {
+        let at = tubes.place(segment, 0.5);
+        assert!((f64::from(at.radius) - 0.5 * parameters[1].fiber_radius).abs() < 1e-6);
+        let (place, p) = locate(&strands, at.centre);
+        let axis = made.axis(&place, ply);
+        let in_ply = p - f64::from(ply.distance) * axis;
+        assert!(in_ply.length() < f64::from(ply.core_radius) * 1.002, "{in_ply}");
+        // The tangent that the aggregated model takes for this place.
+        let model = crate::geometry::yarn::fiber_tangent(
+            ply,
+            shape.ply_rate,
+            (f64::from(ply.distance) * axis).as_vec2(),
+            axis.as_vec2(),
+            p.as_vec2(),
+        );
+        let across = place.tangent.cross(place.normal);
+        // A fibre on the outside of a bend has farther to go.
+        let bend = place.curvature * place.radius;
+        let stretch = 1.0 - p.x as f32 * bend.dot(place.normal) - p.y as f32 * bend.dot(across);
+        let want = (model.x * place.normal + model.y * across + stretch * place.tangent).normalize();
+        assert!(at.tangent.dot(want) > 0.9995, "{} {want}", at.tangent);
+    }
+}
+
+#[test]
+fn regular_fibers_do_not_cut_through_each_other() {
+    let shape = touching_yarn(1, 40, 0.5, 0.0, 0.3);
+    let parameters = plies(1, 40, 0.5, 0.3);
+    let strands = arch(&shape);
+    let (tubes, _) = Plies::new(&strands, &parameters, &shape, 4).fibers(0, Placement::Regular);
+    let per_fiber = tubes.segments().len() / 40;
+    let middle = |fiber: usize| tubes.place((fiber * per_fiber + per_fiber / 2) as u32, 0.0);
+    for i in 0..40 {
+        for j in 0..i {
+            let gap = middle(i).centre.distance(middle(j).centre) / (2.0 * middle(i).radius);
+            assert!(gap > 0.99, "fibres {i} and {j}: {gap}");
+        }
+    }
+}
+
+#[test]
+fn elliptical_plies_keep_their_short_axis_towards_the_yarn() {
+    let shape_of = |parameters: &[PlyParameters]| YarnShape::new(parameters, 0.25, true);
+    let mut parameters = plies(2, 60, 0.3, -0.4);
+    for p in &mut parameters {
+        p.aspect = 0.6;
+        p.radius = 0.4;
+    }
+    let shape = shape_of(&parameters);
+    let strands = arch(&shape);
+    let made = Plies::new(&strands, &parameters, &shape, 2);
+    let (tubes, _) = made.fibers(0, Placement::Regular);
+    let ply = &shape.plies[0];
+    let (mut short, mut long) = (0.0f64, 0.0f64);
+    for segment in (0..tubes.segments().len() as u32).step_by(7) {
+        let (place, p) = locate(&strands, tubes.place(segment, 0.3).centre);
+        let axis = made.axis(&place, ply);
+        let q = p - f64::from(ply.distance) * axis;
+        short = short.max(q.dot(axis).abs());
+        long = long.max(q.dot(axis.perp()).abs());
+    }
+    let core = f64::from(ply.core_radius);
+    assert!((short / (core * 0.6f64.sqrt()) - 1.0).abs() < 0.06, "{short}");
+    assert!((long / (core / 0.6f64.sqrt()) - 1.0).abs() < 0.06, "{long}");
+}
+
+#[test]
+fn measured_fibers_crowd_at_the_axis_and_migrate() {
+    let shape = touching_yarn(1, 400, 0.3, 0.0, 0.35);
+    let parameters = plies(1, 400, 0.3, 0.35);
+    let strands = arch(&shape);
+    let made = Plies::new(&strands, &parameters, &shape, 3);
+    let radii = |beta: f64, migration: [f64; 2], segment_of: &dyn Fn(usize) -> usize| -> Vec<f64> {
+        let d = Distribution { epsilon: 0.0, beta, migration, migration_rate: 1.0, jitter: 0.0 };
+        let (tubes, _) = made.fibers(0, Placement::Measured(d));
+        let per = tubes.segments().len() / 400;
+        (0..400)
+            .map(|i| {
+                let segment = segment_of(i).min(per - 1);
+                locate(&strands, tubes.place((i * per + segment) as u32, 0.5).centre).1.length()
+            })
+            .collect()
+    };
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let even = mean(&radii(0.0, [1.0, 1.0], &|_| 5)) / f64::from(shape.plies[0].core_radius);
+    let crowded = mean(&radii(1.5, [1.0, 1.0], &|_| 5)) / f64::from(shape.plies[0].core_radius);
+    assert!((even - 2.0 / 3.0).abs() < 0.03, "even: {even}");
+    assert!(crowded < 0.55, "crowded: {crowded}");
+    let (a, b) = (radii(0.0, [0.5, 1.0], &|_| 4), radii(0.0, [0.5, 1.0], &|_| 9));
+    let moved = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 0.05).count();
+    assert!(moved > 150, "{moved} fibres of 400 migrate");
+}
+
+#[test]
+fn flyaways_are_as_many_and_reach_as_far_as_asked() {
+    let shape = touching_yarn(3, 30, 0.3, 0.2, -0.3);
+    let parameters = plies(3, 30, 0.3, -0.3);
+    let strands = arch(&shape);
+    let made = Plies::new(&strands, &parameters, &shape, 9);
+    let of = Flyaways {
+        hair_density: 2.0,
+        hair_start: [0.4, 0.02],
+        hair_rise: [0.5, 0.05],
+        hair_length: [0.8, 0.2],
+        hair_turn: [0.3, 0.1],
+        loop_density: 1.0,
+        loop_height: [0.7, 0.05],
+        loop_turns: 0.5,
+    };
+    let (tubes, first) = made.flyaways(2, &of);
+    let length = strands.length_of(0) / 0.5;
+    assert!((tubes.count() as f64 - 3.0 * length).abs() <= 2.0, "{} over {length}", tubes.count());
+    assert_eq!(first, [0]);
+    let far = (0..tubes.segments().len() as u32)
+        .map(|s| locate(&strands, tubes.place(s, 1.0).centre).1.length())
+        .fold(0.0, f64::max);
+    assert!((1.0..2.2).contains(&far), "{far}");
+    let none = Flyaways { hair_density: 0.0, loop_density: 0.0, ..of };
+    assert!(made.flyaways(0, &none).0.count() <= 1);
+}
+
+#[test]
+fn the_same_seed_makes_the_same_fibers() {
+    let shape = touching_yarn(2, 20, 0.3, 0.2, -0.3);
+    let parameters = plies(2, 20, 0.3, -0.3);
+    let strands = arch(&shape);
+    let points = |seed| Plies::new(&strands, &parameters, &shape, seed).fibers(1, Placement::Regular).0.points().to_vec();
+    assert_eq!(points(1), points(1));
+    assert_ne!(points(1), points(2));
+}
+
+#[test]
+fn ply_curves_run_through_the_middle_of_their_plies() {
+    let shape = touching_yarn(3, 33, 0.3, 0.25, -0.3);
+    let parameters = plies(3, 33, 0.3, -0.3);
+    let strands = arch(&shape);
+    let made = Plies::new(&strands, &parameters, &shape, 1);
+    let curves = made.ply_curves(2);
+    assert_eq!(curves.len(), 1);
+    let (curve, radii, axes) = &curves[0];
+    assert!((radii[3] - 0.5 * parameters[2].radius).abs() < 1e-6);
+    let tubes = Tubes::new(&[(curve.clone(), radii.clone())]);
+    assert_eq!(axes.len(), tubes.segments().len() + 1);
+    for segment in 0..tubes.segments().len() as u32 {
+        let (place, p) = locate(&strands, tubes.place(segment, 0.5).centre);
+        let want = f64::from(shape.plies[2].distance) * made.axis(&place, &shape.plies[2]);
+        assert!((p - want).length() < 0.03, "{p} {want}");
+    }
+}
