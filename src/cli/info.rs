@@ -14,7 +14,7 @@ use crate::{
     },
     plan::Plan,
     scene::{Fabric, Scene, Thread},
-    trace::World,
+    trace::{self, Estimate},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -38,7 +38,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let is_scene = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let (report, text) = if is_scene {
         let scene = args.options.load(&args.file)?;
-        scene_report(&scene)?
+        scene_report(&scene)
     } else {
         let set =
             curve_file::read(&args.file, &ReadOptions::default()).map_err(|e| Failure::Input(format!("error: {e}")))?;
@@ -97,10 +97,9 @@ fn length(fabric: &Fabric) -> f64 {
     fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
 }
 
-fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
-    // Building is the surest estimate, and takes less time than any picture.
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let (world, _) = World::new(scene, threads)?;
+fn scene_report(scene: &Scene) -> (Value, String) {
+    let estimates = trace::estimates(scene);
+    let total: Estimate = estimates.iter().copied().sum();
     let plan = Plan::new(scene);
     let render = &scene.render;
     let (low, high) = scene.bounds().map_or((DVec3::ZERO, DVec3::ZERO), |(a, b)| (a + scene.middle, b + scene.middle));
@@ -108,16 +107,15 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
     let fabrics: Vec<Value> = scene
         .fabrics
         .iter()
-        .enumerate()
-        .map(|(index, f)| {
+        .zip(&estimates)
+        .map(|(f, estimate)| {
             let (kind, number, name) = match f.thread {
                 Thread::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
                 Thread::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
             };
             json!({
                 "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
-                "segments": world.of_fabric(index).map(|t| t.curves().2.len()).sum::<usize>(),
-                "length_mm": length(f), "tight_bends": world.tight_bends().filter(|(at, _)| *at == index).count(),
+                "segments": estimate.segments, "length_mm": length(f), "tight_bends": estimate.tight_bends,
             })
         })
         .collect();
@@ -130,7 +128,7 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
         "image": {"width": render.width, "height": render.height, "spp": render.spp},
         "fabrics": fabrics,
         "bounds_mm": [list(low), list(high)],
-        "memory": {"geometry_bytes": world.geometry_bytes(), "bvh_bytes": world.bvh_bytes()},
+        "memory": {"geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes},
         "pixels": pixels,
         "used": reasons(true), "left_out": reasons(false),
         "warnings": scene.warnings,
@@ -144,7 +142,7 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
         render.mode.name(),
         render.model.name()
     );
-    for (index, f) in scene.fabrics.iter().enumerate() {
+    for (f, estimate) in scene.fabrics.iter().zip(&estimates) {
         let what = match f.thread {
             Thread::Yarn(yarn) => {
                 let yarn = &scene.yarns[yarn];
@@ -153,18 +151,18 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
             Thread::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
         };
         text += &format!(
-            "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments made\n",
+            "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
             f.origin,
             f.curves.len(),
             length(f) / 1000.0,
             f.control_points(),
-            world.of_fabric(index).map(|t| t.curves().2.len()).sum::<usize>()
+            estimate.segments
         );
     }
     text += &format!(
-        "  memory    curves {}, BVH {}\n",
-        bytes_in_words(world.geometry_bytes()),
-        bytes_in_words(world.bvh_bytes())
+        "  memory    about {} of curves, {} of BVH\n",
+        bytes_in_words(total.geometry_bytes),
+        bytes_in_words(total.bvh_bytes)
     );
     for used in [true, false] {
         text += if used { "  used\n" } else { "  left out\n" };
@@ -175,5 +173,5 @@ fn scene_report(scene: &Scene) -> Result<(Value, String), Failure> {
     for warning in &scene.warnings {
         text += &format!("  warning   {warning}\n");
     }
-    Ok((report, text))
+    (report, text)
 }

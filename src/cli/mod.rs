@@ -18,6 +18,7 @@ use crate::{
         document::Value,
         load::{LoadError, LoadOptions, load},
     },
+    trace::BuildError,
 };
 
 /// A renderer for knitted and woven cloth: yarns are curves, an analytic model answers for their fibres.
@@ -71,9 +72,15 @@ impl From<crate::image::ImageError> for Failure {
     }
 }
 
-impl From<crate::ffi::embree::EmbreeError> for Failure {
-    fn from(error: crate::ffi::embree::EmbreeError) -> Self {
-        Self::Input(format!("error: {error}"))
+impl From<BuildError> for Failure {
+    fn from(error: BuildError) -> Self {
+        let hint = match &error {
+            BuildError::Embree(_) => "",
+            BuildError::Memory { .. } => {
+                "\n  hint: --max-memory GIGABYTES allows more; fewer yarns, or --mode yarn, take less"
+            }
+        };
+        Self::Input(format!("error: {error}{hint}"))
     }
 }
 
@@ -139,6 +146,9 @@ struct SceneArgs {
     /// Threads; all cores if not given.
     #[arg(long, short = 'j', value_name = "N")]
     threads: Option<u32>,
+    /// Refuse scenes whose curves and BVH would take more than so many gigabytes.
+    #[arg(long, value_name = "GIGABYTES")]
+    max_memory: Option<f64>,
     /// Start of all random numbers.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
@@ -195,6 +205,7 @@ impl SceneArgs {
             ("max_bounces", count(self.max_bounces)),
             ("threads", count(self.threads)),
             ("seed", count(self.seed)),
+            ("max_memory", number(self.max_memory)),
         ] {
             set(key, value, shown);
         }

@@ -55,6 +55,7 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
             Thread::Fiber(i) => of_fabric("fiber", &scene.fibers[i].0),
         }
         of_fabric("phase", &fabric.phases);
+        of_fabric("seed", &fabric.seed);
         of_fabric("curves", &curves(fabric));
         of_fabric("curve_basis", &fabric.basis);
         of_fabric("curve_tolerance", &(fabric.tolerance, fabric.longest_segment));

@@ -21,6 +21,7 @@ pub use light::Light;
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        fiber::{Placement, flyaway::Flyaways},
         mesh::Mesh,
         yarn::{PlyParameters, YarnShape},
     },
@@ -33,11 +34,15 @@ use crate::{
 pub enum Mode {
     /// Yarns are curves; plies and fibres are found analytically.
     Yarn,
+    /// Plies are curves; the fibres in them are found analytically.
+    Ply,
+    /// Every fibre is a curve: the reference.
+    Fiber,
 }
 
 impl Mode {
     /// Every mode with its name in files and on the command line.
-    pub const NAMES: [(&'static str, Self); 1] = [("yarn", Self::Yarn)];
+    pub const NAMES: [(&'static str, Self); 3] = [("yarn", Self::Yarn), ("ply", Self::Ply), ("fiber", Self::Fiber)];
 
     /// The name in files and on the command line.
     pub fn name(self) -> &'static str {
@@ -117,6 +122,8 @@ pub struct RenderSettings {
     pub seed: u32,
     /// Smaller or faster BVH.
     pub compact_bvh: bool,
+    /// Bytes that curves and BVH may take; `None` for no limit.
+    pub max_memory: Option<u64>,
 }
 
 /// Layers of an EXR beside the picture and its alpha.
@@ -192,6 +199,10 @@ pub struct Yarn {
     pub ply_twist: f64,
     /// The fibre of each ply: name and material.
     pub fibers: Vec<(String, FiberMaterial)>,
+    /// Where explicit fibres lie.
+    pub placement: Placement,
+    /// Fibres that leave the plies.
+    pub flyaways: Option<Flyaways>,
     /// Whether rays see plies as tilted cylinders; false is the paper's perpendicular section.
     pub tilted: bool,
 }
@@ -225,6 +236,8 @@ pub struct Fabric {
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
+    /// Start of what is random in it: where explicit fibres lie.
+    pub seed: u32,
     /// The basis for Embree.
     pub basis: Basis,
     /// How far a resampled curve may lie from the given one, in yarn radii; 0 keeps the given points.

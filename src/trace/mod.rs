@@ -4,6 +4,7 @@
 //! are told), allocate nothing and may be called in any order. Exit hits never count: Embree as built by Debian does
 //! not cull the back faces of curves, and a ray born inside a yarn must leave it.
 
+mod build;
 mod filter;
 mod mesh;
 
@@ -15,21 +16,24 @@ use std::{
 use glam::{Vec3A, Vec4};
 
 use crate::{
-    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, EmbreeError, RawHit, Ray, SceneBuilder},
+    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, Ray, SceneBuilder},
     geometry::{
         curve::Basis,
         section::{Crossings, Section},
-        strand::{StrandOptions, Strands, TightBend},
+        strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
+        yarn::YarnShape,
     },
     scattering::{
         aggregated::AggregatedYarn,
-        fiber::FiberBcsdf,
+        fiber::{FiberBcsdf, FiberMaterial},
         lobes::{ChordModel, ChordYarn},
         yarn::YarnScatterer,
     },
-    scene::{Fabric, Model, Scene, Thread, Yarn},
+    scene::{Model, Scene, Yarn},
 };
+use build::Preparation;
+pub use build::{BuildError, Estimate};
 use filter::{GapFilter, ShadowFilter};
 pub use mesh::SurfacePlace;
 use mesh::TriangleMesh;
@@ -121,22 +125,17 @@ impl World {
     /// Prepares the scene's curves and builds Embree's BVH with `threads` threads.
     ///
     /// # Errors
-    /// What Embree says, mostly that memory is short.
-    pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), EmbreeError> {
+    /// What Embree says, mostly that memory is short; or that the scene would take more than it may.
+    pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
         let started = Instant::now();
-        let mut threads_made = Vec::new();
-        for (index, fabric) in scene.fabrics.iter().enumerate() {
-            threads_made.push(match fabric.thread {
-                Thread::Yarn(yarn) => Threads::Yarns(Weave::new(index, fabric, &scene.yarns[yarn], scene.render.model)),
-                Thread::Fiber(fiber) => Threads::Fibers(Fleece {
-                    fabric: index,
-                    ply: 0,
-                    first_tubes: Vec::new(),
-                    tubes: Tubes::new(&fabric.curves),
-                    fiber: FiberBcsdf::new(&scene.fibers[fiber].1),
-                }),
-            });
+        let preparation = Preparation::new(scene);
+        let needed: Estimate = preparation.estimates().sum();
+        if let Some(limit) = scene.render.max_memory
+            && needed.bytes() > limit
+        {
+            return Err(BuildError::Memory { needed, limit });
         }
+        let threads_made = preparation.threads();
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
         let started = Instant::now();
@@ -273,33 +272,23 @@ impl Threads {
     }
 }
 
-impl Weave {
-    fn new(index: usize, fabric: &Fabric, yarn: &Yarn, model: Model) -> Self {
-        let scatterer = scatterer(yarn, model);
-        let shape = scatterer.shape();
-        let strands = Strands::new(
-            &fabric.curves,
-            &StrandOptions {
-                basis: fabric.basis,
-                tolerance: fabric.tolerance,
-                longest_segment: fabric.longest_segment,
-                ply_rate: f64::from(shape.ply_rate),
-                symmetry: shape.symmetry,
-                phases: fabric.phases.clone(),
-            },
-        );
-        Self { fabric: index, first_ply: 0, strands, yarn: scatterer }
-    }
+/// What the curves of each fabric will take, without making them.
+pub fn estimates(scene: &Scene) -> Vec<Estimate> {
+    Preparation::new(scene).estimates().collect()
 }
 
 /// A yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
     let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
-    let chord = |model| YarnScatterer::Chord(ChordYarn::new(yarn.shape(), &materials, model));
-    match model {
-        Model::Aggregated => YarnScatterer::Aggregated(AggregatedYarn::new(yarn.shape(), &materials)),
-        Model::TwoStream => chord(ChordModel::TwoStream),
-        Model::Paper => chord(ChordModel::Paper),
-        Model::Printed => chord(ChordModel::Printed),
-    }
+    yarn_scatterer(yarn.shape(), &materials, model)
+}
+
+fn yarn_scatterer(shape: YarnShape, materials: &[&FiberMaterial], model: Model) -> YarnScatterer {
+    let chord = match model {
+        Model::Aggregated => return YarnScatterer::Aggregated(AggregatedYarn::new(shape, materials)),
+        Model::TwoStream => ChordModel::TwoStream,
+        Model::Paper => ChordModel::Paper,
+        Model::Printed => ChordModel::Printed,
+    };
+    YarnScatterer::Chord(ChordYarn::new(shape, materials, chord))
 }

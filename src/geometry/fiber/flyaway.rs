@@ -45,10 +45,23 @@ pub struct Flyaways {
 
 /// Points of a hair: it is nearly straight.
 const HAIR_POINTS: usize = 9;
+fn loop_points(of: &Flyaways) -> usize {
+    (LOOP_POINTS * of.loop_turns.max(0.5)).ceil() as usize
+}
+
 /// Points of a loop for each of its turns.
 const LOOP_POINTS: f64 = 14.0;
 
 impl Plies<'_> {
+    /// Control points and segments of all fly-aways to be expected.
+    pub fn flyaway_counts(&self, of: &Flyaways) -> (u64, u64) {
+        let lengths = (0..self.strands.yarns()).map(|y| self.strands.length_of(y) / self.strands.mean_radius_of(y));
+        let plies = self.plies.len() as f64 * lengths.sum::<f64>();
+        let (hairs, loops) = (of.hair_density * plies, of.loop_density * plies);
+        let knots = hairs * HAIR_POINTS as f64 + loops * loop_points(of) as f64;
+        ((knots + 2.0 * (hairs + loops)) as u64, (knots - hairs - loops) as u64)
+    }
+
     /// The fly-aways of one ply in all yarns, and the first of each yarn.
     pub fn flyaways(&self, ply: usize, of: &Flyaways) -> (Tubes, Vec<u32>) {
         let per_yarn: Vec<Vec<Vec<Vec4>>> =
@@ -119,7 +132,7 @@ impl Plies<'_> {
                     let r = inside + (height - inside) * (PI * t).sin().powi(2);
                     (along, DVec2::from_angle(angle + own_rate * run * t) * r)
                 },
-                (LOOP_POINTS * turns.max(0.5)).ceil() as usize,
+                loop_points(of),
             );
         }
         curves

@@ -196,7 +196,8 @@ fn the_same_seed_makes_the_same_fibers() {
     let shape = touching_yarn(2, 20, 0.3, 0.2, -0.3);
     let parameters = plies(2, 20, 0.3, -0.3);
     let strands = arch(&shape);
-    let points = |seed| Plies::new(&strands, &parameters, &shape, seed).fibers(1, Placement::Regular).0.points().to_vec();
+    let points =
+        |seed| Plies::new(&strands, &parameters, &shape, seed).fibers(1, Placement::Regular).0.points().to_vec();
     assert_eq!(points(1), points(1));
     assert_ne!(points(1), points(2));
 }

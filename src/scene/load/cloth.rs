@@ -279,6 +279,7 @@ impl FabricPlan {
             thread,
             curves,
             phases,
+            seed: self.seed,
             basis: detail.basis.unwrap_or(of_file),
             tolerance: detail.tolerance,
             longest_segment: detail.longest_segment,

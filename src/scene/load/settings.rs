@@ -24,6 +24,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         threads: None,
         seed: 0,
         compact_bvh: true,
+        max_memory: None,
     };
     let Some(table) = table else { return Some(defaults) };
     let width = table.u64_or("width", 768, SIZE) as u32;
@@ -56,8 +57,11 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         1 => PixelFilter::Tent(filter_width.unwrap_or(1.0)),
         _ => PixelFilter::Gaussian(filter_width.unwrap_or(0.5)),
     };
+    let mode = table.one_of_or("mode", defaults.mode, &Mode::NAMES);
+    // Explicit fibres scatter dozens of times where a yarn scatters once.
+    let bounces = if mode == Mode::Fiber { 512 } else { 64 };
     Some(RenderSettings {
-        mode: table.one_of_or("mode", defaults.mode, &Mode::NAMES),
+        mode,
         model: table.one_of_or("model", defaults.model, &Model::NAMES),
         width,
         height,
@@ -66,10 +70,11 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         spp: table.u64_or("spp", 64, 1..=u64::from(u32::MAX)) as u32,
         time: table.f64("time", Range::above(0.0)),
         noise: table.f64("noise", Range::above(0.0)),
-        max_bounces: table.u64_or("max_bounces", 64, 0..=1_000_000) as u32,
+        max_bounces: table.u64_or("max_bounces", bounces, 0..=1_000_000) as u32,
         threads: table.u64("threads", 1..=4096).map(|t| t as usize),
         seed: table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32,
         compact_bvh: table.one_of_or("bvh", true, &[("compact", true), ("fast", false)]),
+        max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
     })
 }
 

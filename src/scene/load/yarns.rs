@@ -4,7 +4,13 @@ use std::{collections::BTreeMap, f64::consts::TAU};
 
 use super::{super::Yarn, Context, Range, Reader, TWIST, radians};
 use crate::{
-    geometry::yarn::{MAX_PLIES, PlyParameters, touching_plies},
+    geometry::{
+        fiber::{
+            Distribution, Placement,
+            flyaway::{Flyaways, Spread},
+        },
+        yarn::{MAX_PLIES, PlyParameters, touching_plies},
+    },
     scattering::fiber::FiberMaterial,
     scene::diagnostic::{Sources, unknown_name},
 };
@@ -102,6 +108,65 @@ impl PlyKeys {
     }
 }
 
+/// `[yarn.NAME.packing]`: where explicit fibres lie.
+fn packing(table: Reader<'_>) -> Placement {
+    let measured = table.one_of_or("type", false, &[("regular", false), ("measured", true)]);
+    let distribution = Distribution {
+        epsilon: table.f64_or("epsilon", 0.0, Range::between(0.0, 0.5)),
+        beta: table.f64_or("beta", 0.0, Range::between(0.0, 100.0)),
+        migration: match table.numbers("migration", Range::UNIT).as_deref() {
+            None => [1.0, 1.0],
+            Some(&[least, most]) if least <= most => [least, most],
+            Some(_) => {
+                let hint = "migration = [0.85, 1.0]: the least and the most of a fibre's distance from the ply's axis";
+                table.error_at("migration", "expected two numbers, the smaller first", Some(hint));
+                [1.0, 1.0]
+            }
+        },
+        migration_rate: table.f64_or("migration_rate", 1.0, Range::between(0.0, 100.0)),
+        jitter: table.f64_or("jitter", 0.0, Range::between(0.0, 10.0)),
+    };
+    if !measured {
+        for key in ["epsilon", "beta", "migration", "migration_rate", "jitter"] {
+            if table.has(key) {
+                table.error_at(key, format!("`{key}` is for `type = \"measured\"`"), None);
+                break;
+            }
+        }
+    }
+    table.finish();
+    if measured { Placement::Measured(distribution) } else { Placement::Regular }
+}
+
+/// `[yarn.NAME.flyaways]`: lengths in the scene's unit, as the yarn's radius; counts for each ply and unit of length.
+fn flyaways(table: Reader<'_>, radius: f64) -> Flyaways {
+    let spread = |key: &str, unit: f64, range: Range| -> Spread {
+        match table.numbers(key, range).as_deref() {
+            None => [0.0; 2],
+            Some(&[mean]) => [mean / unit, 0.0],
+            Some(&[mean, deviation]) if deviation >= 0.0 => [mean / unit, deviation / unit],
+            Some(_) => {
+                let message = "expected a mean and a standard deviation";
+                table.error_at(key, message, Some("hair_length = [0.2, 0.05], or one number for all"));
+                [0.0; 2]
+            }
+        }
+    };
+    let density = Range::between(0.0, 1e6);
+    let flyaways = Flyaways {
+        hair_density: table.f64_or("hair_density", 0.0, density) * radius,
+        hair_start: spread("hair_start", radius, Range::at_least(0.0)),
+        hair_rise: spread("hair_rise", radius, Range::FINITE),
+        hair_length: spread("hair_length", radius, Range::FINITE),
+        hair_turn: spread("hair_turn", 1f64.to_degrees(), Range::FINITE),
+        loop_density: table.f64_or("loop_density", 0.0, density) * radius,
+        loop_height: spread("loop_height", radius, Range::at_least(0.0)),
+        loop_turns: table.f64_or("loop_turns", 1.0, Range::above(0.0).and_at_most(100.0)),
+    };
+    table.finish();
+    flyaways
+}
+
 fn yarn(
     name: &str,
     table: Reader<'_>,
@@ -141,6 +206,8 @@ fn yarn(
         table.finish();
         return None;
     };
+    let placement = table.table("packing").map_or(Placement::Regular, packing);
+    let flyaways = table.table("flyaways").map(|t| flyaways(t, radius));
     let (touching, _) = touching_plies(count as u32);
 
     let mut plies = Vec::new();
@@ -231,6 +298,8 @@ fn yarn(
         plies,
         ply_twist: radians(ply_twist),
         fibers: materials,
+        placement,
+        flyaways,
         tilted,
     })
 }

@@ -1,0 +1,297 @@
+//! What stands for the cloth in each mode, and how much memory it takes, known before it is made.
+
+use std::{f64::consts::TAU, fmt, iter::Sum};
+
+use super::{Fleece, Threads, Weave, yarn_scatterer};
+use crate::{
+    ffi::embree::EmbreeError,
+    geometry::{
+        curve::Basis,
+        fiber::Plies,
+        strand::{StrandOptions, Strands},
+        tube::Tubes,
+        yarn::{PlyParameters, YarnShape},
+    },
+    scattering::fiber::FiberBcsdf,
+    scene::{Fabric, Mode, Scene, Thread, Yarn},
+};
+
+/// Bytes of Embree's BVH for a cubic segment: compact and fast, measured on fibres and on yarns.
+const BVH_BYTES: [f64; 2] = [44.0, 119.0];
+/// Bytes of a control point with its radius, of what a yarn keeps beside it, and of a segment's index.
+const POINT_BYTES: u64 = 16;
+/// As `POINT_BYTES`.
+const FRAME_BYTES: u64 = 20;
+/// As `POINT_BYTES`.
+const SEGMENT_BYTES: u64 = 4;
+
+/// Why a scene could not be made ready for rays.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BuildError {
+    /// What Embree said.
+    Embree(EmbreeError),
+    /// It would take more memory than it may.
+    Memory {
+        /// What it would take.
+        needed: Estimate,
+        /// What it may take, bytes.
+        limit: u64,
+    },
+}
+
+impl From<EmbreeError> for BuildError {
+    fn from(error: EmbreeError) -> Self {
+        Self::Embree(error)
+    }
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Embree(error) => error.fmt(f),
+            Self::Memory { needed, limit } => {
+                let gigabytes = |bytes: u64| bytes as f64 / 1e9;
+                write!(
+                    f,
+                    "the scene needs about {:.2} GB ({:.2} GB of curves, {:.2} GB of BVH, {} segments), but may take {:.2} GB",
+                    gigabytes(needed.bytes()),
+                    gigabytes(needed.geometry_bytes),
+                    gigabytes(needed.bvh_bytes),
+                    needed.segments,
+                    gigabytes(*limit)
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+/// What curves will take, and where they cannot be followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Control points.
+    pub points: u64,
+    /// Segments.
+    pub segments: u64,
+    /// Bytes of control points, indices and what is kept for each point.
+    pub geometry_bytes: u64,
+    /// Bytes of Embree's BVH.
+    pub bvh_bytes: u64,
+    /// Yarns that bend more tightly somewhere than their radius allows.
+    pub tight_bends: usize,
+}
+
+impl Sum for Estimate {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            points: a.points + b.points,
+            segments: a.segments + b.segments,
+            geometry_bytes: a.geometry_bytes + b.geometry_bytes,
+            bvh_bytes: a.bvh_bytes + b.bvh_bytes,
+            tight_bends: a.tight_bends + b.tight_bends,
+        })
+    }
+}
+
+impl Estimate {
+    /// All bytes.
+    pub fn bytes(&self) -> u64 {
+        self.geometry_bytes + self.bvh_bytes
+    }
+
+    fn add(&mut self, points: u64, segments: u64, framed: bool, compact: bool) {
+        self.points += points;
+        self.segments += segments;
+        self.geometry_bytes += points * (POINT_BYTES + if framed { FRAME_BYTES } else { 0 }) + segments * SEGMENT_BYTES;
+        self.bvh_bytes += (segments as f64 * BVH_BYTES[usize::from(!compact)]) as u64;
+    }
+}
+
+/// A fabric's yarns with their frames: all that is needed to make any representation of them.
+struct Prepared<'a> {
+    index: usize,
+    fabric: &'a Fabric,
+    of: Of<'a>,
+}
+
+enum Of<'a> {
+    Yarns { yarn: &'a Yarn, shape: Box<YarnShape>, strands: Strands },
+    Fibers { material: FiberBcsdf },
+}
+
+/// A scene's cloth before it is turned into curves for Embree.
+pub(super) struct Preparation<'a> {
+    scene: &'a Scene,
+    fabrics: Vec<Prepared<'a>>,
+}
+
+impl<'a> Preparation<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Self {
+        let fabrics = scene
+            .fabrics
+            .iter()
+            .enumerate()
+            .map(|(index, fabric)| {
+                let of = match fabric.thread {
+                    Thread::Yarn(yarn) => {
+                        let yarn = &scene.yarns[yarn];
+                        let shape = Box::new(yarn.shape());
+                        let strands = strands(fabric, &shape);
+                        Of::Yarns { yarn, shape, strands }
+                    }
+                    Thread::Fiber(fiber) => Of::Fibers { material: FiberBcsdf::new(&scene.fibers[fiber].1) },
+                };
+                Prepared { index, fabric, of }
+            })
+            .collect();
+        Self { scene, fabrics }
+    }
+
+    /// What each fabric will take.
+    pub(super) fn estimates(&self) -> impl Iterator<Item = Estimate> {
+        self.fabrics.iter().map(|prepared| {
+            let mut estimate = Estimate::default();
+            let compact = self.scene.render.compact_bvh;
+            match &prepared.of {
+                Of::Fibers { .. } => {
+                    let curves = &prepared.fabric.curves;
+                    let points: u64 = curves.iter().map(|(c, _)| c.points.len() as u64).sum();
+                    estimate.add(points, points, false, compact);
+                }
+                Of::Yarns { yarn, shape, strands } => {
+                    estimate.tight_bends = strands.tight_bends().len();
+                    let plies = prepared.plies(yarn, shape, strands);
+                    match self.scene.render.mode {
+                        Mode::Yarn => {
+                            let (points, segments) = (strands.points().len(), strands.segments().len());
+                            estimate.add(points as u64, segments as u64, true, compact);
+                        }
+                        Mode::Ply => {
+                            let (points, segments) = plies.ply_counts();
+                            estimate.add(points, segments, true, compact);
+                        }
+                        Mode::Fiber => {
+                            let (points, segments) = plies.fiber_counts();
+                            estimate.add(points, segments, false, compact);
+                        }
+                    }
+                    if let Some(flyaways) = &yarn.flyaways {
+                        let (points, segments) = plies.flyaway_counts(flyaways);
+                        estimate.add(points, segments, false, compact);
+                    }
+                }
+            }
+            estimate
+        })
+    }
+
+    /// The curves for Embree, one entry for each geometry.
+    pub(super) fn threads(self) -> Vec<Threads> {
+        let (mode, model) = (self.scene.render.mode, self.scene.render.model);
+        let mut all = Vec::new();
+        for prepared in self.fabrics {
+            let index = prepared.index;
+            match prepared.of {
+                Of::Fibers { material } => all.push(Threads::Fibers(Fleece {
+                    fabric: index,
+                    ply: 0,
+                    first_tubes: Vec::new(),
+                    tubes: Tubes::new(&prepared.fabric.curves),
+                    fiber: material,
+                })),
+                Of::Yarns { yarn, ref shape, ref strands } => {
+                    let plies = prepared.plies(yarn, shape, strands);
+                    let fleece = |ply: usize, (tubes, first_tubes)| {
+                        let fiber = FiberBcsdf::new(&yarn.fibers[ply].1);
+                        Threads::Fibers(Fleece { fabric: index, ply, first_tubes, tubes, fiber })
+                    };
+                    let slots = 0..yarn.plies.len();
+                    match mode {
+                        Mode::Yarn => {}
+                        Mode::Ply => all.extend(slots.clone().map(|ply| {
+                            let (strands, shape) = ply_strands(&plies, &yarn.plies[ply], shape, ply);
+                            let yarn = yarn_scatterer(shape, &[&yarn.fibers[ply].1], model);
+                            Threads::Yarns(Weave { fabric: index, first_ply: ply, strands, yarn })
+                        })),
+                        Mode::Fiber => {
+                            all.extend(slots.clone().map(|ply| fleece(ply, plies.fibers(ply, yarn.placement))));
+                        }
+                    }
+                    if let Some(flyaways) = &yarn.flyaways {
+                        all.extend(slots.map(|ply| fleece(ply, plies.flyaways(ply, flyaways))));
+                    }
+                    if let (Mode::Yarn, Of::Yarns { shape, strands, .. }) = (mode, prepared.of) {
+                        let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
+                        let yarn = yarn_scatterer(*shape, &materials, model);
+                        all.push(Threads::Yarns(Weave { fabric: index, first_ply: 0, strands, yarn }));
+                    }
+                }
+            }
+        }
+        // A yarn too short to hold a hair leaves nothing for Embree.
+        all.retain(|threads| threads.count() > 0);
+        all
+    }
+}
+
+impl Prepared<'_> {
+    fn plies<'b>(&self, yarn: &'b Yarn, shape: &'b YarnShape, strands: &'b Strands) -> Plies<'b> {
+        Plies::new(strands, &yarn.plies, shape, self.fabric.seed)
+    }
+}
+
+fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
+    Strands::new(
+        &fabric.curves,
+        &StrandOptions {
+            basis: fabric.basis,
+            tolerance: fabric.tolerance,
+            longest_segment: fabric.longest_segment,
+            ply_rate: f64::from(shape.ply_rate),
+            symmetry: shape.symmetry,
+            phases: fabric.phases.clone(),
+        },
+    )
+}
+
+/// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
+fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usize) -> (Strands, YarnShape) {
+    let (mut curves, mut axes) = (Vec::new(), Vec::new());
+    for (curve, radii, along) in plies.ply_curves(slot) {
+        curves.push((curve, radii));
+        axes.push(along);
+    }
+    let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));
+    // A ply at angle alpha is longer than its yarn by 1 / cos(alpha), and its rotation-minimising frame turns with the
+    // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
+    let cos = 1.0 / (wp * ply.distance).hypot(1.0);
+    let wide = ply.radius / ply.aspect.sqrt();
+    let axis_rate = wp * cos * cos * wide;
+    let fiber_rate = (wf - wp) * cos * wide + axis_rate;
+    let parameters = PlyParameters {
+        radius: ply.radius / wide,
+        distance: 0.0,
+        angle: 0.0,
+        fiber_radius: ply.fiber_radius / wide,
+        fiber_twist: (fiber_rate * ply.radius / wide).atan(),
+        ..ply.clone()
+    };
+    let mut shape = YarnShape::new(&[parameters], 0.0, of.tilted);
+    let mut strands = Strands::new(
+        &curves,
+        &StrandOptions {
+            basis: Basis::BSpline,
+            tolerance: 0.0,
+            longest_segment: f64::INFINITY,
+            ply_rate: 0.0,
+            symmetry: TAU,
+            phases: vec![0.0],
+        },
+    );
+    if shape.elliptical {
+        shape.ply_rate = axis_rate as f32;
+        strands.align(&axes);
+    }
+    (strands, shape)
+}
