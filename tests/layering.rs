@@ -27,7 +27,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
 
 /// All that a room takes from the foreign libraries: kept small, so that Embree could be exchanged.
 const FROM_FFI: [(&str, &[&str]); 6] = [
-    ("cli", &["ffi::embree::EmbreeError", "ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
+    ("cli", &["ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
     ("image", &["ffi::oiio", "ffi::oiio::OiioError", "ffi::oiio::is_loaded"]),
     ("integrator", &["ffi::embree::Ray"]),
     ("render", &["ffi::oidn::Denoiser", "ffi::oidn::Guides", "ffi::oidn::OidnError"]),
