@@ -2,7 +2,11 @@
 //! pictures, as text, JSON and pages.
 
 pub mod compare;
+pub mod convergence;
+pub mod machine;
 pub mod page;
+pub mod plot;
+pub mod table3;
 
 use std::time::Duration;
 

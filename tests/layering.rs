@@ -20,8 +20,8 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("film", &["integrator", "math", "scene"]),
     ("render", &["ffi", "film", "image", "integrator", "math", "scene", "trace"]),
     ("plan", &["image", "scene"]),
-    ("report", &["geometry", "image", "plan", "render", "scene", "trace"]),
-    ("experiment", &["geometry", "image", "math", "scattering", "scene", "trace"]),
+    ("report", &["geometry", "image", "math", "plan", "render", "scene", "trace"]),
+    ("experiment", &["film", "geometry", "image", "math", "render", "report", "scattering", "scene", "trace"]),
     ("cli", &["experiment", "ffi", "geometry", "image", "plan", "render", "report", "scene", "trace"]),
 ];
 

@@ -3,6 +3,8 @@
 //! Data that lies beside the project is looked for under `YARNRAY_SHARED`, or `../shared`; what needs it says that it
 //! was skipped where it is absent.
 
+// Table 3's procedure from end to end, resumed, and with mistakes in suites.
+mod bench;
 // What the command line promises: help, info, statistics, outputs, stops, signals, metadata.
 mod cli;
 // What compositors get: parts that add up to the picture, precision and compression.
@@ -11,6 +13,8 @@ mod compositing;
 mod determinism;
 // Two pictures against each other: metrics, masks, thresholds, maps and pages.
 mod compare;
+// Error against run time: files, slopes, converged pictures that are kept.
+mod converge;
 // What bad input is answered with: whole messages, exit status 2, no output.
 mod errors;
 // Pictures against explicit fibres, where the truths lie beside the project.

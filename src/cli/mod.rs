@@ -2,7 +2,9 @@
 //!
 //! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted.
 
+mod bench;
 mod compare;
+mod converge;
 mod info;
 mod render;
 mod scatter;
@@ -41,8 +43,12 @@ const EXAMPLES: &str = "Examples:
 enum Command {
     /// Render a scene.
     Render(render::RenderArgs),
+    /// Measure explicit fibres against aggregated yarns at equal quality: Table 3.
+    Bench(bench::BenchArgs),
     /// Compare two pictures: how far one is from the other, and where.
     Compare(compare::CompareArgs),
+    /// Measure error against run time for modes and models.
+    Converge(converge::ConvergeArgs),
     /// Tell what a scene or curve file holds, and what a render of it uses and leaves out.
     Info(info::InfoArgs),
     /// Measure how a fibre, ply or yarn scatters light.
@@ -95,7 +101,9 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Scatter(args) => scatter::run(&args),
     };

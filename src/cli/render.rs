@@ -166,7 +166,7 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
 }
 
 /// Raised by SIGINT or SIGTERM; a second signal ends the process at once.
-fn interrupt_flag() -> Arc<AtomicBool> {
+pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // Registration fails only for signals that cannot be caught.

@@ -1,4 +1,4 @@
-//! Numbers, not yarns: colours in one register, frames, special functions, sample points, exact sums.
+//! Numbers, not yarns: colours in one register, frames, special functions, sample points, exact sums, small statistics.
 //!
 //! Knows nothing of curves, light or files. `f32` serves rays and directions, `f64` tables and sums.
 
@@ -7,6 +7,7 @@ pub mod frame;
 pub mod rgb;
 pub mod sampler;
 pub mod special;
+pub mod stats;
 pub mod warp;
 
 pub use rgb::Rgb;

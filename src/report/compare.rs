@@ -130,7 +130,7 @@ pub fn to_html(comparison: &Comparison, names: [&str; 2], pictures: [&Picture; 2
         h1 { (names[0]) " against " (names[1]) }
         (table)
         div.row {
-            (page::slider("pictures", names, pictures))
+            (page::slider("pictures", names, pictures, 0.0))
             (page::figure(map, "FLIP (LDR), black 0 to white 1"))
         }
     };

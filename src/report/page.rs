@@ -102,8 +102,9 @@ fn shown_width(picture: &Picture) -> usize {
     picture.width * (480 / picture.width.max(1)).clamp(1, 4)
 }
 
-/// Two pictures of the same size, one over the other, with a line between them that follows the pointer, and an exposure.
-pub fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2]) -> Markup {
+/// Two pictures of the same size, one over the other, with a line between them that follows the pointer, and an exposure
+/// that begins at `stops`.
+pub fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2], stops: f32) -> Markup {
     let (width, height) = (pictures[0].width, pictures[0].height());
     html! {
         figure.slider id=(id) data-width=(width) data-height=(height) {
@@ -112,7 +113,7 @@ pub fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2]) -> Markup {
                 img.source data-side=(side) src=(picture.wide_range_address()) alt="";
             }
             figcaption { span { "◀ " (names[0]) } span { (names[1]) " ▶" } }
-            label { "exposure " input type="range" min="-6" max="6" step="0.25" value="0"; output { "0" } " stops" }
+            label { "exposure " input type="range" min="-10" max="10" step="0.25" value=(stops); output { (stops) } " stops" }
         }
     }
 }
@@ -150,7 +151,7 @@ mod tests {
     #[test]
     fn pages_escape_names_and_stand_alone() {
         let picture = Picture { width: 2, colors: vec![[0.5; 3]; 4] };
-        let body = slider("x", ["<a>", "b & c"], [&picture, &picture]);
+        let body = slider("x", ["<a>", "b & c"], [&picture, &picture], 0.0);
         let page = document("a < b", &body);
         assert!(page.contains("&lt;a&gt;") && page.contains("b &amp; c") && page.contains("<title>a &lt; b</title>"));
         assert!(!page.contains("http"), "nothing is loaded from elsewhere");

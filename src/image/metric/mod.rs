@@ -6,10 +6,13 @@
 //! their pixels, what noise alone would do is said beside what was found.
 
 pub mod flip;
+mod halves;
 pub mod map;
 pub mod ssim;
 
 use std::fmt;
+
+pub use halves::Halves;
 
 use super::Image;
 
@@ -127,35 +130,17 @@ impl Pair {
     /// Both pictures with `factor` x `factor` pixels averaged to one. Only whole boxes are kept; of a box, only pixels
     /// that count are averaged, and it counts if they are at least half of it. `None` where not one box fits.
     pub fn downsampled(&self, factor: usize) -> Option<Self> {
-        let (columns, rows) = (self.width / factor, self.height() / factor);
-        if columns == 0 || rows == 0 {
+        let boxes = Boxes::new(self.width, &self.counted, factor);
+        if boxes.columns == 0 || boxes.rows == 0 {
             return None;
         }
-        let boxes = || (0..rows).flat_map(move |y| (0..columns).map(move |x| (x * factor, y * factor)));
-        let pixels = |x: usize, y: usize| {
-            let all = (0..factor).flat_map(move |dy| (0..factor).map(move |dx| (y + dy) * self.width + x + dx));
-            all.filter(|i| self.counted[*i])
-        };
-        let mean = |colors: &[[f32; 3]], power: i32| -> Vec<[f32; 3]> {
-            boxes()
-                .map(|(x, y)| {
-                    let mut sum = [0.0_f64; 3];
-                    let mut count = 0.0_f64;
-                    for i in pixels(x, y) {
-                        sum = std::array::from_fn(|k| sum[k] + f64::from(colors[i][k]));
-                        count += 1.0;
-                    }
-                    sum.map(|v| (v / count.max(1.0).powi(power)) as f32)
-                })
-                .collect()
-        };
         Some(Self {
-            width: columns,
-            test: mean(&self.test, 1),
-            reference: mean(&self.reference, 1),
-            counted: boxes().map(|(x, y)| 2 * pixels(x, y).count() >= factor * factor).collect(),
+            width: boxes.columns,
+            test: boxes.mean(&self.test, 1),
+            reference: boxes.mean(&self.reference, 1),
+            counted: boxes.counted(),
             // The variance of a mean: the sum over the square of the count.
-            variance: self.variance.as_ref().map(|v| mean(v, 2)),
+            variance: self.variance.as_ref().map(|v| boxes.mean(v, 2)),
             non_finite: self.non_finite,
         })
     }
@@ -164,6 +149,52 @@ impl Pair {
     fn pixels(&self) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> {
         let counted = self.counted.iter().enumerate().filter(|(_, counted)| **counted);
         counted.map(|(i, _)| (i, self.test[i].map(f64::from), self.reference[i].map(f64::from)))
+    }
+}
+
+/// The whole boxes of `factor` x `factor` pixels of a picture, row by row.
+struct Boxes<'a> {
+    width: usize,
+    columns: usize,
+    rows: usize,
+    factor: usize,
+    counted: &'a [bool],
+}
+
+impl<'a> Boxes<'a> {
+    fn new(width: usize, counted: &'a [bool], factor: usize) -> Self {
+        let height = counted.len() / width.max(1);
+        Self { width, columns: width / factor, rows: height / factor, factor, counted }
+    }
+
+    /// The pixels that count of each box.
+    fn pixels(&self) -> impl Iterator<Item = impl Iterator<Item = usize>> {
+        let boxes =
+            (0..self.rows).flat_map(move |y| (0..self.columns).map(move |x| (x * self.factor, y * self.factor)));
+        boxes.map(move |(x, y)| {
+            let all = (y..y + self.factor).flat_map(move |y| (x..x + self.factor).map(move |x| y * self.width + x));
+            all.filter(move |i| self.counted[*i])
+        })
+    }
+
+    /// Sums over boxes, divided by the count of pixels to some power.
+    fn mean(&self, colors: &[[f32; 3]], power: i32) -> Vec<[f32; 3]> {
+        self.pixels()
+            .map(|pixels| {
+                let mut sum = [0.0_f64; 3];
+                let mut count = 0.0_f64;
+                for i in pixels {
+                    sum = std::array::from_fn(|k| sum[k] + f64::from(colors[i][k]));
+                    count += 1.0;
+                }
+                sum.map(|v| (v / count.max(1.0).powi(power)) as f32)
+            })
+            .collect()
+    }
+
+    /// Whether at least half of each box counts.
+    fn counted(&self) -> Vec<bool> {
+        self.pixels().map(|pixels| 2 * pixels.count() >= self.factor * self.factor).collect()
     }
 }
 

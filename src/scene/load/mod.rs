@@ -108,7 +108,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     }
 }
 
-fn read_text(path: &Path) -> Result<String, String> {
+/// The text of a scene, library or suite file.
+///
+/// # Errors
+/// Why there is none, in words that may follow the file's name.
+pub fn read_text(path: &Path) -> Result<String, String> {
     let meta = std::fs::metadata(path).map_err(|e| in_words(&e))?;
     if !meta.is_file() {
         return Err("not a file".to_owned());

@@ -1,0 +1,191 @@
+//! `yarnray bench`
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{Failure, render::interrupt_flag, write_text};
+use crate::{
+    experiment::{
+        converge::{self, ConvergeError},
+        converged::{Converged, LOBES, key},
+        suite::{ConvergePlan, Suite},
+        table3::{self, BenchError, Processes},
+    },
+    image::output,
+    report::{
+        page::Picture,
+        table3::{
+            Row, Table,
+            html::{Plot, RowPictures, page},
+        },
+    },
+    scene::load,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray bench scenes/table3.toml               the whole table, in out/table3/: up to 40 minutes on 2 cores
+  yarnray bench scenes/table3.toml --quick       smaller pictures, a looser target, fewer rows: minutes
+  yarnray bench scenes/table3.toml --row silk    only rows whose name contains this
+
+Writes table.md, table.csv, table.json and report.html (a page that needs nothing else), anew after every row. Begun again, it goes on
+after the last row that was finished; converged pictures are kept in the directory `cache` within. Each render is a process of its own.";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct BenchArgs {
+    /// The suite file.
+    suite: PathBuf,
+    /// Measure what the suite's table [quick] says.
+    #[arg(long)]
+    quick: bool,
+    /// Only rows whose name contains this (repeatable).
+    #[arg(long, value_name = "TEXT")]
+    row: Vec<String>,
+    /// The directory to write to. Default: out/SUITE
+    #[arg(short, long, value_name = "DIRECTORY")]
+    out: Option<PathBuf>,
+    /// Threads of each render; all cores if not given.
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Say nothing of the progress.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
+    let mut suite = Suite::load(&args.suite, args.quick)?;
+    if !args.row.is_empty() {
+        let wanted = |name: &str| args.row.iter().any(|text| name.contains(text.as_str()));
+        suite.cases.retain(|case| wanted(&case.name));
+        suite.missing.retain(|(name, _)| wanted(name));
+        if suite.cases.is_empty() && suite.missing.is_empty() {
+            return Err(Failure::Input(format!("error: no row of {} contains {}", suite.path, args.row.join(" or "))));
+        }
+    }
+    let stem = args.suite.file_stem().map_or("suite".into(), |stem| stem.to_string_lossy().into_owned());
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
+    for name in ["table.md", "table.csv", "table.json", "report.html", "rows/x", "cache/x"] {
+        output::check_target(&out.join(name))?;
+    }
+    let threads = args.threads.map(|threads| threads as usize);
+    let interrupt = interrupt_flag();
+    let say = |text: &str| {
+        if !args.quiet {
+            eprintln!("{text}");
+        }
+    };
+    let mut processes = Processes { threads, scratch: &out, interrupt: &interrupt };
+    let saved = |table: &Table| {
+        write(&out, table, &[]).map_err(|failure| match failure {
+            Failure::Input(message) | Failure::Check(message) => BenchError::Suite(message),
+            Failure::Interrupted => BenchError::Interrupted,
+        })
+    };
+    let table = table3::run(&suite, &mut processes, &out, threads, say, saved).map_err(failure)?;
+    let mut plots = Vec::new();
+    for name in suite.converge.iter().flat_map(|plan| &plan.cases) {
+        if let Some(plan) = &suite.converge
+            && suite.case(name).is_some()
+        {
+            plots.push(plot(&suite, plan, name, &out, threads, &interrupt, say)?);
+        }
+    }
+    write(&out, &table, &plots)?;
+    if !args.quiet {
+        eprintln!("wrote {}", out.join("report.html").display());
+    }
+    print!("{}", table.to_markdown());
+    let failed: Vec<String> = table
+        .missing
+        .iter()
+        .filter(|missing| !suite.missing.iter().any(|(name, _)| *name == missing.name))
+        .map(|missing| format!("{} was not measured: {}", missing.name, missing.reason))
+        .collect();
+    if failed.is_empty() { Ok(()) } else { Err(Failure::Check(failed.join("\n"))) }
+}
+
+fn failure(error: BenchError) -> Failure {
+    match error {
+        BenchError::Case(message) | BenchError::Suite(message) => Failure::Input(message),
+        BenchError::Interrupted => Failure::Interrupted,
+    }
+}
+
+/// Writes the table in all its forms, and the page.
+fn write(out: &Path, table: &Table, plots: &[Plot]) -> Result<(), Failure> {
+    write_text(&out.join("table.md"), &table.to_markdown())?;
+    write_text(&out.join("table.csv"), &table.to_csv())?;
+    write_text(&out.join("table.json"), &table.to_json())?;
+    let pictures: Vec<Option<RowPictures>> = table.rows.iter().map(|row| pictures(out, row)).collect();
+    write_text(&out.join("report.html"), &page(table, &pictures, plots))
+}
+
+/// The pictures of a row; `None` if a file is gone.
+fn pictures(out: &Path, row: &Row) -> Option<RowPictures> {
+    let load = |name: &str| Converged::load(&out.join(name));
+    let mean = |picture: &Converged| Picture { width: picture.halves.width, colors: picture.halves.mean() };
+    let [reference, aggregated] = [load(&row.pictures[0])?, load(&row.pictures[1])?];
+    let width = aggregated.halves.width;
+    let lobes = aggregated.lobes.iter().flatten().zip(LOBES);
+    Some(RowPictures {
+        reference: mean(&reference),
+        aggregated: mean(&aggregated),
+        lobes: lobes.map(|(colors, name)| (name, Picture { width, colors: colors.clone() })).collect(),
+        others: row.others.iter().map(|other| load(&other.picture).as_ref().map(mean)).collect::<Option<_>>()?,
+    })
+}
+
+/// Error against time of one case; kept beside the rows.
+fn plot(
+    suite: &Suite,
+    plan: &ConvergePlan,
+    name: &str,
+    out: &Path,
+    threads: Option<usize>,
+    interrupt: &std::sync::atomic::AtomicBool,
+    say: impl Fn(&str) + Sync,
+) -> Result<Plot, Failure> {
+    let case = suite.case(name).ok_or_else(|| Failure::Input(format!("error: no row is called {name}")))?;
+    let load = |method| load::load(&case.scene, &case.options(suite, method, &[])).map_err(|error| error.to_string());
+    let fingerprint = load(suite.tested).map_err(Failure::Input)?.fingerprint;
+    let settings = format!("{plan:?} {} {} {} {threads:?}", suite.reference, suite.tested, suite.target);
+    let stem = out.join("rows").join(format!("converge-{}", key(&[&fingerprint, &settings])));
+    let [svg_file, text_file] = ["svg", "txt"].map(|extension| stem.with_extension(extension));
+    let kept = std::fs::read_to_string(&svg_file).ok().zip(std::fs::read_to_string(&text_file).ok());
+    if let Some((svg, text)) = kept {
+        return Ok(Plot { caption: text, svg });
+    }
+    say(&format!("{name}: error against time, {} seeds", plan.seeds));
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads.unwrap_or(all);
+    let options = converge::Options {
+        methods: vec![suite.reference, suite.tested],
+        reference: Some(suite.reference),
+        seeds: plan.seeds,
+        spp: plan.spp,
+        seconds: Some(plan.seconds),
+        converged_spp: plan.converged_spp,
+        target: suite.target,
+        threads,
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
+    let result = pool.install(|| converge::run(load, &options, &out.join("cache"), interrupt, &say)).map_err(
+        |error| match error {
+            ConvergeError::Failed(message) => Failure::Input(message),
+            ConvergeError::Interrupted => Failure::Interrupted,
+        },
+    )?;
+    let text = format!(
+        "{name}. Solid: noise, against the method's own converged picture; dashed: noise and model error, against explicit fibres. Bars: 95 % \
+         over {} seeds. {}",
+        plan.seeds,
+        result.to_text().trim_end().replace('\n', "; ")
+    );
+    write_text(&svg_file, &result.to_svg())?;
+    write_text(&text_file, &text)?;
+    Ok(Plot { caption: text, svg: result.to_svg() })
+}

@@ -1,0 +1,120 @@
+//! `yarnray converge`
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Failure, SceneArgs, render::interrupt_flag, write_text};
+use crate::{
+    experiment::{
+        converge::{self, ConvergeError, Options},
+        method::Method,
+    },
+    image::output,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray converge scenes/swatch.toml --method yarn:aggregated --method yarn:two-stream --reference none
+                                        noise of two models against time, in out/converge/
+  yarnray converge scenes/swatch.toml --width 192 --height 144 --spp 255
+                                        explicit fibres and the aggregated model, both against explicit fibres
+  yarnray converge scenes/swatch.toml --target 0.01 --seeds 8 -o out/study
+
+Writes converge.csv, converge.json and converge.svg. Every method is rendered with several seeds; each time the samples have doubled, the
+relMSE (square error / (square of the truth + 0.01)) is taken against the method's own converged picture (noise) and against that of the
+reference (noise and model error), both of independent seeds and without their own noise. Converged pictures are kept in out/cache.";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct ConvergeArgs {
+    /// The scene file.
+    scene: PathBuf,
+    /// Mode, or mode:model, of a curve (repeatable). Default: the reference, and yarn with the scene's model.
+    #[arg(long = "method", value_name = "MODE[:MODEL]", value_parser = Method::parse)]
+    methods: Vec<Method>,
+    /// Mode, or mode:model, whose converged picture counts as true; `none` measures noise only.
+    #[arg(long, value_name = "MODE[:MODEL]|none", default_value = "fiber")]
+    reference: String,
+    /// Renders behind every point, each with its own seed.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    seeds: u32,
+    /// Samples per pixel of each half of a converged picture. Default: twice --spp
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    converged_spp: Option<u32>,
+    /// Error for which times are told.
+    #[arg(long, value_name = "RELMSE", default_value_t = 0.01)]
+    target: f64,
+    /// The directory to write to.
+    #[arg(short, long, value_name = "DIRECTORY", default_value = "out/converge")]
+    out: PathBuf,
+    /// Where converged pictures are kept. Default: the directory `cache` beside the output
+    #[arg(long, value_name = "DIRECTORY")]
+    cache: Option<PathBuf>,
+    /// Say nothing of the progress.
+    #[arg(long, short)]
+    quiet: bool,
+    #[command(flatten)]
+    options: SceneArgs,
+}
+
+pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
+    if !(args.target.is_finite() && args.target > 0.0) {
+        return Err(Failure::Input(format!("error: --target must be above 0, found {}", args.target)));
+    }
+    let reference = match args.reference.as_str() {
+        "none" => None,
+        text => Some(Method::parse(text).map_err(|e| Failure::Input(format!("error: --reference {text}: {e}")))?),
+    };
+    let files = ["converge.csv", "converge.json", "converge.svg"].map(|name| args.out.join(name));
+    for file in &files {
+        output::check_target(file)?;
+    }
+    let cache = args.cache.clone().unwrap_or_else(|| args.out.parent().unwrap_or(&args.out).join("cache"));
+    let load = |method: Method| {
+        let mut options = args.options.clone();
+        options.mode = Some(method.mode.name().to_owned());
+        if let Some(model) = method.model {
+            options.model = Some(model.name().to_owned());
+        }
+        options.load(&args.scene).map_err(|error| error.to_string())
+    };
+    let plain = args.options.load(&args.scene)?;
+    let methods = if args.methods.is_empty() {
+        let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };
+        reference.into_iter().filter(|method| *method != yarn).chain([yarn]).collect()
+    } else {
+        args.methods.clone()
+    };
+    let threads = plain.render.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let options = Options {
+        methods,
+        reference,
+        seeds: args.seeds,
+        spp: plain.render.spp,
+        seconds: plain.render.time,
+        converged_spp: args.converged_spp.unwrap_or_else(|| plain.render.spp.saturating_mul(2)),
+        target: args.target,
+        threads,
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
+    let interrupt = interrupt_flag();
+    let say = |text: &str| {
+        if !args.quiet {
+            eprintln!("{text}");
+        }
+    };
+    let result =
+        pool.install(|| converge::run(load, &options, &cache, &interrupt, say)).map_err(|error| match error {
+            ConvergeError::Failed(message) => Failure::Input(message),
+            ConvergeError::Interrupted => Failure::Interrupted,
+        })?;
+    let json = serde_json::to_string_pretty(&result.to_json()).expect("numbers and text become JSON") + "\n";
+    for (file, text) in files.iter().zip([result.to_csv(), json, result.to_svg()]) {
+        write_text(file, &text)?;
+    }
+    print!("{}", result.to_text());
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! Converged pictures: two halves of independent seeds, kept on disk under a hash of everything that changes them.
+
+use std::{
+    hash::{DefaultHasher, Hash as _, Hasher as _},
+    path::{Path, PathBuf},
+    time::UNIX_EPOCH,
+};
+
+use crate::{
+    image::{
+        self, Attribute, Image, ImageError,
+        exr::{self, ChannelSpec, ExrLayout, Line, Sample},
+        metric::Halves,
+    },
+    render::picture::PART_NAMES,
+};
+
+/// Names of the parts of light that are kept where the picture has them: direct and indirect light by the lobe of its first
+/// scattering at cloth.
+pub const LOBES: [&str; 5] = ["R", "TT", "D", "F", "B"];
+
+/// A converged picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Converged {
+    /// Both halves.
+    pub halves: Halves,
+    /// Samples per pixel of both together.
+    pub spp: f64,
+    /// The relMSE that the sample variance of one half promises, for choosing sample counts.
+    pub half_noise: f64,
+    /// Light by lobe, as [`LOBES`], where it was asked for; of the first half.
+    pub lobes: Option<[Vec<[f32; 3]>; 5]>,
+}
+
+/// One of the halves, as a render gives it.
+#[derive(Clone, Debug)]
+pub struct Half {
+    /// R, G, B, A, and the parts of light if wanted.
+    pub image: Image,
+    /// Samples per pixel.
+    pub spp: f64,
+    /// Estimated relMSE.
+    pub noise: f64,
+}
+
+impl Converged {
+    /// Puts two halves together; `None` if a picture lacks colours.
+    pub fn new(first: &Half, second: &Half) -> Option<Self> {
+        let colors = |image: &Image| {
+            let [r, g, b] = image.rgb()?;
+            Some(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect::<Vec<_>>())
+        };
+        let alpha =
+            |image: &Image| image.channel("A").map_or_else(|| vec![1.0; image.width * image.height], <[f32]>::to_vec);
+        let (a, b) = (alpha(&first.image), alpha(&second.image));
+        let halves = Halves {
+            width: first.image.width,
+            colors: [colors(&first.image)?, colors(&second.image)?],
+            alpha: a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect(),
+        };
+        let (spp, half_noise) = (first.spp + second.spp, 0.5 * (first.noise + second.noise));
+        Some(Self { halves, spp, half_noise, lobes: lobes(&first.image) })
+    }
+
+    /// Reads what [`Self::store`] has written; `None` if there is no such file, or another program has written it.
+    pub fn load(path: &Path) -> Option<Self> {
+        let image = image::read(path).ok()?;
+        let plane = |layer: &str| -> Option<Vec<[f32; 3]>> {
+            let [r, g, b] = image.layer_rgb(layer)?;
+            Some(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect())
+        };
+        let number = |name: &str| match image.attribute(name)? {
+            Attribute::Double(value) => Some(*value),
+            _ => None,
+        };
+        let lobes: Vec<_> = LOBES.iter().filter_map(|name| plane(name)).collect();
+        let colors = [plane("first")?, plane("second")?];
+        // A file that was cut or damaged in a way that EXR does not notice must not become the truth.
+        if colors.iter().flatten().flatten().any(|v| !v.is_finite()) {
+            return None;
+        }
+        Some(Self {
+            halves: Halves { width: image.width, colors, alpha: image.channel("A")?.to_vec() },
+            spp: number("yarnray.spp")?,
+            half_noise: number("yarnray.half_noise")?,
+            lobes: lobes.try_into().ok(),
+        })
+    }
+
+    /// Writes an EXR: the picture as R, G, B, A, the variance of its pixels from the difference of the halves, the layers
+    /// `first` and `second` with the halves, and the lobes.
+    ///
+    /// # Errors
+    /// What writing a file can say.
+    pub fn store(&self, path: &Path) -> Result<(), ImageError> {
+        let (mean, variance) = (self.halves.mean(), self.halves.variance());
+        let mut layers: Vec<(String, &[[f32; 3]])> = vec![
+            (String::new(), &mean),
+            ("variance.".to_owned(), &variance),
+            ("first.".to_owned(), &self.halves.colors[0]),
+            ("second.".to_owned(), &self.halves.colors[1]),
+        ];
+        for (name, colors) in LOBES.iter().zip(self.lobes.iter().flatten()) {
+            layers.push((format!("{name}."), colors));
+        }
+        let names = layers.iter().flat_map(|(layer, _)| ["R", "G", "B"].map(|c| format!("{layer}{c}")));
+        let channels = names.chain(["A".to_owned()]).map(|name| ChannelSpec::new(name, Sample::F32)).collect();
+        let width = self.halves.width;
+        let mut layout = ExrLayout::new(width, mean.len() / width.max(1), channels);
+        layout.attributes = vec![
+            ("yarnray.spp".to_owned(), Attribute::Double(self.spp)),
+            ("yarnray.half_noise".to_owned(), Attribute::Double(self.half_noise)),
+        ];
+        exr::write(path, &layout, |y, lines| {
+            let row = y * width..(y + 1) * width;
+            let planes = layers.iter().flat_map(|(_, colors)| (0..3).map(move |k| (k, *colors)));
+            for (line, plane) in lines.iter_mut().zip(planes.map(Some).chain([None])) {
+                let Line::Float(line) = line else { continue };
+                match plane {
+                    Some((k, colors)) => line.iter_mut().zip(&colors[row.clone()]).for_each(|(out, c)| *out = c[k]),
+                    None => line.copy_from_slice(&self.halves.alpha[row.clone()]),
+                }
+            }
+        })
+    }
+}
+
+/// Direct and indirect light of each lobe together, if the picture has such layers.
+fn lobes(image: &Image) -> Option<[Vec<[f32; 3]>; 5]> {
+    let sums: Option<Vec<Vec<[f32; 3]>>> = LOBES
+        .iter()
+        .map(|lobe| {
+            let mut sum = vec![[0.0; 3]; image.width * image.height];
+            let parts = PART_NAMES.iter().filter(|part| part.split('_').next() == Some(lobe));
+            for part in parts {
+                let [r, g, b] = image.layer_rgb(part)?;
+                for (i, sum) in sum.iter_mut().enumerate() {
+                    *sum = [sum[0] + r[i], sum[1] + g[i], sum[2] + b[i]];
+                }
+            }
+            Some(sum)
+        })
+        .collect();
+    sums?.try_into().ok()
+}
+
+/// The file of a converged picture that everything in `parts` decides, together with the program itself.
+pub fn path(cache: &Path, parts: &[&str]) -> PathBuf {
+    cache.join(format!("{}.exr", key(parts)))
+}
+
+/// A name for everything in `parts` and for this program.
+pub fn key(parts: &[&str]) -> String {
+    let mut hasher = DefaultHasher::new();
+    parts.hash(&mut hasher);
+    exr::SOFTWARE.hash(&mut hasher);
+    // A commit names the program only if nothing was changed since.
+    if (exr::SOFTWARE.contains("dirty") || exr::SOFTWARE.contains("unknown"))
+        && let Ok(file) = std::env::current_exe().and_then(std::fs::metadata)
+    {
+        let changed = file.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        (file.len(), changed.map(|time| time.as_nanos())).hash(&mut hasher);
+    }
+    format!("{:016x}", hasher.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Channel;
+
+    fn half(level: f32) -> Half {
+        let mut image = Image::new(5, 4);
+        let parts = PART_NAMES.iter().flat_map(|p| ["R", "G", "B"].map(|c| format!("{p}.{c}")));
+        for (i, name) in ["R", "G", "B", "A"].map(str::to_owned).into_iter().chain(parts).enumerate() {
+            let samples = (0..20).map(|p| level + p as f32 + 0.1 * i as f32).collect();
+            image.channels.push(Channel { name, samples });
+        }
+        Half { image, spp: 32.0, noise: 0.125 }
+    }
+
+    #[test]
+    fn what_is_stored_is_found_again() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = path(directory.path(), &["a", "b"]);
+        assert_eq!(Converged::load(&path), None);
+        let converged = Converged::new(&half(1.0), &half(2.0)).unwrap();
+        assert_eq!((converged.spp, converged.half_noise), (64.0, 0.125));
+        converged.store(&path).unwrap();
+        assert_eq!(Converged::load(&path), Some(converged.clone()));
+        let image = image::read(&path).unwrap();
+        assert_eq!(image.channel("R").unwrap()[3], 1.5 + 3.0);
+        assert!((image.channel("variance.G").unwrap()[0] - 0.25).abs() < 1e-6);
+        let lobe = converged.lobes.unwrap()[0][0][0];
+        assert!(lobe > 2.0, "direct and indirect: {lobe}");
+        std::fs::write(&path, b"not a picture").unwrap();
+        assert_eq!(Converged::load(&path), None);
+    }
+
+    #[test]
+    fn every_part_changes_the_name() {
+        let all = [key(&["a", "b"]), key(&["a", "c"]), key(&["ab"]), key(&["a", "b", ""]), key(&[])];
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| a != b));
+        }
+        assert_eq!(key(&["a"]), key(&["a"]));
+    }
+}

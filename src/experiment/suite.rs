@@ -1,0 +1,348 @@
+//! Suite files: which scenes, under which lights, by which methods, to which quality. TOML with the diagnostics of scenes.
+
+use std::path::{Path, PathBuf};
+
+use super::method::Method;
+use crate::{
+    report::table3::Paper,
+    scene::{
+        diagnostic::{Diagnostics, Sources, unknown_name},
+        document::Document,
+        load::{LoadError, LoadOptions, read_text},
+        reader::{Range, Reader},
+    },
+};
+
+/// A checked suite.
+#[derive(Clone, Debug)]
+pub struct Suite {
+    /// The file, as it was named.
+    pub path: String,
+    /// What it calls itself.
+    pub title: String,
+    /// Explicit fibres, or what stands in their place.
+    pub reference: Method,
+    /// What is compared with it.
+    pub tested: Method,
+    /// Further ways, of which only pictures are compared.
+    pub others: Vec<OtherWay>,
+    /// Equal quality: this relMSE.
+    pub target: f64,
+    /// Timed runs of each kind.
+    pub repeats: u32,
+    /// Converged pictures have at most the target over this as their estimated relMSE.
+    pub converged: f64,
+    /// Most samples per pixel of any run.
+    pub max_spp: u32,
+    /// Size of all pictures; `None` leaves it to the scenes.
+    pub size: Option<[u32; 2]>,
+    /// Scenes under lights, in order.
+    pub cases: Vec<Case>,
+    /// Rows that need files which are not there.
+    pub missing: Vec<(String, String)>,
+    /// The cases whose error is shown against time, and how.
+    pub converge: Option<ConvergePlan>,
+}
+
+/// A further way to render a case.
+#[derive(Clone, Debug)]
+pub struct OtherWay {
+    /// What it is called.
+    pub name: String,
+    /// Mode and model.
+    pub method: Method,
+    /// `KEY=VALUE` over the scene.
+    pub set: Vec<String>,
+}
+
+/// A scene under a light.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Row and light.
+    pub name: String,
+    /// The scene file.
+    pub scene: PathBuf,
+    /// In place of the first fabric's curves.
+    pub curves: Option<PathBuf>,
+    /// `KEY=VALUE` over the scene, those of the light last.
+    pub set: Vec<String>,
+    /// The paper's figures.
+    pub paper: Option<Paper>,
+}
+
+/// Which cases are measured against time.
+#[derive(Clone, Debug)]
+pub struct ConvergePlan {
+    /// Names of cases.
+    pub cases: Vec<String>,
+    /// Renders behind every point.
+    pub seeds: u32,
+    /// Most samples per pixel of the tested method; the reference has its own.
+    pub spp: u32,
+    /// Longest render of a curve, in seconds.
+    pub seconds: f64,
+    /// Samples per pixel of each half of a converged picture.
+    pub converged_spp: u32,
+}
+
+impl Case {
+    /// The options with which the case's scene is loaded for a method; `more` stands over all others.
+    pub fn options(&self, suite: &Suite, method: Method, more: &[String]) -> LoadOptions {
+        let mut assignments = self.set.clone();
+        assignments.extend_from_slice(more);
+        assignments.push(format!("render.mode=\"{}\"", method.mode.name()));
+        assignments.extend(method.model.map(|model| format!("render.model=\"{}\"", model.name())));
+        if let Some([width, height]) = suite.size {
+            assignments.extend([format!("render.width={width}"), format!("render.height={height}")]);
+        }
+        LoadOptions { assignments, curves: self.curves.clone(), ..LoadOptions::default() }
+    }
+}
+
+const METHOD_HINT: &str = "a mode, or a mode and a model, as in \"fiber\" or \"yarn:aggregated\"";
+
+impl Suite {
+    /// Reads a suite; with `quick`, what its table `[quick]` says takes the place of the rest.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, as text for the user.
+    pub fn load(path: &Path, quick: bool) -> Result<Self, LoadError> {
+        let mut sources = Sources::new();
+        let diagnostics = Diagnostics::new();
+        let name = path.display().to_string();
+        let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
+        let document = Document::parse(&name, &text, &mut sources, &diagnostics);
+        let suite = document.and_then(|document| read(&name, path, Reader::new(&document, &diagnostics), quick));
+        match suite {
+            Some(suite) if !diagnostics.has_errors() => Ok(suite),
+            _ => Err(LoadError(diagnostics.render(&sources))),
+        }
+    }
+
+    /// The case of a name.
+    pub fn case(&self, name: &str) -> Option<&Case> {
+        self.cases.iter().find(|case| case.name == name)
+    }
+}
+
+/// A row before it meets the lights.
+struct Row {
+    name: String,
+    scene: PathBuf,
+    curves: Option<PathBuf>,
+    set: Vec<String>,
+    lights: Vec<String>,
+    paper: Option<Paper>,
+    missing: Option<String>,
+}
+
+fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let title = root.string_or("title", "Explicit fibres and aggregated yarns at equal quality").to_owned();
+    let reference = method(&root, "reference", "fiber");
+    let tested = method(&root, "tested", "yarn:aggregated");
+    let mut quality = Quality::read(&root);
+    let others = root.tables("other").into_iter().map(|table| {
+        let name = table.required_string("name").unwrap_or_default().to_owned();
+        let method =
+            if table.has("method") { method(&table, "method", "") } else { table.required_string("method").and(None) };
+        let set = strings(&table, "set");
+        table.finish();
+        method.map(|method| OtherWay { name, method, set })
+    });
+    let mut others: Vec<OtherWay> = others.flatten().collect();
+    let lights: Vec<(String, Vec<String>)> = root
+        .named_tables("lighting")
+        .into_iter()
+        .map(|(name, table)| {
+            let set = strings(&table, "set");
+            table.finish();
+            (name.to_owned(), set)
+        })
+        .collect();
+    let known_light = |table: &Reader<'_>, key: &str| -> Vec<String> {
+        let names: Vec<String> = strings(table, key);
+        for name in &names {
+            if !lights.iter().any(|(known, _)| known == name) {
+                let (message, hint) = unknown_name("lighting", name, lights.iter().map(|(known, _)| known.as_str()));
+                table.error_at(key, message, Some(&hint));
+            }
+        }
+        names
+    };
+    let mut rows: Vec<Row> = root.tables("row").into_iter().map(|table| row(table, folder, known_light)).collect();
+    if rows.is_empty() {
+        root.error("a suite needs at least one [[row]]", Some("[[row]] with `name` and `scene`"));
+    }
+    for (i, row) in rows.iter().enumerate() {
+        if rows[..i].iter().any(|other| other.name == row.name) {
+            root.error(format!("two rows are called \"{}\"", row.name), None);
+        }
+    }
+    let mut converge = root.table("converge").map(converge_plan);
+    if let Some(table) = root.table("quick") {
+        let shorter = quality.over(&table);
+        let kept = if table.has("rows") { Some(strings(&table, "rows")) } else { None };
+        let lights = if table.has("lights") { Some(known_light(&table, "lights")) } else { None };
+        let with_others = table.bool_or("others", true);
+        let with_converge = table.bool_or("converge", true);
+        for name in kept.iter().flatten() {
+            if !rows.iter().any(|row| row.name == *name) {
+                let (message, hint) = unknown_name("row", name, rows.iter().map(|row| row.name.as_str()));
+                table.error_at("rows", message, Some(&hint));
+            }
+        }
+        table.finish();
+        if quick {
+            quality = shorter;
+            rows.retain(|row| kept.as_ref().is_none_or(|kept| kept.contains(&row.name)));
+            for row in &mut rows {
+                row.lights.retain(|light| lights.as_ref().is_none_or(|lights| lights.contains(light)));
+            }
+            if !with_others {
+                others.clear();
+            }
+            if !with_converge {
+                converge = None;
+            }
+        }
+    }
+    let mut cases = Vec::new();
+    let mut missing = Vec::new();
+    for row in rows {
+        if let Some(reason) = row.missing {
+            missing.push((row.name, reason));
+            continue;
+        }
+        let case = |name: String, light: &[String]| Case {
+            name,
+            scene: row.scene.clone(),
+            curves: row.curves.clone(),
+            set: row.set.iter().chain(light).cloned().collect(),
+            paper: row.paper,
+        };
+        if lights.is_empty() {
+            cases.push(case(row.name.clone(), &[]));
+        }
+        for (light, set) in lights.iter().filter(|(light, _)| row.lights.contains(light)) {
+            cases.push(case(format!("{}, {light}", row.name), set));
+        }
+    }
+    if let Some(plan) = &mut converge {
+        // A quick suite may have left a case out; a case that no suite has is a mistake.
+        plan.cases.retain(|name| {
+            let known = cases.iter().any(|case| case.name == *name);
+            if !known && !quick && !missing.iter().any(|(row, _)| name.starts_with(row.as_str())) {
+                let (message, hint) =
+                    unknown_name("row and lighting", name, cases.iter().map(|case| case.name.as_str()));
+                root.error_at("converge", message, Some(&hint));
+            }
+            known
+        });
+    }
+    root.finish();
+    Some(Suite {
+        path: name.to_owned(),
+        title,
+        reference: reference?,
+        tested: tested?,
+        others,
+        target: quality.target,
+        repeats: quality.repeats,
+        converged: quality.converged,
+        max_spp: quality.max_spp,
+        size: quality.size,
+        cases,
+        missing,
+        converge,
+    })
+}
+
+/// What decides how long a suite takes.
+#[derive(Clone, Copy)]
+struct Quality {
+    target: f64,
+    repeats: u32,
+    converged: f64,
+    max_spp: u32,
+    size: Option<[u32; 2]>,
+}
+
+impl Quality {
+    fn read(table: &Reader<'_>) -> Self {
+        Self { target: 0.01, repeats: 3, converged: 4.0, max_spp: 1 << 16, size: None }.over(table)
+    }
+
+    /// These, where the table does not say otherwise.
+    fn over(self, table: &Reader<'_>) -> Self {
+        let size = table.vec2("size", Range::between(8.0, 65_536.0));
+        if size.is_some_and(|size| size.iter().any(|v| v.fract() != 0.0)) {
+            table.error_at("size", "expected two whole numbers", Some("size = [192, 144]"));
+        }
+        Self {
+            target: table.f64_or("target", self.target, Range::above(0.0)),
+            repeats: table.u64_or("repeats", self.repeats.into(), 1..=1000) as u32,
+            converged: table.f64_or("converged", self.converged, Range::between(1.0, 1e4)),
+            max_spp: table.u64_or("max_spp", self.max_spp.into(), 2..=u64::from(u32::MAX)) as u32,
+            size: size.map(|size| size.map(|v| v as u32)).or(self.size),
+        }
+    }
+}
+
+fn method(table: &Reader<'_>, key: &str, default: &str) -> Option<Method> {
+    match Method::parse(table.string_or(key, default)) {
+        Ok(method) => Some(method),
+        Err(message) => {
+            table.error_at(key, message, Some(METHOD_HINT));
+            None
+        }
+    }
+}
+
+fn strings(table: &Reader<'_>, key: &str) -> Vec<String> {
+    table.strings(key).into_iter().map(|(text, _)| text.to_owned()).collect()
+}
+
+fn row(table: Reader<'_>, folder: &Path, known_light: impl Fn(&Reader<'_>, &str) -> Vec<String>) -> Row {
+    let name = table.required_string("name").unwrap_or_default().to_owned();
+    let scene = folder.join(table.required_string("scene").unwrap_or_default());
+    let curves = table.string("curves").map(|path| folder.join(path));
+    let fallback = table.string("fallback").map(|path| folder.join(path));
+    let set = strings(&table, "set");
+    let lights = known_light(&table, "lights");
+    let pair = |table: &Reader<'_>, key: &str| table.vec2(key, Range::POSITIVE);
+    let paper = table.table("paper").and_then(|paper| {
+        let figures = [pair(&paper, "seconds"), pair(&paper, "megabytes"), pair(&paper, "bounces")];
+        if figures.contains(&None) {
+            paper.error(
+                "expected `seconds`, `megabytes` and `bounces`, two numbers each",
+                Some("the reference's, then theirs"),
+            );
+        }
+        paper.finish();
+        Some(Paper { seconds: figures[0]?, megabytes: figures[1]?, bounces: figures[2]? })
+    });
+    table.finish();
+    // A curve file that is not there is no mistake: it may be one that must not be passed on.
+    let absent = curves.as_ref().filter(|path| !path.exists()).cloned();
+    match (absent, fallback) {
+        (None, _) => Row { name, scene, curves, set, lights, paper, missing: None },
+        (Some(_), Some(scene)) => Row { name, scene, curves: None, set: Vec::new(), lights, paper, missing: None },
+        (Some(path), None) => {
+            let missing = Some(format!("{} is not there", path.display()));
+            Row { name, scene, curves, set, lights, paper, missing }
+        }
+    }
+}
+
+fn converge_plan(table: Reader<'_>) -> ConvergePlan {
+    let plan = ConvergePlan {
+        cases: strings(&table, "rows"),
+        seeds: table.u64_or("seeds", 5, 2..=1000) as u32,
+        spp: table.u64_or("spp", 255, 1..=1 << 20) as u32,
+        seconds: table.f64_or("seconds", 10.0, Range::above(0.0)),
+        converged_spp: table.u64_or("converged_spp", 512, 2..=1 << 20) as u32,
+    };
+    table.finish();
+    plan
+}

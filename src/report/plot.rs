@@ -1,0 +1,174 @@
+//! Plots with two logarithmic axes, as SVG.
+
+use std::fmt::Write as _;
+
+use crate::math::stats::PowerLaw;
+
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 470.0;
+/// Left, right, top and bottom of the frame.
+const FRAME: [f64; 4] = [72.0, WIDTH - 16.0, 34.0, HEIGHT - 52.0];
+/// Told apart by people who see fewer colours as well (after Okabe and Ito).
+const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00", "#56b4e9", "#333333"];
+
+/// One series of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// For the legend.
+    pub name: String,
+    /// Argument, value, and half the width of its interval.
+    pub points: Vec<[f64; 3]>,
+    /// Series of one group have one colour.
+    pub group: usize,
+    /// Dashed, with open marks.
+    pub dashed: bool,
+    /// A law to draw through the points.
+    pub fit: Option<PowerLaw>,
+}
+
+/// A plot of series that fall. Points that are not positive are left out.
+pub fn log_log(title: &str, axes: [&str; 2], series: &[Series], level: Option<f64>) -> String {
+    let shown = |p: &&[f64; 3]| p[0] > 0.0 && p[1] > 0.0 && p[0].is_finite() && p[1].is_finite();
+    let all = || series.iter().flat_map(|s| s.points.iter().filter(shown));
+    let range = |k: usize, more: Option<f64>| {
+        let values = all().map(|p| p[k].log10()).chain(more.filter(|v| *v > 0.0).map(f64::log10));
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        if low > high { (0.0, 1.0) } else { (low - 0.08, high.max(low + 0.3) + 0.08) }
+    };
+    let (x, y) = (range(0, None), range(1, level));
+    let [left, right, top, bottom] = FRAME;
+    let at_x = |v: f64| left + (v.log10() - x.0) / (x.1 - x.0) * (right - left);
+    let at_y = |v: f64| bottom - (v.log10() - y.0) / (y.1 - y.0) * (bottom - top);
+    let height = HEIGHT + 18.0 * series.len() as f64;
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
+         font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\" font-size=\"12\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{left}\" y=\"20\" font-size=\"14\">{}</text>\n",
+        escaped(title)
+    );
+    // A line for each 1, 2, 5 of a decade, or for decades alone where there are many.
+    let steps: &[f64] = if x.1 - x.0 > 3.0 || y.1 - y.0 > 4.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+    let ticks = |(low, high): (f64, f64)| {
+        let decades = (low.floor() as i32)..=(high.ceil() as i32);
+        let all = decades.flat_map(move |d| steps.iter().map(move |s| s * 10f64.powi(d)));
+        all.filter(move |v| v.log10() >= low && v.log10() <= high)
+    };
+    for v in ticks(x) {
+        let p = at_x(v);
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{p:.1} {top}V{bottom}\" stroke=\"#ddd\"/><text x=\"{p:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+            bottom + 16.0,
+            number(v)
+        );
+    }
+    for v in ticks(y) {
+        let p = at_y(v);
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{left} {p:.1}H{right}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            left - 6.0,
+            p + 4.0,
+            number(v)
+        );
+    }
+    if let Some(level) = level {
+        let p = at_y(level);
+        let _ = writeln!(svg, "<path d=\"M{left} {p:.1}H{right}\" stroke=\"#888\" stroke-dasharray=\"2 3\"/>");
+    }
+    let _ = writeln!(
+        svg,
+        "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#333\"/>\n\
+         <text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n\
+         <text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+        right - left,
+        bottom - top,
+        0.5 * (left + right),
+        bottom + 38.0,
+        escaped(axes[0]),
+        0.5 * (top + bottom),
+        escaped(axes[1])
+    );
+    for (i, s) in series.iter().enumerate() {
+        let color = COLORS[s.group % COLORS.len()];
+        let dash = if s.dashed { " stroke-dasharray=\"6 4\"" } else { "" };
+        let points: Vec<[f64; 3]> = s.points.iter().filter(shown).copied().collect();
+        let path: Vec<String> = points.iter().map(|p| format!("{:.1} {:.1}", at_x(p[0]), at_y(p[1]))).collect();
+        if path.len() > 1 {
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.6\"{dash}/>",
+                path.join("L")
+            );
+        }
+        if let (Some(fit), [first, .., last]) = (s.fit, points.as_slice()) {
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"{color}\" stroke-width=\"4\" opacity=\"0.2\"/>",
+                at_x(first[0]),
+                at_y(fit.at(first[0])),
+                at_x(last[0]),
+                at_y(fit.at(last[0]))
+            );
+        }
+        for [px, py, half] in &points {
+            let fill = if s.dashed { "#fff" } else { color };
+            let _ = writeln!(
+                svg,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{fill}\" stroke=\"{color}\"/>",
+                at_x(*px),
+                at_y(*py)
+            );
+            if *half > 0.0 && half.is_finite() {
+                // An interval that reaches below zero ends at the frame.
+                let low = if py - half > 0.0 { at_y(py - half).min(bottom) } else { bottom };
+                let _ = writeln!(
+                    svg,
+                    "<path d=\"M{:.1} {low:.1}V{:.1}\" stroke=\"{color}\"/>",
+                    at_x(*px),
+                    at_y(py + half).max(top)
+                );
+            }
+        }
+        let line = HEIGHT + 18.0 * i as f64;
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{left} {}h28\" stroke=\"{color}\" stroke-width=\"1.6\"{dash}/><text x=\"{}\" y=\"{}\">{}</text>",
+            line - 4.0,
+            left + 36.0,
+            line,
+            escaped(&s.name)
+        );
+    }
+    svg + "</svg>\n"
+}
+
+fn number(v: f64) -> String {
+    if (1e-3..1e4).contains(&v) { format!("{}", (v * 1e6).round() / 1e6) } else { format!("{v:.0e}") }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plots_hold_what_can_be_shown() {
+        let series = Series {
+            name: "a < b".to_owned(),
+            points: vec![[0.1, 1.0, 0.1], [1.0, 0.1, 0.2], [10.0, -0.01, 0.0], [f64::NAN, 1.0, 0.0]],
+            group: 0,
+            dashed: false,
+            fit: PowerLaw::fit(&[(0.1, 1.0), (1.0, 0.1)]),
+        };
+        let svg = log_log("t & u", ["x", "y"], &[series], Some(0.5));
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(svg.contains("a &lt; b") && svg.contains("t &amp; u") && !svg.contains("NaN") && !svg.contains("inf"));
+        assert!(svg.ends_with("</svg>\n"));
+        let empty = log_log("", ["", ""], &[], None);
+        assert!(!empty.contains("NaN"));
+    }
+}

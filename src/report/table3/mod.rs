@@ -1,0 +1,403 @@
+//! Table 3: two ways to render the same cloth at equal quality, as Markdown, CSV and JSON; [`html`] has the page.
+
+pub mod html;
+
+use std::fmt::Write as _;
+
+use serde::{Deserialize, Serialize};
+
+use crate::image::metric::EPSILON;
+
+/// What one way took to reach the target, means over repeated runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Mode and model.
+    pub method: String,
+    /// Seconds of rendering.
+    pub render_seconds: f64,
+    /// Their standard deviation over the runs.
+    pub render_seconds_deviation: f64,
+    /// Seconds for making curves and the BVH.
+    pub build_seconds: f64,
+    /// Control points, indices and what is kept for each point.
+    pub geometry_bytes: u64,
+    /// What Embree reports for its BVH.
+    pub bvh_bytes: u64,
+    /// The most memory that a process of its own has held.
+    pub peak_rss_bytes: u64,
+    /// Scattering events of a camera path that hits cloth.
+    pub mean_bounces: f64,
+    /// Samples per pixel.
+    pub spp: f64,
+    /// Rays of all kinds.
+    pub rays: f64,
+    /// Samples per pixel that the timed runs took.
+    pub timed_spp: f64,
+    /// relMSE of each timed run.
+    pub timed_relmse: Vec<f64>,
+    /// Seconds of rendering of each timed run.
+    pub timed_seconds: Vec<f64>,
+    /// Samples per pixel of the converged picture.
+    pub converged_spp: f64,
+}
+
+/// How far what a method converges to is from the reference, on the cloth: pixels that the reference covers at least half.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelError {
+    /// Mean over mean of the reference, each channel.
+    pub mean_ratio: [f64; 3],
+    /// relMSE without noise, full resolution.
+    pub relmse: f64,
+    /// relMSE without noise, after averaging boxes of 8 x 8 pixels; absent where the cloth fills none.
+    pub relmse_8: Option<f64>,
+    /// Mean HDR-FLIP, with the little noise that converged pictures have.
+    pub flip: f64,
+}
+
+/// A third way, of which only the picture is compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Other {
+    /// What it is called.
+    pub name: String,
+    /// How far it is from the reference.
+    pub model_error: ModelError,
+    /// File of its converged picture, from the directory of the table.
+    pub picture: String,
+}
+
+/// Figures of the paper's table, reference and theirs: seconds, megabytes, bounces.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Paper {
+    /// Seconds at equal quality.
+    pub seconds: [f64; 2],
+    /// Memory in megabytes.
+    pub megabytes: [f64; 2],
+    /// Mean bounces.
+    pub bounces: [f64; 2],
+}
+
+/// One row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The cloth and its light.
+    pub name: String,
+    /// The scene file.
+    pub scene: String,
+    /// Size of the pictures.
+    pub size: [usize; 2],
+    /// Every fibre a curve.
+    pub reference: Run,
+    /// What is compared with it.
+    pub aggregated: Run,
+    /// Seconds of rendering, reference over aggregated.
+    pub time_ratio: f64,
+    /// Standard deviation of that ratio, from the spread of both.
+    pub time_ratio_deviation: f64,
+    /// Geometry and BVH, aggregated over reference.
+    pub memory_ratio: f64,
+    /// Mean bounces, aggregated over reference.
+    pub bounce_ratio: f64,
+    /// What the aggregated picture converges to, against the reference.
+    pub model_error: ModelError,
+    /// Other ways, compared by their pictures.
+    pub others: Vec<Other>,
+    /// What the paper says of the row that this one is like.
+    pub paper: Option<Paper>,
+    /// Files of the converged pictures, reference and aggregated, from the directory of the table.
+    pub pictures: [String; 2],
+}
+
+/// A row that is not there, and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Missing {
+    /// The row's name.
+    pub name: String,
+    /// Why it is missing.
+    pub reason: String,
+}
+
+/// All of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// What the suite calls itself.
+    pub title: String,
+    /// The suite file.
+    pub suite: String,
+    /// What it ran on.
+    pub machine: String,
+    /// The program.
+    pub commit: String,
+    /// What equal quality means.
+    pub metric: String,
+    /// Its value.
+    pub target: f64,
+    /// Timed runs of each kind behind every row.
+    pub repeats: usize,
+    /// Threads of each run; 0 for all.
+    pub threads: usize,
+    /// What was measured.
+    pub rows: Vec<Row>,
+    /// What was not.
+    pub missing: Vec<Missing>,
+}
+
+/// The metric in words.
+pub fn metric() -> String {
+    format!(
+        "relMSE: mean over pixels and channels of (picture - converged)^2 / (converged^2 + {EPSILON}), \
+         against a converged picture of the same mode and model from independent seeds, without the latter's noise"
+    )
+}
+
+/// Bytes in megabytes of a million.
+fn megabytes(bytes: u64) -> String {
+    let mb = bytes as f64 / 1e6;
+    if mb < 10.0 { format!("{mb:.2}") } else { format!("{mb:.0}") }
+}
+
+/// Three figures that mean something.
+fn short(value: f64) -> String {
+    match value.abs() {
+        v if v >= 100.0 => format!("{value:.0}"),
+        v if v >= 10.0 => format!("{value:.1}"),
+        v if v >= 0.1 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}
+
+fn ratios(mean_ratio: [f64; 3]) -> String {
+    mean_ratio.map(|v| format!("{v:.3}")).join(" ")
+}
+
+/// The columns that people read: heading, and each row's text.
+type Column = (&'static str, fn(&Row) -> String);
+const COLUMNS: [Column; 13] = [
+    ("row", |r| r.name.clone()),
+    ("time, s: fibres / ours", |r| {
+        format!("{} / {}", short(r.reference.render_seconds), short(r.aggregated.render_seconds))
+    }),
+    ("ratio", |r| format!("{} ± {}", short(r.time_ratio), short(r.time_ratio_deviation))),
+    ("spp", |r| format!("{:.0} / {:.0}", r.reference.spp, r.aggregated.spp)),
+    ("build, s", |r| format!("{} / {}", short(r.reference.build_seconds), short(r.aggregated.build_seconds))),
+    ("geometry, MB", |r| {
+        format!("{} / {}", megabytes(r.reference.geometry_bytes), megabytes(r.aggregated.geometry_bytes))
+    }),
+    ("BVH, MB", |r| format!("{} / {}", megabytes(r.reference.bvh_bytes), megabytes(r.aggregated.bvh_bytes))),
+    ("memory ratio", |r| format!("{:.2} %", 100.0 * r.memory_ratio)),
+    ("process, MB", |r| {
+        format!("{} / {}", megabytes(r.reference.peak_rss_bytes), megabytes(r.aggregated.peak_rss_bytes))
+    }),
+    ("bounces", |r| format!("{} / {}", short(r.reference.mean_bounces), short(r.aggregated.mean_bounces))),
+    ("rays, millions", |r| format!("{} / {}", short(r.reference.rays / 1e6), short(r.aggregated.rays / 1e6))),
+    ("mean ratio R G B", |r| ratios(r.model_error.mean_ratio)),
+    ("relMSE 8x8, FLIP", |r| {
+        let relmse = r.model_error.relmse_8.map_or("–".to_owned(), |v| format!("{v:.4}"));
+        format!("{relmse}, {:.3}", r.model_error.flip)
+    }),
+];
+
+impl Table {
+    /// What a reader must know before the figures.
+    fn preface(&self) -> Vec<String> {
+        vec![
+            format!("Machine: {}. Program: {}.", self.machine, self.commit),
+            format!(
+                "Equal quality: every time is the time of rendering to relMSE {}. {}. Each figure is the mean of {} runs of each kind, \
+                 taken by turns, each a process of its own; a run takes about the samples that the target needs, and its time is \
+                 scaled by its own error over the target.",
+                self.target,
+                capital(&self.metric),
+                self.repeats
+            ),
+            "Of two figures the first is that of explicit fibres, the second that of the aggregated model; the time ratio is first over \
+             second, the memory ratio (geometry and BVH) second over first. Model error, on the cloth, is that of the aggregated model's \
+             converged picture against that of explicit fibres: ratio of the means, relMSE without noise after averaging boxes of 8 x 8 \
+             pixels, mean HDR-FLIP."
+                .to_owned(),
+        ]
+    }
+
+    /// The table as Markdown.
+    pub fn to_markdown(&self) -> String {
+        let mut out = format!("# {}\n\n{}\n\n", self.title, self.preface().join("\n\n"));
+        let _ = writeln!(out, "| {} |", COLUMNS.map(|(name, _)| name).join(" | "));
+        let _ = writeln!(out, "|{}", " --- |".repeat(COLUMNS.len()));
+        for row in &self.rows {
+            let _ = writeln!(out, "| {} |", COLUMNS.map(|(_, text)| text(row)).join(" | "));
+        }
+        for missing in &self.missing {
+            let _ = writeln!(out, "\nMissing: {}: {}", missing.name, missing.reason);
+        }
+        out
+    }
+
+    /// Every figure, a line for each row.
+    pub fn to_csv(&self) -> String {
+        let mut out = "row,scene,width,height".to_owned();
+        let sides = ["reference", "aggregated"];
+        let figures = [
+            "render_seconds",
+            "render_seconds_deviation",
+            "build_seconds",
+            "geometry_bytes",
+            "bvh_bytes",
+            "peak_rss_bytes",
+            "mean_bounces",
+            "spp",
+            "rays",
+        ];
+        for side in sides {
+            for figure in figures {
+                let _ = write!(out, ",{side}_{figure}");
+            }
+        }
+        out += ",time_ratio,time_ratio_deviation,memory_ratio,bounce_ratio,mean_ratio_r,mean_ratio_g,mean_ratio_b,relmse,relmse_8,flip\n";
+        for row in &self.rows {
+            let _ = write!(
+                out,
+                "\"{}\",\"{}\",{},{}",
+                row.name.replace('"', "\"\""),
+                row.scene.replace('"', "\"\""),
+                row.size[0],
+                row.size[1]
+            );
+            for run in [&row.reference, &row.aggregated] {
+                let _ = write!(
+                    out,
+                    ",{},{},{},{},{},{},{},{},{}",
+                    run.render_seconds,
+                    run.render_seconds_deviation,
+                    run.build_seconds,
+                    run.geometry_bytes,
+                    run.bvh_bytes,
+                    run.peak_rss_bytes,
+                    run.mean_bounces,
+                    run.spp,
+                    run.rays
+                );
+            }
+            let e = &row.model_error;
+            let [r, g, b] = e.mean_ratio;
+            let _ = writeln!(
+                out,
+                ",{},{},{},{},{r},{g},{b},{},{},{}",
+                row.time_ratio,
+                row.time_ratio_deviation,
+                row.memory_ratio,
+                row.bounce_ratio,
+                e.relmse,
+                e.relmse_8.map_or(String::new(), |v| v.to_string()),
+                e.flip
+            );
+        }
+        out
+    }
+
+    /// The table as JSON.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(in super::super) fn run(seconds: f64, bytes: u64) -> Run {
+        Run {
+            method: "fiber".to_owned(),
+            render_seconds: seconds,
+            render_seconds_deviation: 0.1 * seconds,
+            build_seconds: 0.5,
+            geometry_bytes: bytes,
+            bvh_bytes: 2 * bytes,
+            peak_rss_bytes: 100_000_000,
+            mean_bounces: 4.5,
+            spp: 100.0,
+            rays: 1.5e6,
+            timed_spp: 110.0,
+            timed_relmse: vec![0.01, 0.011],
+            timed_seconds: vec![seconds; 2],
+            converged_spp: 512.0,
+        }
+    }
+
+    pub(in super::super) fn table() -> Table {
+        let error = ModelError { mean_ratio: [1.0, 0.9, 1.1], relmse: 0.02, relmse_8: Some(0.01), flip: 0.05 };
+        let row = Row {
+            name: "silk, front".to_owned(),
+            scene: "s.toml".to_owned(),
+            size: [64, 48],
+            reference: run(30.0, 50_000_000),
+            aggregated: run(2.0, 100_000),
+            time_ratio: 15.0,
+            time_ratio_deviation: 2.0,
+            memory_ratio: 0.002,
+            bounce_ratio: 0.2,
+            model_error: error.clone(),
+            others: vec![Other { name: "paper".to_owned(), model_error: error, picture: "cache/x.exr".to_owned() }],
+            paper: Some(Paper { seconds: [187.0, 29.0], megabytes: [210.0, 1.8], bounces: [12.4, 1.6] }),
+            pictures: ["cache/a.exr".to_owned(), "cache/b.exr".to_owned()],
+        };
+        Table {
+            title: "T".to_owned(),
+            suite: "t.toml".to_owned(),
+            machine: "M".to_owned(),
+            commit: "c".to_owned(),
+            metric: metric(),
+            target: 0.01,
+            repeats: 2,
+            threads: 0,
+            rows: vec![row],
+            missing: vec![Missing { name: "glove".to_owned(), reason: "no file".to_owned() }],
+        }
+    }
+
+    #[test]
+    fn every_form_holds_the_figures() {
+        let table = table();
+        let text = table.to_markdown();
+        assert!(text.contains("| silk, front | 30.0 / 2.00 | 15.0 ± 2.00 | 100 / 100 |"), "{text}");
+        assert!(text.contains("| 50 / 0.10 | 100 / 0.20 | 0.20 % |") && text.contains("relMSE 0.01."), "{text}");
+        assert!(text.contains("Missing: glove: no file"));
+        let lines: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
+        assert!(lines.iter().all(|l| l.matches('|').count() == COLUMNS.len() + 1), "{text}");
+        let csv = table.to_csv();
+        let columns: Vec<usize> = csv.lines().map(|l| l.replace("\"silk, front\"", "x").matches(',').count()).collect();
+        assert_eq!(columns, [columns[0]; 2]);
+        let back: Table = serde_json::from_str(&table.to_json()).unwrap();
+        assert_eq!(back, table);
+    }
+
+    #[test]
+    fn json_has_the_keys_of_the_interface() {
+        let json: serde_json::Value = serde_json::from_str(&table().to_json()).unwrap();
+        for key in ["machine", "commit", "metric", "target", "rows"] {
+            assert!(!json[key].is_null(), "{key}");
+        }
+        let row = &json["rows"][0];
+        for key in ["name", "reference", "aggregated", "time_ratio", "memory_ratio", "bounce_ratio", "model_error"] {
+            assert!(!row[key].is_null(), "{key}");
+        }
+        for run in [&row["reference"], &row["aggregated"]] {
+            for key in [
+                "render_seconds",
+                "build_seconds",
+                "geometry_bytes",
+                "bvh_bytes",
+                "peak_rss_bytes",
+                "mean_bounces",
+                "spp",
+                "rays",
+            ] {
+                assert!(run[key].is_number(), "{key}");
+            }
+        }
+        assert!(["mean_ratio", "relmse_8", "flip"].iter().all(|key| !row["model_error"][*key].is_null()));
+    }
+}
