@@ -33,6 +33,8 @@ pub struct Tile {
     /// The sample that comes next for the even and the odd pixels, by (x + y) mod 2: the same but for adaptive
     /// sampling.
     pub next: [u32; 2],
+    /// What light is divided by before it is summed up; a power of two.
+    scale: f32,
     sums: Sums,
     matte: Matte,
 }
@@ -82,17 +84,19 @@ impl Sums {
 }
 
 impl Tile {
-    fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers) -> Self {
+    fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers, scale: f32) -> Self {
         let n = (width * height) as usize;
         let matte = Matte::new(if layers.cryptomatte { n } else { 0 });
-        Self { x, y, width, height, next: [0; 2], sums: Sums::new(n, layers), matte }
+        Self { x, y, width, height, next: [0; 2], scale, sums: Sums::new(n, layers), matte }
     }
 
     /// Adds a sample to a pixel, given from the tile's corner. A sample that is not finite, or brighter than
-    /// [`Sum::LIMIT`], is refused.
+    /// [`Sum::LIMIT`] times the light's scale, is refused.
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, sample: &Sample) -> bool {
-        let radiance = sample.radiance.to_array();
+        // A division by a power of two loses nothing.
+        let down = 1.0 / self.scale;
+        let radiance = (sample.radiance * down).to_array();
         // NaN compares as false.
         if !radiance.iter().all(|v| v.abs() < Sum::LIMIT) {
             return false;
@@ -119,7 +123,7 @@ impl Tile {
         }
         if let Some(parts) = sums.parts.get_mut(i) {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
-                add_color(sum, value.to_array());
+                add_color(sum, (value * down).to_array());
             }
         }
         true
@@ -277,14 +281,16 @@ pub struct Film {
 
 impl Film {
     /// An empty film for the pixels x0, y0, x1, y1 (the latter exclusive).
-    pub fn new(crop: [u32; 4], layers: Layers) -> Self {
+    ///
+    /// `light_scale` is that of the scene ([`crate::scene::Scene::light_scale`]): the unit in which light is summed up.
+    pub fn new(crop: [u32; 4], layers: Layers, light_scale: f32) -> Self {
         let [x0, y0, x1, y1] = crop;
         let (width, height) = (x1 - x0, y1 - y0);
         let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
         let tiles = (0..rows * columns)
             .map(|i| {
                 let (x, y) = (x0 + i % columns * TILE, y0 + i / columns * TILE);
-                Tile::new(x, y, TILE.min(x1 - x), TILE.min(y1 - y), layers)
+                Tile::new(x, y, TILE.min(x1 - x), TILE.min(y1 - y), layers, light_scale)
             })
             .collect();
         let mut order: Vec<u32> = (0..rows * columns).collect();
@@ -323,13 +329,16 @@ impl Film {
         let depth = |sum: &Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
         Pixel {
-            color: mean.map(|c| c as f32),
+            color: mean.map(|c| c as f32 * tile.scale),
             alpha: (alpha / n) as f32,
-            variance: variance.map(|v| v as f32),
+            variance: variance.map(|v| (v * f64::from(tile.scale).powi(2)) as f32),
             depth: sums.depth.get(i).map_or(0.0, depth),
             normal: sums.normal.get(i).map_or([0.0; 3], normal),
             albedo: sums.albedo.get(i).map_or([0.0; 3], color),
-            parts: sums.parts.get(i).map_or_else(Default::default, |p| std::array::from_fn(|k| color(&p[k]))),
+            parts: sums
+                .parts
+                .get(i)
+                .map_or_else(Default::default, |p| std::array::from_fn(|k| color(&p[k]).map(|c| c * tile.scale))),
             samples,
         }
     }
@@ -387,7 +396,7 @@ mod tests {
 
     #[test]
     fn pixels_are_found_again_and_average() {
-        let mut film = Film::new([5, 7, 45, 40], Layers::ALL);
+        let mut film = Film::new([5, 7, 45, 40], Layers::ALL, 1.0);
         for tile in film.tiles_in_order() {
             for y in 0..tile.height {
                 for x in 0..tile.width {
@@ -420,7 +429,7 @@ mod tests {
         let layers = Layers { cryptomatte: true, ..Layers::DEFAULT };
         assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 108);
         assert_eq!(Tile::bytes_per_pixel(layers), 488);
-        let mut tile = Tile::new(0, 0, 3, 2, layers);
+        let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0);
         let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
         for x in 0..3 {
             let radiance = Rgb::splat(0.3 + x as f32);
@@ -429,7 +438,7 @@ mod tests {
         let mut bytes = Vec::new();
         tile.save(&mut bytes);
         assert_eq!(bytes.len(), 6 * 488 + 3 * 16);
-        let mut again = Tile::new(0, 0, 3, 2, layers);
+        let mut again = Tile::new(0, 0, 3, 2, layers, 1.0);
         assert_eq!(again.load(&bytes), Some(()));
         assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));
         for cut in [0, 5, bytes.len() - 1] {
@@ -441,7 +450,7 @@ mod tests {
 
     #[test]
     fn every_tile_is_rendered_once() {
-        let mut film = Film::new([0, 0, 100, 33], Layers::NONE);
+        let mut film = Film::new([0, 0, 100, 33], Layers::NONE, 1.0);
         let mut seen: Vec<(u32, u32)> = film.tiles_in_order().iter().map(|t| (t.x, t.y)).collect();
         seen.sort_unstable();
         seen.dedup();

@@ -96,7 +96,7 @@ pub fn render(
 ) -> Rendered {
     let settings = &scene.render;
     let integrator = Integrator::new(scene, world);
-    let mut film = Film::new(settings.crop, scene.collected());
+    let mut film = Film::new(settings.crop, scene.collected(), scene.light_scale());
     let mut counters = Counters::default();
     let started = Instant::now();
     let deadline = settings.time.map(|t| started + Duration::from_secs_f64(t.min(1e9)));
