@@ -41,6 +41,8 @@ use crate::{
 const LEAN_SIDEWAYS: f32 = 1.2;
 /// The most that the light's own way may brighten F against its mean: keeps sampled weights bounded.
 const MAX_FORWARD_GAIN: f32 = 3.0;
+/// Sine of the steepest latitude at which the mean of that gain is looked at.
+const STEEPEST_MEAN: f32 = 0.99;
 /// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
 /// light's side, unknown then, does not make the true lobe wider than the sampled one.
 const SAMPLING_WIDENING: f32 = 0.7;
@@ -160,6 +162,8 @@ struct Forward {
     scale: f32,
     /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord, over the lobe's mean gain.
     norm: Rgb,
+    /// Whether the light's own way counts; else the lobe is as the camera's chord has it.
+    follows: bool,
 }
 
 /// One place of scattering, for one camera direction: see the module's notes.
@@ -633,7 +637,7 @@ impl<'a> Vertex<'a> {
         let density = m * around;
         let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
         let mut value = forward.energy * density;
-        if !self.yarn.plain {
+        if forward.follows {
             value *= forward.gain(self.yarn, self.section, w);
         }
         (value, pdf)
@@ -737,14 +741,22 @@ impl Forward {
             half_depth_unscattered,
             scale,
             norm: Rgb::ONE / energy.max(Rgb::splat(1e-12)),
+            follows: !yarn.plain,
         };
         if !yarn.plain && energy.max_channel() > 1e-3 {
             // The gain must not make or lose light: over its mean, by three-point Gauss-Hermite quadrature in azimuth.
             let spread = sigma.iter().sum::<f32>() / 3.0;
-            let towards = |off: f32| forward.gain(yarn, section, forward.frame.direction(-forward.frame.sin, PI + off));
+            // Along the yarn there is no azimuth; the gain hardly hangs on the latitude.
+            let latitude = (-forward.frame.sin).clamp(-STEEPEST_MEAN, STEEPEST_MEAN);
+            let towards = |off: f32| forward.gain(yarn, section, forward.frame.direction(latitude, PI + off));
             let reach = 3f32.sqrt() * spread;
             let mean = (towards(reach) + towards(-reach)) * (1.0 / 6.0) + towards(0.0) * (2.0 / 3.0);
-            forward.norm = forward.norm / mean.max(Rgb::splat(1.0 / MAX_FORWARD_GAIN));
+            // Where hardly anything seems to leave forward, the chords ahead know nothing of the few fibres there are.
+            let mean = energy.select_below(1e-3, Rgb::ONE, mean);
+            forward.follows = mean.min_channel() > 1.0 / MAX_FORWARD_GAIN;
+            if forward.follows {
+                forward.norm = forward.norm / mean;
+            }
         }
         Some(forward)
     }
