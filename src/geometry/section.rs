@@ -20,6 +20,9 @@ const MAX_SLOPE: f32 = 1.0;
 /// How far along the yarn, in yarn radii, turning and bending are followed.
 const MAX_TRAVEL: f32 = 1.2;
 
+/// Turns of the plies, radians per yarn radius, beyond which they are placed with more care: about 28 degrees of twist.
+const FAST_TURN: f32 = 1.0;
+
 /// The same for the way of the light, measured to the plies' nearest points.
 const MAX_LIGHT_TRAVEL: f32 = 1.2;
 
@@ -243,7 +246,8 @@ impl Section {
 
     /// Where the ray passes a ply.
     ///
-    /// Depth and turning depend on each other; two rounds settle them, three where the ray is steep.
+    /// Depth and turning depend on each other; two rounds settle them, three where the ray is steep or the plies turn
+    /// fast.
     #[inline]
     fn follow(&self, shape: &YarnShape, ply: &PlyShape) -> Passage {
         let mut axis = self.ply_axis(ply, (0.0, 1.0));
@@ -254,7 +258,7 @@ impl Section {
         let untwisted = shape.ply_rate == 0.0;
         let mut travel = 0.0;
         let mut straightness = 1.0;
-        for _ in 0..if self.slope.abs() < 1.0 { 2 } else { 3 } {
+        for _ in 0..if self.slope.abs() < 1.0 && shape.ply_rate.abs() < FAST_TURN { 2 } else { 3 } {
             straightness = self.straightness(Vec2::new(centre.x, self.h));
             travel = (-(self.enter - centre.x) * self.slope / straightness).clamp(-MAX_TRAVEL, MAX_TRAVEL);
             if !untwisted {
