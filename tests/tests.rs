@@ -35,5 +35,7 @@ mod scatter;
 mod meshes;
 // Every scene of the project, and real curve files.
 mod scenes;
+// Stiff and extreme cases, as the program reports them.
+mod stress;
 // Temporary directories, runs of the program, pictures: what the others share.
 mod support;

@@ -8,6 +8,7 @@ mod converge;
 mod info;
 mod render;
 mod scatter;
+mod stress;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -53,6 +54,8 @@ enum Command {
     Info(info::InfoArgs),
     /// Measure how a fibre, ply or yarn scatters light.
     Scatter(scatter::ScatterArgs),
+    /// Run stiff and extreme cases, and tell which keep their bounds.
+    Stress(stress::StressArgs),
 }
 
 /// What a command ends with besides success.
@@ -106,6 +109,7 @@ pub fn run() -> ExitCode {
         Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Scatter(args) => scatter::run(&args),
+        Command::Stress(args) => stress::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -20,16 +20,19 @@ const ROUNDING: f32 = 4e-7;
 const LONGEST_CHORD: f32 = 6.0;
 
 /// A fibre at a hit, in the frame of its BCSDF: z along the fibre, x towards the camera.
-struct Frame {
+pub(crate) struct Frame {
     x: Vec3A,
     y: Vec3A,
     z: Vec3A,
-    sin_o: f32,
-    cos_o: f32,
+    /// Sine and cosine of the camera's latitude.
+    pub(crate) sin_o: f32,
+    /// As `sin_o`.
+    pub(crate) cos_o: f32,
 }
 
 impl Frame {
-    fn new(tangent: Vec3A, camera: Vec3A) -> Self {
+    /// For a fibre's tangent and the direction towards the camera, both of unit length.
+    pub(crate) fn new(tangent: Vec3A, camera: Vec3A) -> Self {
         let sin_o = camera.dot(tangent).clamp(-1.0, 1.0);
         let across = camera - sin_o * tangent;
         let cos_o = across.length();
@@ -43,8 +46,9 @@ impl Frame {
         Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
     }
 
+    /// A vector of this frame in the world.
     #[inline]
-    fn to_world(&self, v: Vec3A) -> Vec3A {
+    pub(crate) fn to_world(&self, v: Vec3A) -> Vec3A {
         v.x * self.x + v.y * self.y + v.z * self.z
     }
 }
@@ -52,7 +56,7 @@ impl Frame {
 /// Where a ray in `direction` leaves a fibre met at its surface: outside of it, as the BCSDF has already dealt with
 /// the way through.
 #[inline]
-fn start(place: &TubePlace, normal: Vec3A, direction: Vec3A) -> Vec3A {
+pub(crate) fn start(place: &TubePlace, normal: Vec3A, direction: Vec3A) -> Vec3A {
     let lift = place.radius * (1.0 + OFFSET) + ROUNDING * place.centre.abs().max_element();
     let outward = direction.dot(normal);
     if outward >= 0.0 {

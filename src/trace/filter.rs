@@ -126,3 +126,17 @@ impl HitFilter for ShadowFilter<'_> {
         self.passed < OPAQUE
     }
 }
+
+/// A filter that counts how often it is asked.
+pub(super) struct Counting<F> {
+    pub(super) filter: F,
+    pub(super) calls: u32,
+}
+
+impl<F: HitFilter> HitFilter for Counting<F> {
+    #[inline]
+    fn accept(&mut self, hit: &RawHit) -> bool {
+        self.calls += 1;
+        self.filter.accept(hit)
+    }
+}

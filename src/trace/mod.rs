@@ -34,7 +34,7 @@ use crate::{
 };
 use build::Preparation;
 pub use build::{BuildError, Estimate};
-use filter::{GapFilter, ShadowFilter};
+use filter::{Counting, GapFilter, ShadowFilter};
 pub use mesh::SurfacePlace;
 use mesh::TriangleMesh;
 
@@ -192,14 +192,33 @@ impl World {
         }
         let mut filter = GapFilter::new(&self.threads, ray);
         let raw = self.scene.intersect(ray, &mut filter)?;
+        Some(self.hit(ray, &raw, &filter))
+    }
+
+    #[inline]
+    fn hit(&self, ray: &Ray, raw: &RawHit, filter: &GapFilter<'_>) -> Hit {
         let threads = raw.geometry as usize;
         let place = match self.threads.get(threads) {
-            Some(Threads::Yarns(weave)) => HitPlace::Yarn(filter.section(weave, &raw)),
+            Some(Threads::Yarns(weave)) => HitPlace::Yarn(filter.section(weave, raw)),
             Some(Threads::Fibers(fleece)) => HitPlace::Fiber(fleece.tubes.place(raw.segment, raw.u)),
-            None => HitPlace::Surface(self.meshes[threads - self.threads.len()].place(ray, &raw)),
+            None => HitPlace::Surface(self.meshes[threads - self.threads.len()].place(ray, raw)),
         };
         let normal = raw.normal.normalize_or(-ray.direction);
-        Some(Hit { t: raw.t, threads, segment: raw.segment, normal, place })
+        Hit { t: raw.t, threads, segment: raw.segment, normal, place }
+    }
+
+    /// As [`Self::intersect`] and [`Self::transmittance`], with the number of hits that Embree offered each: what a ray
+    /// costs beyond its traversal.
+    pub fn probe(&self, ray: &Ray, crossings: &mut Crossings) -> (Option<Hit>, f32, [u32; 2]) {
+        if !ray.is_finite() {
+            return (None, 0.0, [0; 2]);
+        }
+        let mut nearest = Counting { filter: GapFilter::new(&self.threads, ray), calls: 0 };
+        let raw = self.scene.intersect(ray, &mut nearest);
+        let hit = raw.map(|raw| self.hit(ray, &raw, &nearest.filter));
+        let mut shadow = Counting { filter: ShadowFilter::new(&self.threads, ray, crossings), calls: 0 };
+        let passed = if self.scene.occluded(ray, &mut shadow) { 0.0 } else { shadow.filter.passed() };
+        (hit, passed, [nearest.calls, shadow.calls])
     }
 
     /// The share of light that comes through along a ray: 0 or the product of what each yarn lets pass.

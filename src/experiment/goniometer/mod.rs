@@ -14,6 +14,7 @@ mod specimen;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+pub(crate) use specimen::straight_section;
 pub use specimen::{Specimen, ply_alone};
 
 use crate::{math::sampler::Sampler, scattering::LobeValues};

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use super::*;
 use crate::{
+    geometry::yarn::{PlyParameters, touching_plies},
     scattering::fiber::FiberMaterial,
     scene::{
-        Model,
+        Model, Yarn,
         load::{Definitions, LoadOptions, load_definitions},
     },
 };
@@ -117,4 +118,91 @@ fn an_option_of_density_takes_the_place_of_a_fiber_radius() {
     let definitions = library(&["yarn.silk1.density=0.5"]);
     let p = &definitions.yarn("silk1").unwrap().plies[0];
     assert!((f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2) - 0.5).abs() < 1e-12);
+}
+
+/// The truths that lie beside the project: explicit fibres traced by another program.
+fn oracle() -> Option<Vec<serde_json::Value>> {
+    let text = crate::testing::shared("oracle/truth_energies.json")?;
+    Some(serde_json::from_str::<Vec<serde_json::Value>>(&text).unwrap())
+}
+
+/// The yarn and view of one of them.
+fn configuration(v: &serde_json::Value) -> (Yarn, View) {
+    let number = |key: &str| v[key].as_f64().unwrap();
+    let triple = |v: &serde_json::Value| -> [f64; 3] { std::array::from_fn(|c| v[c].as_f64().unwrap()) };
+    let plies = v["n_plies"].as_u64().unwrap() as u32;
+    let (radius, distance) = touching_plies(plies);
+    let one = |k: u32| PlyParameters {
+        radius,
+        aspect: 1.0,
+        distance,
+        angle: 2.0 * PI * f64::from(k) / f64::from(plies),
+        fibers: v["n"].as_u64().unwrap() as u32,
+        fiber_radius: number("r_f") * radius,
+        fiber_twist: number("twist_deg").to_radians(),
+    };
+    let fiber = |k: u32| {
+        let scale = triple(&v["ply_scale"][k as usize]);
+        let scaled = |key: &str| -> [f64; 3] { std::array::from_fn(|c| triple(&v[key])[c] * scale[c]) };
+        FiberMaterial {
+            r: scaled("a_r"),
+            tt: scaled("a_tt"),
+            d: scaled("a_d"),
+            beta_r: number("beta_R"),
+            beta_tt: number("beta_TT"),
+            beta_n: number("beta_N"),
+        }
+    };
+    let yarn = Yarn {
+        plies: (0..plies).map(one).collect(),
+        fibers: (0..plies).map(|k| (format!("ply {k}"), fiber(k))).collect(),
+        ply_twist: 0.0,
+        radius: 1.0,
+        ..library(&[]).yarn("silk1").unwrap().clone()
+    };
+    let phase = number("ply_phase");
+    let view = View { theta: number("theta_deg").to_radians(), offset: None, phase: (phase > -100.0).then_some(phase) };
+    (yarn, view)
+}
+
+/// Mean relative errors of reflected and of transmitted (with unscattered) energy, over cases and channels.
+fn errors(model: Model, cases: &[&serde_json::Value]) -> (f64, f64) {
+    let (mut back, mut forward, mut n) = (0.0, 0.0, 0.0);
+    for v in cases {
+        let (yarn, view) = configuration(v);
+        let m = measure(&Specimen::Yarn(&yarn, model), &view, Effort { paths: 16_000, seed: 11 });
+        let (reflected, transmitted) = m.energies();
+        let t0 = v["T0"].as_f64().unwrap();
+        for c in 0..3 {
+            let want = (v["back"][c].as_f64().unwrap(), v["fwd"][c].as_f64().unwrap() + t0);
+            back += (reflected[c].mean / want.0 - 1.0).abs();
+            forward += (transmitted[c].mean / want.1 - 1.0).abs();
+            n += 1.0;
+        }
+    }
+    (back / n, forward / n)
+}
+
+#[test]
+fn the_recommended_model_is_as_close_to_the_oracle_as_its_specification_says() {
+    let Some(all) = oracle() else { return };
+    let dense = |plies: &dyn Fn(u64) -> bool| -> Vec<&serde_json::Value> {
+        all.iter()
+            .filter(|v| plies(v["n_plies"].as_u64().unwrap()) && v["density_area"].as_f64().unwrap() >= 0.3 - 1e-9)
+            .collect()
+    };
+    for (name, cases, back_bound, forward_bound) in
+        [("one ply", dense(&|n| n == 1), 0.031, 0.084), ("several plies", dense(&|n| n > 1), 0.042, 0.021)]
+    {
+        let (back, forward) = errors(Model::Aggregated, &cases);
+        let printed = errors(Model::Printed, &cases);
+        eprintln!(
+            "{name}, {} cases of density 0.3 to 0.9: reflected {back:.4}, transmitted {forward:.4}; printed {:.3}, {:.3}",
+            cases.len(),
+            printed.0,
+            printed.1
+        );
+        assert!(back <= back_bound && forward <= forward_bound, "{name}: {back} {forward}");
+        assert!(printed.0 > 5.0 * back && printed.1 > 5.0 * forward, "the printed model has become good: {printed:?}");
+    }
 }

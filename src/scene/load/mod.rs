@@ -91,13 +91,19 @@ impl Context<'_> {
 /// # Errors
 /// Everything that is wrong with it, as text for the user.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let name = path.display().to_string();
+    let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
+    parse(&name, &text, options)
+}
+
+/// Loads a scene from its text; `name` is what messages call it, and paths are relative to where that would lie.
+///
+/// # Errors
+/// Everything that is wrong with it, as text for the user.
+pub fn parse(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, LoadError> {
     let mut sources = Sources::new();
     let diagnostics = Diagnostics::new();
-    let name = path.display().to_string();
-    let scene = read_text(path)
-        .map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))
-        .map(|text| load_text(&name, &text, options, &mut sources, &diagnostics))?;
-    match scene {
+    match load_text(name, text, options, &mut sources, &diagnostics) {
         Some(mut scene) if !diagnostics.has_errors() => {
             if !diagnostics.is_empty() {
                 scene.warnings.push(diagnostics.render(&sources).trim_end().to_owned());

@@ -1,0 +1,524 @@
+//! Yarns with each of the models: packings, twists, plies and rays at their ends.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+
+use glam::Vec3A;
+
+use super::{Case, Checks, Group::Scattering, Scale, fibers::chi_square};
+use crate::{
+    experiment::goniometer::{self, Effort, Specimen, View, straight_section},
+    geometry::{
+        section::{Crossings, Section},
+        yarn::{MAX_PLIES, PlyParameters, touching_plies},
+    },
+    math::{Rgb, sampler::Stream},
+    scattering::{fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
+    scene::{Model, Yarn},
+    trace::scatterer,
+};
+
+pub(super) const CASES: &[Case] = &[
+    Case {
+        group: Scattering,
+        name: "fiber_counts",
+        about: "1 to 1 000 000 fibres in a ply, 0.001 to 10 000 expected on a chord",
+        run: counts,
+    },
+    Case { group: Scattering, name: "packing", about: "area fractions from 1e-6 to 3, beyond overlap", run: packing },
+    Case {
+        group: Scattering,
+        name: "twist",
+        about: "fibre and ply twist from 0 to 89.9 degrees, both hands",
+        run: twist,
+    },
+    Case {
+        group: Scattering,
+        name: "yarn_albedos",
+        about: "a_F to 0 and to 1: albedos 0, 1e-6, 0.999999 and exactly 1 in each lobe",
+        run: albedos,
+    },
+    Case { group: Scattering, name: "yarn_widths", about: "lobes from 1e-5 to 10 rad in a yarn", run: widths },
+    Case {
+        group: Scattering,
+        name: "rays_on_a_yarn",
+        about: "latitudes to 1e-6 rad from the yarn's direction and along it; offsets to exactly +-1",
+        run: rays,
+    },
+    Case {
+        group: Scattering,
+        name: "many_plies",
+        about: "1 to 64 plies, very unequal plies, a ply without fibres, plies of different fibres",
+        run: plies,
+    },
+    Case {
+        group: Scattering,
+        name: "energy_over_the_width",
+        about: "white yarns of all packings and twists under light from all sides, averaged over width and azimuth",
+        run: energy,
+    },
+    Case {
+        group: Scattering,
+        name: "yarn_chi_square",
+        about: "where samples of F and of single scattering fall against their densities",
+        run: samples_against_density,
+    },
+    Case {
+        group: Scattering,
+        name: "section_branches",
+        about: "continuity of what a ray meets where rays turn steep, and where ellipses turn round",
+        run: branches,
+    },
+];
+
+fn fiber(r: f64, tt: f64, d: f64, beta: [f64; 3]) -> FiberMaterial {
+    FiberMaterial { r: [r; 3], tt: [tt; 3], d: [d; 3], beta_r: beta[0], beta_tt: beta[1], beta_n: beta[2] }
+}
+
+const BETA: [f64; 3] = [0.15, 0.12, 0.35];
+
+fn white() -> FiberMaterial {
+    fiber(0.2, 0.5, 0.3, BETA)
+}
+
+/// Equal touching plies.
+fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64, material: &FiberMaterial) -> Yarn {
+    let (radius, distance) = touching_plies(plies);
+    let one = |k: u32| PlyParameters {
+        radius,
+        aspect: 1.0,
+        distance,
+        angle: TAU * f64::from(k) / f64::from(plies),
+        fibers,
+        fiber_radius: radius * (density / f64::from(fibers.max(1))).sqrt(),
+        fiber_twist,
+    };
+    Yarn {
+        name: "stress".to_owned(),
+        radius: 1.0,
+        plies: (0..plies).map(one).collect(),
+        ply_twist,
+        fibers: (0..plies).map(|_| ("stress".to_owned(), material.clone())).collect(),
+        tilted: true,
+    }
+}
+
+/// Models that keep energy; the printed one does not, and is only asked to stay finite.
+const MODELS: [Model; 4] = [Model::Aggregated, Model::TwoStream, Model::Paper, Model::Printed];
+
+/// What one ray on one yarn is asked.
+struct Ray {
+    theta: f64,
+    h: f32,
+    phase: f64,
+}
+
+/// Scatters `n` times at one place; the least energy that white fibres must return is `floor`.
+fn examine(
+    scatterer: &YarnScatterer,
+    model: Model,
+    ray: &Ray,
+    n: u32,
+    floor: Option<f64>,
+    checks: &mut Checks,
+    at: &dyn Fn() -> String,
+) {
+    let section = straight_section(ray.theta, ray.h, ray.phase, scatterer.shape().tilted);
+    let mut crossings = Crossings::new();
+    section.crossings(scatterer.shape(), &mut crossings);
+    let fibers: f32 = crossings.iter().map(|c| c.fibers).sum();
+    checks.never("fibres on a ray not finite or negative", !fibers.is_finite() || fibers < 0.0, at);
+    let unscattered = scatterer.transparency(&crossings);
+    checks.never("transparency outside 0 to 1", !(0.0..=1.0).contains(&unscattered), at);
+    if unscattered >= 1.0 || crossings.is_empty() {
+        return;
+    }
+    let scattered = f64::from(1.0 - unscattered);
+    let mut stream = Stream::new((ray.h.to_bits() ^ (ray.theta as f32).to_bits()).wrapping_add(n));
+    let uniform = 0.25 / std::f32::consts::PI;
+    let (mut sum, mut square) = ([0.0; 3], [0.0; 3]);
+    for _ in 0..n {
+        let u = [0; 4].map(|_| stream.next());
+        let vertex = scatterer.vertex(&section, &crossings, unscattered, Rgb::ONE, u, &mut stream);
+        let z = 2.0 * stream.next() - 1.0;
+        let (s, c) = (std::f32::consts::TAU * stream.next()).sin_cos();
+        let across = (1.0 - z * z).max(0.0).sqrt();
+        let w = Vec3A::new(across * c, across * s, z);
+        for light_pdf in [f32::INFINITY, uniform, 0.0] {
+            let direct = vertex.evaluate(w, light_pdf);
+            let all = direct.lobes.to_array();
+            checks.never("a value not finite", all.iter().any(|l| !l.is_finite()), at);
+            checks.never("a value negative", all.iter().any(|l| l.min_channel() < 0.0), at);
+            let share = direct.forward_share;
+            checks.never("share of F outside 0 to 1", !(-1e-6..=1.000_001).contains(&share), at);
+        }
+        let u = [0; 3].map(|_| stream.next());
+        let Some(next) = vertex.sample(u, &mut stream) else { continue };
+        let finite =
+            next.weight.is_finite() && next.pdf.is_finite() && next.direction.is_finite() && next.start.is_finite();
+        checks.never("a sample not finite", !finite, at);
+        checks.never("a sample negative", next.weight.min_channel() < 0.0 || next.pdf < 0.0, at);
+        checks.at_most(
+            "length of a sampled direction, off 1",
+            f64::from((next.direction.length() - 1.0).abs()),
+            1e-4,
+            at,
+        );
+        if model != Model::Printed {
+            let name = if model == Model::Aggregated {
+                "largest sample weight, aggregated"
+            } else {
+                "largest sample weight, chord models"
+            };
+            checks.at_most(name, f64::from(next.weight.max_channel()), 6.0, at);
+        }
+        for (c, v) in next.weight.to_array().into_iter().enumerate() {
+            sum[c] += f64::from(v) / f64::from(n);
+            square[c] += f64::from(v).powi(2) / f64::from(n);
+        }
+    }
+    if model == Model::Printed {
+        return;
+    }
+    for c in 0..3 {
+        let se = ((square[c] - sum[c] * sum[c]).max(0.0) / f64::from(n)).sqrt();
+        // Energy of all light: what passed and what was scattered.
+        let energy = 1.0 - scattered + scattered * sum[c];
+        let slack = 4.0 * scattered * se;
+        if model == Model::Aggregated {
+            let name = "one ray: energy beyond 1 and four standard errors, aggregated";
+            checks.at_most(name, energy - slack - 1.0, super::ENERGY_ABOVE_ONE_RAY, at);
+        } else {
+            let name = "one ray: energy beyond 1 and four standard errors, chord models";
+            checks.at_most(name, energy - slack - 1.0, super::ENERGY_ABOVE, at);
+        }
+        if let Some(floor) = floor
+            && model == Model::Aggregated
+        {
+            checks.at_least("energy of white fibres, with four standard errors", energy + slack, floor, at);
+        }
+    }
+}
+
+fn counts(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(150, 1500);
+    for (fibers, density) in [
+        (1, 1e-6),
+        (1, 0.01),
+        (1, 0.5),
+        (1, 0.99),
+        (2, 0.3),
+        (7, 0.7),
+        (1_000, 1e-8),
+        (1_000_000, 1e-7),
+        (1_000_000, 0.5),
+        (1_000_000, 0.9),
+        (u32::MAX, 0.9),
+    ] {
+        for model in MODELS {
+            let scatterer = scatterer(&yarn(1, fibers, density, 0.0, 0.0, &white()), model);
+            for h in [0.0, 0.5, 0.99, 0.999_999, 1.0] {
+                let at = || format!("{fibers} fibres, density {density:e}, {}, h {h}", model.name());
+                examine(&scatterer, model, &Ray { theta: 0.3, h, phase: 0.0 }, n, Some(0.97), checks, &at);
+            }
+        }
+    }
+}
+
+fn packing(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(150, 1500);
+    for density in [1e-6, 1e-3, 0.1, 0.5, 0.84, 0.849_999, 0.850_001, 0.9, 1.0, 1.5, 3.0] {
+        for plies in [1, 3] {
+            for model in MODELS {
+                let scatterer = scatterer(&yarn(plies, 50, density, 0.0, 0.2, &white()), model);
+                for (h, phase) in [(0.0, 0.0), (0.6, 1.0), (-0.97, 2.0)] {
+                    let at = || format!("density {density}, {plies} plies, {}, h {h}", model.name());
+                    examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.95), checks, &at);
+                }
+            }
+        }
+    }
+}
+
+fn twist(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(100, 1500);
+    for degrees in [0.0f64, 1e-6, 20.0, 45.0, 80.0, 89.0, 89.9] {
+        for (ply, fiber) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0)] {
+            let (ply, fiber) = ((ply * degrees).to_radians(), (fiber * degrees).to_radians());
+            for model in MODELS {
+                let scatterer = scatterer(&yarn(3, 40, 0.3, ply, fiber, &white()), model);
+                for (theta, h, phase) in [(0.0, 0.1, 0.5), (0.9, -0.5, 2.0), (-1.5, 0.8, 4.0)] {
+                    let at = || format!("ply {ply:.3}, fibre {fiber:.3} rad, {}, theta {theta}, h {h}", model.name());
+                    examine(&scatterer, model, &Ray { theta, h, phase }, n, Some(0.9), checks, &at);
+                }
+            }
+        }
+    }
+}
+
+fn albedos(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(100, 1000);
+    for a in [0.0, 1e-12, 1e-6, 0.5, 0.999_999, 1.0 - 1e-12, 1.0] {
+        for (r, tt, d) in [(a, 0.0, 0.0), (0.0, a, 0.0), (0.0, 0.0, a), (0.2 * a, 0.5 * a, 0.3 * a)] {
+            // beta_n -> 0: TT is all chain, a_F -> 1 with tt -> 1.
+            for beta_n in [1e-5, 0.35, 10.0] {
+                let m = fiber(r, tt, d, [0.15, 0.12, beta_n]);
+                let floor = (r + tt + d >= 1.0).then_some(0.95);
+                for model in MODELS {
+                    for (plies, fibers, density) in [(1, 400, 0.6), (2, 30, 0.2)] {
+                        let scatterer = scatterer(&yarn(plies, fibers, density, 0.1, -0.3, &m), model);
+                        for h in [0.0, 0.7] {
+                            let at = || {
+                                format!(
+                                    "r {r}, tt {tt}, d {d}, beta_n {beta_n:e}, {}, {plies} plies of {fibers}, h {h}",
+                                    model.name()
+                                )
+                            };
+                            examine(&scatterer, model, &Ray { theta: 0.3, h, phase: 0.8 }, n, floor, checks, &at);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn widths(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(100, 1500);
+    for beta in [1e-5, 1e-4, 1e-3, 0.02, 0.7, 1.5, 3.2, 10.0] {
+        for beta_n in [1e-5, 1e-3, 0.35, 3.2, 10.0] {
+            let m = fiber(0.2, 0.5, 0.3, [beta, beta, beta_n]);
+            for model in MODELS {
+                let scatterer = scatterer(&yarn(2, 60, 0.3, 0.2, -0.3, &m), model);
+                for (theta, h) in [(0.0, 0.0), (1.2, 0.5)] {
+                    let at = || format!("beta {beta:e}, beta_n {beta_n:e}, {}, theta {theta}, h {h}", model.name());
+                    examine(&scatterer, model, &Ray { theta, h, phase: 1.0 }, n, Some(0.9), checks, &at);
+                }
+            }
+        }
+    }
+}
+
+fn rays(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(60, 1000);
+    for (plies, ply_twist, fiber_twist) in [(1, 0.0, 0.0), (1, 0.0, 0.7), (3, 0.3, -0.4)] {
+        for model in MODELS {
+            let scatterer = scatterer(&yarn(plies, 60, 0.4, ply_twist, fiber_twist, &white()), model);
+            for off in [FRAC_PI_2, 0.8, FRAC_PI_4, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0] {
+                for h in [-1.0, -0.999_999_9, -0.5, 0.0, 0.3, 0.999, 1.0] {
+                    let theta = FRAC_PI_2 - off;
+                    let at = || format!("{off:e} rad from the yarn, h {h}, {plies} plies, {}", model.name());
+                    examine(&scatterer, model, &Ray { theta, h, phase: 0.3 }, n, Some(0.9), checks, &at);
+                }
+            }
+        }
+    }
+}
+
+fn plies(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(60, 800);
+    for count in [1, 2, 3, 7, 20, MAX_PLIES as u32] {
+        for model in MODELS {
+            let scatterer = scatterer(&yarn(count, 20, 0.4, 0.2, -0.2, &white()), model);
+            for i in 0..9 {
+                let (h, phase) = (-0.96 + 0.24 * i as f32, 0.7 * f64::from(i));
+                let at = || format!("{count} plies, {}, h {h}", model.name());
+                examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
+            }
+        }
+    }
+    // A thick ply with a thin one at its side, one that holds nothing, one of black fibres, one squeezed flat.
+    let mut odd = yarn(4, 30, 0.4, 0.2, 0.1, &white());
+    for (k, radius) in [0.6, 0.006, 0.2, 0.15].into_iter().enumerate() {
+        let p = &mut odd.plies[k];
+        p.fiber_radius *= radius / p.radius;
+        p.radius = radius;
+        p.distance = 1.0 - radius;
+    }
+    odd.plies[2].fibers = 0;
+    odd.plies[3].aspect = 0.02;
+    odd.fibers[3].1 = fiber(0.0, 0.0, 0.0, BETA);
+    let mut empty = yarn(3, 30, 0.4, 0.2, 0.1, &white());
+    for p in &mut empty.plies {
+        p.fibers = 0;
+    }
+    for (name, yarn) in [("unequal plies", &odd), ("plies without fibres", &empty)] {
+        for model in MODELS {
+            let scatterer = scatterer(yarn, model);
+            for i in 0..40 {
+                let (h, phase) = (-0.975 + 0.05 * i as f32, 0.37 * f64::from(i));
+                let at = || format!("{name}, {}, h {h}, phase {phase:.2}", model.name());
+                examine(&scatterer, model, &Ray { theta: 0.2, h, phase }, n, None, checks, &at);
+            }
+        }
+    }
+}
+
+fn energy(scale: Scale, checks: &mut Checks) {
+    let effort = Effort { paths: scale.pick(2_000, 200_000), seed: 5 };
+    for (plies, ply_twist, fiber_twist) in
+        [(1, 0.0, 0.0), (1, 0.0, 0.5), (2, 0.1, -0.2), (3, 0.22, -0.33), (3, 0.5, 0.5)]
+    {
+        for density in [0.02, 0.1, 0.3, 0.6, 0.85] {
+            for theta in [0.0, 0.6, 1.2, 1.5] {
+                for model in [Model::Aggregated, Model::TwoStream, Model::Paper] {
+                    let yarn = yarn(plies, 60, density, ply_twist, fiber_twist, &white());
+                    let view = View { theta, offset: None, phase: None };
+                    let m = goniometer::measure(&Specimen::Yarn(&yarn, model), &view, effort);
+                    let (back, on) = m.energies();
+                    let total = back[1].mean + on[1].mean;
+                    // Batches share a sequence of sample points: their spread is that of the sum, not of its parts.
+                    let slack = 4.0 * back[1].se.hypot(on[1].se);
+                    let at = || {
+                        format!(
+                            "{plies} plies, twist {ply_twist} {fiber_twist}, density {density}, theta {theta}, {}: {total:.5} +- {:.5}",
+                            model.name(),
+                            slack / 4.0
+                        )
+                    };
+                    checks.at_most(
+                        "energy beyond 1 and four standard errors",
+                        total - slack - 1.0,
+                        super::ENERGY_ABOVE,
+                        &at,
+                    );
+                    if model == Model::Aggregated {
+                        checks.at_least("energy, aggregated, with four standard errors", total + slack, 0.98, &at);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Cells of (theta, phi) in which samples are counted, and the finer grid on which densities are summed up.
+const BINS: usize = 16;
+const FINE: usize = 12;
+
+fn bin(w: Vec3A) -> usize {
+    let row = ((f64::from(w.z) * 0.5 + 0.5) * BINS as f64) as usize;
+    let phi = f64::from(w.y).atan2(f64::from(w.x)).rem_euclid(TAU);
+    row.min(BINS - 1) * BINS + ((phi / TAU * BINS as f64) as usize).min(BINS - 1)
+}
+
+/// Directions with equal solid angle (its size beside them), by which every bin is covered evenly.
+fn fine_sphere() -> impl Iterator<Item = (Vec3A, f64)> {
+    let n = BINS * FINE;
+    (0..n * n).map(move |i| {
+        let z = ((i / n) as f64 + 0.5) / n as f64 * 2.0 - 1.0;
+        let (s, c) = (((i % n) as f64 + 0.5) / n as f64 * TAU).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        (Vec3A::new((r * c) as f32, (r * s) as f32, z as f32), 2.0 * TAU / (n * n) as f64)
+    })
+}
+
+/// The density behind a multiple-importance weight: values weighted for a light density of 1 give it away.
+fn density_of(full: f32, weighted: f32) -> f64 {
+    if weighted > 0.0 { f64::from((full / weighted - 1.0).max(0.0)) } else { 0.0 }
+}
+
+fn samples_against_density(scale: Scale, checks: &mut Checks) {
+    let n = scale.pick(20_000, 200_000);
+    debug_assert!((mis_weight(1.0, 0.0) - 1.0).abs() < 1e-6, "weights are those of the balance heuristic");
+    let wide = fiber(0.2, 0.5, 0.3, [0.35, 0.3, 0.6]);
+    for (index, (plies, theta, h)) in [(1, 0.0, 0.2), (1, 0.6, -0.7), (3, -0.4, 0.35)].into_iter().enumerate() {
+        for model in [Model::Aggregated, Model::TwoStream, Model::Paper, Model::Printed] {
+            let scatterer = scatterer(&yarn(plies, 40, 0.25, 0.2, -0.33, &wide), model);
+            let section: Section = straight_section(theta, h, 0.6, true);
+            let mut crossings = Crossings::new();
+            section.crossings(scatterer.shape(), &mut crossings);
+            let unscattered = scatterer.transparency(&crossings);
+            let mut stream = Stream::new(index as u32);
+            // One node for all: its place hangs on the first two numbers only.
+            let node = [0.3, 0.45];
+            let vertex = |stream: &mut Stream| {
+                let u = [node[0], node[1], stream.next(), stream.next()];
+                scatterer.vertex(&section, &crossings, unscattered, Rgb::ONE, u, stream)
+            };
+            // [F, single scattering, all] of expected and counted samples.
+            let mut expected = [const { Vec::new() }; 3];
+            let mut counts = [const { Vec::new() }; 3];
+            for v in expected.iter_mut().chain(&mut counts) {
+                v.resize(BINS * BINS, 0.0);
+            }
+            let fixed = vertex(&mut stream);
+            for (w, dw) in fine_sphere() {
+                let (full, weighted) = (fixed.evaluate(w, f32::INFINITY).lobes, fixed.evaluate(w, 1.0).lobes);
+                let f = density_of(full.f.max_channel(), weighted.f.max_channel());
+                let single = |l: &crate::scattering::LobeValues| (l.r + l.tt + l.d).max_channel();
+                let s = density_of(single(&full), single(&weighted));
+                let all = density_of(full.sum().max_channel(), weighted.sum().max_channel());
+                for (k, p) in [f, s, all].into_iter().enumerate() {
+                    expected[k][bin(w)] += p * dw * f64::from(n);
+                }
+            }
+            for _ in 0..n {
+                let v = vertex(&mut stream);
+                let u = [0; 3].map(|_| stream.next());
+                let Some(next) = v.sample(u, &mut stream) else { continue };
+                let cell = bin(next.direction);
+                counts[2][cell] += 1.0;
+                if !next.shares.f.is_zero() {
+                    counts[0][cell] += 1.0;
+                } else if next.shares.b.is_zero() {
+                    counts[1][cell] += 1.0;
+                }
+            }
+            let at = || format!("{}, {plies} plies, theta {theta}, h {h}", model.name());
+            if model == Model::Aggregated {
+                checks.at_most("chi-square of F, standard deviations", chi_square(&expected[0], &counts[0]), 5.0, &at);
+                let z = chi_square(&expected[1], &counts[1]);
+                checks.at_most("chi-square of single scattering, standard deviations", z, 5.0, &at);
+            } else {
+                let z = chi_square(&expected[2], &counts[2]);
+                checks.at_most("chi-square of chord models, standard deviations", z, 5.0, &at);
+                let total: f64 = expected[2].iter().sum::<f64>() / f64::from(n);
+                checks.at_most("density of chord models, integral off 1", (total - 1.0).abs(), 0.01, &at);
+            }
+        }
+    }
+}
+
+fn branches(_: Scale, checks: &mut Checks) {
+    let fibers = |yarn: &YarnScatterer, theta: f64, h: f32, phase: f64| -> f64 {
+        let mut crossings = Crossings::new();
+        straight_section(theta, h, phase, true).crossings(yarn.shape(), &mut crossings);
+        crossings.iter().map(|c| f64::from(c.fibers)).sum()
+    };
+    for (ply_twist, fiber_twist) in [(0.0, 0.4), (0.2, -0.3), (0.7, 0.7)] {
+        let scatterer = scatterer(&yarn(3, 60, 0.4, ply_twist, fiber_twist, &white()), Model::Aggregated);
+        for i in 0..200 {
+            let (h, phase) = (-0.9 + 0.009 * i as f32, 0.1 * f64::from(i));
+            // Slopes are held at 1: a ray of 45 degrees.
+            let (below, above) = (FRAC_PI_4 - 1e-5, FRAC_PI_4 + 1e-5);
+            let (a, b) = (fibers(&scatterer, below, h, phase), fibers(&scatterer, above, h, phase));
+            let at = || format!("ply twist {ply_twist}, h {h:.3}, phase {phase:.2}: {a:.4} and {b:.4} fibres");
+            let name = if ply_twist < 0.3 {
+                "fibres on a ray across 45 degrees, usual twist, jump over one and the count"
+            } else {
+                "fibres on a ray across 45 degrees, strong twist, jump over one and the count"
+            };
+            // Two rounds and three of placing the plies, for usual twists: they move by some percent of their radius.
+            checks.at_most(name, (a - b).abs() / (1.0 + a.max(b)), 0.1, &at);
+        }
+    }
+    // An ellipse that is all but round, and a round ply.
+    let round = yarn(3, 60, 0.4, 0.2, -0.3, &white());
+    let mut nearly = round.clone();
+    for p in &mut nearly.plies {
+        p.aspect = 1.0 - 1e-5;
+    }
+    let (round, nearly) = (scatterer(&round, Model::Aggregated), scatterer(&nearly, Model::Aggregated));
+    for i in 0..200 {
+        let (h, phase) = (-0.9 + 0.009 * i as f32, 0.1 * f64::from(i));
+        for theta in [0.0, 0.5, 1.2] {
+            let (a, b) = (fibers(&round, theta, h, phase), fibers(&nearly, theta, h, phase));
+            let at = || format!("theta {theta}, h {h:.3}: {a:.4} and {b:.4} fibres");
+            checks.at_most(
+                "round and nearly round plies, jump over one and the count",
+                (a - b).abs() / (1.0 + a.max(b)),
+                0.02,
+                &at,
+            );
+        }
+    }
+}

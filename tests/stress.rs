@@ -1,0 +1,33 @@
+//! `yarnray stress`: its promises to scripts.
+
+use crate::support::{directory, listing, read_json, yarnray};
+
+#[test]
+fn stress_runs_cases_and_reports_them() {
+    let directory = directory();
+    let args = ["stress", "--quick", "--case", "closed_forms", "--case", "threads", "-o", "r.md", "-o", "r.json"];
+    let run = yarnray(directory.path(), &args).good();
+    assert!(run.stdout.contains("pass  closed_forms") && run.stdout.contains("0 failed"), "{}", run.stdout);
+    assert_eq!(listing(directory.path()), ["r.json", "r.md"]);
+    let report = read_json(&directory.path().join("r.json"));
+    assert_eq!(report["passed"], true);
+    assert_eq!(report["cases"].as_array().unwrap().len(), 2);
+    for case in report["cases"].as_array().unwrap() {
+        for check in case["checks"].as_array().unwrap() {
+            assert!(check["worst"].is_number() && check["bound"].is_number() && check["count"].as_u64() > Some(0));
+        }
+    }
+    let markdown = std::fs::read_to_string(directory.path().join("r.md")).unwrap();
+    assert!(markdown.contains("| **closed_forms**") && markdown.contains("| pass |"), "{markdown}");
+}
+
+#[test]
+fn stress_refuses_cases_that_it_does_not_have() {
+    let directory = directory();
+    for (args, word) in [(["stress", "--case", "nonsense"], "no case"), (["stress", "-o", "x.txt"], ".md or .json")] {
+        let run = yarnray(directory.path(), &args);
+        assert_eq!(run.status, Some(2), "{}", run.stderr);
+        assert!(run.stderr.contains(word), "{}", run.stderr);
+    }
+    assert_eq!(listing(directory.path()), [""; 0]);
+}
