@@ -8,6 +8,7 @@ use super::{Case, Checks, Group::Scattering, Scale, fibers::chi_square};
 use crate::{
     experiment::goniometer::{self, Effort, Specimen, View, straight_section},
     geometry::{
+        fiber::Placement,
         section::{Crossings, Section},
         yarn::{MAX_PLIES, PlyParameters, touching_plies},
     },
@@ -99,6 +100,8 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
         ply_twist,
         fibers: (0..plies).map(|_| ("stress".to_owned(), material.clone())).collect(),
         tilted: true,
+        placement: Placement::Regular,
+        flyaways: None,
     }
 }
 
