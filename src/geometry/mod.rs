@@ -3,9 +3,9 @@
 pub mod curve;
 pub mod curve_file;
 pub mod fiber;
-pub mod generate;
 pub mod mesh;
 pub mod obj;
+pub mod pattern;
 pub mod section;
 mod spline;
 pub mod strand;

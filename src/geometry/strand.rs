@@ -266,11 +266,11 @@ impl Chain {
         Self { basis: curve.basis, points }
     }
 
-    fn segments(&self) -> usize {
+    pub(super) fn segments(&self) -> usize {
         self.points.len() - 3
     }
 
-    fn at(&self, segment: usize, u: f64) -> SplinePoint {
+    pub(super) fn at(&self, segment: usize, u: f64) -> SplinePoint {
         let p = &self.points[segment..segment + 4];
         evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
     }
