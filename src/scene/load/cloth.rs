@@ -10,14 +10,16 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
     super::{Fabric, Thread, Yarn, transform_curves},
-    Context, Range, Reader, UNITS, placement, radians,
+    Context, Range, Reader, UNITS,
+    pattern::{self, KnitPlan, WeavePlan},
+    placement, radians,
     yarns::Library,
 };
 use crate::{
     geometry::{
         curve::{Basis, Curve},
         curve_file::{self, ReadOptions},
-        generate::{Stockinette, straight},
+        pattern::straight,
     },
     math::sampler::Stream,
     scene::diagnostic::{Span, unknown_name},
@@ -46,7 +48,8 @@ impl Detail {
 
 enum Source {
     File { path: PathBuf, span: Span, unit: Option<f64>, options: ReadOptions, up: Up },
-    Stockinette(Stockinette),
+    Knit(KnitPlan),
+    Weave(WeavePlan),
     Straight { count: u32, length: f64, spacing: f64 },
 }
 
@@ -113,12 +116,17 @@ pub(super) fn plan(
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let transform = placement(&table, context);
     let source = match table.table("source") {
-        Some(source_table) => source(source_table, context, yarn.as_ref().and_then(|y| library.yarns.get(y)), curves),
+        Some(source_table) => {
+            let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
+            let fallback = if fiber.is_some() { FIBER_RADIUS } else { 0.5 };
+            let known = Yarns { library, own, radius, fallback };
+            source(source_table, context, &known, curves)
+        }
         None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),
         None => {
             table.error(
                 "missing table `source`: where the curves come from",
-                Some("source = { type = \"stockinette\" } or { type = \"file\", path = \"glove.bcc\" }"),
+                Some("source = { type = \"knit\" } or { type = \"file\", path = \"glove.bcc\" }"),
             );
             None
         }
@@ -149,8 +157,31 @@ fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Read
     Source::File { path, span, unit, options, up }
 }
 
-fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves: Option<&Path>) -> Option<Source> {
-    let kinds = [("file", 0), ("stockinette", 1), ("straight", 2)];
+/// The yarns that a source may name.
+pub(super) struct Yarns<'a> {
+    pub(super) library: &'a Library,
+    /// The fabric's own, by name and, where it is sound, as it is.
+    own: (&'a str, Option<&'a Yarn>),
+    /// What the fabric says in place of its yarn's radius.
+    radius: Option<f64>,
+    /// That of fibres, or something to go on with where the yarn has mistakes.
+    fallback: f64,
+}
+
+impl Yarns<'_> {
+    /// Radius of the fabric's yarns or fibres, millimetres.
+    pub(super) fn radius(&self) -> f64 {
+        self.radius.or(self.own.1.map(|y| y.radius)).unwrap_or(self.fallback)
+    }
+
+    /// Name of the fabric's yarn.
+    pub(super) fn name(&self) -> &str {
+        self.own.0
+    }
+}
+
+fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: Option<&Path>) -> Option<Source> {
+    let kinds = [("file", 0), ("knit", 1), ("weave", 2), ("straight", 3), ("stockinette", 4)];
     let kind = table.required_one_of("type", &kinds);
     let header = table.header();
     let made = match kind {
@@ -173,29 +204,18 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
             let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table));
             path.map(|_| source)
         }
-        Some(1) => {
-            let s = Stockinette {
-                stitches: table.u64_or("stitches", 20, 1..=10_000) as u32,
-                rows: table.u64_or("rows", 20, 1..=10_000) as u32,
-                width: table.f64_or("stitch_width", Stockinette::WIDTH, Range::between(1.0, 100.0)),
-                height: table.f64_or("row_height", Stockinette::HEIGHT, Range::between(0.1, 100.0)),
-                points: table.u64_or("points", 32, 8..=1000) as u32,
-            };
-            if u64::from(s.stitches) * u64::from(s.rows) * u64::from(s.points) > 1 << 26 {
-                table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
-            }
-            Some(Source::Stockinette(s))
-        }
-        Some(2) => Some(Source::Straight {
+        Some(1) => pattern::knit(&table, context, yarns).map(Source::Knit),
+        Some(2) => pattern::weave(&table, context, yarns).map(Source::Weave),
+        // Short for a flat knit of that pattern.
+        Some(4) => pattern::stockinette(&table).map(Source::Knit),
+        Some(3) => Some(Source::Straight {
             count: table.u64_or("count", 1, 1..=1_000_000) as u32,
             length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
-            spacing: table
-                .f64("spacing", Range::POSITIVE)
-                .map_or(yarn.map_or(1.0, |y| 2.0 * y.radius), |s| s * context.unit),
+            spacing: table.f64("spacing", Range::POSITIVE).map_or(2.0 * yarns.radius(), |s| s * context.unit),
         }),
         _ => None,
     };
-    if let (Some(path), Some(1 | 2)) = (curves, kind) {
+    if let (Some(path), Some(1..)) = (curves, kind) {
         table.finish();
         return Some(file_source(path.to_owned(), header, None, None));
     }
@@ -203,8 +223,15 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarn: Option<&Yarn>, curves:
     made
 }
 
+/// Curves of one kind of yarn, before they are moved to their place.
+struct Made {
+    origin: String,
+    thread: Thread,
+    curves: Vec<(Curve, Vec<f64>)>,
+}
+
 impl FabricPlan {
-    /// Reads or makes the curves.
+    /// Reads or makes the curves: one fabric for each kind of yarn.
     pub(super) fn make(
         self,
         index: usize,
@@ -212,32 +239,43 @@ impl FabricPlan {
         library: &Library,
         detail: &Detail,
         warnings: &mut Vec<String>,
-    ) -> Option<Fabric> {
+    ) -> Option<Vec<Fabric>> {
+        let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(Thread::Yarn);
         let (thread, own_radius) = match &self.thread {
-            ThreadName::Yarn(name) => {
-                let place = library.yarns.keys().position(|n| n == name)?;
-                (Thread::Yarn(place), library.yarns[name].radius)
-            }
+            ThreadName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
             ThreadName::Fiber(name) => (Thread::Fiber(library.fibers.keys().position(|n| n == name)?), FIBER_RADIUS),
         };
         let radius = self.radius.unwrap_or(own_radius);
-        let with_radii = |curves: Vec<Curve>, own: bool, scale: f64| -> Vec<(Curve, Vec<f64>)> {
-            curves
-                .into_iter()
-                .map(|mut curve| {
-                    let radii = curve.radii.take().filter(|_| own && self.radius.is_none());
-                    let radii = radii
-                        .map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
-                    (curve, radii)
-                })
-                .collect()
+        let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
+            let with = |curve: Curve| {
+                let radii = vec![radius; curve.points.len()];
+                (curve, radii)
+            };
+            curves.into_iter().map(with).collect()
         };
-        let (origin, mut curves) = match self.source {
-            Source::Stockinette(s) => {
-                (format!("stockinette, {} x {}", s.stitches, s.rows), with_radii(s.curves(2.0 * radius), false, 1.0))
+        let made = match self.source {
+            Source::Knit(plan) => {
+                let curves = plan.curves(2.0 * radius, context)?;
+                vec![Made { origin: plan.origin(), thread, curves: with_radius(curves, radius) }]
+            }
+            Source::Weave(plan) => {
+                let [warps, wefts] = plan.curves(context)?;
+                let weft = plan.weft_yarn.as_deref().map_or(Some(thread), place_of)?;
+                let weft_radius = plan.weave.weft_radius;
+                let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, weft_radius));
+                if weft == thread {
+                    warps.extend(wefts);
+                    vec![Made { origin: plan.origin(), thread, curves: warps }]
+                } else {
+                    vec![
+                        Made { origin: format!("{}, warp", plan.origin()), thread, curves: warps },
+                        Made { origin: format!("{}, weft", plan.origin()), thread: weft, curves: wefts },
+                    ]
+                }
             }
             Source::Straight { count, length, spacing } => {
-                (format!("{count} straight"), with_radii(straight(count, length, spacing), false, 1.0))
+                let curves = with_radius(straight(count, length, spacing), radius);
+                vec![Made { origin: format!("{count} straight"), thread, curves }]
             }
             Source::File { path, span, unit, options, up } => {
                 let set = match curve_file::read(&path, &options) {
@@ -249,41 +287,48 @@ impl FabricPlan {
                 };
                 warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
                 let scale = unit.or(set.unit_mm).unwrap_or(context.unit);
-                let mut curves = with_radii(set.curves, true, scale);
-                // Radii are in millimetres already; the transform below would scale them with the points.
-                for (curve, _) in &mut curves {
+                let own_radii = |mut curve: Curve| {
+                    let given = curve.radii.take().filter(|_| self.radius.is_none());
+                    let radii = given
+                        .map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
+                    // Radii are in millimetres already; the transform below would scale them with the points.
                     for p in &mut curve.points {
                         *p *= scale;
                     }
-                }
+                    (curve, radii)
+                };
+                let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
                 if up == Up::Z || (up == Up::Auto && set.up_axis == Some(2)) {
                     // z up becomes y up: a quarter turn about x.
                     let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
                     transform_curves(&mut curves, &DAffine3::from_mat3(turn));
                 }
-                (path.display().to_string(), curves)
+                vec![Made { origin: path.display().to_string(), thread, curves }]
             }
         };
-        transform_curves(&mut curves, &self.transform);
-        let phases = self.phases.unwrap_or_else(|| {
-            let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
-            curves.iter().map(|_| TAU * f64::from(stream.next())).collect()
-        });
-        let of_file = match curves.first().map(|(curve, _)| curve.basis) {
-            Some(Basis::BSpline) => Basis::BSpline,
-            _ => Basis::CatmullRom,
+        let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
+        let name = self.name.unwrap_or_else(|| self.thread.into_name());
+        let fabric = |Made { origin, thread, mut curves }: Made| {
+            transform_curves(&mut curves, &self.transform);
+            let phases =
+                self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
+            let of_file = match curves.first().map(|(curve, _)| curve.basis) {
+                Some(Basis::BSpline) => Basis::BSpline,
+                _ => Basis::CatmullRom,
+            };
+            Fabric {
+                name: name.clone(),
+                origin,
+                thread,
+                curves,
+                phases,
+                seed: self.seed,
+                basis: detail.basis.unwrap_or(of_file),
+                tolerance: detail.tolerance,
+                longest_segment: detail.longest_segment,
+            }
         };
-        Some(Fabric {
-            name: self.name.unwrap_or_else(|| self.thread.into_name()),
-            origin,
-            thread,
-            curves,
-            phases,
-            seed: self.seed,
-            basis: detail.basis.unwrap_or(of_file),
-            tolerance: detail.tolerance,
-            longest_segment: detail.longest_segment,
-        })
+        Some(made.into_iter().map(fabric).collect())
     }
 }
 

@@ -6,6 +6,7 @@
 mod cloth;
 mod definitions;
 mod mesh;
+mod pattern;
 mod settings;
 mod view;
 mod yarns;
@@ -234,6 +235,7 @@ fn build(
         .flatten()
         .enumerate()
         .filter_map(|(i, plan)| plan.make(i, &context, &library, &detail, &mut warnings))
+        .flatten()
         .collect();
     let mut made = Vec::new();
     let mut objects: Vec<Object> =

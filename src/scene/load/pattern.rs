@@ -1,0 +1,225 @@
+//! `source = { type = "knit" }` and `{ type = "weave" }`: cloth that the program makes.
+
+use glam::DVec2;
+
+use super::{Context, Range, Reader, cloth::Yarns};
+use crate::{
+    geometry::{
+        curve::Curve,
+        pattern::{
+            MAX_POINTS, PatternStrand, StrandKind,
+            chart::{Chart, PATTERNS},
+            draft::{Draft, DraftError},
+            knit::{self, Form, Knit},
+            weave::{self, Weave},
+        },
+    },
+    scene::diagnostic::{Span, unknown_name},
+};
+
+/// A knit that is checked but for what only knitting tells.
+pub(super) struct KnitPlan {
+    knit: Knit,
+    name: String,
+    /// Where the chart's rows were written, for what is wrong with them.
+    lines: Vec<Span>,
+    header: Span,
+}
+
+impl KnitPlan {
+    pub(super) fn origin(&self) -> String {
+        format!("{}, {} x {}", self.name, self.knit.stitches, self.knit.rows)
+    }
+
+    /// The courses; what is wrong with the chart is told.
+    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<Vec<Curve>> {
+        match self.knit.strands(diameter) {
+            Ok(strands) => Some(strands.into_iter().map(|s| s.curve).collect()),
+            Err(error) => {
+                let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
+                context.error(*span, error.problem, Some(error.hint));
+                None
+            }
+        }
+    }
+}
+
+/// Reads the keys of a knit.
+pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
+    let chart_rows = table.strings("chart");
+    let pattern = table.string("pattern");
+    if pattern.is_some() && !chart_rows.is_empty() {
+        table.error_at(
+            "chart",
+            "both `pattern` and `chart` are given",
+            Some("a chart is a pattern of its own: keep one"),
+        );
+    }
+    let (name, chart) = if chart_rows.is_empty() {
+        let name = pattern.unwrap_or("stockinette");
+        let chart = Chart::named(name);
+        if chart.is_none() {
+            let (message, hint) = unknown_name("pattern", name, PATTERNS.iter().map(|(n, _)| *n));
+            table.error_at("pattern", message, Some(&hint));
+        }
+        (name, chart)
+    } else {
+        let rows: Vec<&str> = chart_rows.iter().map(|(text, _)| *text).collect();
+        match Chart::parse(&rows) {
+            Ok(chart) => ("knit", Some(chart)),
+            Err(error) => {
+                let span = error.line.map_or(table.header(), |l| chart_rows[l].1);
+                context.error(span, error.problem, Some(error.hint));
+                ("knit", None)
+            }
+        }
+    };
+    let profile = table.pairs("profile", Range::FINITE);
+    let forms = [("flat", 0), ("tube", 1), ("revolution", 2)];
+    let form = match table.one_of_or("form", if profile.is_some() { 2 } else { 0 }, &forms) {
+        0 => Some(Form::Flat),
+        1 => Some(Form::Tube),
+        _ => revolution(table, context, profile.as_deref(), yarns.radius()),
+    };
+    if let (Some(Form::Flat | Form::Tube), true) = (&form, profile.is_some()) {
+        table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
+    }
+    let lines = chart_rows.iter().map(|(_, span)| *span).collect();
+    let rows = if lines_are_all(&form, &chart_rows) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
+    counted(table, chart?, form?, name, rows, lines)
+}
+
+/// Shaped pieces are knitted once, from the first row of the chart to the last.
+fn lines_are_all(form: &Option<Form>, chart_rows: &[(&str, Span)]) -> bool {
+    matches!(form, Some(Form::Revolution(_))) && !chart_rows.is_empty()
+}
+
+/// `type = "stockinette"`: a flat knit of that pattern.
+pub(super) fn stockinette(table: &Reader<'_>) -> Option<KnitPlan> {
+    counted(table, Chart::named("stockinette")?, Form::Flat, "stockinette", 20, Vec::new())
+}
+
+fn counted(table: &Reader<'_>, chart: Chart, form: Form, name: &str, rows: u32, lines: Vec<Span>) -> Option<KnitPlan> {
+    let knit = Knit {
+        chart,
+        stitches: table.u64_or("stitches", 20, 1..=1_000_000) as u32,
+        rows: table.u64_or("rows", rows.into(), 1..=1_000_000) as u32,
+        form,
+        stitch_width: table.f64("stitch_width", Range::between(1.0, 20.0)),
+        row_height: table.f64("row_height", Range::between(0.5, 20.0)),
+        yarn_per_stitch: table.f64_or("yarn_per_stitch", knit::YARN_PER_STITCH, Range::between(6.0, 60.0)),
+        points: table.u64_or("points", knit::POINTS.into(), 12..=200) as u32,
+    };
+    if knit.control_points() > MAX_POINTS {
+        table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
+    }
+    if knit.form != Form::Flat && knit.stitches < 3 {
+        table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
+        return None;
+    }
+    Some(KnitPlan { knit, name: name.to_owned(), lines, header: table.header() })
+}
+
+/// The profile in millimetres, if it is one.
+fn revolution(table: &Reader<'_>, context: &Context<'_>, profile: Option<&[[f64; 2]]>, radius: f64) -> Option<Form> {
+    const HINT: &str =
+        "profile = [[90, 0], [90, 60], [70, 110], [10, 130]]: radius and height from the cast-on edge on";
+    let Some(profile) = profile else {
+        if !table.has("profile") {
+            table.error("a surface of revolution needs a `profile`", Some(HINT));
+        }
+        return None;
+    };
+    let profile: Vec<DVec2> = profile.iter().map(|p| DVec2::from(*p) * context.unit).collect();
+    if !(2..=10_000).contains(&profile.len()) {
+        table.error_at("profile", "a profile has 2 to 10000 points", Some(HINT));
+    } else if profile.iter().any(|p| p.x < 0.0) {
+        table.error_at("profile", "the radius of a profile must be at least 0", Some(HINT));
+    } else if profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
+        table.error_at("profile", "two points of the profile fall together", Some(HINT));
+    } else {
+        return Some(Form::Revolution(profile));
+    }
+    None
+}
+
+/// A weave that is checked.
+pub(super) struct WeavePlan {
+    pub(super) weave: Weave,
+    /// If it is not the fabric's own.
+    pub(super) weft_yarn: Option<String>,
+    name: String,
+    header: Span,
+}
+
+impl WeavePlan {
+    pub(super) fn origin(&self) -> String {
+        format!("{}, {} x {}", self.name, self.weave.warps, self.weave.wefts)
+    }
+
+    /// Warps and wefts.
+    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[Vec<Curve>; 2]> {
+        match self.weave.strands() {
+            Ok(strands) => {
+                let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
+                    strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
+                Some([warps, wefts].map(|side| side.into_iter().map(|s| s.curve).collect()))
+            }
+            Err(tight) => {
+                let (key, least) =
+                    (if tight.warp { "warp_spacing" } else { "weft_spacing" }, tight.least / context.unit);
+                let problem = format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here");
+                let hint = "thinner yarns, another `crimp`, or no spacing at all for the tightest";
+                context.error(self.header, problem, Some(hint.to_owned()));
+                None
+            }
+        }
+    }
+}
+
+/// Reads the keys of a weave.
+pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
+    let (name, draft) = draft(table);
+    let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
+    let names = &yarns.library.yarn_names;
+    if let Some(name) = weft_yarn.filter(|name| !names.iter().any(|n| n == name)) {
+        let (message, hint) = unknown_name("yarn", name, names.iter().map(String::as_str));
+        table.error_at("weft_yarn", message, Some(&hint));
+    }
+    let own = yarns.radius();
+    let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
+    let weave = Weave {
+        draft: draft?,
+        warps: table.u64_or("warps", 20, 1..=1_000_000) as u32,
+        wefts: table.u64_or("wefts", 20, 1..=1_000_000) as u32,
+        warp_radius: own,
+        weft_radius,
+        warp_spacing: table.f64("warp_spacing", Range::POSITIVE).map(|s| s * context.unit),
+        weft_spacing: table.f64("weft_spacing", Range::POSITIVE).map(|s| s * context.unit),
+        crimp: table.f64_or("crimp", 0.5, Range::UNIT),
+        points: table.u64_or("points", weave::POINTS.into(), 4..=200) as u32,
+    };
+    if weave.control_points() > MAX_POINTS {
+        table.error_at("warps", "more than 2^26 control points", Some("fewer warps, wefts or points"));
+        return None;
+    }
+    Some(WeavePlan { weave, weft_yarn: weft_yarn.map(str::to_owned), name, header: table.header() })
+}
+
+/// `draft`: a name, or rows of a matrix.
+fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
+    let rows = table.strings("draft");
+    let read: Result<(String, Draft), DraftError> = match rows.as_slice() {
+        [] if table.has("draft") => return (String::new(), None),
+        [] => Draft::named("plain").map(|d| ("plain weave".to_owned(), d)),
+        [(name, _)] if !name.contains(['#', '.']) => Draft::named(name).map(|d| (format!("{name} weave"), d)),
+        rows => Draft::matrix(&rows.iter().map(|(text, _)| *text).collect::<Vec<_>>()).map(|d| ("weave".to_owned(), d)),
+    };
+    match read {
+        Ok((name, draft)) => (name, Some(draft)),
+        Err(error) => {
+            table.error_at("draft", error.problem, Some(&error.hint));
+            (String::new(), None)
+        }
+    }
+}
