@@ -193,7 +193,7 @@ impl Chart {
         for r in 0..rows {
             let row = &self.rows[r as usize % self.rows.len()];
             let (takes, makes) = row.takes_and_makes();
-            let cut = takes == 0 || found % takes != 0;
+            let cut = takes == 0 || !found.is_multiple_of(takes);
             if takes == 0 || (cut && !row.is_plain()) {
                 let problem = format!("row {} repeats over {takes} stitches, but finds {found}", r + 1);
                 let hint = "the number of stitches must be a multiple of what a row with shaping or cables takes";

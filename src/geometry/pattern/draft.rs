@@ -60,7 +60,7 @@ impl Draft {
             ("basket", &[n]) => Ok(Self::from_fn(2 * n, 2 * n, |i, j| (i / n + j / n) % 2 == 0)),
             ("twill", &[n, m]) => Ok(Self::from_fn(n + m, n + m, |i, j| (i + n + m - j) % (n + m) < n)),
             ("satin" | "sateen", &[n, ref rest @ ..]) if rest.len() <= 1 => {
-                let coprime = |step: usize| (1..=n).all(|d| d == 1 || n % d != 0 || step % d != 0);
+                let coprime = |step: usize| (1..=n).all(|d| d == 1 || !n.is_multiple_of(d) || !step.is_multiple_of(d));
                 // The usual step: neither neighbours, and as even as it gets.
                 let even =
                     || (2..n.saturating_sub(1)).filter(|&s| coprime(s)).min_by_key(|&s| (s * s % n).abs_diff(n - 1));

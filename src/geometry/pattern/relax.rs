@@ -214,7 +214,7 @@ impl Relaxation {
             let (q0, q1) = self.ends(b);
             let near = nearest(p0, p1, q0 + pair.shift, q1 + pair.shift);
             let distance = near.between.length();
-            if distance >= APART || distance < 1e-9 {
+            if !(1e-9..APART).contains(&distance) {
                 continue;
             }
             let (s, t) = (near.s, near.t);
