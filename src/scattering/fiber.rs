@@ -9,7 +9,9 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use glam::Vec3A;
 
 use super::LobeValues;
-use super::kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel_scalar, sample_sine, sample_sine_diffuse};
+use super::kernel::{
+    DIFFUSE, Latitudes, kappa_of_variance, normalisation, normalised_kernel, sample_sine, sample_sine_diffuse,
+};
 use crate::math::{
     Rgb,
     frame::sin_cos,
@@ -53,8 +55,9 @@ pub struct FiberBcsdf {
     r: Rgb,
     tt: Rgb,
     d: Rgb,
-    kappa_r: f32,
-    kappa_tt: f32,
+    /// kappa of R and of TT, and the factors of their kernels.
+    kappa: Rgb,
+    factor: Rgb,
     beta_n: f32,
 }
 
@@ -74,13 +77,14 @@ pub struct FiberSample {
 impl FiberBcsdf {
     /// From the material's albedos and widths.
     pub fn new(material: &FiberMaterial) -> Self {
-        let kappa = |beta: f64| kappa_of_variance(Rgb::splat((beta * beta) as f32)).to_array()[0];
+        let variance = |beta: f64| (beta * beta) as f32;
+        let kappa = kappa_of_variance(Rgb::new(variance(material.beta_r), variance(material.beta_tt), 1.0));
         Self {
             r: material.r.into(),
             tt: material.tt.into(),
             d: material.d.into(),
-            kappa_r: kappa(material.beta_r),
-            kappa_tt: kappa(material.beta_tt),
+            kappa,
+            factor: normalisation(kappa),
             beta_n: material.beta_n as f32,
         }
     }
@@ -93,8 +97,7 @@ impl FiberBcsdf {
         let sin_i = wi.z;
         let cos_i = (1.0 - sin_i * sin_i).max(0.0).sqrt();
         let at = Latitudes::new(sin_o, cos_o, sin_i, cos_i);
-        let m_r = kernel_scalar(self.kappa_r, at);
-        let m_tt = kernel_scalar(self.kappa_tt, at);
+        let [m_r, m_tt, _] = normalised_kernel(self.kappa, self.factor, at).to_array();
         let n_tt = if m_tt > 0.0 { wrapped_normal(wi.y.atan2(wi.x) - PI, self.beta_n) } else { 0.0 };
         let r = m_r * cos_i * (0.5 * FRAC_1_PI);
         let d = DIFFUSE * cos_i * (0.5 * FRAC_1_PI);
@@ -125,10 +128,11 @@ impl FiberBcsdf {
             return None;
         }
         let lat = [u[1], u[2]];
+        let [kappa_r, kappa_tt, _] = self.kappa.to_array();
         let (sin_i, phi) = if u[0] < p_r {
-            (sample_sine(self.kappa_r, sin_o, cos_o, lat, stream), TAU * u[3])
+            (sample_sine(kappa_r, sin_o, cos_o, lat, stream), TAU * u[3])
         } else if u[0] < p_r + p_tt {
-            (sample_sine(self.kappa_tt, sin_o, cos_o, lat, stream), PI + self.beta_n * normal(u[3]))
+            (sample_sine(kappa_tt, sin_o, cos_o, lat, stream), PI + self.beta_n * normal(u[3]))
         } else {
             (sample_sine_diffuse(lat), TAU * u[3])
         };

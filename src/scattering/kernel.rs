@@ -50,12 +50,23 @@ impl Latitudes {
 /// M for three values of kappa at once, in 1/radian; relative error below 1e-5.
 #[inline]
 pub fn kernel(kappa: Rgb, at: Latitudes) -> Rgb {
+    normalised_kernel(kappa, normalisation(kappa), at)
+}
+
+/// The factor of M that depends on kappa only: for lobes whose width never changes.
+#[inline]
+pub fn normalisation(kappa: Rgb) -> Rgb {
     let bounded = kappa.min(Rgb::splat(KAPPA_ASYMPTOTIC));
     let beyond = kappa / bounded.max(Rgb::splat(1e-30));
     let beyond = beyond.max(Rgb::ONE);
     let p = P[1..].iter().fold(Rgb::splat(P[0]), |sum, &c| sum * bounded + c);
     let q = Q[1..].iter().fold(Rgb::splat(Q[0]), |sum, &c| sum * bounded + c);
-    let normalisation = (p / q).sqrt() * FRAC_2_PI * beyond * beyond.sqrt();
+    (p / q).sqrt() * FRAC_2_PI * beyond * beyond.sqrt()
+}
+
+/// [`kernel`] with [`normalisation`] of the same kappa at hand.
+#[inline]
+pub fn normalised_kernel(kappa: Rgb, normalisation: Rgb, at: Latitudes) -> Rgb {
     let x = kappa * (2.0 * at.cosines);
     // (1 - e^-2x) / 2x
     let spread = x.select_below(1e-6, Rgb::ONE, x.one_minus_exp_neg() / x.max(Rgb::splat(1e-30)));
