@@ -72,6 +72,24 @@ pub fn mean_steps(loss: f64, n: f64) -> f64 {
     mean.max(0.0)
 }
 
+/// (a_1B, a_3B) of Eq. 9 for infinitely many fibres: a_B / (1 - a_F^2) and a_B^3 a_F^2 / (1 - a_F^2)^3. `back`, a_B, is at
+/// most `loss`, 1 - a_F, so that both are finite for fibres that lose nothing else.
+pub fn endless_back(loss: f64, back: f64) -> (f64, f64) {
+    // 1 - a_F^2
+    let turned = loss * (2.0 - loss);
+    if turned <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let once = back / turned;
+    (once, once.powi(3) * (1.0 - loss) * (1.0 - loss))
+}
+
+/// As [`mean_steps`], for infinitely many fibres: a_F^2 / (1 - a_F^2), at most 1e6.
+pub fn endless_steps(loss: f64) -> f64 {
+    let turned = loss * (2.0 - loss);
+    if turned > 1e-6 { (1.0 - turned) / turned } else { 1e6 }
+}
+
 /// E[a_F^N] for a Poisson number of mean n.
 #[inline]
 pub fn poisson_passed(loss: f64, n: f64) -> f64 {
@@ -169,6 +187,20 @@ mod tests {
             }
         }
         (once, thrice)
+    }
+
+    #[test]
+    fn endless_forms_are_the_limits_of_many_fibers() {
+        for loss in [0.02, 0.3, 0.9, 1.0] {
+            let back = 0.7 * loss;
+            let (once, thrice) = endless_back(loss, back);
+            assert!((once / (back * once_back(loss, 1e4)) - 1.0).abs() < 1e-9, "{loss}: {once}");
+            let many = back.powi(3) * thrice_back(loss, 1e4);
+            assert!((thrice - many).abs() <= 1e-9 * many, "{loss}: {thrice} {many}");
+            assert!((endless_steps(loss) - mean_steps(loss, 1e4)).abs() < 1e-6 * (1.0 + endless_steps(loss)), "{loss}");
+        }
+        assert_eq!(endless_back(0.0, 0.0), (0.0, 0.0));
+        assert!(endless_steps(0.0).is_finite());
     }
 
     #[test]

@@ -12,6 +12,9 @@
 //! | azimuth of B | back half | full circle (Eq. 12) | full circle (Eq. 12) |
 //! | several plies | in order | in order | Eq. 14 |
 //!
+//! [`ChordModel::DualScattering`] is the classical form that the paper starts from (Zinke et al. 2008, Yuksel 2008): as
+//! `Paper`, but the averaged fibre has no D, and light turns back among infinitely many fibres.
+//!
 //! In order: B_1 + F_1^2 B_2 + F_1^2 F_2^2 B_3 ..., which is what Eq. 14 seems to mean; as printed it counts each ply
 //! twice and dims none. Forward, plies multiply (Eq. 14). All three use the kernel of [`super::kernel`] for every
 //! longitudinal lobe, since the printed one (Eq. 5) neither conserves energy nor is reciprocal.
@@ -26,8 +29,8 @@ use glam::Vec3A;
 use super::{
     Continuation, Direct, LobeValues,
     closed_forms::{
-        mean_steps, once_back, passed, poisson_mean_steps, poisson_once_back, poisson_passed, poisson_thrice_back,
-        thrice_back, two_stream,
+        endless_back, endless_steps, mean_steps, once_back, passed, poisson_mean_steps, poisson_once_back,
+        poisson_passed, poisson_thrice_back, thrice_back, two_stream,
     },
     fiber::FiberMaterial,
     kernel::{DIFFUSE, MIN_VARIANCE, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
@@ -61,6 +64,8 @@ pub enum ChordModel {
     Paper,
     /// The paper's equations as printed; only what cannot be read is mended.
     Printed,
+    /// Classical dual scattering: no D in the averages, infinitely many fibres behind.
+    DualScattering,
 }
 
 impl ChordModel {
@@ -104,9 +109,14 @@ fn mean_of(parts: [(f64, f64); 3]) -> f64 {
 }
 
 impl AveragedFiber {
-    fn new(material: &FiberMaterial, ply: &PlyShape) -> Self {
+    fn new(material: &FiberMaterial, ply: &PlyShape, model: ChordModel) -> Self {
+        let direct_d = material.d;
+        let averaged = FiberMaterial {
+            d: if model == ChordModel::DualScattering { [0.0; 3] } else { material.d },
+            ..material.clone()
+        };
         let channels = |value: &dyn Fn(usize) -> f64| [value(0), value(1), value(2)];
-        let m = material;
+        let m = &averaged;
         // Hemispheres relative to phi_i, as the text has it (phi_r - phi_i); with those as printed in Eqs. 3 and 4,
         // fixed ones, TT would leak backward even if it were a mirror's straight ray.
         let q = front_share_of_wrapped_normal(m.beta_n);
@@ -124,7 +134,7 @@ impl AveragedFiber {
         let twist = f64::from(ply.fiber_rate) * radius;
         Self {
             r: m.r,
-            d: m.d,
+            d: direct_d,
             loss: channels(&|c| (absorbed(c) + back(c)).min(1.0)),
             forward: channels(&|c| side(c) + m.tt[c] * q),
             back: channels(&back),
@@ -169,7 +179,7 @@ impl ChordYarn {
     /// If their numbers differ.
     pub fn new(shape: YarnShape, materials: &[&FiberMaterial], model: ChordModel) -> Self {
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
-        let plies = shape.plies.iter().zip(materials).map(|(p, m)| AveragedFiber::new(m, p)).collect();
+        let plies = shape.plies.iter().zip(materials).map(|(p, m)| AveragedFiber::new(m, p, model)).collect();
         Self { shape, plies, model }
     }
 
@@ -227,17 +237,26 @@ impl ChordYarn {
                     let thrice = back.powi(3) * poisson_thrice_back(loss, n);
                     (once + thrice, poisson_passed(loss, n), -(-n).exp_m1())
                 }
+                ChordModel::DualScattering => {
+                    let (once, thrice) = endless_back(loss, back);
+                    (once + thrice, poisson_passed(loss, n), -(-n).exp_m1())
+                }
                 ChordModel::Printed => {
                     (back * once_back(loss, n) + back.powi(3) * thrice_back(loss, n), passed(loss, n), 1.0)
                 }
             };
-            let steps = if printed { mean_steps(loss, n) } else { poisson_mean_steps(loss, n, front) };
+            let steps = match self.model {
+                ChordModel::Printed => mean_steps(loss, n),
+                ChordModel::DualScattering => endless_steps(loss),
+                ChordModel::TwoStream | ChordModel::Paper => poisson_mean_steps(loss, n, front),
+            };
             if front {
                 let share = if printed { 1.0 } else { 0.5 * single };
                 (out.r[c], out.d[c]) = (fiber.r[c] * share, fiber.d[c] * share);
                 if !printed {
                     // What R and D show is no longer B's. Turned-back TT has no lobe of its own and stays here.
-                    returned = (returned - out.r[c] - out.d[c]).max(0.0);
+                    let averaged_d = if self.model == ChordModel::DualScattering { 0.0 } else { out.d[c] };
+                    returned = (returned - out.r[c] - averaged_d).max(0.0);
                 }
             }
             // Printed Eq. 14: sum of a_B (1 + a_F^2) over plies, none dimmed by those before it. A yarn of one ply is

@@ -61,15 +61,18 @@ pub enum Model {
     Paper,
     /// The paper's equations as printed: gains energy.
     Printed,
+    /// Classical dual scattering, from which the paper starts.
+    DualScattering,
 }
 
 impl Model {
     /// Every model with its name in files and on the command line.
-    pub const NAMES: [(&'static str, Self); 4] = [
+    pub const NAMES: [(&'static str, Self); 5] = [
         ("aggregated", Self::Aggregated),
         ("two-stream", Self::TwoStream),
         ("paper", Self::Paper),
         ("printed", Self::Printed),
+        ("dual-scattering", Self::DualScattering),
     ];
 
     /// The name in files and on the command line.
@@ -80,6 +83,31 @@ impl Model {
 
 fn name_of<T: PartialEq>(value: T, names: &[(&'static str, T)]) -> &'static str {
     names.iter().find(|(_, v)| *v == value).map_or("?", |(name, _)| name)
+}
+
+/// A lobe of a single fibre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FiberLobe {
+    /// Reflection at the surface.
+    R,
+    /// Light that passes through.
+    Tt,
+    /// Light scattered diffusely inside.
+    D,
+}
+
+impl FiberLobe {
+    /// Every lobe with its name in files.
+    pub const NAMES: [(&'static str, Self); 3] = [("R", Self::R), ("TT", Self::Tt), ("D", Self::D)];
+
+    /// Takes the lobe away from a fibre.
+    pub fn remove_from(self, fiber: &mut FiberMaterial) {
+        match self {
+            Self::R => fiber.r = [0.0; 3],
+            Self::Tt => fiber.tt = [0.0; 3],
+            Self::D => fiber.d = [0.0; 3],
+        }
+    }
 }
 
 /// How samples spread around a pixel's centre.
@@ -100,6 +128,8 @@ pub struct RenderSettings {
     pub mode: Mode,
     /// The yarns' scattering model.
     pub model: Model,
+    /// Lobes of single fibres that are left out, in every mode: the ablations of the paper's Fig. 6.
+    pub without: Vec<FiberLobe>,
     /// Picture size in pixels.
     pub width: u32,
     /// As `width`.

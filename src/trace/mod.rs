@@ -308,6 +308,7 @@ fn yarn_scatterer(shape: YarnShape, materials: &[&FiberMaterial], model: Model) 
         Model::TwoStream => ChordModel::TwoStream,
         Model::Paper => ChordModel::Paper,
         Model::Printed => ChordModel::Printed,
+        Model::DualScattering => ChordModel::DualScattering,
     };
     YarnScatterer::Chord(ChordYarn::new(shape, materials, chord))
 }

@@ -6,7 +6,8 @@ use crate::{
     scattering::testing::{SILK, lossless, material, section, silk, sphere},
 };
 
-const MODELS: [ChordModel; 3] = [ChordModel::TwoStream, ChordModel::Paper, ChordModel::Printed];
+const MODELS: [ChordModel; 4] =
+    [ChordModel::TwoStream, ChordModel::Paper, ChordModel::DualScattering, ChordModel::Printed];
 /// Mean abs. relative errors over cases and channels, and the largest energy of the model.
 #[derive(Debug, Default)]
 struct Errors {

@@ -21,13 +21,14 @@ use glam::{DAffine3, DQuat, DVec3, EulerRot};
 pub use definitions::{Definitions, load_definitions};
 
 use super::{
-    Fabric, Ground, Light, Object, Scene, Thread, bounds,
+    Fabric, Ground, Light, Mode, Object, Scene, Thread, bounds,
     diagnostic::{Diagnostic, Diagnostics, Sources, Span},
     document::{Document, MAX_FILE_BYTES, Value},
     identity,
     reader::{Range, Reader},
     transform_curves,
 };
+use crate::geometry::fiber::packing;
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -289,7 +290,14 @@ fn build(
         warnings,
     };
     keep_used(&mut scene);
+    for lobe in scene.render.without.clone() {
+        let of_yarns = scene.yarns.iter_mut().flat_map(|y| &mut y.fibers);
+        for (_, fiber) in of_yarns.chain(&mut scene.fibers) {
+            lobe.remove_from(fiber);
+        }
+    }
     warn_about_precision(&mut scene);
+    warn_about_density(&mut scene);
     scene.identity = identity::identity(&scene);
     scene.fingerprint = identity::fingerprint(&scene.identity);
     Some(scene)
@@ -312,6 +320,25 @@ fn keep_used(scene: &mut Scene) {
     }
     scene.yarns = yarns.into_iter().map(|y| scene.yarns[y].clone()).collect();
     scene.fibers = fibers.into_iter().map(|f| scene.fibers[f].clone()).collect();
+}
+
+/// Explicit fibres that do not fit their ply overlap.
+fn warn_about_density(scene: &mut Scene) {
+    if scene.render.mode != Mode::Fiber {
+        return;
+    }
+    for yarn in &scene.yarns {
+        let fullest = yarn.plies.iter().map(|p| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2));
+        let fullest = fullest.fold(0.0, f64::max);
+        if fullest > packing::DENSEST {
+            scene.warnings.push(format!(
+                "yarn `{}`: fibres would fill {:.0} % of a ply; above {:.0} % they overlap",
+                yarn.name,
+                100.0 * fullest,
+                100.0 * packing::DENSEST
+            ));
+        }
+    }
 }
 
 /// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.

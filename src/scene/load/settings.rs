@@ -13,6 +13,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
     let defaults = RenderSettings {
         mode: Mode::Yarn,
         model: Model::Aggregated,
+        without: Vec::new(),
         width: 768,
         height: 576,
         crop: [0, 0, 768, 576],
@@ -63,6 +64,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
     Some(RenderSettings {
         mode,
         model: table.one_of_or("model", defaults.model, &Model::NAMES),
+        without: without(table),
         width,
         height,
         crop,
@@ -97,6 +99,23 @@ pub(super) struct Output {
     pub(super) layers: Layers,
     pub(super) storage: Storage,
     pub(super) denoise: bool,
+}
+
+/// `without = ["D"]`: lobes of single fibres to leave out.
+fn without(table: &Reader<'_>) -> Vec<FiberLobe> {
+    let mut lobes = Vec::new();
+    if table.has("without") {
+        for (name, _) in table.strings("without") {
+            match FiberLobe::NAMES.iter().find(|(known, _)| *known == name) {
+                Some((_, lobe)) => lobes.push(*lobe),
+                None => {
+                    let message = format!("unknown lobe `{name}` of a fibre");
+                    table.error_at("without", message, Some("known are R, TT and D"));
+                }
+            }
+        }
+    }
+    lobes
 }
 
 /// The settings of `[output]`.
