@@ -23,6 +23,8 @@ mod fabric_truth;
 mod furnace;
 // Damaged scene files give errors, never panics.
 mod fuzz;
+// Yarns, plies or fibres as curves: the same cloth, its memory told beforehand.
+mod modes;
 // What must not change a picture: units, places, seams, and the way plies are intersected where it cannot matter.
 mod invariance;
 // Which room of the crate may use which, and what may stand in one room only.
