@@ -19,7 +19,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("integrator", &["ffi", "geometry", "math", "scattering", "scene", "trace"]),
     ("film", &["integrator", "math", "scene"]),
     ("render", &["ffi", "film", "image", "integrator", "math", "scene", "trace"]),
-    ("plan", &["image", "scene"]),
+    ("plan", &["film", "geometry", "image", "math", "scattering", "scene"]),
     ("report", &["geometry", "image", "math", "plan", "render", "scene", "trace"]),
     ("experiment", &["ffi", "film", "geometry", "image", "math", "render", "report", "scattering", "scene", "trace"]),
     ("cli", &["experiment", "ffi", "geometry", "image", "plan", "render", "report", "scene", "trace"]),

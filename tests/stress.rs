@@ -31,3 +31,15 @@ fn stress_refuses_cases_that_it_does_not_have() {
     }
     assert_eq!(listing(directory.path()), [""; 0]);
 }
+
+#[test]
+fn the_program_is_not_linked_with_what_only_some_scenes_need() {
+    // OpenImageIO and Open Image Denoise are loaded when a scene asks for them, if at all.
+    let Ok(listed) = std::process::Command::new("ldd").arg(env!("CARGO_BIN_EXE_yarnray")).output() else {
+        eprintln!("skipped: no ldd");
+        return;
+    };
+    let text = String::from_utf8_lossy(&listed.stdout).to_lowercase();
+    assert!(text.contains("embree"), "{text}");
+    assert!(!text.contains("openimageio") && !text.contains("openimagedenoise"), "{text}");
+}

@@ -120,7 +120,11 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         })
         .collect();
     let reasons = |used: bool| -> Vec<Value> {
-        plan.features.iter().filter(|f| f.used == used).map(|f| json!({"name": f.name, "reason": f.reason})).collect()
+        plan.features
+            .iter()
+            .filter(|f| f.used == used)
+            .map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes}))
+            .collect()
     };
     let report = json!({
         "scene": scene.path, "fingerprint": scene.fingerprint,
@@ -167,7 +171,9 @@ fn scene_report(scene: &Scene) -> (Value, String) {
     for used in [true, false] {
         text += if used { "  used\n" } else { "  left out\n" };
         for f in plan.features.iter().filter(|f| f.used == used) {
-            text += &format!("    {:18}{}\n", f.name, f.reason);
+            let verb = if used { "takes" } else { "saves" };
+            let memory = f.bytes.filter(|b| *b > 0).map(|b| format!(" ({verb} {})", bytes_in_words(b)));
+            text += &format!("    {:18}{}{}\n", f.name, f.reason, memory.unwrap_or_default());
         }
     }
     for warning in &scene.warnings {

@@ -16,6 +16,7 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::{
     image::output,
+    plan,
     scene::{
         Mode, Model, Scene,
         document::Value,
@@ -225,7 +226,11 @@ impl SceneArgs {
             let [x0, y0, x1, y1] = crop;
             options.assignments.push(format!("render.crop=[{x0},{y0},{x1},{y1}]"));
         }
-        load(path, &options)
+        let mut scene = load(path, &options)?;
+        for name in scene.render.force.clone() {
+            plan::force(&mut scene, &name).map_err(|e| LoadError(format!("{}: error: {e}", path.display())))?;
+        }
+        Ok(scene)
     }
 }
 

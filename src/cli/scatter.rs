@@ -28,6 +28,7 @@ const EXAMPLES: &str = "Examples:
   yarnray scatter silk1 --model aggregated --model printed         two models beside each other
   yarnray scatter silk1 --light 0,150                              the value for light from one direction
   yarnray scatter --fiber wool --theta 60                          a single fibre
+  yarnray scatter silk1 --truth 1000000                            beside paths through explicit fibres
   yarnray scatter silk1 --sweep density=0.1..0.7:7 -o sweep.svg    over any parameter";
 
 #[derive(Args, Debug)]
@@ -63,6 +64,9 @@ pub(super) struct ScatterArgs {
     /// Also the value, with the cosine, for light from this latitude and azimuth, degrees (0,0 is the camera's side).
     #[arg(long, value_name = "THETA,PHI", value_parser = pair, allow_hyphen_values = true)]
     light: Option<(f64, f64)>,
+    /// Also trace this many paths through explicit fibres of one straight yarn, placed as the yarn's file says.
+    #[arg(long, value_name = "N", conflicts_with = "fiber", value_parser = clap::value_parser!(u64).range(1..))]
+    truth: Option<u64>,
     /// Samples of the model.
     #[arg(long, value_name = "N", default_value_t = 400_000)]
     samples: u64,
@@ -90,6 +94,9 @@ fn pair(text: &str) -> Result<(f64, f64), String> {
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or("expected two numbers");
     Ok((number(a)?, number(b)?))
 }
+
+/// The name of the measurement of explicit fibres.
+const TRUTH: &str = "truth";
 
 fn input(message: impl std::fmt::Display) -> Failure {
     Failure::Input(format!("error: {message}"))
@@ -240,6 +247,10 @@ impl ScatterArgs {
             all.push((model.name().to_owned(), goniometer::measure(&specimen, &job.view, effort)));
             at_light = at_light.or_else(|| values(&specimen));
         }
+        if let Some(paths) = self.truth {
+            let truth = goniometer::truth(&yarn, &job.view, Effort { paths, ..effort })?;
+            all.push((TRUTH.to_owned(), truth));
+        }
         Ok(Found { all, values: at_light, title: format!("yarn {}", yarn.name) })
     }
 }
@@ -330,9 +341,19 @@ fn report_json(args: &ScatterArgs, job: &Job, found: &Found) -> Value {
         let by_lobe = LOBES.iter().zip(values).map(|(n, v)| ((*n).to_owned(), json!(v.map(|m| m.mean))));
         report["value"] = json!({"light": [theta, phi], "lobes": Value::Object(by_lobe.collect())});
     }
-    if found.all.len() > 1 {
-        let others = found.all[1..].iter().map(|(n, m)| (n.clone(), m.to_json()));
-        report["others"] = Value::Object(others.collect());
+    let others: serde_json::Map<String, Value> =
+        found.all[1..].iter().filter(|(n, _)| n != TRUTH).map(|(n, m)| (n.clone(), m.to_json())).collect();
+    if !others.is_empty() {
+        report["others"] = Value::Object(others);
+    }
+    if let Some((_, truth)) = found.all.iter().find(|(n, _)| n == TRUTH) {
+        report["truth"] = truth.to_json();
+        let off = |a: &[Mean; 3], b: &[Mean; 3]| -> [f64; 3] { std::array::from_fn(|c| a[c].mean - b[c].mean) };
+        report["difference"] = json!({
+            "forward": off(&first.scattered.forward, &truth.scattered.forward),
+            "backward": off(&first.scattered.backward, &truth.scattered.backward),
+            "unscattered": first.unscattered.mean - truth.unscattered.mean,
+        });
     }
     report
 }
@@ -369,6 +390,16 @@ fn report_text(args: &ScatterArgs, found: &Found) -> String {
                     half.forward[1].mean,
                     half.forward[2].mean
                 );
+            }
+        }
+    }
+    if let Some((_, truth)) = found.all.iter().find(|(n, _)| n == TRUTH) {
+        for (name, m) in found.all.iter().filter(|(n, _)| n != TRUTH) {
+            let _ = writeln!(text, "{name} over truth, reflected and transmitted (with unscattered)");
+            let ((back, on), (true_back, true_on)) = (m.energies(), truth.energies());
+            for (what, a, b) in [("reflected", back, true_back), ("transmitted", on, true_on)] {
+                let r: [f64; 3] = std::array::from_fn(|c| a[c].mean / b[c].mean);
+                let _ = writeln!(text, "  {what:14} {:.3}  {:.3}  {:.3}", r[0], r[1], r[2]);
             }
         }
     }

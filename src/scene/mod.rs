@@ -154,6 +154,8 @@ pub struct RenderSettings {
     pub compact_bvh: bool,
     /// Bytes that curves and BVH may take; `None` for no limit.
     pub max_memory: Option<u64>,
+    /// Features to bring in though the scene does not need them, for measurements.
+    pub force: Vec<String>,
 }
 
 /// Layers of an EXR beside the picture and its alpha.

@@ -139,10 +139,28 @@ impl World {
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
         let started = Instant::now();
+        let world = Self::of(threads_made, meshes, scene.render.compact_bvh, threads)?;
+        Ok((world, BuildTimes { generate, build: started.elapsed() }))
+    }
+
+    /// From curves that are made already, and nothing else.
+    ///
+    /// # Errors
+    /// What Embree says.
+    pub fn of_threads(cloth: Vec<Threads>, threads: usize) -> Result<Self, BuildError> {
+        Self::of(cloth, Vec::new(), true, threads)
+    }
+
+    fn of(
+        cloth: Vec<Threads>,
+        meshes: Vec<TriangleMesh>,
+        compact_bvh: bool,
+        threads: usize,
+    ) -> Result<Self, BuildError> {
         let device = Device::new(threads)?;
-        let layout = if scene.render.compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
+        let layout = if compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;
-        for threads in &threads_made {
+        for threads in &cloth {
             let (basis, points, segments) = threads.curves();
             let basis = match basis {
                 Basis::BSpline => CurveBasis::BSpline,
@@ -153,9 +171,7 @@ impl World {
         for mesh in &meshes {
             builder.add_triangles(Arc::clone(&mesh.points), Arc::clone(&mesh.triangles))?;
         }
-        let committed = builder.commit()?;
-        let world = Self { scene: committed, device, threads: threads_made, meshes };
-        Ok((world, BuildTimes { generate, build: started.elapsed() }))
+        Ok(Self { scene: builder.commit()?, device, threads: cloth, meshes })
     }
 
     /// The cloth, one entry for each geometry of Embree.

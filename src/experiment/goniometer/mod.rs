@@ -10,12 +10,14 @@
 
 pub mod picture;
 mod specimen;
+mod truth;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 pub(crate) use specimen::straight_section;
 pub use specimen::{Specimen, ply_alone};
+pub use truth::truth;
 
 use crate::{math::sampler::Sampler, scattering::LobeValues};
 use glam::Vec3A;
@@ -163,6 +165,18 @@ impl Tally {
             energy: vec![[0.0; 3]; ROWS * COLUMNS],
             largest: 0.0,
         }
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.unscattered += other.unscattered;
+        for (mine, others) in self.halves.iter_mut().flatten().flatten().zip(other.halves.iter().flatten().flatten()) {
+            *mine += others;
+        }
+        for (mine, others) in self.energy.iter_mut().flatten().zip(other.energy.iter().flatten()) {
+            *mine += others;
+        }
+        self.largest = self.largest.max(other.largest);
     }
 
     pub(crate) fn add(&mut self, outcome: Outcome) {

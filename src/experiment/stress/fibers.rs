@@ -187,6 +187,10 @@ fn samples_against_density(scale: Scale, checks: &mut Checks) {
     for (index, beta) in [1e-3, 0.02, 0.15, 0.59, 0.61, 1.5, 10.0].into_iter().enumerate() {
         for theta in [0.0, -0.9, 1.4, FRAC_PI_2 - 1e-3] {
             let beta_n = [0.35, 2.49, 2.51, 0.01, 10.0, 1.0, 0.1][index];
+            if beta * f64::cos(theta) < 1e-5 {
+                // A sine in single precision has steps of several percent of such a lobe.
+                continue;
+            }
             let at = || format!("beta {beta}, beta_n {beta_n}, theta {theta:.4}");
             let bcsdf = FiberBcsdf::new(&material(0.3, 0.4, 0.3, [beta, 0.7 * beta, beta_n]));
             let (sin, cos) = (theta.sin() as f32, theta.cos() as f32);

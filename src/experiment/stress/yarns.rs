@@ -235,7 +235,7 @@ fn packing(scale: Scale, checks: &mut Checks) {
                 let scatterer = scatterer(&yarn(plies, 50, density, 0.0, 0.2, &white()), model);
                 for (h, phase) in [(0.0, 0.0), (0.6, 1.0), (-0.97, 2.0)] {
                     let at = || format!("density {density}, {plies} plies, {}, h {h}", model.name());
-                    examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.95), checks, &at);
+                    examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
                 }
             }
         }
@@ -357,7 +357,7 @@ fn plies(scale: Scale, checks: &mut Checks) {
 }
 
 fn energy(scale: Scale, checks: &mut Checks) {
-    let effort = Effort { paths: scale.pick(2_000, 200_000), seed: 5 };
+    let effort = Effort { paths: scale.pick(2_000, 50_000), seed: 5 };
     for (plies, ply_twist, fiber_twist) in
         [(1, 0.0, 0.0), (1, 0.0, 0.5), (2, 0.1, -0.2), (3, 0.22, -0.33), (3, 0.5, 0.5)]
     {

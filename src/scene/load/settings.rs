@@ -26,6 +26,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         seed: 0,
         compact_bvh: true,
         max_memory: None,
+        force: Vec::new(),
     };
     let Some(table) = table else { return Some(defaults) };
     let width = table.u64_or("width", 768, SIZE) as u32;
@@ -77,6 +78,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         seed: table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32,
         compact_bvh: table.one_of_or("bvh", true, &[("compact", true), ("fast", false)]),
         max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
+        force: table.strings("force").into_iter().map(|(name, _)| name.to_owned()).collect(),
     })
 }
 

@@ -1,6 +1,15 @@
-//! What a render needs and what it leaves out, decided from the checked scene before anything is built.
+//! What a render needs and what it leaves out, told from the checked scene before anything is built.
+//!
+//! What is left out is not computed, allocated or loaded; [`force`] brings it back, to measure what that saves.
 
-use crate::scene::{Light, Scene};
+mod force;
+
+pub use force::{FORCEABLE, force};
+
+use crate::{
+    film::Tile,
+    scene::{Layers, Light, Mode, Scene, Thread},
+};
 
 /// One feature of the renderer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,6 +20,8 @@ pub struct Feature {
     pub used: bool,
     /// Why, in words.
     pub reason: &'static str,
+    /// Bytes that leaving it out saves, or that using it takes, where that is known before the render.
+    pub bytes: Option<u64>,
 }
 
 /// Every feature, used or left out.
@@ -28,7 +39,47 @@ impl Plan {
         let image = |l: &Light| matches!(l, Light::Environment(e) if e.image.is_some());
         let area = |l: &Light| matches!(l, Light::Area(_));
         let mut features = Vec::new();
-        let mut add = |name, used, yes, no| features.push(Feature { name, used, reason: if used { yes } else { no } });
+        let mut add = |name, used, yes, no| {
+            features.push(Feature { name, used, reason: if used { yes } else { no }, bytes: None });
+        };
+        let of_yarns = |mode: &dyn Fn(Mode) -> bool| {
+            mode(scene.render.mode) && scene.fabrics.iter().any(|f| matches!(f.thread, Thread::Yarn(_)))
+        };
+        add(
+            "aggregated_yarns",
+            of_yarns(&|m| m != Mode::Fiber),
+            "a model answers for the fibres in yarns or plies",
+            "no yarn is aggregated",
+        );
+        add(
+            "fiber_generation",
+            of_yarns(&|m| m == Mode::Fiber),
+            "every fibre of the yarns is a curve",
+            "fibres in yarns are found analytically",
+        );
+        add(
+            "flyaways",
+            scene.yarns.iter().any(|y| y.flyaways.is_some()),
+            "a yarn has fly-aways",
+            "no yarn has fly-aways",
+        );
+        add("exit_rejection", !scene.fabrics.is_empty(), "Embree offers hits from inside of curves", "no curves");
+        add(
+            "all_lobes",
+            scene
+                .yarns
+                .iter()
+                .flat_map(|y| &y.fibers)
+                .all(|(_, f)| [f.r, f.tt, f.d].iter().all(|albedo| albedo.iter().any(|a| *a > 0.0))),
+            "every fibre has all of R, TT and D",
+            "lobes of albedo 0 are neither evaluated nor sampled",
+        );
+        add(
+            "ply_materials",
+            scene.yarns.iter().any(|y| y.fibers.windows(2).any(|w| w[0].1 != w[1].1)),
+            "plies of a yarn are of different fibres",
+            "all plies of a yarn are of the same fibre",
+        );
         add("ply_filter", shapes.iter().any(|s| !s.filled), "plies leave gaps", "plies fill the yarn");
         add("elliptical_plies", shapes.iter().any(|s| s.elliptical), "a ply is elliptical", "all plies are round");
         add(
@@ -79,6 +130,8 @@ impl Plan {
         add("lobe_layers", scene.layers.lobes, "asked for", "no output holds them");
         add("depth_layer", scene.layers.depth, "asked for", "no output holds it");
         add("normal_layer", scene.layers.normal, "asked for", "no output holds it");
+        add("variance_layer", scene.layers.variance, "asked for", "no output holds it");
+        add("sample_layer", scene.layers.samples, "asked for", "no output holds it");
         add("denoiser", scene.denoise, "asked for", "nobody asks for a denoised picture: not loaded");
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
         add("textures", false, "", "no texture in the scene");
@@ -89,6 +142,25 @@ impl Plan {
             "a surface has a coat",
             "no surface has a coat",
         );
+        let pixels = {
+            let [x0, y0, x1, y1] = scene.render.crop.map(u64::from);
+            (x1 - x0) * (y1 - y0)
+        };
+        // What sums of a layer take; the variance layer shares the squares that the estimate of noise needs anyway.
+        for (name, layer) in [
+            ("lobe_layers", Layers { lobes: true, ..Layers::NONE }),
+            ("depth_layer", Layers { depth: true, ..Layers::NONE }),
+            ("normal_layer", Layers { normal: true, ..Layers::NONE }),
+            ("albedo_layer", Layers { albedo: true, ..Layers::NONE }),
+            ("cryptomatte", Layers { cryptomatte: true, ..Layers::NONE }),
+            ("variance_layer", Layers { variance: true, ..Layers::NONE }),
+            ("sample_layer", Layers { samples: true, ..Layers::NONE }),
+        ] {
+            let bytes = Tile::bytes_per_pixel(layer) - Tile::bytes_per_pixel(Layers::NONE);
+            if let Some(feature) = features.iter_mut().find(|f| f.name == name) {
+                feature.bytes = Some(bytes as u64 * pixels);
+            }
+        }
         Self { features }
     }
 
@@ -97,3 +169,6 @@ impl Plan {
         self.features.iter().filter(|f| f.used == used).map(|f| f.name).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;
