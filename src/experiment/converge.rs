@@ -107,7 +107,13 @@ pub fn run(
                 return Err(ConvergeError::Interrupted);
             }
             let noise = rendered.film.noise().map_or(0.0, |n| n.estimate);
-            halves.push(Half { image: image_of(&rendered.film), spp: f64::from(options.converged_spp), noise });
+            let seconds = rendered.elapsed.as_secs_f64();
+            halves.push(Half {
+                image: image_of(&rendered.film),
+                spp: f64::from(options.converged_spp),
+                noise,
+                seconds,
+            });
         }
         let converged = Converged::new(&halves[0], &halves[1])
             .ok_or_else(|| ConvergeError::Failed("error: a picture without colours".to_owned()))?;

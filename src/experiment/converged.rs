@@ -28,6 +28,8 @@ pub struct Converged {
     pub spp: f64,
     /// The relMSE that the sample variance of one half promises, for choosing sample counts.
     pub half_noise: f64,
+    /// Seconds that a sample per pixel took, for choosing sample counts.
+    pub sample_seconds: f64,
     /// Light by lobe, as [`LOBES`], where it was asked for; of the first half.
     pub lobes: Option<[Vec<[f32; 3]>; 5]>,
 }
@@ -41,6 +43,8 @@ pub struct Half {
     pub spp: f64,
     /// Estimated relMSE.
     pub noise: f64,
+    /// Seconds of rendering.
+    pub seconds: f64,
 }
 
 impl Converged {
@@ -59,7 +63,8 @@ impl Converged {
             alpha: a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect(),
         };
         let (spp, half_noise) = (first.spp + second.spp, 0.5 * (first.noise + second.noise));
-        Some(Self { halves, spp, half_noise, lobes: lobes(&first.image) })
+        let sample_seconds = (first.seconds + second.seconds) / spp;
+        Some(Self { halves, spp, half_noise, sample_seconds, lobes: lobes(&first.image) })
     }
 
     /// Reads what [`Self::store`] has written; `None` if there is no such file, or another program has written it.
@@ -83,6 +88,7 @@ impl Converged {
             halves: Halves { width: image.width, colors, alpha: image.channel("A")?.to_vec() },
             spp: number("yarnray.spp")?,
             half_noise: number("yarnray.half_noise")?,
+            sample_seconds: number("yarnray.sample_seconds")?,
             lobes: lobes.try_into().ok(),
         })
     }
@@ -110,6 +116,7 @@ impl Converged {
         layout.attributes = vec![
             ("yarnray.spp".to_owned(), Attribute::Double(self.spp)),
             ("yarnray.half_noise".to_owned(), Attribute::Double(self.half_noise)),
+            ("yarnray.sample_seconds".to_owned(), Attribute::Double(self.sample_seconds)),
         ];
         exr::write(path, &layout, |y, lines| {
             let row = y * width..(y + 1) * width;
@@ -176,7 +183,7 @@ mod tests {
             let samples = (0..20).map(|p| level + p as f32 + 0.1 * i as f32).collect();
             image.channels.push(Channel { name, samples });
         }
-        Half { image, spp: 32.0, noise: 0.125 }
+        Half { image, spp: 32.0, noise: 0.125, seconds: 8.0 }
     }
 
     #[test]
@@ -185,7 +192,7 @@ mod tests {
         let path = path(directory.path(), &["a", "b"]);
         assert_eq!(Converged::load(&path), None);
         let converged = Converged::new(&half(1.0), &half(2.0)).unwrap();
-        assert_eq!((converged.spp, converged.half_noise), (64.0, 0.125));
+        assert_eq!((converged.spp, converged.half_noise, converged.sample_seconds), (64.0, 0.125, 0.25));
         converged.store(&path).unwrap();
         assert_eq!(Converged::load(&path), Some(converged.clone()));
         let image = image::read(&path).unwrap();

@@ -32,6 +32,8 @@ pub struct Suite {
     pub repeats: u32,
     /// Converged pictures have at most the target over this as their estimated relMSE.
     pub converged: f64,
+    /// Timed runs take at least this long, by more samples than the target needs.
+    pub min_seconds: f64,
     /// Most samples per pixel of any run.
     pub max_spp: u32,
     /// Size of all pictures; `None` leaves it to the scenes.
@@ -250,6 +252,7 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
         target: quality.target,
         repeats: quality.repeats,
         converged: quality.converged,
+        min_seconds: quality.min_seconds,
         max_spp: quality.max_spp,
         size: quality.size,
         cases,
@@ -264,13 +267,14 @@ struct Quality {
     target: f64,
     repeats: u32,
     converged: f64,
+    min_seconds: f64,
     max_spp: u32,
     size: Option<[u32; 2]>,
 }
 
 impl Quality {
     fn read(table: &Reader<'_>) -> Self {
-        Self { target: 0.01, repeats: 3, converged: 4.0, max_spp: 1 << 16, size: None }.over(table)
+        Self { target: 0.01, repeats: 3, converged: 4.0, min_seconds: 0.0, max_spp: 1 << 16, size: None }.over(table)
     }
 
     /// These, where the table does not say otherwise.
@@ -283,6 +287,7 @@ impl Quality {
             target: table.f64_or("target", self.target, Range::above(0.0)),
             repeats: table.u64_or("repeats", self.repeats.into(), 1..=1000) as u32,
             converged: table.f64_or("converged", self.converged, Range::between(1.0, 1e4)),
+            min_seconds: table.f64_or("min_seconds", self.min_seconds, Range::between(0.0, 3600.0)),
             max_spp: table.u64_or("max_spp", self.max_spp.into(), 2..=u64::from(u32::MAX)) as u32,
             size: size.map(|size| size.map(|v| v as u32)).or(self.size),
         }

@@ -3,7 +3,8 @@
 //! For each case and method: two halves of a converged picture, until the sample variance promises a fraction of the target;
 //! from their noise the samples that the target needs; then timed runs, methods by turns, so that a machine that
 //! slows down slows both. A timed run's error is measured against its own converged picture of other seeds, without the latter's
-//! noise, and its time is scaled by error over target: error falls as one over time, and the runs are near the target.
+//! noise, and its time is scaled by error over target: error falls as one over time, and the runs are near the target, or take the
+//! suite's shortest time.
 //! Every run is a process of its own, so that its memory is its own.
 
 use std::{
@@ -313,8 +314,8 @@ fn measure(
     let methods = [suite.reference, suite.tested];
     let truths = [&reference, &tested];
     let spp = truths.map(|truth| {
-        // One half has half of the samples; noise falls as one over their number.
-        let needed = 0.5 * truth.spp * truth.half_noise / suite.target;
+        // What is over in a moment cannot be timed.
+        let needed = (sample_noise(truth) / suite.target).max(suite.min_seconds / truth.sample_seconds.max(1e-9));
         needed.ceil().clamp(1.0, f64::from(suite.max_spp)) as u32
     });
     let mut timed: [Vec<(Figures, f64)>; 2] = [Vec::new(), Vec::new()];
@@ -333,10 +334,10 @@ fn measure(
             };
             let done = renderer.render(suite, &job)?;
             let error = truths[side].halves.rel_mse(&colors(&done.image)?);
-            if error.is_nan() || error <= 0.02 * suite.target {
+            let expected = sample_noise(truths[side]) / f64::from(spp[side]);
+            if error.is_nan() || error <= 0.2 * expected {
                 return Err(BenchError::Case(format!(
-                    "the error of a run by {method} cannot be measured: {error:.2e}, target {}",
-                    suite.target
+                    "the error of a run by {method} cannot be measured: {error:.2e}, expected {expected:.2e}"
                 )));
             }
             timed[side].push((Figures::of(&done.stats)?, error));
@@ -362,6 +363,11 @@ fn measure(
         paper: case.paper,
         pictures: [reference_file, tested_file],
     })
+}
+
+/// The relMSE of one sample per pixel. One half has half of the samples, and noise falls as one over their number.
+fn sample_noise(truth: &Converged) -> f64 {
+    0.5 * truth.spp * truth.half_noise
 }
 
 /// Means over timed runs, each scaled to the target.
@@ -416,7 +422,7 @@ fn converge(
         say(&format!("{}: {label}, converged picture, half {number} of 2", job.case.name));
         let done = renderer.render(suite, &Job { spp, noise, seed: number, ..job.clone() })?;
         let figures = Figures::of(&done.stats)?;
-        Ok(Half { image: done.image, spp: figures.spp, noise: figures.noise })
+        Ok(Half { image: done.image, spp: figures.spp, noise: figures.noise, seconds: figures.seconds })
     };
     let first = half(1, job.spp, Some(limit))?;
     let second = half(2, first.spp.round() as u32, None)?;
