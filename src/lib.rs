@@ -27,8 +27,8 @@
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files.
 //! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`integrator`]: light along a path.
 //! * [`film`]: what pixels have collected. [`render`]: the driver, and pictures from films.
-//! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was.
-//! * [`experiment`]: what the parts say, held against what is true. [`cli`]: the program.
+//! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was, and what many were.
+//! * [`experiment`]: what parts and pictures say, held against what is true. [`cli`]: the program.
 //!
 //! # Conventions
 //! * Lengths are millimetres in a [`scene::Scene`], yarn radii in [`geometry::section`] and [`scattering`]. Angles are

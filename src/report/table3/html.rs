@@ -121,9 +121,11 @@ fn section(id: &str, row: &Row, pictures: &RowPictures) -> Markup {
     html! {
         div.row {
             (page::slider(id, ["explicit fibres", "aggregated"], [reference, aggregated], stops))
-            (shown(reference, "explicit fibres"))
-            (shown(aggregated, "aggregated"))
             (page::figure(&flip_of(aggregated), &format!("HDR-FLIP, black 0 to white 1; mean {:.4}", row.model_error.flip)))
+            div.thumbnails {
+                (shown(reference, "explicit fibres"))
+                (shown(aggregated, "aggregated"))
+            }
         }
         @if !pictures.lobes.is_empty() {
             h3 { "Light by the lobe of its first scattering" }

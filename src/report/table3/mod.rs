@@ -202,11 +202,11 @@ impl Table {
         vec![
             format!("Machine: {}. Program: {}.", self.machine, self.commit),
             format!(
-                "Equal quality: every time is the time of rendering to relMSE {}. {}. Each figure is the mean of {} runs of each kind, \
+                "Equal quality: every time is the time of rendering to an error of {} in {}. Each figure is the mean of {} runs of each kind, \
                  taken by turns, each a process of its own; a run takes about the samples that the target needs, or more if \
                  that is too short to be timed, and its time is scaled by its own error over the target.",
                 self.target,
-                capital(&self.metric),
+                self.metric,
                 self.repeats
             ),
             "Of two figures the first is that of explicit fibres, the second that of the aggregated model; the time ratio is first over \
@@ -299,11 +299,6 @@ impl Table {
     }
 }
 
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -363,7 +358,11 @@ pub(super) mod tests {
         let table = table();
         let text = table.to_markdown();
         assert!(text.contains("| silk, front | 30.0 / 2.00 | 15.0 ± 2.00 | 100 / 100 |"), "{text}");
-        assert!(text.contains("| 50 / 0.10 | 100 / 0.20 | 0.20 % |") && text.contains("relMSE 0.01."), "{text}");
+        assert!(
+            text.contains("| 50 / 0.10 | 100 / 0.20 | 0.20 % |")
+                && text.contains("an error of 0.01 in relMSE: mean over"),
+            "{text}"
+        );
         assert!(text.contains("Missing: glove: no file"));
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
         assert!(lines.iter().all(|l| l.matches('|').count() == COLUMNS.len() + 1), "{text}");
