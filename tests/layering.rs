@@ -31,7 +31,7 @@ const FROM_FFI: [(&str, &[&str]); 7] = [
     ("experiment", &["ffi::embree::Ray"]),
     ("image", &["ffi::oiio", "ffi::oiio::OiioError", "ffi::oiio::is_loaded"]),
     ("integrator", &["ffi::embree::Ray"]),
-    ("render", &["ffi::oidn::Denoiser", "ffi::oidn::Guides", "ffi::oidn::OidnError"]),
+    ("render", &["ffi::embree::Ray", "ffi::oidn::Denoiser", "ffi::oidn::Guides", "ffi::oidn::OidnError"]),
     ("scene", &["ffi::embree::Ray"]),
     (
         "trace",

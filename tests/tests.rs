@@ -15,6 +15,8 @@ mod determinism;
 mod compare;
 // Error against run time: files, slopes, converged pictures that are kept.
 mod converge;
+// Sequences: numbered files, moving cameras and yarns, the shutter.
+mod frames;
 // What bad input is answered with: whole messages, exit status 2, no output.
 mod errors;
 // Pictures against explicit fibres, where the truths lie beside the project.

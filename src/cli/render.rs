@@ -2,6 +2,7 @@
 
 use std::{
     io::IsTerminal as _,
+    ops::RangeInclusive,
     path::PathBuf,
     sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
@@ -21,7 +22,7 @@ use crate::{
         picture::{self, Frame},
     },
     report::{Phases, RunRecord},
-    scene::{Layers, Scene},
+    scene::{Layers, Scene, animation::numbered},
     trace::World,
 };
 
@@ -32,7 +33,7 @@ const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml --crop 300,200,460,320 -o c.png  a part of the frame
   yarnray render scenes/single_yarn.toml --set yarn.sample.plies=1   any key of the scene";
 
-#[derive(Args, Debug)]
+#[derive(Args, Debug, Clone)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RenderArgs {
     /// The scene file.
@@ -40,6 +41,9 @@ pub(super) struct RenderArgs {
     /// Where to write; the extension names the format (.exr, .png, .hdr, .tif, ...). Repeatable. Default: out/SCENE.exr
     #[arg(short, long = "out", value_name = "PATH")]
     out: Vec<PathBuf>,
+    /// Render these frames of a sequence, the last included; put #### or {frame} into the names of outputs.
+    #[arg(long, value_name = "A..B", value_parser = frames)]
+    frames: Option<Frames>,
     /// Add a denoised picture, by Open Image Denoise: a layer of an EXR, else a file of its own (x.denoised.png).
     #[arg(long)]
     denoise: bool,
@@ -66,6 +70,32 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let Some(frames) = &args.frames else { return run_one(args) };
+    let each: Vec<RenderArgs> = frames.0.clone().map(|frame| args.of_frame(frame)).collect::<Result<_, _>>()?;
+    each.iter().try_for_each(run_one)
+}
+
+impl RenderArgs {
+    /// The arguments for one frame of several.
+    fn of_frame(&self, frame: u32) -> Result<Self, Failure> {
+        let alone = self.frames.as_ref().is_none_or(|f| f.0.start() == f.0.end());
+        let named = |path: &PathBuf| match numbered(path, frame) {
+            Some(path) => Ok(path),
+            None if alone => Ok(path.clone()),
+            None => Err(Failure::Input(format!(
+                "error: --frames would write every frame to {}: put #### or {{frame}} into its name",
+                path.display()
+            ))),
+        };
+        let mut args = self.clone();
+        args.out = outputs(self).iter().map(named).collect::<Result<_, _>>()?;
+        args.stats = self.stats.as_ref().map(named).transpose()?;
+        args.options.set.push(format!("render.frame={frame}"));
+        Ok(args)
+    }
+}
+
+fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let mut scene = args.options.load(&args.scene)?;
     let outputs = outputs(args);
@@ -148,6 +178,18 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
     })
 }
 
+/// Numbers of frames, from the first to the last.
+#[derive(Clone, Debug)]
+struct Frames(RangeInclusive<u32>);
+
+fn frames(text: &str) -> Result<Frames, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if first <= last => Ok(Frames(first..=last)),
+        _ => Err("expected one frame or the first and the last of several, as in 1..24".to_owned()),
+    }
+}
+
 /// An address as the option wants it; who is there is found out later.
 fn host_and_port(text: &str) -> Result<String, String> {
     let port =
@@ -160,7 +202,8 @@ fn host_and_port(text: &str) -> Result<String, String> {
 fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
     if args.out.is_empty() {
         let stem = args.scene.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
-        return vec![PathBuf::from("out").join(stem + ".exr")];
+        let number = if args.frames.is_some() { ".####" } else { "" };
+        return vec![PathBuf::from("out").join(format!("{stem}{number}.exr"))];
     }
     args.out.clone()
 }

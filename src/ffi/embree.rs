@@ -196,19 +196,24 @@ impl SceneBuilder {
 
     /// Adds round curves and returns their geometry id: 0, 1, 2, ... in the order of the calls.
     ///
-    /// `points` are positions with the radius in `w`; each of `segments` is the index of the first of the four
+    /// `points` are positions with the radius in `w`, at one time or at several that are evenly spaced from 0 to 1, between
+    /// which all moves on straight lines; each of `segments` is the index of the first of the four
     /// control points of one cubic segment. Embree reads both in place.
     ///
     /// # Panics
-    /// If a segment reaches beyond the points.
+    /// If a segment reaches beyond the points, or there are no points or not as many at all times.
     pub fn add_round_curves(
         &mut self,
         basis: CurveBasis,
-        points: Arc<[Vec4]>,
+        points: Vec<Arc<[Vec4]>>,
         segments: Arc<[u32]>,
     ) -> Result<u32, EmbreeError> {
         assert!(
-            segments.iter().all(|&first| (first as usize) + 4 <= points.len()),
+            !points.is_empty() && points.iter().all(|p| p.len() == points[0].len()),
+            "curves have as many control points at all times"
+        );
+        assert!(
+            segments.iter().all(|&first| (first as usize) + 4 <= points[0].len()),
             "a curve segment reaches beyond its control points"
         );
         let kind = match basis {
@@ -221,16 +226,21 @@ impl SceneBuilder {
         // and lengths, and each Vec4 is 16-byte aligned and fully readable.
         unsafe {
             let geometry = sys::rtcNewGeometry(device, kind);
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTC_BUFFER_TYPE_VERTEX,
-                0,
-                sys::RTC_FORMAT_FLOAT4,
-                points.as_ptr().cast(),
-                0,
-                size_of::<Vec4>(),
-                points.len(),
-            );
+            if points.len() > 1 {
+                sys::rtcSetGeometryTimeStepCount(geometry, points.len() as u32);
+            }
+            for (step, points) in points.iter().enumerate() {
+                sys::rtcSetSharedGeometryBuffer(
+                    geometry,
+                    sys::RTC_BUFFER_TYPE_VERTEX,
+                    step as u32,
+                    sys::RTC_FORMAT_FLOAT4,
+                    points.as_ptr().cast(),
+                    0,
+                    size_of::<Vec4>(),
+                    points.len(),
+                );
+            }
             sys::rtcSetSharedGeometryBuffer(
                 geometry,
                 sys::RTC_BUFFER_TYPE_INDEX,
@@ -320,12 +330,14 @@ pub struct Ray {
     pub t_near: f32,
     /// Hits farther than this do not count.
     pub t_far: f32,
+    /// When it is there, from 0 to 1: where what moves is.
+    pub time: f32,
 }
 
 impl Ray {
     /// A ray without an end.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        Self { origin, direction, t_near: 0.0, t_far: f32::INFINITY }
+        Self { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0 }
     }
 
     /// Whether Embree can trace it: a NaN in a ray makes one query four hundred times as slow.
@@ -481,7 +493,7 @@ fn raw_ray(ray: &Ray) -> sys::RTCRay {
         dir_x: ray.direction.x,
         dir_y: ray.direction.y,
         dir_z: ray.direction.z,
-        time: 0.0,
+        time: ray.time,
         tfar: ray.t_far,
         mask: u32::MAX,
         id: 0,
@@ -507,8 +519,25 @@ mod tests {
         let points: Arc<[Vec4]> = (0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect();
         let segments: Arc<[u32]> = (0..5).collect();
         let mut builder = SceneBuilder::new(device, BvhLayout::Compact).unwrap();
-        builder.add_round_curves(CurveBasis::CatmullRom, points, segments).unwrap();
+        builder.add_round_curves(CurveBasis::CatmullRom, vec![points], segments).unwrap();
         builder.commit().unwrap()
+    }
+
+    #[test]
+    fn a_ray_meets_a_moving_curve_where_it_is_at_its_time() {
+        let device = Device::new(1).unwrap();
+        let at = |y: f32| -> Arc<[Vec4]> { (0..8).map(|i| Vec4::new(i as f32, y, 0.0, 0.25)).collect() };
+        let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
+        // Up by two, then back by one.
+        let segments: Arc<[u32]> = (0..5).collect();
+        builder.add_round_curves(CurveBasis::CatmullRom, vec![at(0.0), at(2.0), at(1.0)], segments).unwrap();
+        let scene = builder.commit().unwrap();
+        let mut filter = Counting { guard: 0, calls: 0, accept: true };
+        for (time, y) in [(0.0, 0.0), (0.25, 1.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0)] {
+            let ray = Ray { time, ..Ray::new(Vec3A::new(3.2, 5.0, 0.0), Vec3A::new(0.01, -1.0, 0.002)) };
+            let hit = scene.intersect(&ray, &mut filter).unwrap();
+            assert!((hit.t - (4.75 - y)).abs() < 2e-3, "at {time}: {}", hit.t);
+        }
     }
 
     /// Counts hits behind a guard value, where a context that Embree thinks larger would be overwritten.

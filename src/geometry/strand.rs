@@ -54,23 +54,54 @@ struct PointFrame {
     growth: f32,
 }
 
-/// Yarns of one kind in one geometry of Embree.
+impl PointFrame {
+    /// The frame a share `s` of the way to that of a later time.
+    fn towards(&self, later: &Self, s: f32) -> Self {
+        let turn = later.phase - self.phase;
+        let turn = turn - std::f32::consts::TAU * (turn / std::f32::consts::TAU).round();
+        Self {
+            normal: self.normal.lerp(later.normal, s),
+            phase: self.phase + s * turn,
+            growth: self.growth + s * (later.growth - self.growth),
+        }
+    }
+}
+
+/// Yarns of one kind in one geometry of Embree; where they move, at times evenly spaced over the shutter's.
 #[derive(Clone, Debug)]
 pub struct Strands {
     basis: Basis,
     points: Arc<[Vec4]>,
     segments: Arc<[u32]>,
     frames: Vec<PointFrame>,
+    /// The same points and frames at later times; empty where yarns stand still.
+    later: Vec<Pose>,
     /// The first segment of each yarn, and the number of all segments at the end.
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
     length: f64,
 }
 
+/// All points of [`Strands`] at one time.
+#[derive(Clone, Debug)]
+struct Pose {
+    points: Arc<[Vec4]>,
+    frames: Vec<PointFrame>,
+}
+
+/// Where the points of curves are at other times: for each time, for each curve, its points.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Movement<'a> {
+    /// At times that follow the curves' own, evenly spaced until the shutter closes.
+    pub later: &'a [Vec<Vec<DVec3>>],
+    /// At rest: by lengths along these, plies wind about the yarn, so that stretching carries them along.
+    pub rest: Option<&'a [Vec<DVec3>]>,
+}
+
 /// One yarn before it joins the others.
 struct Strand {
-    points: Vec<Vec4>,
-    frames: Vec<PointFrame>,
+    /// Points and frames at each time.
+    poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
     tight: Option<(usize, f64)>,
     length: f64,
 }
@@ -78,36 +109,54 @@ struct Strand {
 impl Strands {
     /// Prepares `curves`, each with its radii in the same unit; yarns are independent and made in parallel.
     pub fn new(curves: &[(Curve, Vec<f64>)], options: &StrandOptions) -> Self {
+        Self::moving(curves, Movement::default(), options)
+    }
+
+    /// Prepares curves that move.
+    ///
+    /// # Panics
+    /// If curves or their points have other numbers at other times.
+    pub fn moving(curves: &[(Curve, Vec<f64>)], movement: Movement<'_>, options: &StrandOptions) -> Self {
         let made: Vec<Strand> = curves
             .par_iter()
             .enumerate()
             .map(|(yarn, (curve, radii))| {
                 let phase = if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
-                Strand::new(curve, radii, options, phase)
+                let later: Vec<&[DVec3]> = movement.later.iter().map(|curves| curves[yarn].as_slice()).collect();
+                Strand::new(curve, radii, &later, movement.rest.map(|curves| curves[yarn].as_slice()), options, phase)
             })
             .collect();
         let mut strands = Self {
             basis: options.basis,
             points: Arc::new([]),
             segments: Arc::new([]),
-            frames: Vec::with_capacity(made.iter().map(|s| s.frames.len()).sum()),
+            frames: Vec::new(),
+            later: Vec::new(),
             first_segments: Vec::with_capacity(made.len() + 1),
             tight_bends: Vec::new(),
             length: 0.0,
         };
-        let mut segments = Vec::with_capacity(made.iter().map(|s| s.points.len().saturating_sub(3)).sum());
-        let mut points = Vec::with_capacity(made.iter().map(|s| s.points.len()).sum());
+        let count: usize = made.iter().map(|s| s.poses[0].0.len()).sum();
+        let mut segments = Vec::with_capacity(count.saturating_sub(3 * made.len()));
+        let mut poses: Vec<(Vec<Vec4>, Vec<PointFrame>)> =
+            (0..=movement.later.len()).map(|_| (Vec::with_capacity(count), Vec::with_capacity(count))).collect();
         for (yarn, strand) in made.into_iter().enumerate() {
             strands.first_segments.push(segments.len() as u32);
-            let first = points.len() as u32;
-            segments.extend(first..first + strand.points.len().saturating_sub(3) as u32);
-            points.extend(strand.points);
-            strands.frames.extend(strand.frames);
+            let first = poses[0].0.len() as u32;
+            segments.extend(first..first + strand.poses[0].0.len().saturating_sub(3) as u32);
+            for (all, (points, frames)) in poses.iter_mut().zip(strand.poses) {
+                all.0.extend(points);
+                all.1.extend(frames);
+            }
             strands.length += strand.length;
             strands.tight_bends.extend(strand.tight.map(|(segment, tightness)| TightBend { yarn, segment, tightness }));
         }
         strands.first_segments.push(segments.len() as u32);
-        strands.points = points.into();
+        let mut poses = poses.into_iter().map(|(points, frames)| Pose { points: points.into(), frames });
+        if let Some(first) = poses.next() {
+            (strands.points, strands.frames) = (first.points, first.frames);
+        }
+        strands.later = poses.collect();
         strands.segments = segments.into();
         strands
     }
@@ -120,6 +169,11 @@ impl Strands {
     /// Control points, radius in `w`.
     pub fn points(&self) -> &Arc<[Vec4]> {
         &self.points
+    }
+
+    /// Control points at all times: once where yarns stand still.
+    pub fn points_in_time(&self) -> Vec<Arc<[Vec4]>> {
+        std::iter::once(&self.points).chain(self.later.iter().map(|pose| &pose.points)).map(Arc::clone).collect()
     }
 
     /// The first of the four control points of each segment.
@@ -147,6 +201,7 @@ impl Strands {
         (size_of_val(&*self.points)
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
+            + self.later.iter().map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames)).sum::<usize>()
             + size_of_val(&*self.first_segments)) as u64
     }
 
@@ -207,11 +262,37 @@ impl Strands {
     pub fn place(&self, segment: u32, u: f32) -> Place {
         let first = self.segments[segment as usize] as usize;
         let p: &[Vec4; 4] = self.points[first..first + 4].try_into().expect("a segment has four points");
+        self.place_of(p, &self.frames[first + 1], &self.frames[first + 2], u)
+    }
+
+    /// As [`Self::place`], at a time from 0, when the shutter opens, to 1, when it closes.
+    #[inline]
+    pub fn place_at(&self, segment: u32, u: f32, time: f32) -> Place {
+        if self.later.is_empty() { self.place(segment, u) } else { self.place_between(segment, u, time) }
+    }
+
+    fn place_between(&self, segment: u32, u: f32, time: f32) -> Place {
+        let x = (time * self.later.len() as f32).clamp(0.0, self.later.len() as f32);
+        let step = (x as usize).min(self.later.len() - 1);
+        let s = x - step as f32;
+        let pose = |step: usize| match step.checked_sub(1) {
+            None => (&self.points, &self.frames),
+            Some(i) => (&self.later[i].points, &self.later[i].frames),
+        };
+        let ((points, frames), (next_points, next_frames)) = (pose(step), pose(step + 1));
+        let first = self.segments[segment as usize] as usize;
+        // As Embree moves them.
+        let p = std::array::from_fn(|i| points[first + i].lerp(next_points[first + i], s));
+        let frame = |i: usize| frames[first + i].towards(&next_frames[first + i], s);
+        self.place_of(&p, &frame(1), &frame(2), u)
+    }
+
+    #[inline]
+    fn place_of(&self, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> Place {
         let (at, d1, d2) = evaluate_f32(self.basis, p, u);
         let speed_squared = d1.length_squared().max(1e-30);
         let tangent = d1 / speed_squared.sqrt();
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
-        let (a, b) = (&self.frames[first + 1], &self.frames[first + 2]);
         let normal = Vec3A::from(a.normal + u * (b.normal - a.normal));
         let normal = normal - normal.dot(tangent) * tangent;
         Place {
@@ -235,11 +316,16 @@ impl Chain {
     /// Adds the points that the ends need: closed curves repeat theirs, open Catmull-Rom curves reach their end
     /// points (a mirrored point beyond), B-splines with too few points repeat their ends.
     pub(super) fn new(curve: &Curve, radii: &[f64]) -> Self {
-        let mut given: Vec<DVec4> = curve.points.iter().zip(radii).map(|(p, &r)| p.extend(r)).collect();
+        Self::at_time(curve, radii, &curve.points)
+    }
+
+    /// The chain of the same curve while its points are elsewhere.
+    fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
+        assert_eq!(points.len(), curve.points.len(), "a curve has as many points at all times");
+        let all = points.iter().zip(radii).map(|(p, &r)| p.extend(r));
         // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
-        if curve.basis != Basis::BSpline {
-            given.dedup_by(|a, b| a.truncate() == b.truncate());
-        }
+        let repeated = |i: usize| curve.basis != Basis::BSpline && i > 0 && curve.points[i] == curve.points[i - 1];
+        let mut given: Vec<DVec4> = all.enumerate().filter(|(i, _)| !repeated(*i)).map(|(_, p)| p).collect();
         let n = given.len();
         if n == 1 {
             let p = given[0];
@@ -275,6 +361,12 @@ impl Chain {
         evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
     }
 
+    /// A chain in the wanted basis through places of this one.
+    fn through(&self, knots: &[(usize, f64)], closed: bool, basis: Basis) -> Self {
+        let knots: Vec<DVec4> = knots.iter().map(|&(segment, u)| self.at(segment, u).at).collect();
+        interpolate(&knots, closed, basis)
+    }
+
     /// Arc length at `steps` points of each segment, from the chain's start.
     fn lengths(&self, steps: usize) -> Vec<f64> {
         let mut lengths = Vec::with_capacity(self.segments() * steps + 1);
@@ -299,22 +391,66 @@ const LENGTH_STEPS: usize = 8;
 const FRAME_STEPS: usize = 16;
 
 impl Strand {
-    fn new(curve: &Curve, radii: &[f64], options: &StrandOptions, phase: f64) -> Self {
+    fn new(
+        curve: &Curve,
+        radii: &[f64],
+        later: &[&[DVec3]],
+        rest: Option<&[DVec3]>,
+        options: &StrandOptions,
+        phase: f64,
+    ) -> Self {
         let chain = Chain::new(curve, radii);
         let lengths = chain.lengths(LENGTH_STEPS);
         let total = lengths[lengths.len() - 1];
+        let closed = curve.closed && curve.points.len() >= 3;
         let mean_radius = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
         let kept = options.tolerance <= 0.0 && chain.basis == options.basis;
-        let resampled = if kept || total <= 0.0 || total.is_nan() {
-            Chain { basis: if kept { options.basis } else { Basis::CatmullRom }, points: chain.points }
+        let knots = if kept || total <= 0.0 || total.is_nan() {
+            None
         } else {
-            resample(&chain, &lengths, curve.closed && curve.points.len() >= 3, mean_radius, options)
+            resample(&chain, &lengths, closed, mean_radius, options)
         };
-        Self::with_frames(&resampled, curve.closed, options, phase, total)
+        // The same places of the yarn at all times: points move with it.
+        let resampled = |chain: Chain| match &knots {
+            Some(knots) => chain.through(knots, closed, options.basis),
+            None => chain,
+        };
+        let rest = rest.map(|points| resampled(Chain::at_time(curve, radii, points)));
+        let poses: Vec<Chain> = std::iter::once(chain)
+            .chain(later.iter().map(|points| Chain::at_time(curve, radii, points)))
+            .map(resampled)
+            .collect();
+        let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, options)).collect();
+        let at_rest = rest.map(|rest| Winding::new(&rest, options));
+        let at_rest = at_rest.as_ref().unwrap_or(&wound[0]);
+        let missing =
+            |residual: f64, from: f64| residual - options.symmetry * ((residual - from) / options.symmetry).round();
+        let missing_at_rest = missing(at_rest.residual(at_rest), 0.0);
+        let frames = |winding: &Winding| {
+            // The frame of a closed yarn comes back turned by some angle; what is missing to a full symmetry is spread
+            // over the yarn, always the same one.
+            let missing = if curve.closed { missing(winding.residual(at_rest), missing_at_rest) } else { 0.0 };
+            winding.frames(at_rest, missing, phase)
+        };
+        let tight = wound[0].tight;
+        let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
+        let poses = poses.iter().zip(&wound).map(|(chain, winding)| (points(chain), frames(winding))).collect();
+        Self { poses, tight, length: total }
     }
+}
 
+/// A normal carried along a chain, and how far plies have turned about it.
+struct Winding {
+    /// At each knot, and the angle of the plies' turns up to there.
+    knots: Vec<(DVec3, f64)>,
+    /// By how much a closed chain turns the normal against itself.
+    angle: f64,
+    tight: Option<(usize, f64)>,
+}
+
+impl Winding {
     /// Carries the normal along the chain and integrates the phase of the plies.
-    fn with_frames(chain: &Chain, closed: bool, options: &StrandOptions, phase: f64, length: f64) -> Self {
+    fn new(chain: &Chain, options: &StrandOptions) -> Self {
         let segments = chain.segments();
         let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
         let mut here = chain.at(0, 0.0);
@@ -347,28 +483,32 @@ impl Strand {
             }
             knots.push((normal, turned));
         }
-        if closed {
-            // The frame comes back turned by some angle; spread what is missing to a full symmetry over the yarn.
-            let angle = tangent.dot(start.cross(normal)).atan2(start.dot(normal));
-            let residual = angle + turned;
-            let missing = residual - options.symmetry * (residual / options.symmetry).round();
-            for (i, knot) in knots.iter_mut().enumerate() {
-                knot.1 -= missing * i as f64 / segments as f64;
-            }
-        }
+        Self { knots, angle: tangent.dot(start.cross(normal)).atan2(start.dot(normal)), tight }
+    }
+
+    /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
+    fn residual(&self, at_rest: &Self) -> f64 {
+        self.angle + at_rest.knots[at_rest.knots.len() - 1].1
+    }
+
+    /// What is known at each control point.
+    fn frames(&self, at_rest: &Self, missing: f64, phase: f64) -> Vec<PointFrame> {
+        let segments = self.knots.len() - 1;
+        let turned = |i: usize| at_rest.knots[i].1 - missing * i as f64 / segments as f64;
         // Knot i is where segment i starts: the second of its four points.
         let frame = |i: usize| {
-            let (normal, angle) = knots[i.min(segments)];
-            let growth = knots[(i + 1).min(segments)].1 - angle;
+            let angle = turned(i.min(segments));
+            let growth = turned((i + 1).min(segments)) - angle;
             let wrapped = phase + angle;
             let wrapped = wrapped - TAU * (wrapped / TAU).round();
+            let normal = self.knots[i.min(segments)].0;
             PointFrame { normal: normal.as_vec3(), phase: wrapped as f32, growth: growth as f32 }
         };
         let mut frames = Vec::with_capacity(segments + 3);
         frames.push(frame(0));
         frames.extend((0..=segments).map(frame));
         frames.push(frame(segments));
-        Self { points: chain.points.iter().map(|p| p.as_vec4()).collect(), frames, tight, length }
+        frames
     }
 }
 
@@ -388,16 +528,27 @@ fn double_reflection(from: DVec3, tangent: DVec3, to: DVec3, next_tangent: DVec3
     (carried - carried.dot(next_tangent) * next_tangent).try_normalize().unwrap_or(normal)
 }
 
-/// Knots at equal arc length, as few as keep the new curve within the tolerance of the old one.
-fn resample(chain: &Chain, lengths: &[f64], closed: bool, radius: f64, options: &StrandOptions) -> Chain {
+/// Places on the chain (segment, and where in it) at equal arc length, as few as keep the curve through them within the
+/// tolerance of the old one; `None` if that takes the chain's own points.
+fn resample(
+    chain: &Chain,
+    lengths: &[f64],
+    closed: bool,
+    radius: f64,
+    options: &StrandOptions,
+) -> Option<Vec<(usize, f64)>> {
     let total = lengths[lengths.len() - 1];
-    let point_at = |s: f64| {
+    let place_at = |s: f64| {
         let i = lengths.partition_point(|&l| l <= s).clamp(1, lengths.len() - 1) - 1;
         let span = lengths[i + 1] - lengths[i];
         let t = if span > 0.0 { ((s - lengths[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
         let place = i as f64 + t;
         let segment = ((place / LENGTH_STEPS as f64) as usize).min(chain.segments() - 1);
-        chain.at(segment, place / LENGTH_STEPS as f64 - segment as f64)
+        (segment, place / LENGTH_STEPS as f64 - segment as f64)
+    };
+    let point_at = |s: f64| {
+        let (segment, u) = place_at(s);
+        chain.at(segment, u)
     };
     let longest = (options.longest_segment * radius).max(total * 1e-7);
     let fewest = if closed { 4 } else { 1 };
@@ -407,8 +558,8 @@ fn resample(chain: &Chain, lengths: &[f64], closed: bool, radius: f64, options: 
     let most = if exact { chain.segments() } else { 2 * chain.segments() }.max(fewest);
     count = count.min(most);
     loop {
-        let knots: Vec<DVec4> = (0..=count).map(|i| point_at(total * i as f64 / count as f64).at).collect();
-        let made = interpolate(&knots, closed, options.basis);
+        let knots: Vec<_> = (0..=count).map(|i| place_at(total * i as f64 / count as f64)).collect();
+        let made = chain.through(&knots, closed, options.basis);
         let allowed = options.tolerance * radius;
         let worst = (0..count)
             .flat_map(|i| [0.25, 0.5, 0.75].map(|u| (i, u)))
@@ -421,10 +572,10 @@ fn resample(chain: &Chain, lengths: &[f64], closed: bool, radius: f64, options: 
             })
             .fold(0.0, f64::max);
         if worst <= allowed || (count >= most && !exact) {
-            return made;
+            return Some(knots);
         }
         if count >= most {
-            return Chain { basis: chain.basis, points: chain.points.clone() };
+            return None;
         }
         // The error of a cubic falls with the third power of the spacing at least.
         let grow = (worst / allowed).powf(1.0 / 3.0).clamp(1.1, 2.0);
@@ -544,6 +695,40 @@ mod tests {
                     p.normal * p.phase.cos() + across * p.phase.sin()
                 };
                 assert!((ply(&a) - ply(&b)).length() < 3e-3, "segment {i} of {last}: {} {}", ply(&a), ply(&b));
+            }
+        }
+    }
+
+    #[test]
+    fn what_moves_is_between_its_poses_and_takes_its_plies_along() {
+        for (basis, closed) in [(Basis::CatmullRom, true), (Basis::CatmullRom, false), (Basis::BSpline, true)] {
+            let curve = knit_like(200, closed);
+            let radii = vec![0.5; curve.points.len()];
+            // Lifted, turned a little and stretched by a fifth along x.
+            let move_by = |s: f64, p: &DVec3| {
+                let turn = glam::DQuat::from_rotation_y(0.2 * s);
+                turn * DVec3::new(p.x * (1.0 + 0.2 * s), p.y, p.z) + DVec3::new(0.0, 3.0 * s, 0.0)
+            };
+            let pose = |s: f64| -> Vec<Vec<DVec3>> { vec![curve.points.iter().map(|p| move_by(s, p)).collect()] };
+            let later = [pose(0.5), pose(1.0)];
+            let rest = [curve.points.clone()];
+            let movement = Movement { later: &later, rest: Some(&rest) };
+            let o = options(basis);
+            let moving = Strands::moving(&[(curve.clone(), radii.clone())], movement, &o);
+            let still = strands(curve.clone(), 0.5, &o);
+            for i in (0..still.segments().len() as u32).step_by(7) {
+                let (a, b) = (moving.place_at(i, 0.3, 0.0), still.place(i, 0.3));
+                assert_eq!((a.centre, a.phase), (b.centre, b.phase), "it starts where it is");
+                let centre = b.centre.as_dvec3();
+                for s in [0.25, 0.5, 0.75, 1.0] {
+                    let place = moving.place_at(i, 0.3, s as f32);
+                    let want = move_by(s, &centre).as_vec3a();
+                    assert!((place.centre - want).length() < 0.03, "{basis:?} {s}: {} {want}", place.centre);
+                    let turn = (place.phase - b.phase) / std::f32::consts::TAU;
+                    let off = (turn - turn.round()).abs() * std::f32::consts::TAU;
+                    // A closed yarn shares out how much its frame turns more or less on the way around.
+                    assert!(off < if closed { 0.3 } else { 1e-5 }, "{basis:?} closed {closed} at {s}: {off}");
+                }
             }
         }
     }

@@ -115,6 +115,8 @@ pub struct Integrator<'a> {
 /// A worker's own memory: reused from sample to sample.
 #[derive(Debug, Default)]
 pub struct Scratch {
+    /// The time of the path in work: where what moves is for all its rays.
+    time: f32,
     crossings: Crossings,
     shadow_crossings: Crossings,
 }
@@ -193,7 +195,9 @@ impl<'a> Integrator<'a> {
         };
         counters.camera += 1;
         let mut cloth_events = 0;
+        scratch.time = ray.time;
         loop {
+            path.ray.time = scratch.time;
             let hit = self.world.intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;
@@ -431,7 +435,7 @@ impl<'a> Integrator<'a> {
         if self.ground.is_some_and(|g| distance_to_ground(&g, ray).is_some()) {
             return 0.0;
         }
-        self.world.transmittance(ray, &mut scratch.shadow_crossings)
+        self.world.transmittance(&Ray { time: scratch.time, ..*ray }, &mut scratch.shadow_crossings)
     }
 }
 

@@ -133,6 +133,18 @@ impl Plan {
         add("variance_layer", scene.layers.variance, "asked for", "no output holds it");
         add("sample_layer", scene.layers.samples, "asked for", "no output holds it");
         add("denoiser", scene.denoise, "asked for", "nobody asks for a denoised picture: not loaded");
+        add(
+            "camera_motion",
+            !scene.camera_path.is_empty(),
+            "the camera moves while the shutter is open",
+            "the camera stands still",
+        );
+        add(
+            "yarn_motion",
+            scene.cloth_moves(),
+            "yarns move while the shutter is open",
+            "yarns stand still: one time in the BVH",
+        );
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
         add("textures", false, "", "no texture in the scene");
         add("meshes", !scene.objects.is_empty(), "the scene has a mesh", "no mesh in the scene");

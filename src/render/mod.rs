@@ -16,6 +16,7 @@ use glam::Vec2;
 use rayon::prelude::*;
 
 use crate::{
+    ffi::embree::Ray,
     film::{Film, Tile},
     integrator::{Counters, Integrator, Scratch},
     math::{
@@ -163,7 +164,8 @@ fn render_tile(
 ) -> Counters {
     let settings = &scene.render;
     let mut counters = Counters::default();
-    let seed = hash2(settings.seed, 0x79a2_17a5);
+    let seed = hash2(settings.frame.map_or(settings.seed, |f| hash2(settings.seed, f)), 0x79a2_17a5);
+    let moves = !scene.camera_path.is_empty() || scene.cloth_moves();
     for y in 0..tile.height {
         for x in 0..tile.width {
             let (px, py) = (tile.x + x, tile.y + y);
@@ -172,7 +174,13 @@ fn render_tile(
                 let [u, v, lens_u, lens_v] = sampler.next4();
                 let offset = Vec2::new(filter_offset(settings.filter, u), filter_offset(settings.filter, v));
                 let point = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
-                let ray = scene.camera.ray(point, Vec2::new(lens_u, lens_v), settings.width, settings.height);
+                let lens = Vec2::new(lens_u, lens_v);
+                let ray = if moves {
+                    let [time, ..] = sampler.next4();
+                    Ray { time, ..scene.camera_at(time).ray(point, lens, settings.width, settings.height) }
+                } else {
+                    scene.camera.ray(point, lens, settings.width, settings.height)
+                };
                 let sample = integrator.sample(ray, &mut sampler, scratch, &mut counters);
                 if !tile.add(x, y, &sample) {
                     counters.invalid += 1;

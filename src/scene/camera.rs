@@ -1,6 +1,6 @@
 //! From a pixel to a ray.
 
-use glam::{DVec3, Vec2, Vec3, Vec3A};
+use glam::{DQuat, DVec3, Vec2, Vec3, Vec3A};
 
 use crate::{ffi::embree::Ray, math::warp};
 
@@ -11,6 +11,21 @@ pub enum Projection {
     Perspective(f64),
     /// Height of the picture, millimetres.
     Orthographic(f64),
+}
+
+impl Projection {
+    /// The same kind of projection with another angle or height.
+    pub fn with(self, opening: f64) -> Self {
+        match self {
+            Self::Perspective(_) => Self::Perspective(opening),
+            Self::Orthographic(_) => Self::Orthographic(opening),
+        }
+    }
+
+    fn opening(self) -> f64 {
+        let (Self::Perspective(opening) | Self::Orthographic(opening)) = self;
+        opening
+    }
 }
 
 /// A thin lens: what lies at the distance of focus is sharp.
@@ -86,6 +101,39 @@ impl Camera {
                     .fold(0.0, f64::max);
                 Self { position: centre + distance.max(1e-9) * self.back, ..*self }
             }
+        }
+    }
+
+    /// The camera after a turn about an axis through `pivot`, in radians.
+    pub fn turned(&self, axis: DVec3, pivot: DVec3, angle: f64) -> Self {
+        let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::Y), angle);
+        Self {
+            position: pivot + turn * (self.position - pivot),
+            right: turn * self.right,
+            up: turn * self.up,
+            back: turn * self.back,
+            ..*self
+        }
+    }
+
+    /// The camera a share `s` of the way to where it is a little later.
+    pub fn towards(&self, later: &Self, s: f64) -> Self {
+        let back = self.back.lerp(later.back, s).normalize_or(self.back);
+        let right = self.up.lerp(later.up, s).cross(back).normalize_or(self.right);
+        let opening = self.projection.opening();
+        let lens = match (self.lens, later.lens) {
+            (Some(a), Some(b)) => {
+                Some(Lens { radius: a.radius + s * (b.radius - a.radius), focus: a.focus + s * (b.focus - a.focus) })
+            }
+            (lens, _) => lens,
+        };
+        Self {
+            position: self.position.lerp(later.position, s),
+            right,
+            up: back.cross(right),
+            back,
+            projection: self.projection.with(opening + s * (later.projection.opening() - opening)),
+            lens,
         }
     }
 
@@ -177,6 +225,24 @@ mod tests {
         assert!((corner.y / -corner.z - 0.5f32.tan()).abs() < 1e-5);
         assert!(Camera::looking_at(DVec3::ZERO, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
         assert!(Camera::looking_at(DVec3::Y, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
+    }
+
+    #[test]
+    fn between_two_poses_a_camera_is_between_them() {
+        let camera = |position: DVec3, angle| {
+            Camera::looking_at(position, DVec3::ZERO, DVec3::Y, Projection::Perspective(angle)).unwrap()
+        };
+        let still = camera(DVec3::new(0.0, 2.0, 10.0), 0.5);
+        let turned = still.turned(DVec3::Y, DVec3::ZERO, 0.1);
+        let half = still.turned(DVec3::Y, DVec3::ZERO, 0.05);
+        let between = still.towards(&turned, 0.5);
+        assert!((between.position - half.position).length() < 0.02, "a chord of the arc");
+        for (a, b) in [(between.right, half.right), (between.up, half.up), (between.back, half.back)] {
+            assert!((a - b).length() < 1e-3 && (a.length() - 1.0).abs() < 1e-12);
+        }
+        assert!((still.towards(&turned, 1.0).right - turned.right).length() < 1e-12);
+        let wider = camera(DVec3::new(0.0, 2.0, 10.0), 0.7);
+        assert_eq!(still.towards(&wider, 0.25).projection, Projection::Perspective(0.55));
     }
 
     #[test]

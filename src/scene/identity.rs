@@ -28,7 +28,9 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
     setting("filter", &r.filter);
     setting("max_bounces", &r.max_bounces);
     setting("seed", &r.seed);
+    setting("frame", &r.frame);
     let camera = &scene.camera;
+    add("camera.shutter".to_owned(), &scene.camera_path);
     add("camera.position".to_owned(), &camera.position);
     add("camera.direction".to_owned(), &[camera.right, camera.up, camera.back]);
     add("camera".to_owned(), camera);
@@ -57,6 +59,7 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         of_fabric("phase", &fabric.phases);
         of_fabric("seed", &fabric.seed);
         of_fabric("curves", &curves(fabric));
+        of_fabric("shutter", &fabric.movement);
         of_fabric("curve_basis", &fabric.basis);
         of_fabric("curve_tolerance", &(fabric.tolerance, fabric.longest_segment));
     }

@@ -5,6 +5,7 @@
 //! renderer's keys, their ranges and units, and reads the files that a scene names. A [`Scene`] is a plain value in
 //! millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or Embree.
 
+pub mod animation;
 pub mod camera;
 pub mod diagnostic;
 pub mod document;
@@ -150,6 +151,8 @@ pub struct RenderSettings {
     pub threads: Option<usize>,
     /// Start of all random numbers.
     pub seed: u32,
+    /// The number of the frame in a sequence; noise changes with it.
+    pub frame: Option<u32>,
     /// Smaller or faster BVH.
     pub compact_bvh: bool,
     /// Bytes that curves and BVH may take; `None` for no limit.
@@ -266,6 +269,8 @@ pub struct Fabric {
     pub thread: Thread,
     /// Curves and their radii, millimetres, about the scene's middle.
     pub curves: Vec<(Curve, Vec<f64>)>,
+    /// Where they are at other times.
+    pub movement: Movement,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
     /// Start of what is random in it: where explicit fibres lie.
@@ -278,7 +283,26 @@ pub struct Fabric {
     pub longest_segment: f64,
 }
 
+/// The points of a fabric's curves at other times: for each time, for each curve, millimetres.
+#[derive(Clone, Debug, Default)]
+pub struct Movement {
+    /// Evenly spaced from the opening of the shutter, which `curves` shows, to its closing. Empty if nothing moves.
+    pub later: Vec<Vec<Vec<DVec3>>>,
+    /// At rest: plies wind by lengths along these. `None` if the curves are at rest.
+    pub rest: Option<Vec<Vec<DVec3>>>,
+}
+
 impl Fabric {
+    /// Moves curves, at all times, by a transform whose scale is the same along all axes; radii grow with it.
+    pub fn transform(&mut self, by: &DAffine3) {
+        transform_curves(&mut self.curves, by);
+        for curve in self.movement.later.iter_mut().flatten().chain(self.movement.rest.iter_mut().flatten()) {
+            for p in curve {
+                *p = by.transform_point3(*p);
+            }
+        }
+    }
+
     /// Number of control points, as given.
     pub fn control_points(&self) -> usize {
         self.curves.iter().map(|(c, _)| c.points.len()).sum()
@@ -327,8 +351,10 @@ pub struct Scene {
     pub storage: Storage,
     /// Whether a denoised picture is made as well.
     pub denoise: bool,
-    /// The view.
+    /// The view, in the middle of the shutter's time.
     pub camera: Camera,
+    /// The view from when the shutter opens to when it closes, evenly spaced in time; empty if it stands still.
+    pub camera_path: Vec<Camera>,
     /// Kinds of yarn that fabrics use.
     pub yarns: Vec<Yarn>,
     /// Fibres that fabrics use by themselves: name and material.
@@ -354,6 +380,20 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether cloth moves while the shutter is open.
+    pub fn cloth_moves(&self) -> bool {
+        self.fabrics.iter().any(|f| !f.movement.later.is_empty())
+    }
+
+    /// The camera at a time from 0, when the shutter opens, to 1, when it closes.
+    #[inline]
+    pub fn camera_at(&self, time: f32) -> Camera {
+        let Some(steps) = self.camera_path.len().checked_sub(1) else { return self.camera };
+        let x = f64::from(time) * steps as f64;
+        let step = (x as usize).min(steps.saturating_sub(1));
+        self.camera_path[step].towards(&self.camera_path[(step + 1).min(steps)], x - step as f64)
+    }
+
     /// The layers that a film must collect: those of the EXR, and what guides a denoiser.
     pub fn collected(&self) -> Layers {
         Layers { albedo: self.layers.albedo || self.denoise, normal: self.layers.normal || self.denoise, ..self.layers }

@@ -8,7 +8,7 @@ use crate::{
     geometry::{
         curve::Basis,
         fiber::Plies,
-        strand::{StrandOptions, Strands},
+        strand::{Movement, StrandOptions, Strands},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
     },
@@ -242,8 +242,9 @@ impl Prepared<'_> {
 }
 
 fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
-    Strands::new(
+    Strands::moving(
         &fabric.curves,
+        Movement { later: &fabric.movement.later, rest: fabric.movement.rest.as_deref() },
         &StrandOptions {
             basis: fabric.basis,
             tolerance: fabric.tolerance,

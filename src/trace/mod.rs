@@ -161,12 +161,12 @@ impl World {
         let layout = if compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;
         for threads in &cloth {
-            let (basis, points, segments) = threads.curves();
+            let (basis, _, segments) = threads.curves();
             let basis = match basis {
                 Basis::BSpline => CurveBasis::BSpline,
                 Basis::CatmullRom | Basis::Linear => CurveBasis::CatmullRom,
             };
-            builder.add_round_curves(basis, Arc::clone(points), Arc::clone(segments))?;
+            builder.add_round_curves(basis, threads.points_in_time(), Arc::clone(segments))?;
         }
         for mesh in &meshes {
             builder.add_triangles(Arc::clone(&mesh.points), Arc::clone(&mesh.triangles))?;
@@ -262,7 +262,7 @@ impl World {
 /// The cross-section at a candidate hit: what filter and shading both look at.
 #[inline]
 fn section_at(weave: &Weave, ray: &Ray, raw: &RawHit) -> Section {
-    let place = weave.strands.place(raw.segment, raw.u);
+    let place = weave.strands.place_at(raw.segment, raw.u, ray.time);
     Section::new(&place, ray.origin, ray.direction, weave.yarn.shape().tilted)
 }
 
@@ -288,6 +288,14 @@ impl Threads {
         match self {
             Self::Yarns(w) => (w.strands.basis(), w.strands.points(), w.strands.segments()),
             Self::Fibers(f) => (f.tubes.basis(), f.tubes.points(), f.tubes.segments()),
+        }
+    }
+
+    /// Control points at all times: once for what stands still.
+    fn points_in_time(&self) -> Vec<Arc<[Vec4]>> {
+        match self {
+            Self::Yarns(w) => w.strands.points_in_time(),
+            Self::Fibers(f) => vec![Arc::clone(f.tubes.points())],
         }
     }
 

@@ -9,15 +9,15 @@ use std::{
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
-    super::{Fabric, Thread, Yarn, transform_curves},
+    super::{Fabric, Mode, Movement, Thread, Yarn, transform_curves},
     Context, Range, Reader, UNITS,
     pattern::{self, KnitPlan, WeavePlan},
-    placement, radians,
+    placement, radians, sequence,
     yarns::Library,
 };
 use crate::{
     geometry::{
-        curve::{Basis, Curve},
+        curve::{Basis, Curve, CurveSet},
         curve_file::{self, ReadOptions},
         pattern::straight,
     },
@@ -34,6 +34,12 @@ pub(super) struct Detail {
     basis: Option<Basis>,
     tolerance: f64,
     longest_segment: f64,
+    /// The number of the frame, in numbered curve files.
+    pub(super) frame: u32,
+    /// Whether yarns may move while the shutter is open: in the mode of yarns.
+    pub(super) can_move: bool,
+    /// When it opens and closes, in frames from the frame's own time.
+    pub(super) shutter: Option<[f64; 2]>,
 }
 
 impl Detail {
@@ -42,15 +48,29 @@ impl Detail {
         let basis = table.and_then(|t| t.one_of_or("curve_basis", None, &bases));
         let tolerance = table.map_or(0.005, |t| t.f64_or("curve_tolerance", 0.005, Range::between(0.0, 1.0)));
         let longest_segment = table.map_or(3.0, |t| t.f64_or("longest_segment", 3.0, Range::above(0.0)));
-        Self { basis, tolerance, longest_segment }
+        let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(1, |f| f as u32);
+        let can_move = table.is_none_or(|t| t.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name());
+        Self { basis, tolerance, longest_segment, frame, can_move, shutter: None }
     }
 }
 
 enum Source {
-    File { path: PathBuf, span: Span, unit: Option<f64>, options: ReadOptions, up: Up },
+    File(CurveFile),
     Knit(KnitPlan),
     Weave(WeavePlan),
     Straight { count: u32, length: f64, spacing: f64 },
+}
+
+/// A curve file, or one for each frame.
+pub(super) struct CurveFile {
+    pub(super) path: PathBuf,
+    /// Curves at rest, if they are not those of the first frame.
+    pub(super) rest: Option<PathBuf>,
+    pub(super) span: Span,
+    /// Millimetres, if the file does not know.
+    unit: Option<f64>,
+    options: ReadOptions,
+    up: Up,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -122,7 +142,9 @@ pub(super) fn plan(
             let known = Yarns { library, own, radius, fallback };
             source(source_table, context, &known, curves)
         }
-        None if curves.is_some() => curves.map(|path| file_source(path.to_owned(), table.header(), None, None)),
+        None if curves.is_some() => {
+            curves.map(|path| file_source(path.to_owned(), table.header(), None, None, context))
+        }
         None => {
             table.error(
                 "missing table `source`: where the curves come from",
@@ -136,7 +158,13 @@ pub(super) fn plan(
     Some(FabricPlan { name, thread, radius, phases, seed, transform, source: source? })
 }
 
-fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Reader<'_>>) -> Source {
+fn file_source(
+    path: PathBuf,
+    span: Span,
+    unit: Option<f64>,
+    table: Option<&Reader<'_>>,
+    context: &Context<'_>,
+) -> Source {
     let mut options = ReadOptions::default();
     let mut up = Up::Auto;
     if let Some(table) = table {
@@ -154,7 +182,8 @@ fn file_source(path: PathBuf, span: Span, unit: Option<f64>, table: Option<&Read
             }
         }
     }
-    Source::File { path, span, unit, options, up }
+    let rest = table.and_then(|t| t.string("rest").map(|p| context.resolve(p, t.span("rest").unwrap_or(span))));
+    Source::File(CurveFile { path, rest, span, unit, options, up })
 }
 
 /// The yarns that a source may name.
@@ -201,7 +230,7 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: O
             };
             let span = if curves.is_some() { table.header() } else { table.span("path").unwrap_or(table.header()) };
             // Read all keys in any case, so that each is known.
-            let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table));
+            let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table), context);
             path.map(|_| source)
         }
         Some(1) => pattern::knit(&table, context, yarns).map(Source::Knit),
@@ -217,7 +246,7 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: O
     };
     if let (Some(path), Some(1..)) = (curves, kind) {
         table.finish();
-        return Some(file_source(path.to_owned(), header, None, None));
+        return Some(file_source(path.to_owned(), header, None, None, context));
     }
     table.finish();
     made
@@ -253,6 +282,7 @@ impl FabricPlan {
             };
             curves.into_iter().map(with).collect()
         };
+        let mut movement = Movement::default();
         let made = match self.source {
             Source::Knit(plan) => {
                 let curves = plan.curves(2.0 * radius, context)?;
@@ -277,58 +307,74 @@ impl FabricPlan {
                 let curves = with_radius(straight(count, length, spacing), radius);
                 vec![Made { origin: format!("{count} straight"), thread, curves }]
             }
-            Source::File { path, span, unit, options, up } => {
-                let set = match curve_file::read(&path, &options) {
-                    Ok(set) => set,
-                    Err(error) => {
-                        context.error(span, error.to_string(), None);
-                        return None;
+            Source::File(file) => {
+                let mut read = |path: &Path| {
+                    let (set, scale) = file.read(path, context, warnings)?;
+                    let own_radii = |mut curve: Curve| {
+                        let given = curve.radii.take().filter(|_| self.radius.is_none());
+                        let radii = given.map_or_else(
+                            || vec![radius; curve.points.len()],
+                            |r| r.iter().map(|r| r * scale).collect(),
+                        );
+                        (curve, radii)
+                    };
+                    let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
+                    if file.up == Up::Z || (file.up == Up::Auto && set.up_axis == Some(2)) {
+                        // z up becomes y up: a quarter turn about x.
+                        let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+                        transform_curves(&mut curves, &DAffine3::from_mat3(turn));
                     }
+                    Some(curves)
                 };
-                warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
-                let scale = unit.or(set.unit_mm).unwrap_or(context.unit);
-                let own_radii = |mut curve: Curve| {
-                    let given = curve.radii.take().filter(|_| self.radius.is_none());
-                    let radii = given
-                        .map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
-                    // Radii are in millimetres already; the transform below would scale them with the points.
-                    for p in &mut curve.points {
-                        *p *= scale;
-                    }
-                    (curve, radii)
-                };
-                let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
-                if up == Up::Z || (up == Up::Auto && set.up_axis == Some(2)) {
-                    // z up becomes y up: a quarter turn about x.
-                    let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
-                    transform_curves(&mut curves, &DAffine3::from_mat3(turn));
-                }
+                let (path, curves, of_file) = sequence::read(&file, detail, context, &mut read)?;
+                movement = of_file;
                 vec![Made { origin: path.display().to_string(), thread, curves }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
         let name = self.name.unwrap_or_else(|| self.thread.into_name());
-        let fabric = |Made { origin, thread, mut curves }: Made| {
-            transform_curves(&mut curves, &self.transform);
+        let fabric = |Made { origin, thread, curves }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
                 Some(Basis::BSpline) => Basis::BSpline,
                 _ => Basis::CatmullRom,
             };
-            Fabric {
+            let mut fabric = Fabric {
                 name: name.clone(),
                 origin,
                 thread,
                 curves,
+                movement: std::mem::take(&mut movement),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
                 tolerance: detail.tolerance,
                 longest_segment: detail.longest_segment,
-            }
+            };
+            fabric.transform(&self.transform);
+            fabric
         };
         Some(made.into_iter().map(fabric).collect())
+    }
+}
+
+impl CurveFile {
+    /// Reads one file; points become millimetres. Gives the scale, by which radii have not been multiplied yet.
+    fn read(&self, path: &Path, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<(CurveSet, f64)> {
+        let mut set = match curve_file::read(path, &self.options) {
+            Ok(set) => set,
+            Err(error) => {
+                context.error(self.span, error.to_string(), None);
+                return None;
+            }
+        };
+        warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
+        let scale = self.unit.or(set.unit_mm).unwrap_or(context.unit);
+        for p in set.curves.iter_mut().flat_map(|c| &mut c.points) {
+            *p *= scale;
+        }
+        Some((set, scale))
     }
 }
 

@@ -6,7 +6,9 @@
 mod cloth;
 mod definitions;
 mod mesh;
+mod motion;
 mod pattern;
+mod sequence;
 mod settings;
 mod view;
 mod yarns;
@@ -26,7 +28,6 @@ use super::{
     document::{Document, MAX_FILE_BYTES, Value},
     identity,
     reader::{Range, Reader},
-    transform_curves,
 };
 use crate::geometry::fiber::packing;
 
@@ -202,7 +203,7 @@ fn build(
     let tilted = render_table
         .as_ref()
         .is_none_or(|r| r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)]));
-    let detail = cloth::Detail::read(render_table.as_ref());
+    let mut detail = cloth::Detail::read(render_table.as_ref());
     if let Some(table) = render_table {
         table.finish();
     }
@@ -228,6 +229,7 @@ fn build(
     if diagnostics.has_errors() {
         return None;
     }
+    detail.shutter = camera_plan.as_ref().and_then(view::CameraPlan::shutter);
 
     // The text is sound: now the files.
     let mut warnings = Vec::new();
@@ -252,7 +254,7 @@ fn build(
         |objects: &[Object]| objects.iter().filter_map(|o| o.mesh.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let middle = bounds(&fabrics).or(around(&objects)).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
     for fabric in &mut fabrics {
-        transform_curves(&mut fabric.curves, &DAffine3::from_translation(-middle));
+        fabric.transform(&DAffine3::from_translation(-middle));
     }
     for object in &mut objects {
         object.mesh.transform(&DAffine3::from_translation(-middle));
@@ -262,7 +264,8 @@ fn build(
     }
     let render = settings?;
     let aspect = f64::from(render.width) / f64::from(render.height);
-    let camera = camera_plan?.make(&fabrics, &objects, middle, aspect);
+    let frame = f64::from(render.frame.unwrap_or(1));
+    let (camera, camera_path) = camera_plan?.make(&fabrics, &objects, middle, aspect, frame);
     let ground = ground_plan.map(|plan| {
         let height = plan.height.map(|h| h * unit - middle.y);
         let lowest = [bounds(&fabrics), around(&objects)].into_iter().flatten().map(|(low, _)| low.y);
@@ -277,6 +280,7 @@ fn build(
         storage: output.storage,
         denoise: output.denoise,
         camera,
+        camera_path,
         yarns: library.yarns.into_values().collect(),
         fibers: library.fibers.into_iter().collect(),
         fabrics,
@@ -298,6 +302,7 @@ fn build(
     }
     warn_about_precision(&mut scene);
     warn_about_density(&mut scene);
+    warn_about_standing_hairs(&mut scene);
     scene.identity = identity::identity(&scene);
     scene.fingerprint = identity::fingerprint(&scene.identity);
     Some(scene)
@@ -339,6 +344,14 @@ fn warn_about_density(scene: &mut Scene) {
             ));
         }
     }
+}
+
+/// Fly-aways are made where yarns are when the shutter opens, and stay there.
+fn warn_about_standing_hairs(scene: &mut Scene) {
+    let hairy = |thread| matches!(thread, Thread::Yarn(yarn) if scene.yarns[yarn].flyaways.is_some());
+    let still = scene.fabrics.iter().filter(|f| !f.movement.later.is_empty() && hairy(f.thread));
+    let warnings = still.map(|f| format!("the fly-aways of `{}` stand still while the shutter is open", f.name));
+    scene.warnings.extend(warnings.collect::<Vec<_>>());
 }
 
 /// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.

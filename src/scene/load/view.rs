@@ -13,6 +13,7 @@ use super::{
     },
     Context, Range, Reader,
     mesh::{MaterialPlan, Materials, material_of},
+    motion::{self, Aim, Motion},
     radians,
 };
 use crate::{
@@ -27,6 +28,10 @@ pub(super) struct CameraPlan {
     /// Margin, if the camera is to frame the cloth.
     frame: Option<f64>,
     lens: Option<LensPlan>,
+    /// What it looks at, if it is told.
+    aim: Option<Aim>,
+    up: DVec3,
+    motion: Motion,
 }
 
 /// A lens before it is known where the cloth is.
@@ -63,6 +68,9 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
             camera: default_camera(direction, DVec3::Y, projection)?,
             frame: Some(DEFAULT_MARGIN),
             lens: None,
+            aim: None,
+            up: DVec3::Y,
+            motion: Motion::default(),
         })
     };
     let Some(node) = root.node("camera") else { return framing(DVec3::Z) };
@@ -88,10 +96,11 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
         let margin = table.f64_or("margin", DEFAULT_MARGIN, Range::between(-5.0, 0.45));
         let flat = table.one_of_or("projection", false, &[("perspective", false), ("orthographic", true)]);
         let projection = if flat { Projection::Orthographic(1.0) } else { fov(&table) };
+        let motion = Motion::read(&table, context, None, projection);
         match default_camera(direction, up, projection) {
             Some(camera) => {
                 let lens = lens(&table, context, projection, Focus::Cloth);
-                Some(CameraPlan { camera, frame: Some(margin), lens })
+                Some(CameraPlan { camera, frame: Some(margin), lens, aim: None, up, motion })
             }
             None => {
                 table.error("`direction` and `up` of the camera must not be parallel or zero", None);
@@ -106,14 +115,17 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
         } else {
             Projection::Orthographic(table.required_f64("size", Range::POSITIVE).unwrap_or(1.0) * context.unit)
         };
-        position.and_then(|position| {
-            let made = Camera::looking_at(context.position(position), context.position(target), up, projection);
+        let aim = position.map(|p| Aim { position: context.position(p), target: context.position(target), up });
+        let motion = Motion::read(&table, context, aim.as_ref().filter(|_| !frame), projection);
+        aim.and_then(|aim| {
+            let made = Camera::looking_at(aim.position, aim.target, up, projection);
             if made.is_none() {
                 table.error_at("position", "`position` and `target` must differ, and not along `up`", None);
             }
-            let focus = if frame { Focus::Cloth } else { Focus::Point(context.position(target)) };
+            let focus = if frame { Focus::Cloth } else { Focus::Point(aim.target) };
             let lens = lens(&table, context, projection, focus);
-            made.map(|camera| CameraPlan { camera, frame: frame.then_some(DEFAULT_MARGIN), lens })
+            let margin = frame.then_some(DEFAULT_MARGIN);
+            made.map(|camera| CameraPlan { camera, frame: margin, lens, aim: (!frame).then_some(aim), up, motion })
         })
     };
     table.finish();
@@ -154,33 +166,61 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
 }
 
 impl CameraPlan {
-    /// The camera for cloth that lies about `middle`; without any, for objects.
-    pub(super) fn make(self, fabrics: &[Fabric], objects: &[Object], middle: DVec3, aspect: f64) -> Camera {
-        let mut camera = match self.frame {
+    /// When the shutter opens and closes, in frames from the frame's own time.
+    pub(super) fn shutter(&self) -> Option<[f64; 2]> {
+        self.motion.shutter
+    }
+
+    /// The camera at a frame for cloth that lies about `middle`, and its path while the shutter is open, if it moves.
+    /// Without any cloth it frames `objects`.
+    pub(super) fn make(
+        self,
+        fabrics: &[Fabric],
+        objects: &[Object],
+        middle: DVec3,
+        aspect: f64,
+        frame: f64,
+    ) -> (Camera, Vec<Camera>) {
+        let frame_all = |margin, points: &mut dyn Iterator<Item = (&DVec3, f64)>| -> Camera {
+            let points: Vec<(DVec3, f64)> = points.map(|(p, r)| (*p, r)).collect();
+            let points = points.iter().map(|(p, r)| (p, *r));
+            if !self.motion.turns() {
+                return self.camera.framing(points, aspect, margin);
+            }
+            // From every side, so that the camera keeps its distance.
+            let outline = motion::revolved(points, self.up);
+            self.camera.framing(outline.iter().map(|p| (p, 0.0)), aspect, margin)
+        };
+        let still = match self.frame {
             None => Camera { position: self.camera.position - middle, ..self.camera },
             Some(margin) if fabrics.is_empty() => {
-                let points = objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0));
-                self.camera.framing(points, aspect, margin)
+                frame_all(margin, &mut objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0)))
             }
             Some(margin) => {
-                let points = fabrics
-                    .iter()
-                    .flat_map(|f| &f.curves)
-                    .flat_map(|(curve, radii)| curve.points.iter().zip(radii.iter().copied()));
-                self.camera.framing(points, aspect, margin)
+                let curves = fabrics.iter().flat_map(|f| &f.curves);
+                frame_all(margin, &mut curves.flat_map(|(c, radii)| c.points.iter().zip(radii.iter().copied())))
             }
         };
-        camera.lens = self.lens.map(|LensPlan { radius, focus }| {
-            let along_view = |point: DVec3| (camera.position - point).dot(camera.back);
-            let focus = match focus {
-                Focus::Cloth => along_view(DVec3::ZERO),
-                Focus::Distance(distance) => distance,
-                Focus::Point(point) => along_view(point - middle),
-            };
-            // What lies behind the camera can not be sharp.
-            Lens { radius, focus: focus.max(1e-6) }
-        });
-        camera
+        let (mut camera, mut path) = self.motion.poses(&still, self.aim.as_ref(), middle, self.up, frame);
+        if let Some(lens) = &self.lens {
+            for camera in std::iter::once(&mut camera).chain(&mut path) {
+                camera.lens = Some(lens.of(camera, middle));
+            }
+        }
+        (camera, path)
+    }
+}
+
+impl LensPlan {
+    fn of(&self, camera: &Camera, middle: DVec3) -> Lens {
+        let along_view = |point: DVec3| (camera.position - point).dot(camera.back);
+        let focus = match self.focus {
+            Focus::Cloth => along_view(DVec3::ZERO),
+            Focus::Distance(distance) => distance,
+            Focus::Point(point) => along_view(point - middle),
+        };
+        // What lies behind the camera can not be sharp.
+        Lens { radius: self.radius, focus: focus.max(1e-6) }
     }
 }
 

@@ -1,0 +1,126 @@
+//! What changes from frame to frame: numbered paths, and values between keys.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+/// A path with the number of a frame in it: `####` becomes `0007`, `{frame}` becomes `7`. `None` for a path that has
+/// no place for a number, and so is the same for all frames.
+pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
+    let text = path.to_str()?;
+    if !text.contains('#') && !text.contains("{frame}") {
+        return None;
+    }
+    let text = text.replace("{frame}", &frame.to_string());
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text.as_str();
+    while let Some(start) = rest.find('#') {
+        let after = rest[start..].trim_start_matches('#');
+        let width = rest.len() - start - after.len();
+        out.push_str(&rest[..start]);
+        out.push_str(&format!("{frame:0width$}"));
+        rest = after;
+    }
+    out.push_str(rest);
+    Some(out.into())
+}
+
+/// The smallest number for which a numbered file exists.
+pub fn first_number(path: &Path) -> Option<u32> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let numbers_in = |name: &str| -> Vec<u32> {
+        let runs = name.split(|c: char| !c.is_ascii_digit());
+        runs.filter_map(|digits| digits.parse().ok()).collect()
+    };
+    let entries = std::fs::read_dir(folder).ok()?;
+    let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let fits = |name: &str, number: u32| numbered(path, number).is_some_and(|p| p.file_name() == Some(name.as_ref()));
+    names.filter_map(|name| numbers_in(&name).into_iter().filter(|&n| fits(&name, n)).min()).min()
+}
+
+/// A value that goes smoothly through keys in time and stays at the first and the last: a Catmull-Rom spline with its
+/// slopes by the keys' own times (cubic Hermite, finite differences).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    keys: Vec<(f64, DVec3)>,
+}
+
+impl Track {
+    /// Through keys whose times increase; `None` without any.
+    pub fn new(keys: Vec<(f64, DVec3)>) -> Option<Self> {
+        debug_assert!(keys.windows(2).all(|k| k[0].0 < k[1].0), "keys stand in order");
+        (!keys.is_empty()).then_some(Self { keys })
+    }
+
+    /// The value at a time.
+    pub fn at(&self, time: f64) -> DVec3 {
+        let keys = &self.keys;
+        let next = keys.partition_point(|(t, _)| *t <= time);
+        if next == 0 || next == keys.len() {
+            return keys[next.saturating_sub(1)].1;
+        }
+        let slope = |i: usize| {
+            let (a, b) = (&keys[i.saturating_sub(1)], &keys[(i + 1).min(keys.len() - 1)]);
+            (b.1 - a.1) / (b.0 - a.0)
+        };
+        let ((t0, v0), (t1, v1)) = (keys[next - 1], keys[next]);
+        let span = t1 - t0;
+        let s = (time - t0) / span;
+        let (s2, s3) = (s * s, s * s * s);
+        (2.0 * s3 - 3.0 * s2 + 1.0) * v0
+            + (s3 - 2.0 * s2 + s) * span * slope(next - 1)
+            + (3.0 * s2 - 2.0 * s3) * v1
+            + (s3 - s2) * span * slope(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_take_numbers() {
+        let of = |path: &str| numbered(Path::new(path), 7).map(|p| p.display().to_string());
+        assert_eq!(of("out/hat.####.exr").as_deref(), Some("out/hat.0007.exr"));
+        assert_eq!(of("#/hat_{frame}.exr").as_deref(), Some("7/hat_7.exr"));
+        assert_eq!(of("hat.exr"), None);
+        assert_eq!(numbered(Path::new("a#.b"), 1234), Some("a1234.b".into()));
+    }
+
+    #[test]
+    fn the_first_file_of_a_sequence_is_found() {
+        let folder = tempfile::tempdir().expect("a directory");
+        for name in ["x.0012.bcc", "x.0009.bcc", "x.9.bcc", "y.0001.bcc", "x.0003.txt"] {
+            std::fs::write(folder.path().join(name), "").expect("a file");
+        }
+        assert_eq!(first_number(&folder.path().join("x.####.bcc")), Some(9));
+        assert_eq!(first_number(&folder.path().join("z.####.bcc")), None);
+        assert_eq!(first_number(&folder.path().join("none/z.####.bcc")), None);
+    }
+
+    #[test]
+    fn tracks_go_through_their_keys_smoothly_and_stay_at_the_ends() {
+        let track = Track::new(vec![
+            (1.0, DVec3::ZERO),
+            (4.0, DVec3::new(3.0, 1.0, 0.0)),
+            (5.0, DVec3::new(4.0, -1.0, 2.0)),
+            (9.0, DVec3::new(8.0, 0.0, 0.0)),
+        ])
+        .expect("keys");
+        for &(time, value) in &track.keys {
+            assert!((track.at(time) - value).length() < 1e-12);
+            // The slope is the same from both sides.
+            let h = 1e-6;
+            let (before, after) = ((value - track.at(time - h)) / h, (track.at(time + h) - value) / h);
+            assert!(time == 1.0 || time == 9.0 || (before - after).length() < 1e-4, "{before} {after}");
+        }
+        // What grows evenly in time does so between uneven keys.
+        for i in 0..80 {
+            let time = 1.0 + f64::from(i) / 10.0;
+            assert!((track.at(time).x - (time - 1.0)).abs() < 1e-12);
+        }
+        assert_eq!((track.at(-3.0), track.at(99.0)), (DVec3::ZERO, DVec3::new(8.0, 0.0, 0.0)));
+        assert!(Track::new(Vec::new()).is_none());
+        assert_eq!(Track::new(vec![(2.0, DVec3::ONE)]).expect("a key").at(7.0), DVec3::ONE);
+    }
+}

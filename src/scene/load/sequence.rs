@@ -1,0 +1,144 @@
+//! Curve files that are numbered by frame: the curves of one, how they move while the shutter is open, and how they lie
+//! at rest.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use glam::DVec3;
+
+use super::{
+    super::{
+        Movement,
+        animation::{first_number, numbered},
+    },
+    Context,
+    cloth::{CurveFile, Detail},
+};
+use crate::geometry::curve::Curve;
+
+/// Curves with their radii, millimetres.
+type Curves = Vec<(Curve, Vec<f64>)>;
+
+/// Reads the curves of a file, or of the file of the frame. Gives the file's name as well.
+pub(super) fn read(
+    file: &CurveFile,
+    detail: &Detail,
+    context: &Context<'_>,
+    read: &mut impl FnMut(&Path) -> Option<Curves>,
+) -> Option<(PathBuf, Curves, Movement)> {
+    let own = numbered(&file.path, detail.frame).filter(|_| !file.path.exists());
+    let rest_of = |curves: &Curves, rest: Curves| same_shape(curves, &rest).map(|()| points_of(rest));
+    let tell = |problem: String, other: &Path| {
+        let message = format!("{}: {problem}", other.display());
+        context.error(file.span, message, Some("yarns keep their points from file to file".to_owned()));
+    };
+    let Some(own) = own else {
+        let curves = read(&file.path)?;
+        let mut movement = Movement::default();
+        if let Some(path) = &file.rest {
+            let rest = read(path)?;
+            movement.rest = Some(rest_of(&curves, rest).map_err(|problem| tell(problem, path)).ok()?);
+        }
+        return Some((file.path.clone(), curves, movement));
+    };
+
+    // Between two files yarns move evenly from one to the other.
+    let times = times(detail.frame, detail.shutter);
+    let mut files: BTreeMap<i64, Curves> = BTreeMap::new();
+    // Before the first file and after the last they stand still.
+    let there = |number: i64| -> Option<(i64, PathBuf)> {
+        let path = numbered(&file.path, u32::try_from(number).ok()?)?;
+        path.exists().then_some((number, path))
+    };
+    let needed = |number: i64| there(number).unwrap_or((i64::from(detail.frame), own.clone()));
+    let mut around = Vec::new();
+    for &time in &times {
+        let (before, after) = (needed(time.floor() as i64), needed(time.ceil() as i64));
+        around.push((before.0, after.0, time - time.floor()));
+        for (number, path) in [before, after] {
+            if !files.contains_key(&number) {
+                let curves = read(&path)?;
+                if let Some(first) = files.values().next() {
+                    same_shape(first, &curves).map_err(|problem| tell(problem, &path)).ok()?;
+                }
+                files.insert(number, curves);
+            }
+        }
+    }
+    let pose = |&(before, after, share): &(i64, i64, f64)| -> Vec<Vec<DVec3>> {
+        let pairs = files[&before].iter().zip(&files[&after]);
+        pairs.map(|((a, _), (b, _))| a.points.iter().zip(&b.points).map(|(a, b)| a.lerp(*b, share)).collect()).collect()
+    };
+    let mut curves = files[&around[0].0].clone();
+    let first = pose(&around[0]);
+    let mut later: Vec<_> = around[1..].iter().map(pose).collect();
+    if later.iter().all(|points| *points == first) {
+        later.clear();
+    }
+    if !later.is_empty() && !detail.can_move {
+        let message = "yarns that move while the shutter is open need mode = \"yarn\"";
+        context.error(file.span, message, Some("shutter = [0, 0] shows them at the frame's own time".to_owned()));
+        return None;
+    }
+    for ((curve, _), points) in curves.iter_mut().zip(first) {
+        curve.points = points;
+    }
+    let rest = match &file.rest {
+        Some(path) => Some(path.clone()),
+        None => first_number(&file.path).filter(|n| *n != detail.frame).and_then(|n| numbered(&file.path, n)),
+    };
+    let rest = match rest {
+        // At rest is where the curves are, or the first of them.
+        None if later.is_empty() => None,
+        None => Some(points_of(read(&own)?)),
+        Some(path) => {
+            let rest = read(&path)?;
+            Some(rest_of(&curves, rest).map_err(|problem| tell(problem, &path)).ok()?)
+        }
+    };
+    Some((own, curves, Movement { later, rest }))
+}
+
+/// Times at which to know the curves, evenly spaced from the opening of the shutter to its closing, in frames.
+fn times(frame: u32, shutter: Option<[f64; 2]>) -> Vec<f64> {
+    let frame = f64::from(frame);
+    let Some([open, close]) = shutter else { return vec![frame] };
+    let (open, close) = (frame + open, frame + close);
+    // Within one step from file to file all goes straight.
+    let steps = if close <= open.floor() + 1.0 { 1 } else { 2 * (close - open).ceil() as usize };
+    (0..=steps).map(|i| open + (close - open) * i as f64 / steps as f64).collect()
+}
+
+fn points_of(curves: Curves) -> Vec<Vec<DVec3>> {
+    curves.into_iter().map(|(curve, _)| curve.points).collect()
+}
+
+/// Whether two files hold the same yarns, if elsewhere.
+fn same_shape(a: &Curves, b: &Curves) -> Result<(), String> {
+    if a.len() != b.len() {
+        return Err(format!("{} curves, where another frame has {}", b.len(), a.len()));
+    }
+    for (i, ((a, _), (b, _))) in a.iter().zip(b).enumerate() {
+        if a.points.len() != b.points.len() || a.closed != b.closed || a.basis != b.basis {
+            let kind = |c: &Curve| format!("{} points, {}", c.points.len(), if c.closed { "closed" } else { "open" });
+            return Err(format!("curve {i} is not as in another frame: {}, there {}", kind(b), kind(a)));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_meet_the_files_where_they_can() {
+        assert_eq!(times(7, None), [7.0]);
+        assert_eq!(times(7, Some([0.0, 0.5])), [7.0, 7.5]);
+        assert_eq!(times(7, Some([0.0, 1.0])), [7.0, 8.0]);
+        assert_eq!(times(7, Some([-0.25, 0.25])), [6.75, 7.0, 7.25]);
+        assert_eq!(times(7, Some([-0.5, 1.5])), [6.5, 7.0, 7.5, 8.0, 8.5]);
+    }
+}
