@@ -21,12 +21,13 @@ fn sound(picture: &Picture, name: &str) {
 #[test]
 fn every_scene_of_the_project_renders() {
     let of_folder = |folder| std::fs::read_dir(project(folder)).unwrap().map(|e| e.unwrap().path());
-    let mut names: Vec<_> = ["scenes", "scenes/table3"].into_iter().flat_map(of_folder).collect();
+    let folders = ["scenes", "scenes/patterns", "scenes/table3", "scenes/variants"];
+    let mut names: Vec<_> = folders.into_iter().flat_map(of_folder).collect();
     names.sort();
     let glove = shared("data/curves/glove.bcc");
     let mut rendered = 0;
     for path in names {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let name = path.strip_prefix(project("scenes")).unwrap().to_string_lossy().into_owned();
         if !name.ends_with(".toml") {
             continue;
         }

@@ -37,6 +37,8 @@ mod lights;
 mod scatter;
 // Meshes and the materials of surfaces.
 mod meshes;
+// Cloth that the program makes: formats, overlap, errors.
+mod make;
 // Every scene of the project, and real curve files.
 mod scenes;
 // Stiff and extreme cases, as the program reports them.

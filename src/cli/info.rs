@@ -6,11 +6,12 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, bytes_in_words};
+use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words};
 use crate::{
     geometry::{
         curve::{Basis, Curve, CurveSet},
         curve_file::{self, ReadOptions},
+        pattern::overlap::{Overlap, TOLERATED, overlap},
     },
     plan::Plan,
     scene::{Fabric, Scene, Thread},
@@ -19,14 +20,17 @@ use crate::{
 
 const EXAMPLES: &str = "Examples:
   yarnray info scenes/swatch.toml          counts, bounds, memory, what is used and what is left out
-  yarnray info glove.bcc                   what a curve file holds
+  yarnray info glove.bcc --radius 0.08      what a curve file holds, and how far its yarns overlap
   yarnray info scenes/swatch.toml --json   the same for programs";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct InfoArgs {
-    /// A scene (.toml) or a curve file (.bcc, .pyp, .txt).
+    /// A scene (.toml) or a curve file (.bcc, .hair, .pyp, .obj, .txt).
     file: PathBuf,
+    /// Radius of the yarns of a curve file that has none, in its unit: tells how far they overlap.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    radius: Option<f64>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -42,7 +46,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     } else {
         let set =
             curve_file::read(&args.file, &ReadOptions::default()).map_err(|e| Failure::Input(format!("error: {e}")))?;
-        curves_report(&args.file, &set)
+        curves_report(&args.file, &set, args.radius)
     };
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report).expect("numbers and text become JSON"));
@@ -56,7 +60,29 @@ fn list(v: DVec3) -> Value {
     json!([v.x, v.y, v.z])
 }
 
-fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+/// Overlap as JSON: shares of the length and mean diameters.
+fn overlap_json(found: Option<Overlap>) -> Value {
+    found.map_or(Value::Null, |o| {
+        let nearest = if o.nearest.is_finite() { json!(o.nearest) } else { Value::Null };
+        json!({"share": o.share, "tolerated": TOLERATED, "deepest": o.deepest, "nearest": nearest})
+    })
+}
+
+fn overlap_line(found: Option<Overlap>) -> String {
+    found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o)))
+}
+
+fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
+    let with_radii: Option<Vec<(&Curve, Vec<f64>)>> = set
+        .curves
+        .iter()
+        .map(|c| Some((c, radius.map(|r| vec![r; c.points.len()]).or_else(|| c.radii.clone())?)))
+        .collect();
+    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, r.as_slice()))));
     let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
     let closed = set.curves.iter().filter(|c| c.closed).count();
     let open = set.curves.len() - closed;
@@ -76,7 +102,7 @@ fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
         "file": path.display().to_string(),
         "curves": set.curves.len(), "closed": closed, "open": open,
         "points": points, "basis": basis, "radii": radii, "up": up,
-        "unit_mm": set.unit_mm, "length": length,
+        "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found),
         "bounds": [list(low), list(high)], "notes": set.notes,
     });
     let mut text = format!(
@@ -86,6 +112,7 @@ fn curves_report(path: &Path, set: &CurveSet) -> (Value, String) {
         if radii { "in the file" } else { "none: the scene's yarn gives them" },
         set.unit_mm.map_or("not stated".to_owned(), |u| format!("{u} mm")),
     );
+    text += &overlap_line(found);
     for note in &set.notes {
         text += &format!("  note      {note}\n");
     }
@@ -126,11 +153,12 @@ fn scene_report(scene: &Scene) -> (Value, String) {
             .map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes}))
             .collect()
     };
+    let found = overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice())));
     let report = json!({
         "scene": scene.path, "fingerprint": scene.fingerprint,
         "mode": render.mode.name(), "model": render.model.name(),
         "image": {"width": render.width, "height": render.height, "spp": render.spp},
-        "fabrics": fabrics,
+        "fabrics": fabrics, "overlap": overlap_json(found),
         "bounds_mm": [list(low), list(high)],
         "memory": {"geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes},
         "pixels": pixels,
@@ -163,6 +191,7 @@ fn scene_report(scene: &Scene) -> (Value, String) {
             estimate.segments
         );
     }
+    text += &overlap_line(found);
     text += &format!(
         "  memory    about {} of curves, {} of BVH\n",
         bytes_in_words(total.geometry_bytes),

@@ -6,6 +6,7 @@ mod bench;
 mod compare;
 mod converge;
 mod info;
+mod make;
 mod render;
 mod scatter;
 mod stress;
@@ -15,6 +16,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Args, Parser, Subcommand};
 
 use crate::{
+    geometry::pattern::overlap::{self, Overlap},
     image::output,
     plan,
     scene::{
@@ -53,6 +55,8 @@ enum Command {
     Converge(converge::ConvergeArgs),
     /// Tell what a scene or curve file holds, and what a render of it uses and leaves out.
     Info(info::InfoArgs),
+    /// Make curve files of knitted and woven cloth.
+    Make(make::MakeArgs),
     /// Measure how a fibre, ply or yarn scatters light.
     Scatter(scatter::ScatterArgs),
     /// Run stiff and extreme cases, and tell which keep their bounds.
@@ -109,6 +113,7 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Make(args) => make::run(&args),
         Command::Scatter(args) => scatter::run(&args),
         Command::Stress(args) => stress::run(&args),
     };
@@ -238,6 +243,19 @@ impl SceneArgs {
 fn write_text(path: &std::path::Path, text: &str) -> Result<(), Failure> {
     use std::io::Write as _;
     Ok(output::write_file(path, |file| file.write_all(text.as_bytes()))?)
+}
+
+/// What was measured of yarns that run into each other, for people.
+fn overlap_in_words(o: &Overlap) -> String {
+    if o.nearest.is_infinite() {
+        return "no yarn comes near another".to_owned();
+    }
+    format!(
+        "{:.2} % of their length overlaps by more than {:.0} % of the diameter; centre lines come within {:.3} diameters",
+        100.0 * o.share,
+        100.0 * overlap::TOLERATED,
+        o.nearest
+    )
 }
 
 /// A number of bytes for people.

@@ -1,11 +1,14 @@
 //! Curve files: bytes in, a [`CurveSet`] out, and back to bytes.
 //!
-//! Three formats are read: BCC (binary, Yuksel's yarn models), PYP (periodic yarn patterns of MADYPG) and plain text.
+//! Five formats are read: BCC (binary, Yuksel's yarn models), cyHair, PYP (periodic yarn patterns of MADYPG), lines of
+//! Wavefront OBJ, and plain text. All but PYP are written.
 //! Files come from strangers, so every number is checked before it is believed, memory stays a small multiple of the
 //! file's size, and small defects are repaired with a note for the user. Radii, units and the direction of up are only
 //! passed on; nothing is smoothed, scaled or sampled here.
 
 mod bcc;
+mod hair;
+mod obj_lines;
 mod pyp;
 mod repair;
 #[cfg(test)]
@@ -15,17 +18,20 @@ mod text;
 use std::borrow::Cow;
 use std::fmt;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::curve::{Basis, CurveSet};
 
 pub use bcc::write_bcc;
+pub use hair::write_hair;
+pub use obj_lines::write_obj_lines;
 pub use text::write_text;
 
 /// What the file itself cannot say.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// How the points of a text file are meant; Catmull-Rom if absent. The other formats know their own basis.
+    /// How the points of a text, cyHair or OBJ file are meant; Catmull-Rom if absent. The other formats know their own.
     pub basis: Option<Basis>,
     /// How many cells of a periodic pattern (PYP) to lay out along x and y; each at least 1.
     pub tile: [u32; 2],
@@ -45,6 +51,10 @@ impl Default for ReadOptions {
 pub enum Format {
     /// Binary Curve Collection: a 64-byte header, then a count and little-endian coordinates for each curve.
     Bcc,
+    /// cyHair: a 128-byte header, then arrays of segments, points and thickness.
+    Hair,
+    /// Line elements of a Wavefront OBJ file.
+    Obj,
     /// MADYPG periodic yarn pattern: text sections `*pattern`, `*Q` and `*E`, lengths in metres.
     Pyp,
     /// `x y z [radius]` on each line, a blank line between curves, `#` begins a comment. A curve whose last line
@@ -126,8 +136,8 @@ impl std::error::Error for CurveFileError {}
 
 /// Reads the curves of a file.
 ///
-/// The content decides first (a BCC file is known by its first three letters), then the extension: `.bcc`, `.pyp`,
-/// `.txt` or `.curves`. Repairs are listed in [`CurveSet::notes`].
+/// The content decides first (a BCC file is known by its first three letters, cyHair by four), then the extension:
+/// `.bcc`, `.hair`, `.pyp`, `.obj`, `.txt` or `.curves`. Repairs are listed in [`CurveSet::notes`].
 ///
 /// # Errors
 /// The file cannot be read, is of no known format, or breaks the rules of its format.
@@ -151,8 +161,11 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     }
     let bytes = fs::read(path).map_err(unreadable)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
-        CurveFileError::new(Place::File, "expected a curve file, found neither the letters BCC nor a known extension")
-            .hint("name it .bcc, .pyp, .txt or .curves after its content")
+        CurveFileError::new(
+            Place::File,
+            "expected a curve file, found neither the letters BCC or HAIR nor a known extension",
+        )
+        .hint("name it .bcc, .hair, .pyp, .obj, .txt or .curves after its content")
     })?;
     parse(&bytes, format, options)
 }
@@ -161,8 +174,13 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
     if bytes.starts_with(bcc::MAGIC) {
         return Some(Format::Bcc);
     }
+    if bytes.starts_with(hair::MAGIC) {
+        return Some(Format::Hair);
+    }
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "bcc" => Some(Format::Bcc),
+        "hair" => Some(Format::Hair),
+        "obj" => Some(Format::Obj),
         "pyp" => Some(Format::Pyp),
         "txt" | "curves" => Some(Format::Text),
         _ => None,
@@ -176,19 +194,53 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
 pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
     let mut set = match format {
         Format::Bcc => bcc::parse(bytes, options)?,
+        Format::Hair => hair::parse(bytes, options)?,
+        Format::Obj => obj_lines::parse(bytes, options)?,
         Format::Pyp => pyp::parse(bytes, options)?,
         Format::Text => text::parse(bytes, options)?,
     };
     if set.curves.is_empty() {
         set.notes.push("the file holds no curve that can be drawn".into());
     }
-    if format != Format::Text && options.basis.is_some() {
+    if matches!(format, Format::Bcc | Format::Pyp) && options.basis.is_some() {
         set.notes.push("the basis asked for was ignored: this format fixes its own".into());
     }
     if format != Format::Pyp && options.tile != [1, 1] {
         set.notes.push("the tile counts asked for were ignored: only periodic patterns (.pyp) are tiled".into());
     }
     Ok(set)
+}
+
+/// The format that a file's name asks for, if it can be written.
+fn written_as(path: &Path) -> Option<Format> {
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "bcc" => Some(Format::Bcc),
+        "hair" => Some(Format::Hair),
+        "obj" => Some(Format::Obj),
+        "txt" | "curves" => Some(Format::Text),
+        _ => None,
+    }
+}
+
+/// Whether [`write`] knows a format by this name.
+pub fn can_write(path: &Path) -> bool {
+    written_as(path).is_some()
+}
+
+/// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.txt`, `.curves`) to `out`.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidInput`] if there is no such format or the curves do not fit it; whatever `out` reports.
+pub fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
+    match written_as(path) {
+        Some(Format::Bcc) => write_bcc(set, out),
+        Some(Format::Hair) => write_hair(set, out),
+        Some(Format::Obj) => write_obj_lines(set, out),
+        Some(Format::Text) => write_text(set, out),
+        Some(Format::Pyp) | None => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "a curve file ends in .bcc, .hair, .obj or .txt"))
+        }
+    }
 }
 
 /// One line of a text format.

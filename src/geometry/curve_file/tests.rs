@@ -42,11 +42,11 @@ fn errors_name_the_file() {
     let renamed = folder.path().join("folder.bcc");
     fs::create_dir(&renamed).expect("a folder");
     assert_eq!(message(&renamed), "expected a regular file, found a folder, pipe or device");
-    let (_folder, path) = scratch("straight.hair", b"HAIR");
+    let (_folder, path) = scratch("straight.yarn", b"YARN");
     assert_eq!(
         message(&path),
-        "expected a curve file, found neither the letters BCC nor a known extension; \
-         name it .bcc, .pyp, .txt or .curves after its content"
+        "expected a curve file, found neither the letters BCC or HAIR nor a known extension; \
+         name it .bcc, .hair, .pyp, .obj, .txt or .curves after its content"
     );
 }
 

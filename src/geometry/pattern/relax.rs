@@ -117,8 +117,8 @@ impl Relaxation {
 
     fn search(&self, segments: &[Segment]) -> Vec<Pair> {
         let middles: Vec<DVec3> = segments.iter().map(|s| 0.5 * (self.ends(s).0 + self.ends(s).1)).collect();
-        let longest =
-            segments.iter().map(|s| self.ends(s).0.distance(self.ends(s).1)).fold(0.0, f64::max).clamp(0.2, 2.0);
+        let halves: Vec<f64> = segments.iter().map(|s| 0.5 * self.ends(s).0.distance(self.ends(s).1)).collect();
+        let longest = 2.0 * halves.iter().copied().fold(0.1, f64::max).min(1.0);
         let reach = 1.0 + MARGIN + longest;
         let grid = Grid::new(&middles, reach, self.period);
         let of_segment = |i: usize| -> Vec<Pair> {
@@ -137,6 +137,11 @@ impl Relaxation {
                     let d = middles[j as usize] - middle;
                     shift.x = -period.x * (d.x / period.x).round();
                     shift.y = -period.y * (d.y / period.y).round();
+                }
+                // Most of what a cell holds is too far away: tell that before anything is computed.
+                let far = 1.0 + MARGIN + halves[i] + halves[j as usize];
+                if (middles[j as usize] + shift - middle).length_squared() > far * far {
+                    return;
                 }
                 if a.rope == b.rope {
                     let along = (b.a - a.a) as usize;
@@ -176,16 +181,20 @@ impl Relaxation {
                 if self.pinned[here] {
                     continue;
                 }
-                let at = |points: &[DVec3], k: isize| {
-                    let j = i + k;
-                    let wrapped = points[rope.first + j.rem_euclid(n) as usize];
-                    match rope.ends {
-                        Ends::Joined(jump) => wrapped + jump * j.div_euclid(n) as f64,
-                        Ends::Open => wrapped,
-                    }
+                let target = if (2..n - 2).contains(&i) {
+                    let p = &self.points[here - 2..here + 3];
+                    (4.0 * (p[1] + p[3]) - p[0] - p[4]) / 6.0
+                } else {
+                    let at = |k: isize| {
+                        let j = i + k;
+                        let wrapped = self.points[rope.first + j.rem_euclid(n) as usize];
+                        match rope.ends {
+                            Ends::Joined(jump) => wrapped + jump * j.div_euclid(n) as f64,
+                            Ends::Open => wrapped,
+                        }
+                    };
+                    (4.0 * (at(-1) + at(1)) - at(-2) - at(2)) / 6.0
                 };
-                let p = &self.points;
-                let target = (4.0 * (at(p, -1) + at(p, 1)) - at(p, -2) - at(p, 2)) / 6.0;
                 let moved = self.points[here].lerp(target, stiffness);
                 self.points[here] = moved;
             }

@@ -1,0 +1,267 @@
+//! `yarnray make`: curve files of cloth that the program makes.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use glam::DVec2;
+
+use super::Failure;
+use crate::{
+    geometry::{
+        curve::CurveSet,
+        curve_file,
+        pattern::{
+            MAX_POINTS, PatternStrand, StrandKind,
+            chart::{Chart, PATTERNS},
+            draft::Draft,
+            knit::{self, Form, Knit},
+            overlap::overlap,
+            weave::{self, Weave},
+        },
+    },
+    image::output,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.bcc
+  yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --form tube -o shaped.hair
+  yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
+  yarnray render scenes/glove.toml --curves rib.bcc --set fabric.0.source.unit=mm -o rib.png
+
+The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it).
+Lengths have no unit in these files; what reads them gives one.";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct MakeArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand, Debug)]
+enum What {
+    /// Knitted cloth from a named pattern or a chart.
+    Knit(KnitArgs),
+    /// Woven cloth from a draft.
+    Weave(WeaveArgs),
+}
+
+/// What all of them share.
+#[derive(Args, Debug)]
+struct Output {
+    /// Where to write; the extension names the format (.bcc, .hair, .obj, .txt). Repeatable.
+    #[arg(short, long = "out", value_name = "PATH", required = true)]
+    out: Vec<PathBuf>,
+    /// Radius of the yarn.
+    #[arg(long, default_value_t = 0.5, value_name = "R", value_parser = positive)]
+    radius: f64,
+    /// Say nothing.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+struct KnitArgs {
+    #[command(flatten)]
+    output: Output,
+    /// A pattern with a name.
+    #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
+    pattern: Option<String>,
+    /// A row of a chart, from the cast-on edge, as in 'k2 p2' or '12: k' (repeatable).
+    #[arg(long, value_name = "ROW")]
+    chart: Vec<String>,
+    /// Stitches cast on.
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    stitches: u32,
+    /// Rows; those of the chart if it is shaped over a profile, else 20.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    rows: Option<u32>,
+    /// Flat, or round about the y axis.
+    #[arg(long, default_value = "flat", value_parser = ["flat", "tube"])]
+    form: String,
+    /// A point of the profile to knit round over, from the cast-on edge: radius and height (repeatable).
+    #[arg(long, value_name = "R,Y", value_parser = pair)]
+    profile: Vec<[f64; 2]>,
+    /// Width of a stitch in yarn diameters.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    stitch_width: Option<f64>,
+    /// Distance between rows in yarn diameters.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    row_height: Option<f64>,
+    /// Control points of a stitch.
+    #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
+    points: u32,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+struct WeaveArgs {
+    #[command(flatten)]
+    output: Output,
+    /// plain, 'basket 2', 'twill 2/1', 'satin 5', 'satin 8/3', 'sateen 5'; or a row of a matrix of # and ., top row first
+    /// (repeatable).
+    #[arg(long, default_value = "plain", value_name = "DRAFT")]
+    draft: Vec<String>,
+    /// Number of warps.
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    warps: u32,
+    /// Number of wefts.
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    wefts: u32,
+    /// Radius of the weft yarn, if not that of the warp.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    weft_radius: Option<f64>,
+    /// Distance between warps; the least possible if not given.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    warp_spacing: Option<f64>,
+    /// Distance between wefts.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    weft_spacing: Option<f64>,
+    /// The warp's share of the crimp, 0 to 1.
+    #[arg(long, default_value_t = 0.5, value_name = "X", value_parser = share)]
+    crimp: f64,
+    /// Control points between two crossings.
+    #[arg(long, default_value_t = weave::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=200))]
+    points: u32,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
+fn pair(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    numbers
+        .and_then(|n| <[f64; 2]>::try_from(n).ok())
+        .filter(|[radius, _]| *radius >= 0.0)
+        .ok_or_else(|| "expected a radius of at least 0 and a height, as in 90,20".to_owned())
+}
+
+pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
+    match &args.what {
+        What::Knit(args) => knit(args),
+        What::Weave(args) => weave(args),
+    }
+}
+
+fn too_many<T>(what: &str) -> Result<T, Failure> {
+    Err(Failure::Input(format!("error: more than 2^26 control points; fewer {what} or points")))
+}
+
+fn knit(args: &KnitArgs) -> Result<(), Failure> {
+    let wrong = |error: &dyn std::fmt::Display| Failure::Input(format!("error: {error}"));
+    let (chart, own_rows) = if args.chart.is_empty() {
+        (Chart::named(args.pattern.as_deref().unwrap_or("stockinette")), None)
+    } else {
+        let chart = Chart::parse(&args.chart).map_err(|e| wrong(&e))?;
+        let rows = chart.rows();
+        (Some(chart), (!args.profile.is_empty()).then_some(rows))
+    };
+    let Some(chart) = chart else { return Err(Failure::Input("error: unknown pattern".to_owned())) };
+    let profile: Vec<DVec2> = args.profile.iter().map(|p| DVec2::from(*p)).collect();
+    if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * args.output.radius) {
+        return Err(Failure::Input(
+            "error: a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80".into(),
+        ));
+    }
+    let form = match (profile.is_empty(), args.form.as_str()) {
+        (false, _) => Form::Revolution(profile),
+        (true, "tube") => Form::Tube,
+        _ => Form::Flat,
+    };
+    if form != Form::Flat && args.stitches < 3 {
+        return Err(Failure::Input("error: knitting in the round takes at least 3 stitches".to_owned()));
+    }
+    let piece = Knit {
+        chart,
+        stitches: args.stitches,
+        rows: args.rows.or(own_rows).unwrap_or(20),
+        form,
+        stitch_width: args.stitch_width,
+        row_height: args.row_height,
+        yarn_per_stitch: knit::YARN_PER_STITCH,
+        points: args.points,
+    };
+    if piece.control_points() > MAX_POINTS {
+        return too_many("stitches, rows");
+    }
+    let strands = piece.strands(2.0 * args.output.radius).map_err(|e| wrong(&e))?;
+    // Flat cloth lies in the plane z = 0, as the files of others do.
+    write(strands, &args.output, args.output.radius)
+}
+
+fn weave(args: &WeaveArgs) -> Result<(), Failure> {
+    let draft = match args.draft.as_slice() {
+        [name] if !name.contains(['#', '.']) => Draft::named(name),
+        rows => Draft::matrix(rows),
+    };
+    let piece = Weave {
+        draft: draft.map_err(|e| Failure::Input(format!("error: {e}")))?,
+        warps: args.warps,
+        wefts: args.wefts,
+        warp_radius: args.output.radius,
+        weft_radius: args.weft_radius.unwrap_or(args.output.radius),
+        warp_spacing: args.warp_spacing,
+        weft_spacing: args.weft_spacing,
+        crimp: args.crimp,
+        points: args.points,
+    };
+    if piece.control_points() > MAX_POINTS {
+        return too_many("warps, wefts");
+    }
+    let strands = piece.strands().map_err(|tight| {
+        let option = if tight.warp { "--warp-spacing" } else { "--weft-spacing" };
+        Failure::Input(format!("error: {option} leaves the yarns no room to pass; at least {:.4} here", tight.least))
+    })?;
+    write(strands, &args.output, piece.weft_radius)
+}
+
+/// Writes all files and says what they hold.
+fn write(strands: Vec<PatternStrand>, output: &Output, weft_radius: f64) -> Result<(), Failure> {
+    let curves = strands
+        .into_iter()
+        .map(|strand| {
+            let radius = if strand.kind == StrandKind::Weft { weft_radius } else { output.radius };
+            let mut curve = strand.curve;
+            curve.radii = Some(vec![radius; curve.points.len()]);
+            curve
+        })
+        .collect();
+    let set = CurveSet { curves, up_axis: Some(1), ..CurveSet::default() };
+    for path in &output.out {
+        if !curve_file::can_write(path) {
+            let problem = format!("error: {}: expected a name that ends in .bcc, .hair, .obj or .txt", path.display());
+            return Err(Failure::Input(problem));
+        }
+    }
+    for path in &output.out {
+        write_curves(path, &set)?;
+    }
+    if !output.quiet {
+        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+        let lengths = overlap(set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?))));
+        for path in &output.out {
+            eprintln!("wrote {}", path.display());
+        }
+        eprintln!("{} yarns, {points} control points", set.curves.len());
+        if let Some(found) = lengths {
+            eprintln!("{}", super::overlap_in_words(&found));
+        }
+    }
+    Ok(())
+}
+
+/// Writes curves to a file that appears whole or not at all.
+fn write_curves(path: &Path, set: &CurveSet) -> Result<(), Failure> {
+    Ok(output::write_file(path, |file| {
+        let mut file = std::io::BufWriter::new(file);
+        curve_file::write(path, set, &mut file)?;
+        std::io::Write::flush(&mut file)
+    })?)
+}

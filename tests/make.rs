@@ -1,0 +1,66 @@
+//! `make` and what `info` says of what it made.
+
+use crate::support::{directory, listing, yarnray};
+
+#[test]
+fn made_cloth_is_written_in_every_format_and_read_again() {
+    let folder = directory();
+    let d = folder.path();
+    let out = ["-o", "a.bcc", "-o", "a.hair", "-o", "a.obj", "-o", "a.txt"];
+    yarnray(
+        d,
+        &[&["make", "weave", "--draft", "twill 2/1", "--warps", "9", "--wefts", "7", "--weft-radius", "0.3"][..], &out]
+            .concat(),
+    )
+    .good();
+    for (file, radii) in [("a.bcc", false), ("a.hair", true), ("a.obj", false), ("a.txt", true)] {
+        let json = |args: &[&str]| -> serde_json::Value {
+            let run = yarnray(d, &[&["info", file, "--json"], args].concat());
+            serde_json::from_str(&run.good().stdout).unwrap()
+        };
+        let info = json(&[]);
+        assert_eq!((info["curves"].as_u64(), info["radii"].as_bool()), (Some(16), Some(radii)), "{file}");
+        assert_eq!(info["overlap"].is_null(), !radii, "{file}: {}", info["overlap"]);
+        let overlap = if radii { info["overlap"].clone() } else { json(&["--radius", "0.3"])["overlap"].clone() };
+        assert_eq!(overlap["share"].as_f64(), Some(0.0), "{file}: {overlap}");
+    }
+}
+
+#[test]
+fn the_same_knit_is_the_same_file_and_keeps_its_yarns_apart() {
+    let folder = directory();
+    let d = folder.path();
+    for file in ["a.bcc", "b.bcc"] {
+        yarnray(
+            d,
+            &["make", "knit", "--pattern", "rib1x1", "--stitches", "12", "--rows", "6", "--form", "tube", "-o", file],
+        )
+        .good();
+    }
+    assert_eq!(std::fs::read(d.join("a.bcc")).unwrap(), std::fs::read(d.join("b.bcc")).unwrap());
+    let run = yarnray(d, &["info", "a.bcc", "--radius", "0.5", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&run.good().stdout).unwrap();
+    assert_eq!((info["curves"].as_u64(), info["closed"].as_u64()), (Some(6), Some(6)));
+    assert!(info["overlap"]["share"].as_f64().unwrap() <= 0.02, "{}", info["overlap"]);
+}
+
+#[test]
+fn what_cannot_be_made_is_refused() {
+    let folder = directory();
+    let d = folder.path();
+    for (args, message) in [
+        (&["knit", "-o", "a.xyz"][..], "error: a.xyz: expected a name that ends in .bcc, .hair, .obj or .txt\n"),
+        (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
+        (
+            &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
+            "error: more than 2^26 control points",
+        ),
+        (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
+        (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
+        (&["weave", "--warp-spacing", "1.2", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
+    ] {
+        let run = yarnray(d, &[&["make"], args].concat());
+        assert!(run.stderr.starts_with(message), "{args:?}: {}", run.stderr);
+        assert_eq!((run.status, run.stdout.as_str(), listing(d).len()), (Some(2), "", 0), "{args:?}");
+    }
+}
