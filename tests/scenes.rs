@@ -27,7 +27,7 @@ fn every_scene_of_the_project_renders() {
     let glove = shared("data/curves/glove.bcc");
     let mut rendered = 0;
     for path in names {
-        let name = path.strip_prefix(project("scenes")).unwrap().to_string_lossy().into_owned();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if !name.ends_with(".toml") {
             continue;
         }
