@@ -35,6 +35,10 @@ pub struct Tile {
     pub next: [u32; 2],
     /// What light is divided by before it is summed up; a power of two.
     scale: f32,
+    /// How densely adaptive sampling takes samples of the even and the odd pixels, against the picture's mean.
+    pub share: [f32; 2],
+    /// Rays traced for the even and the odd pixels: what their samples cost.
+    pub rays: [u64; 2],
     sums: Sums,
     matte: Matte,
 }
@@ -81,13 +85,42 @@ impl Sums {
             parts: vec![Default::default(); sized(layers.lobes)],
         }
     }
+
+    /// Adds pixel `j` of other sums to pixel `i`.
+    fn merge(&mut self, i: usize, other: &Self, j: usize) {
+        fn one<T: Exact>(sums: &mut [T], i: usize, other: &[T], j: usize) {
+            if let (Some(sum), Some(more)) = (sums.get_mut(i), other.get(j)) {
+                sum.merge(more);
+            }
+        }
+        let Self { count, color, square, alpha, depth, normal, albedo, parts } = other;
+        one(&mut self.count, i, count, j);
+        one(&mut self.color, i, color, j);
+        one(&mut self.square, i, square, j);
+        one(&mut self.alpha, i, alpha, j);
+        one(&mut self.depth, i, depth, j);
+        one(&mut self.normal, i, normal, j);
+        one(&mut self.albedo, i, albedo, j);
+        one(&mut self.parts, i, parts, j);
+    }
 }
 
 impl Tile {
     fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers, scale: f32) -> Self {
         let n = (width * height) as usize;
         let matte = Matte::new(if layers.cryptomatte { n } else { 0 });
-        Self { x, y, width, height, next: [0; 2], scale, sums: Sums::new(n, layers), matte }
+        Self {
+            x,
+            y,
+            width,
+            height,
+            next: [0; 2],
+            share: [1.0; 2],
+            rays: [0; 2],
+            scale,
+            sums: Sums::new(n, layers),
+            matte,
+        }
     }
 
     /// Adds a sample to a pixel, given from the tile's corner. A sample that is not finite, or brighter than
@@ -148,6 +181,38 @@ impl Tile {
     fn relative_variance(&self, i: usize) -> Option<f64> {
         let (count, mean, variance) = self.moments(i);
         (count >= 2).then(|| (0..3).map(|k| variance[k] / (mean[k] * mean[k] + NOISE_OFFSET)).sum::<f64>() / 3.0)
+    }
+
+    /// Whether a pixel, given from the tile's corner, is even or odd: 0 or 1, as on a chessboard over the whole picture.
+    #[inline]
+    pub fn color_of(&self, x: u32, y: u32) -> usize {
+        ((self.x + x + self.y + y) & 1) as usize
+    }
+
+    /// The even or the odd pixels of the tile.
+    fn of_color(&self, color: usize) -> impl Iterator<Item = usize> {
+        let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        all.filter(move |&(x, y)| self.color_of(x, y) == color).map(|(x, y)| (y * self.width + x) as usize)
+    }
+
+    /// Number of the even or the odd pixels.
+    pub fn pixels_of(&self, color: usize) -> u32 {
+        self.of_color(color).count() as u32
+    }
+
+    /// The mean number of rays of a sample of the even or the odd pixels; `None` if they have none.
+    pub fn rays_per_sample(&self, color: usize) -> Option<f64> {
+        let samples: f64 = self.of_color(color).map(|i| f64::from(self.sums.count[i])).sum();
+        (samples > 0.0).then(|| self.rays[color] as f64 / samples)
+    }
+
+    /// The mean over the even or the odd pixels, and over channels, of the variance of one sample over (mean^2 + 0.01);
+    /// `None` if no such pixel has two samples.
+    pub fn error_per_sample(&self, color: usize) -> Option<f64> {
+        let errors =
+            self.of_color(color).filter_map(|i| Some(self.relative_variance(i)? * f64::from(self.sums.count[i])));
+        let (sum, n) = errors.fold((0.0, 0.0), |(sum, n), e| (sum + e, n + 1.0));
+        (n > 0.0).then(|| sum / n)
     }
 
     /// Adds the tile's share to an estimate of noise.
@@ -304,6 +369,34 @@ impl Film {
         self.order.iter().filter_map(|&i| slots[i as usize].take()).collect()
     }
 
+    /// Which pixels of the whole picture these are: x0, y0, x1, y1, the latter exclusive.
+    pub fn crop(&self) -> [u32; 4] {
+        let [x, y] = self.origin;
+        [x, y, x + self.width, y + self.height]
+    }
+
+    /// The unit in which light is summed up.
+    pub fn light_scale(&self) -> f32 {
+        self.tiles[0].scale
+    }
+
+    /// Adds another film's samples; its pixels must lie within this one's, its layers and its unit of light must
+    /// be the same.
+    pub fn add(&mut self, other: &Self) {
+        for tile in &other.tiles {
+            for y in 0..tile.height {
+                for x in 0..tile.width {
+                    let (px, py) = (tile.x + x - self.origin[0], tile.y + y - self.origin[1]);
+                    let mine = &mut self.tiles[(py / TILE * self.columns + px / TILE) as usize];
+                    let i = ((py % TILE) * mine.width + px % TILE) as usize;
+                    let j = (y * tile.width + x) as usize;
+                    mine.sums.merge(i, &tile.sums, j);
+                    mine.matte.merge(i, &tile.matte, j);
+                }
+            }
+        }
+    }
+
     /// The tiles, row by row.
     pub fn tiles(&self) -> &[Tile] {
         &self.tiles
@@ -392,7 +485,7 @@ fn morton(x: u32, y: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rgb;
+    use crate::math::{Rgb, sampler::Stream};
 
     #[test]
     fn pixels_are_found_again_and_average() {
@@ -422,6 +515,36 @@ mod tests {
         assert_eq!(film.samples(), (4, 4.0, 4));
         let noise = film.noise().unwrap();
         assert!(0.0 < noise.low && noise.low < noise.estimate && noise.estimate < noise.high, "{noise:?}");
+    }
+
+    /// Over many renders the interval must be about as wide as the estimates differ, or wider where the picture has edges.
+    #[test]
+    fn the_interval_of_the_noise_is_as_wide_as_estimates_differ() {
+        for (edges, narrowest, widest) in [(0.0, 0.7, 1.4), (0.8, 0.7, 4.0)] {
+            let (mut sum, mut square, mut reach) = (0.0, 0.0, 0.0);
+            let runs = 40;
+            for run in 0..runs {
+                let mut random = Stream::new(run);
+                let mut film = Film::new([0, 0, 48, 32], Layers::NONE, 1.0);
+                for tile in film.tiles_mut() {
+                    for i in 0..tile.width * tile.height * 16 {
+                        let (x, y) = (i % tile.width, i / tile.width % tile.height);
+                        let size = if (tile.x + x) % 8 < 4 { 1.0 } else { 1.0 - edges };
+                        // Exponential: as skewed as a path tracer's samples.
+                        let v = -size * (1.0 - random.next()).ln();
+                        tile.add(x, y, &Sample { radiance: Rgb::splat(v), ..Sample::default() });
+                    }
+                }
+                let noise = film.noise().unwrap();
+                sum += noise.estimate;
+                square += noise.estimate * noise.estimate;
+                reach += noise.high - noise.estimate;
+            }
+            let n = f64::from(runs);
+            let deviation = (square / n - (sum / n).powi(2)).sqrt();
+            let ratio = reach / n / 1.96 / deviation;
+            assert!((narrowest..widest).contains(&ratio), "edges {edges}: {ratio}");
+        }
     }
 
     #[test]

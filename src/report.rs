@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use crate::{
     image::Attribute,
     plan::Plan,
-    render::Rendered,
+    render::{Job, Rendered},
     scene::Scene,
     trace::{BuildTimes, Threads, World},
 };
@@ -27,7 +27,7 @@ pub struct Phases {
     pub load: Duration,
     /// Curves, and Embree's BVH.
     pub made: BuildTimes,
-    /// Samples.
+    /// Samples, in this run.
     pub render: Duration,
     /// The denoised picture.
     pub denoise: Duration,
@@ -87,6 +87,7 @@ impl RunRecord<'_> {
             })
             .sum();
         let seconds = |d: Duration| d.as_secs_f64();
+        let noise = film.noise();
         json!({
             "yarnray": env!("CARGO_PKG_VERSION"),
             "commit": env!("YARNRAY_COMMIT"),
@@ -104,6 +105,7 @@ impl RunRecord<'_> {
                 "generate": seconds(self.phases.made.generate),
                 "build": seconds(self.phases.made.build),
                 "render": seconds(self.phases.render),
+                "render_all_runs": seconds(self.rendered.elapsed),
                 "denoise": seconds(self.phases.denoise),
                 "write": seconds(self.phases.write),
                 "total": seconds(self.phases.total),
@@ -125,7 +127,10 @@ impl RunRecord<'_> {
                 "given_points": scene.fabrics.iter().map(crate::scene::Fabric::control_points).sum::<usize>(),
                 "length_mm": yarns().map(crate::geometry::strand::Strands::length).sum::<f64>(),
             },
-            "noise": {"rel_mse_estimate": film.noise().map(|n| n.estimate)},
+            "noise": {
+                "rel_mse_estimate": noise.map(|n| n.estimate),
+                "rel_mse_interval": noise.map(|n| [n.low, n.high]),
+            },
             "used": plan.names(true),
             "left_out": plan.names(false),
         })
@@ -133,25 +138,56 @@ impl RunRecord<'_> {
 
     /// The metadata of an EXR.
     pub fn attributes(&self, command_line: &str) -> Vec<(String, Attribute)> {
-        let scene = self.scene;
-        let text = |s: &str| Attribute::Text(s.to_owned());
-        let (_, spp, _) = self.rendered.film.samples();
-        let mut out = vec![
-            ("yarnray.scene".to_owned(), text(&scene.path)),
-            ("yarnray.fingerprint".to_owned(), text(&scene.fingerprint)),
-            ("yarnray.mode".to_owned(), text(scene.render.mode.name())),
-            ("yarnray.model".to_owned(), text(scene.render.model.name())),
-            ("yarnray.seed".to_owned(), text(&scene.render.seed.to_string())),
-            ("yarnray.spp".to_owned(), Attribute::Double(spp)),
-            ("yarnray.stopped_by".to_owned(), text(self.rendered.stop.name())),
-            ("yarnray.seconds".to_owned(), Attribute::Double(self.phases.render.as_secs_f64())),
-            ("yarnray.threads".to_owned(), Attribute::Whole(self.threads as i32)),
-            ("yarnray.embree".to_owned(), text(&self.world.embree_version())),
-            ("yarnray.command".to_owned(), text(command_line)),
-        ];
-        if let Some(noise) = self.rendered.film.noise().map(|n| n.estimate) {
-            out.push(("yarnray.rel_mse_estimate".to_owned(), Attribute::Double(noise)));
-        }
+        let mut out = story(self.scene, self.world);
+        let film = &self.rendered.film;
+        let noise = film.noise().map(|n| [n.estimate, n.low, n.high]);
+        out.extend(measured(film.samples().1, noise, self.rendered.elapsed, command_line));
+        out.push(("yarnray.stopped_by".to_owned(), Attribute::Text(self.rendered.stop.name().to_owned())));
+        out.push(("yarnray.threads".to_owned(), Attribute::Whole(self.threads as i32)));
         out
     }
+}
+
+/// The metadata that all parts of a render share: what the picture is of.
+pub fn story(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
+    [
+        ("scene", scene.path.clone()),
+        ("fingerprint", scene.fingerprint.clone()),
+        ("mode", scene.render.mode.name().to_owned()),
+        ("model", scene.render.model.name().to_owned()),
+        ("seed", scene.render.seed.to_string()),
+        ("embree", world.embree_version()),
+    ]
+    .map(|(name, value)| (format!("yarnray.{name}"), Attribute::Text(value)))
+    .into()
+}
+
+/// The metadata of a picture that was merged from so many parts.
+pub fn merged_attributes(
+    story: &[(String, Attribute)],
+    job: &Job,
+    parts: usize,
+    command_line: &str,
+) -> Vec<(String, Attribute)> {
+    let mut out = story.to_vec();
+    let noise = job.film.noise().map(|n| [n.estimate, n.low, n.high]);
+    out.extend(measured(job.film.samples().1, noise, job.elapsed, command_line));
+    out.push(("yarnray.parts".to_owned(), Attribute::Whole(parts as i32)));
+    out
+}
+
+/// What was measured: samples of a pixel, noise with the ends of its interval of 95 %, the time on all machines together.
+fn measured(spp: f64, noise: Option<[f64; 3]>, elapsed: Duration, command_line: &str) -> Vec<(String, Attribute)> {
+    let mut out = vec![
+        ("yarnray.spp".to_owned(), Attribute::Double(spp)),
+        ("yarnray.seconds".to_owned(), Attribute::Double(elapsed.as_secs_f64())),
+        ("yarnray.command".to_owned(), Attribute::Text(command_line.to_owned())),
+    ];
+    if let Some([estimate, low, high]) = noise {
+        out.extend(
+            [("estimate", estimate), ("low", low), ("high", high)]
+                .map(|(name, value)| (format!("yarnray.rel_mse_{name}"), Attribute::Double(value))),
+        );
+    }
+    out
 }

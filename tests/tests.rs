@@ -27,6 +27,8 @@ mod furnace;
 mod fuzz;
 // Yarns, plies or fibres as curves: the same cloth, its memory told beforehand.
 mod modes;
+// Checkpoints, shards and merging: the same picture, whatever happens on the way.
+mod farm;
 // What must not change a picture: units, places, seams, and the way plies are intersected where it cannot matter.
 mod invariance;
 // Which room of the crate may use which, and what may stand in one room only.
@@ -43,5 +45,7 @@ mod make;
 mod scenes;
 // Stiff and extreme cases, as the program reports them.
 mod stress;
+// A real Slurm of one machine: shards, a requeued one among them, make the frame of one machine.
+mod slurm;
 // Temporary directories, runs of the program, pictures: what the others share.
 mod support;

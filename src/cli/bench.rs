@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, render::interrupt_flag, write_text};
+use super::{Failure, signals::interrupt_flag, write_text};
 use crate::{
     experiment::{
         converge::{self, ConvergeError},

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, render::interrupt_flag, write_text};
+use super::{Failure, SceneArgs, signals::interrupt_flag, write_text};
 use crate::{
     experiment::{
         converge::{self, ConvergeError, Options},

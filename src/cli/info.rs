@@ -14,6 +14,7 @@ use crate::{
         pattern::overlap::{Overlap, TOLERATED, overlap},
     },
     plan::Plan,
+    render::film_file,
     scene::{Fabric, Scene, Thread},
     trace::{self, Estimate},
 };
@@ -21,12 +22,13 @@ use crate::{
 const EXAMPLES: &str = "Examples:
   yarnray info scenes/swatch.toml          counts, bounds, memory, what is used and what is left out
   yarnray info glove.bcc --radius 0.08      what a curve file holds, and how far its yarns overlap
+  yarnray info part1.film                  how far a checkpoint or part of a render is, and of what
   yarnray info scenes/swatch.toml --json   the same for programs";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct InfoArgs {
-    /// A scene (.toml) or a curve file (.bcc, .hair, .pyp, .obj, .txt).
+    /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .txt) or a film (a checkpoint, a part of a render).
     file: PathBuf,
     /// Radius of the yarns of a curve file that has none, in its unit: tells how far they overlap.
     #[arg(long, value_name = "R", value_parser = positive)]
@@ -40,7 +42,9 @@ pub(super) struct InfoArgs {
 
 pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let is_scene = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    let (report, text) = if is_scene {
+    let (report, text) = if film_file::is_film(&args.file) {
+        film_report(&args.file)?
+    } else if is_scene {
         let scene = args.options.load(&args.file)?;
         scene_report(&scene)
     } else {
@@ -54,6 +58,37 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         print!("{text}");
     }
     Ok(())
+}
+
+/// What a checkpoint or part of a render holds.
+fn film_report(path: &Path) -> Result<(Value, String), Failure> {
+    let header = film_file::read_header(path)?;
+    let (about, [from, to], [least, most]) = (&header.about, header.samples, header.next);
+    let [x0, y0, x1, y1] = header.crop;
+    let seconds = header.elapsed.as_secs_f64();
+    let shard = about.shard.map(|s| [s.index, s.count]);
+    let report = json!({
+        "file": path.display().to_string(), "width": about.frame.width, "height": about.frame.height,
+        "crop": header.crop, "spp": about.spp, "shard": shard, "samples": [from, to], "next": [least, most],
+        "adaptive": header.planned, "seconds": seconds,
+        "keys": about.keys.iter().map(|(k, v)| (k.clone(), v.clone().into())).collect::<serde_json::Map<_, Value>>(),
+    });
+    let part = shard.map_or("whole ".to_owned(), |[i, n]| format!("shard     {i}/{n} of {} spp:", about.spp));
+    let state = match (header.planned, least >= to) {
+        (true, _) => "sampled adaptively".to_owned(),
+        (_, true) => "finished".to_owned(),
+        _ => format!("at {least} to {most}"),
+    };
+    let mut text = format!(
+        "{}\n  film      {} x {}, pixels {x0},{y0} to {x1},{y1}\n  {part} samples {from} to {to}, {state}\n  time      {seconds:.2} s\n",
+        path.display(),
+        about.frame.width,
+        about.frame.height,
+    );
+    for (key, value) in &about.keys {
+        text += &format!("  {key} = {value}\n");
+    }
+    Ok((report, text))
 }
 
 fn list(v: DVec3) -> Value {

@@ -1,14 +1,18 @@
 //! The command line: one file per command, from arguments to a call and to what is printed.
 //!
-//! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted.
+//! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted by the user,
+//! 143 by the system.
 
 mod bench;
 mod compare;
 mod converge;
 mod info;
+mod log;
 mod make;
+mod merge;
 mod render;
 mod scatter;
+mod signals;
 mod stress;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -47,6 +51,8 @@ const EXAMPLES: &str = "Examples:
 enum Command {
     /// Render a scene.
     Render(render::RenderArgs),
+    /// Put parts of one render together: shards, crops, checkpoints.
+    Merge(merge::MergeArgs),
     /// Measure explicit fibres against aggregated yarns at equal quality: Table 3.
     Bench(bench::BenchArgs),
     /// Compare two pictures: how far one is from the other, and where.
@@ -70,7 +76,7 @@ enum Failure {
     Input(String),
     /// The work was done and a check failed: exit status 1.
     Check(String),
-    /// Interrupted; what there was is saved: exit status 130.
+    /// Interrupted; what there was is saved: exit status 130 or 143.
     Interrupted,
 }
 
@@ -109,6 +115,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),
@@ -120,14 +127,14 @@ pub fn run() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Input(message)) => {
-            eprintln!("{message}");
+            log::error(&message);
             ExitCode::from(2)
         }
         Err(Failure::Check(message)) => {
             eprintln!("{message}");
             ExitCode::from(1)
         }
-        Err(Failure::Interrupted) => ExitCode::from(130),
+        Err(Failure::Interrupted) => ExitCode::from(signals::exit_status()),
     }
 }
 
@@ -149,6 +156,9 @@ struct SceneArgs {
     /// Stop at this estimated relative mean square error.
     #[arg(long, value_name = "X")]
     noise: Option<f64>,
+    /// More samples where the first ones say that they are needed; --spp is then the mean.
+    #[arg(long)]
+    adaptive: bool,
     /// Picture width in pixels.
     #[arg(long, value_name = "N")]
     width: Option<u32>,
@@ -205,7 +215,7 @@ impl SceneArgs {
         };
         let mut set = |key: &str, value: Option<Value>, shown: String| {
             if let Some(value) = value {
-                let option = format!("--{} {shown}", key.replace('_', "-"));
+                let option = format!("--{} {shown}", key.replace('_', "-")).trim_end().to_owned();
                 options.settings.push((format!("render.{key}"), value, option));
             }
         };
@@ -220,6 +230,7 @@ impl SceneArgs {
             ("noise", number(self.noise)),
             ("width", count(self.width)),
             ("height", count(self.height)),
+            ("adaptive", (self.adaptive.then_some(Value::Boolean(true)), String::new())),
             ("max_bounces", count(self.max_bounces)),
             ("threads", count(self.threads)),
             ("seed", count(self.seed)),

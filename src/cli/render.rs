@@ -3,25 +3,30 @@
 use std::{
     io::IsTerminal as _,
     ops::RangeInclusive,
-    path::PathBuf,
-    sync::{Arc, atomic::AtomicBool},
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::{Failure, SceneArgs, bytes_in_words, write_text};
+use super::{
+    Failure, SceneArgs, bytes_in_words,
+    log::{self, LogArgs},
+    signals::interrupt_flag,
+    write_text,
+};
 use crate::{
     ffi::oidn::Denoiser,
-    image::{self, output::Format, png::ToneMap},
+    image::{self, ImageError, output::Format, png::ToneMap},
     render::{
-        self, Progress, Rendered, Stop,
+        self, Checkpoints, Control, Job, Progress, Rendered, Shard, Stop,
         denoise::Denoised,
+        film_file::{self, About},
         live::LiveView,
         picture::{self, Frame},
     },
-    report::{Phases, RunRecord},
+    report::{self, Phases, RunRecord},
     scene::{Layers, Scene, animation::numbered},
     trace::World,
 };
@@ -31,6 +36,8 @@ const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml --spp 256 -o s.exr -o s.png      two formats of one render
   yarnray render scenes/glove.toml --curves glove.bcc --time 30      the best picture of half a minute
   yarnray render scenes/swatch.toml --crop 300,200,460,320 -o c.png  a part of the frame
+  yarnray render scenes/swatch.toml --checkpoint c.film --resume     goes on where it was stopped
+  yarnray render scenes/swatch.toml --shard 1/3 -o 1.film            a third of the samples, for `yarnray merge`
   yarnray render scenes/single_yarn.toml --set yarn.sample.plies=1   any key of the scene";
 
 #[derive(Args, Debug, Clone)]
@@ -59,17 +66,26 @@ pub(super) struct RenderArgs {
     /// Write statistics as JSON.
     #[arg(long, value_name = "FILE.json")]
     stats: Option<PathBuf>,
-    /// No progress and no summary.
-    #[arg(long, short)]
-    quiet: bool,
-    /// More about the scene and the run.
-    #[arg(long, short)]
-    verbose: bool,
+    /// Save what there is to this film file: first after 5 seconds, then by interval, and at the end.
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Seconds between two checkpoints.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = positive, requires = "checkpoint")]
+    checkpoint_every: f64,
+    /// Go on from the checkpoint if there is one; more --spp than it has extends it.
+    #[arg(long, requires = "checkpoint")]
+    resume: bool,
+    /// Take only this part of the samples, such as 2/3; `yarnray merge` puts films of all parts together.
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+    #[command(flatten)]
+    log: LogArgs,
     #[command(flatten)]
     options: SceneArgs,
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    args.log.start();
     let Some(frames) = &args.frames else { return run_one(args) };
     let each: Vec<RenderArgs> = frames.0.clone().map(|frame| args.of_frame(frame)).collect::<Result<_, _>>()?;
     each.iter().try_for_each(run_one)
@@ -90,6 +106,7 @@ impl RenderArgs {
         let mut args = self.clone();
         args.out = outputs(self).iter().map(named).collect::<Result<_, _>>()?;
         args.stats = self.stats.as_ref().map(named).transpose()?;
+        args.checkpoint = self.checkpoint.as_ref().map(named).transpose()?;
         args.options.set.push(format!("render.frame={frame}"));
         Ok(args)
     }
@@ -98,11 +115,16 @@ impl RenderArgs {
 fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let mut scene = args.options.load(&args.scene)?;
-    let outputs = outputs(args);
-    let mut layered = false;
-    for path in &outputs {
+    let outputs = Outputs::new(args);
+    // A film may become any picture.
+    let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
+    for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
     }
+    for path in outputs.films.iter().chain(&args.checkpoint) {
+        image::output::check_file(path)?;
+    }
+    check_shard(args, &scene, &outputs)?;
     if let Some(stats) = &args.stats {
         image::output::check_target(stats)?;
     }
@@ -123,31 +145,56 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         .num_threads(threads)
         .build()
         .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
+    let old = old_checkpoint(args)?;
     let load = started.elapsed();
+    log::phase("load", load);
     pool.install(|| {
         let (world, made) = World::new(&scene, threads)?;
         warn(args, &scene, &world);
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
+        log::phase("generate", made.generate);
+        log::phase("build", made.build);
+        let about = About::new(&scene, &world.embree_version(), report::story(&scene, &world), args.shard);
+        let job = match old {
+            Some(old) => resumed(old, &about, args)?,
+            None => Job::new(&scene, args.shard),
+        };
+        let before = job.elapsed;
         let interrupt = interrupt_flag();
         let bar = bar(args);
+        let mut saver = Saver { args, about: &about, films: &outputs.films, failed: None };
+        let mut last_line = None;
         let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
-        let rendered = render::render(&scene, &world, &interrupt, |p| {
-            show(&bar, args, &p);
-            if let Some(live) = &mut live {
-                live.show(p.film);
-            }
-        });
+        let rendered = render::run(
+            &scene,
+            &world,
+            job,
+            Control {
+                interrupt: &interrupt,
+                progress: &mut |p| {
+                    show(&bar, &mut last_line, &p);
+                    if let Some(live) = &mut live {
+                        live.show(p.film);
+                    }
+                },
+                checkpoints: saver.needed().then_some(Checkpoints {
+                    every: args.checkpoint.is_some().then(|| Duration::from_secs_f64(args.checkpoint_every)),
+                    save: &mut |job, last| saver.save(job, last),
+                }),
+            },
+        );
+        log::past(None);
         bar.finish_and_clear();
-        if let (Some(problem), Some(address)) = (live.and_then(|l| l.finish(&rendered.film)), &args.display)
-            && !args.quiet
-        {
-            eprintln!("warning: the viewer at {address}: {problem}");
+        if let (Some(problem), Some(address)) = (live.and_then(|l| l.finish(&rendered.film)), &args.display) {
+            tracing::warn!("the viewer at {address}: {problem}");
         }
+        let render = rendered.elapsed.saturating_sub(before);
+        log::phase("render", render);
 
         let denoising = Instant::now();
         let denoised = denoiser.map(|d| Denoised::new(&d, &rendered.film)).transpose();
-        let denoise = denoising.elapsed();
-        let mut phases = Phases { denoise, load, made, render: rendered.elapsed, ..Phases::default() };
+        let denoise = if scene.denoise { denoising.elapsed() } else { Duration::ZERO };
+        let mut phases = Phases { denoise, load, made, render, ..Phases::default() };
         let writing = Instant::now();
         let command = std::env::args().collect::<Vec<_>>().join(" ");
         let record = |phases| RunRecord { scene: &scene, world: &world, rendered: &rendered, phases, threads };
@@ -156,7 +203,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let clean = denoised.as_ref().ok().and_then(Option::as_ref);
         let mut written = Vec::new();
         let frame = Frame::new(&scene);
-        for path in &outputs {
+        for path in &outputs.pictures {
             picture::write(path, &frame, &rendered.film, clean, &attributes)?;
             written.push(path.clone());
             if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path)) {
@@ -166,13 +213,16 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         }
         denoised?;
         phases.write = writing.elapsed();
+        log::phase("write", phases.write);
         phases.total = started.elapsed();
         if let Some(path) = &args.stats {
             let text = serde_json::to_string_pretty(&record(phases).to_json()).expect("numbers and text become JSON");
             write_text(path, &(text + "\n"))?;
         }
-        if !args.quiet {
-            summary(args, &world, &rendered, &phases, &written);
+        written.extend(outputs.films.iter().cloned());
+        summary(&world, &rendered, &phases, &written);
+        if let Some(error) = saver.failed {
+            return Err(error.into());
         }
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })
@@ -199,99 +249,236 @@ fn host_and_port(text: &str) -> Result<String, String> {
         .ok_or_else(|| "expected HOST:PORT, as in localhost:14158".to_owned())
 }
 
+/// What is to be written: as asked for, or by the scene's name.
 fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
-    if args.out.is_empty() {
-        let stem = args.scene.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
-        let number = if args.frames.is_some() { ".####" } else { "" };
-        return vec![PathBuf::from("out").join(format!("{stem}{number}.exr"))];
+    if !args.out.is_empty() {
+        return args.out.clone();
     }
-    args.out.clone()
+    let stem = args.scene.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+    let number = if args.frames.is_some() { ".####" } else { "" };
+    let name = match args.shard {
+        // The checkpoint of a shard is all that is needed of it.
+        Some(_) if args.checkpoint.is_some() => return Vec::new(),
+        Some(Shard { index, count }) => format!("{stem}{number}.{index}of{count}.film"),
+        None => format!("{stem}{number}.exr"),
+    };
+    vec![Path::new("out").join(name)]
 }
 
-/// Raised by SIGINT or SIGTERM; a second signal ends the process at once.
-pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // Registration fails only for signals that cannot be caught.
-        let _ = signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag));
-        let _ = signal_hook::flag::register(signal, Arc::clone(&flag));
+/// Whether a path names a film file.
+pub(super) fn is_film_path(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("film"))
+}
+
+/// Films and pictures apart.
+struct Outputs {
+    pictures: Vec<PathBuf>,
+    films: Vec<PathBuf>,
+}
+
+impl Outputs {
+    fn new(args: &RenderArgs) -> Self {
+        let (films, pictures) = outputs(args).into_iter().partition(|path| is_film_path(path));
+        Self { pictures, films }
     }
-    flag
+}
+
+/// A shard takes its samples, all of them, and leaves a film.
+fn check_shard(args: &RenderArgs, scene: &Scene, outputs: &Outputs) -> Result<(), Failure> {
+    if args.shard.is_none() {
+        return Ok(());
+    }
+    let r = &scene.render;
+    let wrong = [("time", r.time.is_some()), ("noise", r.noise.is_some()), ("adaptive", r.adaptive)];
+    if let Some((name, _)) = wrong.iter().find(|(_, set)| *set) {
+        return Err(Failure::Input(format!(
+            "error: --shard with render.{name}: a shard takes just its samples, or the shards would not make one picture\n  \
+             hint: leave out --{name}; --spp says how many samples all shards take together"
+        )));
+    }
+    if outputs.films.is_empty() && args.checkpoint.is_none() {
+        return Err(Failure::Input(
+            "error: --shard without a film: pictures of shards cannot be merged\n  hint: -o PART.film, or --checkpoint PART.film"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+/// The checkpoint to go on from, if there is one and it is asked for.
+fn old_checkpoint(args: &RenderArgs) -> Result<Option<(About, Job)>, Failure> {
+    let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) else { return Ok(None) };
+    if !args.resume {
+        return Err(Failure::Input(format!(
+            "error: {} is there already\n  hint: --resume goes on with it; remove it to begin anew",
+            path.display()
+        )));
+    }
+    Ok(Some(film_file::read(path)?))
+}
+
+/// The job of a checkpoint, if it is this render's.
+fn resumed((there, mut job): (About, Job), about: &About, args: &RenderArgs) -> Result<Job, Failure> {
+    let path = args.checkpoint.as_deref().unwrap_or(Path::new("")).display();
+    let differences = about.differences(&there);
+    if !differences.is_empty() {
+        return Err(Failure::Input(format!(
+            "error: {path} is a checkpoint of another render:\n  {}\n  hint: render with the same keys, or remove it to begin \
+             anew",
+            differences.join("\n  ")
+        )));
+    }
+    tracing::info!(checkpoint = %path, spp = job.done, "resumed from {path} at {} spp", job.done);
+    if about.shard.is_none() {
+        job.samples.end = about.spp;
+    }
+    if job.done > about.spp {
+        tracing::warn!("{path} has {} spp already: they are kept", job.done);
+    }
+    Ok(job)
+}
+
+/// Saves films: the checkpoint now and then, and all of them at the end.
+struct Saver<'a> {
+    args: &'a RenderArgs,
+    about: &'a About,
+    films: &'a [PathBuf],
+    /// Why the last one could not be saved.
+    failed: Option<ImageError>,
+}
+
+impl Saver<'_> {
+    fn needed(&self) -> bool {
+        self.args.checkpoint.is_some() || !self.films.is_empty()
+    }
+
+    fn save(&mut self, job: &Job, last: bool) {
+        self.failed = None;
+        let films = if last { self.films } else { &[] };
+        for path in self.args.checkpoint.iter().chain(films) {
+            let began = Instant::now();
+            match film_file::write(path, self.about, job) {
+                Ok(()) => {
+                    let seconds = began.elapsed().as_secs_f64();
+                    let path = path.display();
+                    tracing::debug!(checkpoint = %path, spp = job.done, seconds, "saved {path} in {seconds:.3} s");
+                }
+                Err(error) => {
+                    // Hours of work are not thrown away for a disk that is full now.
+                    if !last {
+                        tracing::warn!("the render goes on without a checkpoint: {error}");
+                    }
+                    self.failed = Some(error);
+                }
+            }
+        }
+    }
+}
+
+/// Reads `2/3`.
+fn shard(text: &str) -> Result<Shard, String> {
+    let numbers = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+    match numbers {
+        Some((index, count)) if 1 <= index && index <= count => Ok(Shard { index, count }),
+        _ => Err("expected I/N with I from 1 to N, as in 2/3".to_owned()),
+    }
+}
+
+/// Reads a number of seconds.
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|s| (1e-3..1e9).contains(s))
+        .ok_or_else(|| "expected a number of seconds above 0".to_owned())
 }
 
 fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
-    if args.quiet {
-        return;
-    }
     for warning in &scene.warnings {
-        eprintln!("warning: {warning}");
+        tracing::warn!("{warning}");
     }
+    let verbose = args.log.verbose > 0;
     const SHOWN: usize = 3;
     let total = world.tight_bends().count();
-    for (weave, bend) in world.tight_bends().take(if args.verbose { usize::MAX } else { SHOWN }) {
-        eprintln!(
-            "warning: {}: yarn {} bends too tightly at segment {}: its radius is {:.2} times its radius of curvature, \
+    for (weave, bend) in world.tight_bends().take(if verbose { usize::MAX } else { SHOWN }) {
+        tracing::warn!(
+            "{}: yarn {} bends too tightly at segment {}: its radius is {:.2} times its radius of curvature, \
              and the tube folds into itself",
-            scene.fabrics[weave].origin, bend.yarn, bend.segment, bend.tightness
+            scene.fabrics[weave].origin,
+            bend.yarn,
+            bend.segment,
+            bend.tightness
         );
     }
-    if total > SHOWN && !args.verbose {
-        eprintln!("warning: ... and {} more yarns with such bends (-v shows all)", total - SHOWN);
+    if total > SHOWN && !verbose {
+        tracing::warn!("... and {} more yarns with such bends (-v shows all)", total - SHOWN);
     }
     if scene.lights.is_empty() {
-        eprintln!("warning: the scene has no light: the picture will be black");
+        tracing::warn!("the scene has no light: the picture will be black");
     }
 }
 
 fn bar(args: &RenderArgs) -> ProgressBar {
-    if args.quiet || !std::io::stderr().is_terminal() {
+    if args.log.quiet || args.log.log_json || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
-    let style = ProgressStyle::with_template("{wide_bar} {percent}%  {msg}  {elapsed} (left: {eta})");
+    let style = ProgressStyle::with_template("{wide_bar} {percent}%  {msg}  {elapsed}");
     bar.set_style(style.expect("the template is well formed"));
+    log::past(Some(&bar));
     bar
 }
 
-fn show(bar: &ProgressBar, args: &RenderArgs, p: &Progress<'_>) {
+/// Shows the progress on the bar; tells it at most once a second, or of every wave with -vv.
+fn show(bar: &ProgressBar, last_line: &mut Option<Instant>, p: &Progress<'_>) {
     let noise = p.noise.map_or(String::new(), |n| format!(", noise {n:.2e}"));
+    let left = p.left.as_secs_f64();
     bar.set_position((p.share * 1000.0) as u64);
-    bar.set_message(format!("{} of {} spp{noise}", p.spp, p.spp_end));
-    if args.verbose && bar.is_hidden() && !args.quiet {
-        let left = p.elapsed.as_secs_f64() * (1.0 / p.share.max(1e-3) - 1.0);
-        eprintln!("{} of {} spp{noise}, {:.1} s, about {left:.0} s left", p.spp, p.spp_end, p.elapsed.as_secs_f64());
+    bar.set_message(format!("{} of {} spp{noise}  (left: {left:.0} s)", p.spp, p.spp_end));
+    let seconds = p.elapsed.as_secs_f64();
+    let line = format!("{} of {} spp{noise}, {seconds:.1} s, about {left:.0} s left", p.spp, p.spp_end);
+    let (spp, spp_end, share, noise) = (p.spp, p.spp_end, p.share, p.noise);
+    if last_line.is_none_or(|t: Instant| t.elapsed() >= Duration::from_secs(1)) {
+        *last_line = Some(Instant::now());
+        tracing::debug!(phase = "render", spp, spp_end, share, noise, seconds, seconds_left = left, "{line}");
+    } else {
+        tracing::trace!(phase = "render", spp, spp_end, share, noise, seconds, seconds_left = left, "{line}");
     }
 }
 
-fn summary(args: &RenderArgs, world: &World, rendered: &Rendered, phases: &Phases, outputs: &[PathBuf]) {
+fn summary(world: &World, rendered: &Rendered, phases: &Phases, outputs: &[PathBuf]) {
     let s = |d: Duration| format!("{:.2} s", d.as_secs_f64());
-    let (_, spp, _) = rendered.film.samples();
+    let (least, spp, most) = rendered.film.samples();
     let c = &rendered.counters;
     for path in outputs {
-        eprintln!("wrote {}", path.display());
+        tracing::info!(path = %path.display(), "wrote {}", path.display());
     }
-    eprintln!(
-        "{spp:.0} spp in {} ({:.2} M samples/s), stopped by {}; load {}, curves {}, BVH {}, total {}",
-        s(phases.render),
-        c.camera as f64 / 1e6 / phases.render.as_secs_f64().max(1e-9),
+    let denoise = if phases.denoise.is_zero() { String::new() } else { format!(", denoised in {}", s(phases.denoise)) };
+    tracing::info!(
+        spp,
+        stopped_by = rendered.stop.name(),
+        seconds = phases.total.as_secs_f64(),
+        "{spp:.0} spp in {} ({:.2} M samples/s), stopped by {}; load {}, curves {}, BVH {}{denoise}, total {}",
+        s(rendered.elapsed),
+        c.camera as f64 / 1e6 / rendered.elapsed.as_secs_f64().max(1e-9),
         rendered.stop.name(),
         s(phases.load),
         s(phases.made.generate),
         s(phases.made.build),
         s(phases.total),
     );
-    if args.verbose {
-        eprintln!(
-            "curves {}, BVH {}, peak memory {}; rays: {} from the camera, {} bounced, {} to lights",
-            bytes_in_words(world.geometry_bytes()),
-            bytes_in_words(world.bvh_bytes()),
-            bytes_in_words(crate::report::peak_rss_bytes()),
-            c.camera,
-            c.bounce,
-            c.shadow
-        );
-    }
+    tracing::debug!(
+        "curves {}, BVH {}, peak memory {}; rays: {} from the camera, {} bounced, {} to lights",
+        bytes_in_words(world.geometry_bytes()),
+        bytes_in_words(world.bvh_bytes()),
+        bytes_in_words(report::peak_rss_bytes()),
+        c.camera,
+        c.bounce,
+        c.shadow
+    );
     if c.invalid > 0 {
-        eprintln!("warning: {} samples were not finite and were left out", c.invalid);
+        tracing::warn!("{} samples were not finite and were left out", c.invalid);
+    }
+    if least == 0 && most > 0 {
+        tracing::warn!("some pixels have no sample and are black: the time was too short for one sample each");
     }
 }

@@ -33,6 +33,11 @@ impl Matte {
         self.pixels.get(pixel).map_or(&[], Vec::as_slice)
     }
 
+    /// Adds the counts of pixel `j` of another matte to pixel `i`.
+    pub(super) fn merge(&mut self, i: usize, other: &Self, j: usize) {
+        other.counts(j).iter().for_each(|(id, count)| self.add(i, *id, *count));
+    }
+
     /// Appends the counts to a file's bytes.
     pub(super) fn save(&self, out: &mut Vec<u8>) {
         for counts in &self.pixels {

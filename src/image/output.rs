@@ -62,10 +62,19 @@ pub fn check_writable(path: &Path) -> Result<Format, ImageError> {
     if matches!(format, Format::Linear | Format::Screen) {
         oiio::check_writable(path)?;
     }
+    check_file(path)?;
+    Ok(format)
+}
+
+/// Checks before a long render that a file can be written to `path` afterwards, and creates missing directories. An
+/// existing file stays untouched.
+///
+/// # Errors
+/// [`ImageError::Write`].
+pub fn check_file(path: &Path) -> Result<(), ImageError> {
     check_target(path)?;
     // Dropped at once, and with that removed.
-    temporary(path)?;
-    Ok(format)
+    temporary(path).map(drop)
 }
 
 /// Writes a file so that it is seen whole or not at all: the content goes to a temporary file beside it, which takes
@@ -77,6 +86,29 @@ pub fn check_writable(path: &Path) -> Result<Format, ImageError> {
 /// [`ImageError::Write`]; then nothing is left behind, and an older file of this name is as it was.
 pub fn write_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), ImageError> {
     replace(path, |temporary| write(temporary.as_file_mut()).map_err(|error| plain(&error)))
+}
+
+/// As [`write_file`], for files that are written again and again and must outlive the machine's failures: the content is
+/// on the disk before it takes the name `path`, and a program that is killed meanwhile leaves one file, `path.new`, that the
+/// next one writes over.
+///
+/// # Errors
+/// [`ImageError::Write`]; then an older file of this name is as it was.
+pub fn write_durable(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), ImageError> {
+    check_target(path)?;
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let mut beside = target.clone().into_os_string();
+    beside.push(".new");
+    let beside = Path::new(&beside);
+    let written = File::create(beside).and_then(|mut file| {
+        write(&mut file)?;
+        file.sync_all()
+    });
+    written.and_then(|()| fs::rename(beside, &target)).map_err(|error| {
+        // What cannot be removed is written over the next time.
+        let _ = fs::remove_file(beside);
+        ImageError::unwritable(path, plain(&error))
+    })
 }
 
 /// Writes colours in the format that the extension names. `row` is asked for every row from the top and fills in

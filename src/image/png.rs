@@ -19,6 +19,11 @@ pub enum ToneMap {
     Filmic,
 }
 
+impl ToneMap {
+    /// Every curve with its name in files and on the command line.
+    pub const NAMES: [(&'static str, Self); 2] = [("srgb", Self::Srgb), ("filmic", Self::Filmic)];
+}
+
 /// How linear colours become eight bits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Display {

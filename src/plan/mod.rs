@@ -145,6 +145,7 @@ impl Plan {
             "yarns move while the shutter is open",
             "yarns stand still: one time in the BVH",
         );
+        add("adaptive_sampling", scene.render.adaptive, "asked for", "all pixels get the same number of samples");
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
         add("textures", false, "", "no texture in the scene");
         add("meshes", !scene.objects.is_empty(), "the scene has a mesh", "no mesh in the scene");

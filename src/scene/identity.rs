@@ -29,6 +29,7 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
     setting("max_bounces", &r.max_bounces);
     setting("seed", &r.seed);
     setting("frame", &r.frame);
+    setting("adaptive", &r.adaptive);
     let camera = &scene.camera;
     add("camera.shutter".to_owned(), &scene.camera_path);
     add("camera.position".to_owned(), &camera.position);

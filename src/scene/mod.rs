@@ -145,6 +145,8 @@ pub struct RenderSettings {
     pub time: Option<f64>,
     /// Stop when the estimated relative mean square error is below this.
     pub noise: Option<f64>,
+    /// More samples where the first ones say that they are needed.
+    pub adaptive: bool,
     /// Most scattering events of a path.
     pub max_bounces: u32,
     /// Threads; `None` for all cores.
@@ -187,7 +189,20 @@ impl Default for Layers {
     }
 }
 
+/// A layer's name, and where it is switched.
+pub type LayerName = (&'static str, fn(&mut Layers) -> &mut bool);
+
 impl Layers {
+    /// Every layer with its name in scene files.
+    pub const NAMES: [LayerName; 7] = [
+        ("lobes", |l| &mut l.lobes),
+        ("depth", |l| &mut l.depth),
+        ("normal", |l| &mut l.normal),
+        ("albedo", |l| &mut l.albedo),
+        ("variance", |l| &mut l.variance),
+        ("samples", |l| &mut l.samples),
+        ("cryptomatte", |l| &mut l.cryptomatte),
+    ];
     /// All of them.
     pub const ALL: Self = Self { cryptomatte: true, ..Self::DEFAULT };
     /// Those of a scene that names none: all but Cryptomatte, whose channels are many.

@@ -21,6 +21,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         spp: 64,
         time: None,
         noise: None,
+        adaptive: false,
         max_bounces: 64,
         threads: None,
         seed: 0,
@@ -75,6 +76,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         time: table.f64("time", Range::above(0.0)),
         noise: table.f64("noise", Range::above(0.0)),
         max_bounces: table.u64_or("max_bounces", bounces, 0..=1_000_000) as u32,
+        adaptive: table.bool_or("adaptive", false),
         threads: table.u64("threads", 1..=4096).map(|t| t as usize),
         seed: table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32,
         frame: table.u64("frame", 0..=u64::from(u32::MAX)).map(|f| f as u32),
@@ -83,18 +85,6 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         force: table.strings("force").into_iter().map(|(name, _)| name.to_owned()).collect(),
     })
 }
-
-/// Layers by their names.
-type LayerNames = [(&'static str, fn(&mut Layers) -> &mut bool); 7];
-const LAYERS: LayerNames = [
-    ("lobes", |l| &mut l.lobes),
-    ("depth", |l| &mut l.depth),
-    ("normal", |l| &mut l.normal),
-    ("albedo", |l| &mut l.albedo),
-    ("variance", |l| &mut l.variance),
-    ("samples", |l| &mut l.samples),
-    ("cryptomatte", |l| &mut l.cryptomatte),
-];
 
 /// What `[output]` says.
 #[derive(Default)]
@@ -126,7 +116,7 @@ fn without(table: &Reader<'_>) -> Vec<FiberLobe> {
 pub(super) fn output(table: Option<Reader<'_>>) -> Output {
     let Some(table) = table else { return Output::default() };
     let display = Display {
-        tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &[("srgb", ToneMap::Srgb), ("filmic", ToneMap::Filmic)]),
+        tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &ToneMap::NAMES),
         exposure: table.f64_or("exposure", 0.0, Range::between(-100.0, 100.0)) as f32,
         alpha: table.bool_or("alpha", false),
     };
@@ -138,13 +128,13 @@ pub(super) fn output(table: Option<Reader<'_>>) -> Output {
     if table.has("layers") {
         layers = Layers::NONE;
         for (name, _) in table.strings("layers") {
-            match LAYERS.iter().find(|(known, _)| *known == name) {
+            match Layers::NAMES.iter().find(|(known, _)| *known == name) {
                 Some((_, layer)) => *layer(&mut layers) = true,
                 None if name == "all" => layers = Layers::ALL,
                 None => table.error_at(
                     "layers",
                     format!("unknown layer `{}`", shortened(name)),
-                    Some(&format!("known are {} and all", LAYERS.map(|(known, _)| known).join(", "))),
+                    Some(&format!("known are {} and all", Layers::NAMES.map(|(known, _)| known).join(", "))),
                 ),
             }
         }
