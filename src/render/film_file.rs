@@ -352,11 +352,8 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let samples: [u32; 2] = words(&v["samples"])?.try_into().ok()?;
     let inside = crop[0] < crop[2] && crop[1] < crop[3] && crop[2] <= frame.width && crop[3] <= frame.height;
     let light_scale = f32::from_bits(word(&v["light_scale_bits"])?);
-    if !(light_scale.is_finite() && light_scale > 0.0)
-        || !inside
-        || frame.width.max(frame.height) > 65_536
-        || samples[0] > samples[1]
-    {
+    let sound = inside && light_scale.is_finite() && light_scale > 0.0;
+    if !sound || frame.width.max(frame.height) > 65_536 || samples[0] > samples[1] {
         return None;
     }
     let counters: Vec<u64> = v["counters"].as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
