@@ -3,6 +3,7 @@
 #include "oiio.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,7 +11,10 @@
 #include <memory>
 #include <string>
 
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/texture.h>
 
 #define FACE extern "C" __attribute__((visibility("default")))
 
@@ -163,4 +167,132 @@ FACE int32_t yarnray_oiio_write(const char *path, int32_t width, int32_t height,
         }
         return YARNRAY_OIIO_DONE;
     });
+}
+
+// --- textures ---
+
+namespace {
+
+#if OIIO_VERSION >= OIIO_MAKE_VERSION(3, 0, 0)
+using SharedSystem = std::shared_ptr<OIIO::TextureSystem>;
+SharedSystem make_system() { return OIIO::TextureSystem::create(true); }
+#else
+using SharedSystem = OIIO::TextureSystem *;
+SharedSystem make_system() { return OIIO::TextureSystem::create(true); }
+#endif
+
+// One for the process, never destroyed: threads may still look textures up when it ends.
+OIIO::TextureSystem &textures() {
+    static SharedSystem *const shared = [] {
+        auto *system = new SharedSystem(make_system());
+        (*system)->attribute("max_memory_MB", 1024.0f);
+        return system;
+    }();
+    return **shared;
+}
+
+float linear(float x) { return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f); }
+
+// A copy that the texture system can filter: three linear channels in tiles, with all smaller levels.
+bool make_texture(const std::string &path, const std::string &copy, std::string &why) {
+    OIIO::ImageBuf picture(path);
+    if (!picture.read(0, 0, true, OIIO::TypeDesc::FLOAT)) {
+        why = reason(picture.geterror(), "the pixels cannot be read");
+        return false;
+    }
+    const bool encoded = is_srgb_encoded(picture.nativespec());
+    const bool grey = picture.nchannels() < 3;
+    const int order[3] = {0, grey ? 0 : 1, grey ? 0 : 2};
+    OIIO::ImageBuf colours = OIIO::ImageBufAlgo::channels(picture, 3, order, {}, {"R", "G", "B"});
+    for (OIIO::ImageBuf::Iterator<float> pixel(colours); !pixel.done(); ++pixel)
+        for (int c = 0; c < 3; ++c) {
+            const float value = encoded ? linear(pixel[c]) : float(pixel[c]);
+            pixel[c] = std::isfinite(value) ? value : 0.0f;
+        }
+    OIIO::ImageSpec config;
+    config.format = OIIO::TypeDesc::HALF;
+    config.attribute("oiio:ColorSpace", "Linear");
+    // Not "box", which drops rows of levels whose size is odd.
+    config.attribute("maketx:filtername", "triangle");
+    if (!OIIO::ImageBufAlgo::make_texture(OIIO::ImageBufAlgo::MakeTxTexture, colours, copy, config)) {
+        why = reason(OIIO::geterror(), "no texture can be made of it");
+        return false;
+    }
+    return true;
+}
+
+} // namespace
+
+struct YarnrayOiioTexture {
+    OIIO::ustring file;
+    OIIO::TextureSystem::TextureHandle *handle;
+};
+
+FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, YarnrayOiioTexture **texture,
+                                       int32_t size[2], char *message, size_t message_size) {
+    return guarded(message, message_size, [&]() -> int32_t {
+        std::string file(path), why;
+        auto input = OIIO::ImageInput::open(file);
+        if (!input) {
+            say(message, message_size, reason(OIIO::geterror(), "no reader knows this format"));
+            return YARNRAY_OIIO_FAILED;
+        }
+        const OIIO::ImageSpec spec = input->spec();
+        if (spec.deep || spec.depth > 1 || spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) {
+            say(message, message_size, "only flat pictures can be textures: no deep or volume image, no empty one");
+            return YARNRAY_OIIO_FAILED;
+        }
+        const bool levels = input->seek_subimage(0, 1);
+        input->close();
+        OIIO::geterror(); // a file without a second level is no error
+        const bool ready = levels && spec.tile_width > 0 && spec.nchannels >= 3 && !is_srgb_encoded(spec);
+        if (!ready) {
+            if (!make_texture(file, copy, why)) {
+                say(message, message_size, why);
+                return YARNRAY_OIIO_FAILED;
+            }
+            file = copy;
+        }
+        const OIIO::ustring name(file);
+        auto *handle = textures().get_texture_handle(name);
+        if (!handle || !textures().good(handle)) {
+            say(message, message_size, reason(textures().geterror(), "the texture cannot be opened"));
+            return YARNRAY_OIIO_FAILED;
+        }
+        size[0] = spec.width;
+        size[1] = spec.height;
+        *texture = new YarnrayOiioTexture{name, handle};
+        return YARNRAY_OIIO_DONE;
+    });
+}
+
+FACE int32_t yarnray_oiio_texture_sample(const YarnrayOiioTexture *texture, float u, float v, float width,
+                                         float rgb[3]) {
+    try {
+        OIIO::TextureOpt options;
+        options.swrap = options.twrap = OIIO::TextureOpt::WrapPeriodic;
+        options.interpmode = OIIO::TextureOpt::InterpBilinear;
+        // Rows run from the top.
+        return textures().texture(texture->handle, nullptr, options, u, 1.0f - v, width, 0.0f, 0.0f, width, 3, rgb);
+    } catch (...) {
+        return 0;
+    }
+}
+
+FACE void yarnray_oiio_texture_close(YarnrayOiioTexture *texture) {
+    try {
+        textures().invalidate(texture->file, true);
+        delete texture;
+    } catch (...) {
+    }
+}
+
+FACE int64_t yarnray_oiio_texture_bytes(void) {
+    try {
+        long long bytes = 0;
+        textures().getattribute("stat:cache_memory_used", OIIO::TypeDesc::INT64, &bytes);
+        return bytes;
+    } catch (...) {
+        return 0;
+    }
 }

@@ -51,6 +51,24 @@ void yarnray_oiio_free(YarnrayOiioImage *image);
 int32_t yarnray_oiio_write(const char *path, int32_t width, int32_t height, int32_t channels, const float *data,
                            int32_t sample, char *message, size_t message_size);
 
+/* A texture: a file in OpenImageIO's cache, tiled and with smaller and smaller copies of itself, linear, red green blue. */
+typedef struct YarnrayOiioTexture YarnrayOiioTexture;
+
+/* Opens a texture. A file that is no mipmapped, tiled picture of linear colours is made into one, in the file `copy`,
+ * which must stay until the texture is closed. `size` gets width and height. */
+int32_t yarnray_oiio_texture_open(const char *path, const char *copy, YarnrayOiioTexture **texture, int32_t size[2],
+                                  char *message, size_t message_size);
+
+/* The colour at (u, v), of which (0, 0) is the lower left corner and the picture repeats beyond 0 to 1, filtered over
+ * `width` in the same units. From any number of threads. 1 if it could be read, else 0. */
+int32_t yarnray_oiio_texture_sample(const YarnrayOiioTexture *texture, float u, float v, float width, float rgb[3]);
+
+/* Closes a texture. */
+void yarnray_oiio_texture_close(YarnrayOiioTexture *texture);
+
+/* Bytes of pixels that the cache of all textures holds now. */
+int64_t yarnray_oiio_texture_bytes(void);
+
 #ifdef __cplusplus
 }
 #endif

@@ -116,7 +116,7 @@ impl RunRecord<'_> {
             "memory": {
                 "geometry_bytes": geometry,
                 "bvh_bytes": bvh,
-                "scene_bytes": geometry + bvh + lights,
+                "scene_bytes": geometry + bvh + lights + crate::image::texture::bytes(),
                 "peak_rss_bytes": peak_rss_bytes(),
             },
             "curves": {

@@ -29,7 +29,16 @@ const ROOMS: [(&str, &[&str]); 14] = [
 const FROM_FFI: [(&str, &[&str]); 7] = [
     ("cli", &["ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
     ("experiment", &["ffi::embree::Ray"]),
-    ("image", &["ffi::oiio", "ffi::oiio::OiioError", "ffi::oiio::is_loaded"]),
+    (
+        "image",
+        &[
+            "ffi::oiio",
+            "ffi::oiio::OiioError",
+            "ffi::oiio::TextureFile",
+            "ffi::oiio::is_loaded",
+            "ffi::oiio::texture_bytes",
+        ],
+    ),
     ("integrator", &["ffi::embree::Ray"]),
     ("render", &["ffi::embree::Ray", "ffi::oidn::Denoiser", "ffi::oidn::Guides", "ffi::oidn::OidnError"]),
     ("scene", &["ffi::embree::Ray"]),

@@ -9,6 +9,8 @@ mod bench;
 mod cli;
 // What compositors get: parts that add up to the picture, precision and compression.
 mod compositing;
+// Colour work: yarns by row and motif, pictures over cloth and meshes, variation from yarn to yarn.
+mod colors;
 // The same picture to the bit: threads, repeated runs, crops; and another one for another seed.
 mod determinism;
 // Two pictures against each other: metrics, masks, thresholds, maps and pages.

@@ -241,6 +241,82 @@ pub fn write(path: &Path, size: [usize; 2], channels: usize, samples: &[f32], sa
     if code == face::YARNRAY_OIIO_DONE { Ok(()) } else { Err(OiioError::Failed(text(&message))) }
 }
 
+/// A picture in OpenImageIO's texture cache.
+#[derive(Debug)]
+pub struct TextureFile {
+    raw: ptr::NonNull<face::YarnrayOiioTexture>,
+    size: [usize; 2],
+}
+
+// SAFETY: the texture system is made for lookups from all threads; a texture is not changed after it is opened.
+unsafe impl Send for TextureFile {}
+// SAFETY: as above.
+unsafe impl Sync for TextureFile {}
+
+impl TextureFile {
+    /// Opens a texture; `copy` names a file that does not exist yet, for a copy that can be filtered if the file
+    /// itself cannot, and which has to stay as long as the texture.
+    ///
+    /// # Errors
+    /// [`OiioError`]
+    pub fn open(path: &Path, copy: &Path) -> Result<Self, OiioError> {
+        let face = face()?;
+        let (path, copy) = (c_path(path)?, c_path(copy)?);
+        let mut message = [0_u8; MESSAGE_SIZE];
+        let mut raw = ptr::null_mut();
+        let mut size = [0_i32; 2];
+        // SAFETY: paths end in NUL; all other pointers are writable, and the size told is the message's own.
+        let code = unsafe {
+            face.yarnray_oiio_texture_open(
+                path.as_ptr(),
+                copy.as_ptr(),
+                &mut raw,
+                size.as_mut_ptr(),
+                message.as_mut_ptr().cast::<c_char>(),
+                message.len(),
+            )
+        };
+        match ptr::NonNull::new(raw) {
+            Some(raw) if code == face::YARNRAY_OIIO_DONE => Ok(Self { raw, size: size.map(to_usize) }),
+            _ => Err(OiioError::Failed(text(&message))),
+        }
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The linear colour at (u, v), filtered over `width`; black where the file can no longer be read.
+    #[inline]
+    pub fn sample(&self, u: f32, v: f32, width: f32) -> [f32; 3] {
+        let mut rgb = [0.0; 3];
+        if let Some(Ok(face)) = FACE.get() {
+            // SAFETY: the texture is open until it is dropped, and `rgb` takes three floats.
+            unsafe { face.yarnray_oiio_texture_sample(self.raw.as_ptr(), u, v, width, rgb.as_mut_ptr()) };
+        }
+        rgb
+    }
+}
+
+impl Drop for TextureFile {
+    fn drop(&mut self) {
+        if let Some(Ok(face)) = FACE.get() {
+            // SAFETY: it came from yarnray_oiio_texture_open, and nothing can refer to it any more.
+            unsafe { face.yarnray_oiio_texture_close(self.raw.as_ptr()) }
+        }
+    }
+}
+
+/// Bytes that textures take in memory now; 0 while OpenImageIO is not loaded.
+pub fn texture_bytes() -> u64 {
+    match FACE.get() {
+        // SAFETY: the function takes nothing and catches every exception.
+        Some(Ok(face)) => u64::try_from(unsafe { face.yarnray_oiio_texture_bytes() }).unwrap_or(0),
+        _ => 0,
+    }
+}
+
 fn face() -> Result<&'static face::Face, OiioError> {
     FACE.get_or_init(load).as_ref().map_err(|reason| OiioError::Missing(reason.clone()))
 }

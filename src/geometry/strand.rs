@@ -76,6 +76,8 @@ pub struct Strands {
     frames: Vec<PointFrame>,
     /// The same points and frames at later times; empty where yarns stand still.
     later: Vec<Pose>,
+    /// What was picked for each segment; empty where nothing was.
+    picks: Vec<u16>,
     /// The first segment of each yarn, and the number of all segments at the end.
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
@@ -102,6 +104,7 @@ pub struct Movement<'a> {
 struct Strand {
     /// Points and frames at each time.
     poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
+    picks: Vec<u16>,
     tight: Option<(usize, f64)>,
     length: f64,
 }
@@ -117,13 +120,30 @@ impl Strands {
     /// # Panics
     /// If curves or their points have other numbers at other times.
     pub fn moving(curves: &[(Curve, Vec<f64>)], movement: Movement<'_>, options: &StrandOptions) -> Self {
+        Self::with_picks(curves, &[], movement, options)
+    }
+
+    /// As [`Self::moving`], with picks for each curve, so many evenly from each given point to the next (a closed curve
+    /// goes on to its first point, an open one ends with its last), of which each segment gets that nearest to its
+    /// middle; or without any.
+    ///
+    /// # Panics
+    /// As [`Self::moving`].
+    pub fn with_picks(
+        curves: &[(Curve, Vec<f64>)],
+        picks: &[Vec<u16>],
+        movement: Movement<'_>,
+        options: &StrandOptions,
+    ) -> Self {
         let made: Vec<Strand> = curves
             .par_iter()
             .enumerate()
             .map(|(yarn, (curve, radii))| {
                 let phase = if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
                 let later: Vec<&[DVec3]> = movement.later.iter().map(|curves| curves[yarn].as_slice()).collect();
-                Strand::new(curve, radii, &later, movement.rest.map(|curves| curves[yarn].as_slice()), options, phase)
+                let rest = movement.rest.map(|curves| curves[yarn].as_slice());
+                let picks = picks.get(yarn).map_or(&[][..], Vec::as_slice);
+                Strand::new(curve, radii, picks, &later, rest, options, phase)
             })
             .collect();
         let mut strands = Self {
@@ -132,6 +152,7 @@ impl Strands {
             segments: Arc::new([]),
             frames: Vec::new(),
             later: Vec::new(),
+            picks: Vec::with_capacity(made.iter().map(|s| s.picks.len()).sum()),
             first_segments: Vec::with_capacity(made.len() + 1),
             tight_bends: Vec::new(),
             length: 0.0,
@@ -148,6 +169,7 @@ impl Strands {
                 all.0.extend(points);
                 all.1.extend(frames);
             }
+            strands.picks.extend(strand.picks);
             strands.length += strand.length;
             strands.tight_bends.extend(strand.tight.map(|(segment, tightness)| TightBend { yarn, segment, tightness }));
         }
@@ -202,7 +224,20 @@ impl Strands {
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
             + self.later.iter().map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames)).sum::<usize>()
+            + size_of_val(&*self.picks)
             + size_of_val(&*self.first_segments)) as u64
+    }
+
+    /// What was picked for a segment, if anything was for any.
+    #[inline]
+    pub fn pick(&self, segment: u32) -> Option<u16> {
+        if self.picks.is_empty() { None } else { Some(self.picks[segment as usize]) }
+    }
+
+    /// Takes what was picked for every segment from elsewhere; nothing, or one for each.
+    pub fn set_picks(&mut self, picks: Vec<u16>) {
+        assert!(picks.is_empty() || picks.len() == self.segments.len(), "a pick for each segment");
+        self.picks = picks;
     }
 
     /// The yarn that a segment belongs to.
@@ -394,6 +429,7 @@ impl Strand {
     fn new(
         curve: &Curve,
         radii: &[f64],
+        picks: &[u16],
         later: &[&[DVec3]],
         rest: Option<&[DVec3]>,
         options: &StrandOptions,
@@ -410,6 +446,7 @@ impl Strand {
         } else {
             resample(&chain, &lengths, closed, mean_radius, options)
         };
+        let picks = if picks.is_empty() { Vec::new() } else { picked(curve, picks, &chain, knots.as_deref()) };
         // The same places of the yarn at all times: points move with it.
         let resampled = |chain: Chain| match &knots {
             Some(knots) => chain.through(knots, closed, options.basis),
@@ -435,7 +472,7 @@ impl Strand {
         let tight = wound[0].tight;
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
         let poses = poses.iter().zip(&wound).map(|(chain, winding)| (points(chain), frames(winding))).collect();
-        Self { poses, tight, length: total }
+        Self { poses, picks, tight, length: total }
     }
 }
 
@@ -510,6 +547,28 @@ impl Winding {
         frames.push(frame(segments));
         frames
     }
+}
+
+/// The pick nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
+fn picked(curve: &Curve, picks: &[u16], chain: &Chain, knots: Option<&[(usize, f64)]>) -> Vec<u16> {
+    let count = knots.map_or(chain.segments(), |knots| knots.len() - 1);
+    // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
+    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
+    let points = curve.points.len();
+    let steps = if curve.closed { picks.len() / points } else { (picks.len() - 1) / (points - 1).max(1) } as f64;
+    (0..count)
+        .map(|segment| {
+            let place = match knots {
+                None => segment as f64 + 0.5,
+                Some(knots) => {
+                    let at = |knot: usize| knots[knot].0 as f64 + knots[knot].1;
+                    0.5 * (at(segment) + at(segment + 1))
+                }
+            };
+            let pick = ((place + shift) * steps).round() as usize;
+            picks[if curve.closed { pick % picks.len() } else { pick.min(picks.len() - 1) }]
+        })
+        .collect()
 }
 
 /// Carries `normal` from one point of a curve to the next without turning it about the tangent.
@@ -652,6 +711,30 @@ mod tests {
     fn strands(curve: Curve, radius: f64, options: &StrandOptions) -> Strands {
         let radii = vec![radius; curve.points.len()];
         Strands::new(&[(curve, radii)], options)
+    }
+
+    #[test]
+    fn segments_take_what_is_picked_at_their_place() {
+        for basis in [Basis::CatmullRom, Basis::BSpline] {
+            for (closed, tolerance) in [(false, 0.01), (true, 0.01), (false, 0.0), (true, 0.0)] {
+                let curve = Curve { basis, ..knit_like(400, closed) };
+                // Three from point to point.
+                let count = if closed { 1200 } else { 1198 };
+                let picks: Vec<u16> = (0..count).map(|i| u16::from((300..750).contains(&i))).collect();
+                let of = StrandOptions { tolerance, ..options(basis) };
+                let s = Strands::with_picks(&[(curve.clone(), vec![0.5; 400])], &[picks], Movement::default(), &of);
+                for segment in 0..s.segments().len() as u32 {
+                    let at = s.place(segment, 0.5).centre.as_dvec3();
+                    let angle = at.y.atan2(at.x).rem_euclid(TAU) / TAU * 400.0;
+                    // Not where one changes into the other.
+                    if [0.0, 100.0, 250.0, 400.0].iter().all(|edge: &f64| (angle - edge).abs() > 3.0) {
+                        let want = u16::from((100.0..250.0).contains(&angle));
+                        assert_eq!(s.pick(segment), Some(want), "{basis:?} {closed} {tolerance}: at {angle}");
+                    }
+                }
+                assert_eq!(strands(curve, 0.5, &of).pick(0), None);
+            }
+        }
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub mod metric;
 mod oiio;
 pub mod output;
 pub mod png;
+pub mod texture;
 
 use std::{fs::File, io::Read as _, path::Path};
 

@@ -93,11 +93,11 @@ impl Integrator<'_> {
         }
         if path.bounces == 0 {
             sample.normal = hit.normal;
-            self.describe(sample, fleece.fabric, fleece.ply, || fleece.yarn_of(hit.segment));
+            self.describe(sample, fleece.fabric, fleece.pick(hit.segment), fleece.ply, || fleece.yarn_of(hit.segment));
         }
         let [u_choice, u_x, u_y, u_roulette] = path.sampler.next4();
         let u = path.sampler.next4();
-        let fiber = &fleece.fiber;
+        let fiber = fleece.fiber_at(hit.segment);
         let frame = Frame::new(place.tangent, -path.ray.direction);
 
         if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())

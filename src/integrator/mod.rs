@@ -17,7 +17,7 @@ use crate::{
     ffi::embree::Ray,
     geometry::section::{Crossings, Section},
     math::{Rgb, sampler::Sampler},
-    scattering::{LobeValues, mis_weight, yarn::YarnVertex},
+    scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnVertex},
     scene::{
         Fabric, Ground, Light, Material, Scene, Thread,
         light::{AreaLight, Environment},
@@ -104,12 +104,15 @@ pub struct Integrator<'a> {
     /// Lights for shadow rays: each with its chance, summed up.
     lights: Vec<(&'a Light, f32, f32)>,
     max_bounces: u32,
-    /// Albedo of one fibre of each ply of each fabric; empty if no layer holds it.
-    albedos: Vec<Vec<Rgb>>,
+    /// Albedo of one fibre of each ply, of each fabric's yarn and then of its variants; empty if no layer holds it.
+    albedos: Vec<Vec<Vec<Rgb>>>,
     /// Whether samples name the cloth they meet.
     identify: bool,
     /// View direction for depths.
     back: Vec3A,
+    /// Where the camera is, and how wide its pixels are: [`crate::scene::Camera::pixel_width`].
+    camera: Vec3A,
+    pixel_width: (f32, f32),
 }
 
 /// A worker's own memory: reused from sample to sample.
@@ -176,6 +179,8 @@ impl<'a> Integrator<'a> {
             },
             identify: scene.layers.cryptomatte,
             back: Vec3A::from(scene.camera.back_f32()),
+            camera: scene.camera.position.as_vec3a(),
+            pixel_width: scene.camera.pixel_width(scene.render.height),
         }
     }
 
@@ -337,7 +342,7 @@ impl<'a> Integrator<'a> {
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> (bool, bool) {
-        let yarn = &weave.yarn;
+        let yarn = weave.yarn_at(hit.segment);
         section.crossings(yarn.shape(), &mut scratch.crossings);
         let unscattered = yarn.transparency(&scratch.crossings);
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
@@ -355,7 +360,9 @@ impl<'a> Integrator<'a> {
             && let Some(front) = scratch.crossings.first()
         {
             sample.normal = section.to_world(front.normal(section));
-            self.describe(sample, weave.fabric, weave.first_ply + front.ply, || weave.strands.yarn_of(hit.segment));
+            let ply = weave.first_ply + front.ply;
+            let pick = weave.strands.pick(hit.segment);
+            self.describe(sample, weave.fabric, pick, ply, || weave.strands.yarn_of(hit.segment));
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
@@ -390,9 +397,16 @@ impl<'a> Integrator<'a> {
 
     /// Notes of what cloth a camera path met first.
     #[inline]
-    fn describe(&self, sample: &mut Sample, fabric: usize, ply: usize, yarn: impl FnOnce() -> usize) {
-        if let Some(plies) = self.albedos.get(fabric) {
-            sample.albedo = plies[ply];
+    fn describe(
+        &self,
+        sample: &mut Sample,
+        fabric: usize,
+        pick: Option<u16>,
+        ply: usize,
+        yarn: impl FnOnce() -> usize,
+    ) {
+        if let Some(variants) = self.albedos.get(fabric) {
+            sample.albedo = variants[pick.map_or(0, |pick| 1 + usize::from(pick))][ply];
         }
         if self.identify {
             sample.cloth = Some(ClothId { fabric: fabric as u32, yarn: yarn() as u32, ply: ply as u32 });
@@ -439,13 +453,15 @@ impl<'a> Integrator<'a> {
     }
 }
 
-/// Albedo of one fibre of each ply of a fabric's yarn, or of the one fibre it is made of.
-fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Rgb> {
+/// Albedo of one fibre of each ply of a fabric's yarn, or of the one fibre it is made of; then of all its variants.
+fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Vec<Rgb>> {
     let fibers = match fabric.thread {
         Thread::Yarn(yarn) => &scene.yarns[yarn].fibers[..],
         Thread::Fiber(fiber) => std::slice::from_ref(&scene.fibers[fiber]),
     };
-    fibers.iter().map(|(_, m)| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]))).collect()
+    let albedo = |m: &FiberMaterial| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]));
+    let variants = fabric.variants.iter().map(|yarn| &yarn.fibers[..]);
+    std::iter::once(fibers).chain(variants).map(|fibers| fibers.iter().map(|(_, m)| albedo(m)).collect()).collect()
 }
 
 /// Adds light that was scattered `events` times to a sample and to the part that it belongs to.

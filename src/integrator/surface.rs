@@ -3,7 +3,12 @@
 use glam::{Vec2, Vec3A};
 
 use super::{Counters, Integrator, Path, Sample, Scratch, add};
-use crate::{ffi::embree::Ray, math::frame::orthonormal_basis, scattering::mis_weight, trace::SurfacePlace};
+use crate::{
+    ffi::embree::Ray,
+    math::{Rgb, frame::orthonormal_basis},
+    scattering::mis_weight,
+    trace::SurfacePlace,
+};
 
 /// How far off a surface rays start, in units of the larger of their distance and place, which single precision rounds.
 const OFFSET: f32 = 1e-5;
@@ -20,7 +25,14 @@ impl Integrator<'_> {
         counters: &mut Counters,
     ) -> bool {
         let material = &self.materials[place.material];
-        let albedo = material.surface.albedo();
+        let mut albedo = material.surface.albedo();
+        if let Some(picture) = &material.texture {
+            // As wide as a pixel there: light that comes after other scattering sees no wider, which only costs noise.
+            let width = self.pixel_width.0 + self.pixel_width.1 * (place.point - self.camera).length();
+            let uv = place.uv * picture.repeat;
+            let width = width * place.uv_per_length * picture.repeat.max_element();
+            albedo *= Rgb::from(picture.texture.sample(uv.x, uv.y, width)).min(Rgb::ONE);
+        }
         if path.bounces == 0 {
             sample.alpha = 1.0;
             sample.depth = (path.from - place.point).dot(self.back);

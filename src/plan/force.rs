@@ -123,7 +123,7 @@ pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
             for p in &mut mesh.points {
                 *p += at;
             }
-            scene.materials.push(Material { surface: SurfaceMaterial::diffuse(Rgb::ZERO) });
+            scene.materials.push(Material { surface: SurfaceMaterial::diffuse(Rgb::ZERO), texture: None });
             let material = scene.materials.len() - 1;
             scene.objects.push(Object { origin: "forced".to_owned(), mesh, material });
         }

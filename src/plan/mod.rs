@@ -147,7 +147,18 @@ impl Plan {
         );
         add("adaptive_sampling", scene.render.adaptive, "asked for", "all pixels get the same number of samples");
         add("openimageio", crate::image::oiio_loaded(), "an image needed it", "no image needs it: not loaded");
-        add("textures", false, "", "no texture in the scene");
+        add(
+            "textures",
+            scene.materials.iter().any(|m| m.texture.is_some()),
+            "a surface has a texture",
+            "no surface has a texture",
+        );
+        add(
+            "yarn_variants",
+            scene.fabrics.iter().any(|f| !f.variants.is_empty()),
+            "a fabric has several yarns or colours",
+            "every fabric is of one yarn throughout",
+        );
         add("meshes", !scene.objects.is_empty(), "the scene has a mesh", "no mesh in the scene");
         add(
             "coated_surfaces",

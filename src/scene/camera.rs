@@ -169,6 +169,15 @@ impl Camera {
         Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()))
     }
 
+    /// How wide a pixel of a picture of so many rows is at the camera, and by how much wider for each length of
+    /// distance.
+    pub fn pixel_width(&self, height: u32) -> (f32, f32) {
+        match self.projection {
+            Projection::Perspective(angle) => (0.0, (2.0 * (0.5 * angle).tan() / f64::from(height)) as f32),
+            Projection::Orthographic(size) => ((size / f64::from(height)) as f32, 0.0),
+        }
+    }
+
     /// The direction towards the viewer in single precision: distances along it are depths.
     pub fn back_f32(&self) -> Vec3 {
         self.back.as_vec3()

@@ -59,6 +59,9 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         }
         of_fabric("phase", &fabric.phases);
         of_fabric("seed", &fabric.seed);
+        if !fabric.variants.is_empty() {
+            of_fabric("colors", &(&fabric.variants, &fabric.picks));
+        }
         of_fabric("curves", &curves(fabric));
         of_fabric("shutter", &fabric.movement);
         of_fabric("curve_basis", &fabric.basis);
@@ -74,7 +77,14 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         }
     }
     for (i, material) in scene.materials.iter().enumerate() {
-        add(format!("material.{i}"), material);
+        // A texture by some of its colours: whoever changes a picture changes its mean, or one of many places.
+        let texture = material.texture.as_ref().map(|t| {
+            let colors =
+                (0..4096).map(|i| t.texture.sample((i % 64) as f32 / 64.0, (i / 64) as f32 / 64.0, 1.0 / 64.0));
+            let bytes: Vec<u8> = colors.flatten().flat_map(f32::to_le_bytes).collect();
+            (t.repeat, t.texture.size(), hashed(&bytes))
+        });
+        add(format!("material.{i}"), &(&material.surface, texture));
     }
     for (i, object) in scene.objects.iter().enumerate() {
         add(format!("mesh.{i}"), &(object.material, triangles(object)));

@@ -14,7 +14,9 @@ pub mod light;
 pub mod load;
 pub mod reader;
 
-use glam::{DAffine3, DVec3};
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec2};
 
 pub use camera::Camera;
 pub use light::Light;
@@ -26,7 +28,7 @@ use crate::{
         mesh::Mesh,
         yarn::{PlyParameters, YarnShape},
     },
-    image::{Compression, png::Display},
+    image::{Compression, png::Display, texture::Texture},
     scattering::{fiber::FiberMaterial, surface::SurfaceMaterial},
 };
 
@@ -258,6 +260,21 @@ pub struct Yarn {
 }
 
 impl Yarn {
+    /// The same of dyed fibres: what passes through them, TT and D, times a colour; what their surface reflects is not.
+    /// A colour above 1 stops where the fibre would make light.
+    pub fn dyed(&self, color: [f64; 3]) -> Self {
+        let mut yarn = self.clone();
+        for (_, fiber) in &mut yarn.fibers {
+            for (c, factor) in color.into_iter().enumerate() {
+                let inside = fiber.tt[c] + fiber.d[c];
+                let most = if inside > 0.0 { (1.0 - fiber.r[c]).max(0.0) / inside } else { 1.0 };
+                fiber.tt[c] *= factor.min(most);
+                fiber.d[c] *= factor.min(most);
+            }
+        }
+        yarn
+    }
+
     /// The cross-section, ready for rays.
     pub fn shape(&self) -> YarnShape {
         YarnShape::new(&self.plies, self.ply_twist, self.tilted)
@@ -286,6 +303,10 @@ pub struct Fabric {
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.
     pub movement: Movement,
+    /// What the yarn turns into here and there: its colours; empty for a fabric of one.
+    pub variants: Vec<Yarn>,
+    /// Indices into `variants` along each curve, as many from each control point to the next; empty if that is.
+    pub picks: Vec<Vec<u16>>,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
     /// Start of what is random in it: where explicit fibres lie.
@@ -338,6 +359,17 @@ pub struct Ground {
 pub struct Material {
     /// How it scatters.
     pub surface: SurfaceMaterial,
+    /// What its albedo is multiplied with, by a mesh's texture coordinates.
+    pub texture: Option<AlbedoTexture>,
+}
+
+/// A picture over a surface.
+#[derive(Clone, Debug)]
+pub struct AlbedoTexture {
+    /// The picture.
+    pub texture: Arc<Texture>,
+    /// How often it is repeated over 0 to 1 of the texture coordinates.
+    pub repeat: Vec2,
 }
 
 /// A mesh of the scene.

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, fmt, iter::Sum};
 
-use super::{Fleece, Threads, Weave, yarn_scatterer};
+use super::{Fleece, Threads, Weave, scatterer, yarn_scatterer};
 use crate::{
     ffi::embree::EmbreeError,
     geometry::{
@@ -24,6 +24,8 @@ const POINT_BYTES: u64 = 16;
 const FRAME_BYTES: u64 = 20;
 /// As `POINT_BYTES`.
 const SEGMENT_BYTES: u64 = 4;
+/// Of what says which variant a segment is of, in a fabric that has any.
+const PICK_BYTES: u64 = 2;
 
 /// Why a scene could not be made ready for rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -153,6 +155,7 @@ impl<'a> Preparation<'a> {
         self.fabrics.iter().map(|prepared| {
             let mut estimate = Estimate::default();
             let compact = self.scene.render.compact_bvh;
+            let colored = !prepared.fabric.variants.is_empty();
             match &prepared.of {
                 Of::Fibers { .. } => {
                     let curves = &prepared.fabric.curves;
@@ -182,6 +185,9 @@ impl<'a> Preparation<'a> {
                     }
                 }
             }
+            if colored {
+                estimate.geometry_bytes += estimate.segments * PICK_BYTES;
+            }
             estimate
         })
     }
@@ -199,32 +205,47 @@ impl<'a> Preparation<'a> {
                     first_tubes: Vec::new(),
                     tubes: Tubes::new(&prepared.fabric.curves),
                     fiber: material,
+                    variants: Vec::new(),
+                    picks: Vec::new(),
                 })),
                 Of::Yarns { yarn, ref shape, ref strands } => {
                     let plies = prepared.plies(yarn, shape, strands);
-                    let fleece = |ply: usize, (tubes, first_tubes)| {
-                        let fiber = FiberBcsdf::new(&yarn.fibers[ply].1);
-                        Threads::Fibers(Fleece { fabric: index, ply, first_tubes, tubes, fiber })
+                    let kinds = &prepared.fabric.variants;
+                    let fleece = |ply: usize, tubes, first_tubes, picks| {
+                        let fiber = |of: &Yarn| FiberBcsdf::new(&of.fibers[ply].1);
+                        let (fiber, variants) = (fiber(yarn), kinds.iter().map(fiber).collect());
+                        Threads::Fibers(Fleece { fabric: index, ply, first_tubes, tubes, fiber, variants, picks })
                     };
                     let slots = 0..yarn.plies.len();
                     match mode {
                         Mode::Yarn => {}
                         Mode::Ply => all.extend(slots.clone().map(|ply| {
-                            let (strands, shape) = ply_strands(&plies, &yarn.plies[ply], shape, ply);
-                            let yarn = yarn_scatterer(shape, &[&yarn.fibers[ply].1], model);
-                            Threads::Yarns(Weave { fabric: index, first_ply: ply, strands, yarn })
+                            let (mut strands, shape) = ply_strands(&plies, &yarn.plies[ply], shape, ply);
+                            strands.set_picks(plies.picks_along(1));
+                            let scatterer = |of: &Yarn| yarn_scatterer(shape.clone(), &[&of.fibers[ply].1], model);
+                            let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
+                            Threads::Yarns(Weave { fabric: index, first_ply: ply, strands, yarn, variants })
                         })),
                         Mode::Fiber => {
-                            all.extend(slots.clone().map(|ply| fleece(ply, plies.fibers(ply, yarn.placement))));
+                            all.extend(slots.clone().map(|ply| {
+                                let (tubes, first) = plies.fibers(ply, yarn.placement);
+                                fleece(ply, tubes, first, plies.picks_along(yarn.plies[ply].fibers as usize))
+                            }));
                         }
                     }
                     if let Some(flyaways) = &yarn.flyaways {
-                        all.extend(slots.map(|ply| fleece(ply, plies.flyaways(ply, flyaways))));
+                        all.extend(slots.map(|ply| {
+                            let (tubes, first, from) = plies.flyaways(ply, flyaways);
+                            let pick = |segment| strands.pick(from[tubes.tube_of(segment)]);
+                            let picks = (0..tubes.segments().len() as u32).filter_map(pick).collect();
+                            fleece(ply, tubes, first, picks)
+                        }));
                     }
                     if let (Mode::Yarn, Of::Yarns { shape, strands, .. }) = (mode, prepared.of) {
+                        let variants = kinds.iter().map(|yarn| scatterer(yarn, model)).collect();
                         let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
                         let yarn = yarn_scatterer(*shape, &materials, model);
-                        all.push(Threads::Yarns(Weave { fabric: index, first_ply: 0, strands, yarn }));
+                        all.push(Threads::Yarns(Weave { fabric: index, first_ply: 0, strands, yarn, variants }));
                     }
                 }
             }
@@ -242,8 +263,9 @@ impl Prepared<'_> {
 }
 
 fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
-    Strands::moving(
+    Strands::with_picks(
         &fabric.curves,
+        &fabric.picks,
         Movement { later: &fabric.movement.later, rest: fabric.movement.rest.as_deref() },
         &StrandOptions {
             basis: fabric.basis,

@@ -51,7 +51,7 @@ impl HitFilter for GapFilter<'_> {
             return false;
         }
         let Threads::Yarns(weave) = threads else { return true };
-        let shape = weave.yarn.shape();
+        let shape = weave.yarn_at(hit.segment).shape();
         if shape.filled {
             return true;
         }
@@ -112,11 +112,12 @@ impl HitFilter for ShadowFilter<'_> {
         }
         let Threads::Yarns(weave) = threads else { return true };
         let section = section_at(weave, self.ray, hit);
-        section.crossings(weave.yarn.shape(), self.crossings);
+        let yarn = weave.yarn_at(hit.segment);
+        section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {
             return false;
         }
-        let through = weave.yarn.transparency(self.crossings);
+        let through = yarn.transparency(self.crossings);
         if through < OPAQUE {
             return true;
         }

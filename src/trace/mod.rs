@@ -49,6 +49,8 @@ pub struct Weave {
     pub strands: Strands,
     /// Cross-section and scattering.
     pub yarn: YarnScatterer,
+    /// The same for each variant of the fabric, in place of `yarn` where there are any.
+    pub variants: Vec<YarnScatterer>,
 }
 
 /// Explicit fibres of one material.
@@ -64,6 +66,10 @@ pub struct Fleece {
     pub tubes: Tubes,
     /// How each of them scatters.
     pub fiber: FiberBcsdf,
+    /// The same for each variant of the fabric, in place of `fiber` where there are any.
+    pub variants: Vec<FiberBcsdf>,
+    /// Which of them each segment is of; empty without.
+    pub picks: Vec<u16>,
 }
 
 /// What one geometry of Embree stands for.
@@ -267,6 +273,21 @@ fn section_at(weave: &Weave, ray: &Ray, raw: &RawHit) -> Section {
 }
 
 impl Fleece {
+    /// Which of the fabric's variants a segment is of, if it has any.
+    #[inline]
+    pub fn pick(&self, segment: u32) -> Option<u16> {
+        if self.picks.is_empty() { None } else { Some(self.picks[segment as usize]) }
+    }
+
+    /// How the fibre of a segment scatters.
+    #[inline]
+    pub fn fiber_at(&self, segment: u32) -> &FiberBcsdf {
+        match self.pick(segment) {
+            None => &self.fiber,
+            Some(pick) => &self.variants[usize::from(pick)],
+        }
+    }
+
     /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
     pub fn yarn_of(&self, segment: u32) -> usize {
         let tube = self.tubes.tube_of(segment);
@@ -310,7 +331,18 @@ impl Threads {
     fn bytes(&self) -> u64 {
         match self {
             Self::Yarns(w) => w.strands.bytes(),
-            Self::Fibers(f) => f.tubes.bytes(),
+            Self::Fibers(f) => f.tubes.bytes() + size_of_val(&*f.picks) as u64,
+        }
+    }
+}
+
+impl Weave {
+    /// The yarn that a segment is of.
+    #[inline]
+    pub fn yarn_at(&self, segment: u32) -> &YarnScatterer {
+        match self.strands.pick(segment) {
+            None => &self.yarn,
+            Some(pick) => &self.variants[usize::from(pick)],
         }
     }
 }

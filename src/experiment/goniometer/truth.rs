@@ -82,6 +82,8 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
                     first_tubes,
                     tubes,
                     fiber: FiberBcsdf::new(&yarn.fibers[ply].1),
+                    variants: Vec::new(),
+                    picks: Vec::new(),
                 })
             })
             .collect();

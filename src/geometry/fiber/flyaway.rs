@@ -62,20 +62,24 @@ impl Plies<'_> {
         ((knots + 2.0 * (hairs + loops)) as u64, (knots - hairs - loops) as u64)
     }
 
-    /// The fly-aways of one ply in all yarns, and the first of each yarn.
-    pub fn flyaways(&self, ply: usize, of: &Flyaways) -> (Tubes, Vec<u32>) {
-        let per_yarn: Vec<Vec<Vec<Vec4>>> =
+    /// The fly-aways of one ply in all yarns, the first of each yarn, and for each of them the yarn's segment from which
+    /// it comes.
+    pub fn flyaways(&self, ply: usize, of: &Flyaways) -> (Tubes, Vec<u32>, Vec<u32>) {
+        let per_yarn: Vec<Vec<(Vec<Vec4>, u32)>> =
             (0..self.strands.yarns()).into_par_iter().map(|yarn| self.flyaways_of(yarn, ply, of)).collect();
         let mut first = Vec::with_capacity(per_yarn.len());
-        let mut all = Vec::new();
+        let (mut all, mut segments) = (Vec::new(), Vec::new());
         for curves in per_yarn {
             first.push(all.len() as u32);
-            all.extend(curves);
+            for (curve, segment) in curves {
+                all.push(curve);
+                segments.push(segment);
+            }
         }
-        (Tubes::from_chains(Basis::BSpline, &all), first)
+        (Tubes::from_chains(Basis::BSpline, &all), first, segments)
     }
 
-    fn flyaways_of(&self, yarn: usize, ply: usize, of: &Flyaways) -> Vec<Vec<Vec4>> {
+    fn flyaways_of(&self, yarn: usize, ply: usize, of: &Flyaways) -> Vec<(Vec<Vec4>, u32)> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
         let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
         let length = guide.along.last().copied().unwrap_or(0.0);
@@ -101,7 +105,7 @@ impl Plies<'_> {
                 })
                 .collect();
             let points: Vec<_> = knots.iter().map(|k| k.0).collect();
-            curves.push(spline_through(&points, |i| knots[i].1 * radius));
+            curves.push((spline_through(&points, |i| knots[i].1 * radius), guide.segment_at(path(0.0).0)));
         };
         for _ in 0..count(&mut stream, of.hair_density) {
             let z = length * f64::from(stream.next());

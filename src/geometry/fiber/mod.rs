@@ -99,6 +99,13 @@ impl Guide {
         Self { places, along, first: segments.start, steps }
     }
 
+    /// The yarn's segment after so many yarn radii along it.
+    fn segment_at(&self, along: f64) -> u32 {
+        let last = self.along.len() - 1;
+        let step = self.along.partition_point(|&a| a <= along).clamp(1, last) - 1;
+        self.first + (step / self.steps) as u32
+    }
+
     /// The place after so many yarn radii along the yarn.
     fn place_at(&self, strands: &Strands, along: f64) -> Place {
         let last = self.along.len() - 1;
@@ -228,6 +235,19 @@ impl<'a> Plies<'a> {
                 spline_through(&knots, |step| guide.places[step].radius * radius)
             })
             .collect()
+    }
+
+    /// For each segment of so many curves along each yarn, what was picked for the yarn's segment below it; nothing if
+    /// nothing was.
+    pub fn picks_along(&self, curves: usize) -> Vec<u16> {
+        let mut picks = Vec::new();
+        for yarn in 0..self.strands.yarns() {
+            for _ in 0..curves {
+                let below = self.strands.segments_of(yarn).filter_map(|segment| self.strands.pick(segment));
+                picks.extend(below.flat_map(|pick| std::iter::repeat_n(pick, self.steps[yarn])));
+            }
+        }
+        picks
     }
 
     /// One curve for each yarn along the middle of a ply, as wide as the ply, and at each of its points the direction

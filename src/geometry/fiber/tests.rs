@@ -179,7 +179,8 @@ fn flyaways_are_as_many_and_reach_as_far_as_asked() {
         loop_height: [0.7, 0.05],
         loop_turns: 0.5,
     };
-    let (tubes, first) = made.flyaways(2, &of);
+    let (tubes, first, from) = made.flyaways(2, &of);
+    assert_eq!(from.len(), tubes.count());
     let length = strands.length_of(0) / 0.5;
     assert!((tubes.count() as f64 - 3.0 * length).abs() <= 2.0, "{} over {length}", tubes.count());
     assert_eq!(first, [0]);

@@ -11,6 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::{
     super::{Fabric, Mode, Movement, Thread, Yarn, transform_curves},
     Context, Range, Reader, UNITS,
+    color::{self, ColorPlan, Grid},
     pattern::{self, KnitPlan, WeavePlan},
     placement, radians, sequence,
     yarns::Library,
@@ -27,6 +28,9 @@ use crate::{
 
 /// Radius, millimetres, of a fibre whose file and fabric give none: that of fine wool and of cotton.
 const FIBER_RADIUS: f64 = 0.01;
+
+/// Columns that a yarn counts where nothing is known of its cloth.
+const COLUMNS: f32 = 256.0;
 
 /// How finely curves are resampled, for all fabrics.
 pub(super) struct Detail {
@@ -102,6 +106,7 @@ pub(super) struct FabricPlan {
     radius: Option<f64>,
     phases: Option<Vec<f64>>,
     seed: u32,
+    color: ColorPlan,
     transform: DAffine3,
     source: Source,
 }
@@ -135,6 +140,7 @@ pub(super) fn plan(
     let seed = table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32;
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let transform = placement(&table, context);
+    let color = color::plan(&table, context, library);
     let source = match table.table("source") {
         Some(source_table) => {
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
@@ -155,7 +161,7 @@ pub(super) fn plan(
     };
     table.finish();
     let thread = fiber.map(ThreadName::Fiber).or(yarn.map(ThreadName::Yarn))?;
-    Some(FabricPlan { name, thread, radius, phases, seed, transform, source: source? })
+    Some(FabricPlan { name, thread, radius, phases, seed, color, transform, source: source? })
 }
 
 fn file_source(
@@ -257,6 +263,8 @@ struct Made {
     origin: String,
     thread: Thread,
     curves: Vec<(Curve, Vec<f64>)>,
+    /// Where their points are in the cloth, if that is known.
+    grid: Option<Grid>,
 }
 
 impl FabricPlan {
@@ -285,27 +293,30 @@ impl FabricPlan {
         let mut movement = Movement::default();
         let made = match self.source {
             Source::Knit(plan) => {
-                let curves = plan.curves(2.0 * radius, context)?;
-                vec![Made { origin: plan.origin(), thread, curves: with_radius(curves, radius) }]
+                let (curves, grid) = plan.curves(2.0 * radius, context)?;
+                vec![Made { origin: plan.origin(), thread, curves: with_radius(curves, radius), grid: Some(grid) }]
             }
             Source::Weave(plan) => {
-                let [warps, wefts] = plan.curves(context)?;
+                let [(warps, mut grid), (wefts, weft_grid)] = plan.curves(context)?;
                 let weft = plan.weft_yarn.as_deref().map_or(Some(thread), place_of)?;
                 let weft_radius = plan.weave.weft_radius;
                 let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, weft_radius));
                 if weft == thread {
                     warps.extend(wefts);
-                    vec![Made { origin: plan.origin(), thread, curves: warps }]
+                    grid.join(weft_grid);
+                    vec![Made { origin: plan.origin(), thread, curves: warps, grid: Some(grid) }]
                 } else {
+                    let (warp_origin, weft_origin) =
+                        (format!("{}, warp", plan.origin()), format!("{}, weft", plan.origin()));
                     vec![
-                        Made { origin: format!("{}, warp", plan.origin()), thread, curves: warps },
-                        Made { origin: format!("{}, weft", plan.origin()), thread: weft, curves: wefts },
+                        Made { origin: warp_origin, thread, curves: warps, grid: Some(grid) },
+                        Made { origin: weft_origin, thread: weft, curves: wefts, grid: Some(weft_grid) },
                     ]
                 }
             }
             Source::Straight { count, length, spacing } => {
                 let curves = with_radius(straight(count, length, spacing), radius);
-                vec![Made { origin: format!("{count} straight"), thread, curves }]
+                vec![Made { origin: format!("{count} straight"), thread, curves, grid: None }]
             }
             Source::File(file) => {
                 let mut read = |path: &Path| {
@@ -328,12 +339,12 @@ impl FabricPlan {
                 };
                 let (path, curves, of_file) = sequence::read(&file, detail, context, &mut read)?;
                 movement = of_file;
-                vec![Made { origin: path.display().to_string(), thread, curves }]
+                vec![Made { origin: path.display().to_string(), thread, curves, grid: None }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
         let name = self.name.unwrap_or_else(|| self.thread.into_name());
-        let fabric = |Made { origin, thread, curves }: Made| {
+        let fabric = |Made { origin, thread, curves, grid }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -346,6 +357,8 @@ impl FabricPlan {
                 thread,
                 curves,
                 movement: std::mem::take(&mut movement),
+                variants: Vec::new(),
+                picks: Vec::new(),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
@@ -353,9 +366,10 @@ impl FabricPlan {
                 longest_segment: detail.longest_segment,
             };
             fabric.transform(&self.transform);
-            fabric
+            self.color.apply(&mut fabric, |f| grid.unwrap_or_else(|| Grid::along(COLUMNS, f)), context, library)?;
+            Some(fabric)
         };
-        Some(made.into_iter().map(fabric).collect())
+        made.into_iter().map(fabric).collect()
     }
 }
 

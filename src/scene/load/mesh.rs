@@ -1,15 +1,16 @@
 //! `[[mesh]]` and `[material.NAME]`: what stands beside the cloth or under it.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
-    super::{Material, Object},
+    super::{AlbedoTexture, Material, Object},
     Context, Range, Reader, UNITS, placement,
 };
 use crate::{
     geometry::{mesh::Mesh, obj},
+    image::texture::Texture,
     math::Rgb,
     scattering::surface::SurfaceMaterial,
     scene::diagnostic::{Span, unknown_name},
@@ -21,33 +22,41 @@ pub(super) struct MaterialPlan {
     albedo: [f64; 3],
     /// Roughness and refractive index of a coat.
     coat: Option<(f64, f64)>,
+    /// A picture over it, where it was named, and how often it is repeated.
+    texture: Option<(PathBuf, Span, [f64; 2])>,
 }
 
 /// Every `[material.NAME]`; `None` for one with mistakes.
 pub(super) type Materials = BTreeMap<String, Option<MaterialPlan>>;
 
 /// Reads every material, also those that the scene does not use.
-pub(super) fn materials(root: &Reader<'_>) -> Materials {
-    root.named_tables("material").into_iter().map(|(name, table)| (name.to_owned(), material(table))).collect()
+pub(super) fn materials(root: &Reader<'_>, context: &Context<'_>) -> Materials {
+    root.named_tables("material").into_iter().map(|(name, table)| (name.to_owned(), material(table, context))).collect()
 }
 
-fn material(table: Reader<'_>) -> Option<MaterialPlan> {
+fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
     let kind = table.one_of_or("type", 0, &[("diffuse", 0), ("coated", 1)]);
-    let albedo = table.rgb_or("albedo", [0.5; 3], Range::UNIT);
+    let repeat = table.vec2("repeat", Range::POSITIVE).unwrap_or([1.0; 2]);
+    let texture = table.string("texture").map(|path| {
+        let span = table.span("texture").unwrap_or(table.header());
+        (context.resolve(path, span), span, repeat)
+    });
+    let plain = if texture.is_some() { 1.0 } else { 0.5 };
+    let albedo = table.rgb_or("albedo", [plain; 3], Range::UNIT);
     let coat = (kind == 1).then(|| {
         // A perfectly smooth coat would be a mirror, in which no light of no size is ever found.
         let roughness = table.f64_or("roughness", 0.3, Range::between(0.03, 1.0));
         (roughness, table.f64_or("ior", 1.5, Range::between(1.01, 4.0)))
     });
     table.finish();
-    Some(MaterialPlan { albedo, coat })
+    Some(MaterialPlan { albedo, coat, texture })
 }
 
 /// The material that a table names under `material`, or a diffuse one of its `albedo`.
 pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<MaterialPlan> {
     let albedo = table.rgb("albedo", Range::UNIT);
     let Some(name) = table.string("material") else {
-        return Some(MaterialPlan { albedo: albedo.unwrap_or([0.5; 3]), coat: None });
+        return Some(MaterialPlan { albedo: albedo.unwrap_or([0.5; 3]), coat: None, texture: None });
     };
     if albedo.is_some() {
         table.error_at("albedo", "give `material` or `albedo`, not both", None);
@@ -63,19 +72,36 @@ pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<M
 }
 
 impl MaterialPlan {
+    /// Where its texture was named.
+    pub(super) fn texture_span(&self) -> Option<Span> {
+        self.texture.as_ref().map(|(_, span, _)| *span)
+    }
+
     /// Adds it to the scene's materials, if it is not there yet, and gives its place.
-    pub(super) fn make(self, made: &mut Vec<(Self, Material)>) -> usize {
+    pub(super) fn make(self, context: &Context<'_>, made: &mut Vec<(Self, Material)>) -> Option<usize> {
         if let Some(place) = made.iter().position(|(plan, _)| *plan == self) {
-            return place;
+            return Some(place);
+        }
+        let mut texture = None;
+        if let Some((path, span, repeat)) = &self.texture {
+            match Texture::open(path) {
+                Ok(opened) => {
+                    let repeat = DVec2::from(*repeat).as_vec2();
+                    texture = Some(AlbedoTexture { texture: Arc::new(opened), repeat });
+                }
+                Err(error) => {
+                    context.error(*span, error.to_string(), None);
+                    return None;
+                }
+            }
         }
         let albedo = Rgb::from(self.albedo);
         let surface = match self.coat {
             None => SurfaceMaterial::diffuse(albedo),
             Some((roughness, ior)) => SurfaceMaterial::coated(albedo, roughness as f32, ior as f32),
         };
-        let material = Material { surface };
-        made.push((self, material));
-        made.len() - 1
+        made.push((self, Material { surface, texture }));
+        Some(made.len() - 1)
     }
 }
 
@@ -204,6 +230,11 @@ impl MeshPlan {
             }
         };
         mesh.transform(&self.transform);
-        Some(Object { origin, mesh, material: self.material.make(materials) })
+        if let Some((_, span, _)) = &self.material.texture
+            && mesh.uvs.is_empty()
+        {
+            context.error(*span, format!("{origin} has no texture coordinates for this texture"), None);
+        }
+        Some(Object { origin, mesh, material: self.material.make(context, materials)? })
     }
 }

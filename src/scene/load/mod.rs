@@ -4,6 +4,7 @@
 //! files and images read.
 
 mod cloth;
+mod color;
 mod definitions;
 mod mesh;
 mod motion;
@@ -220,7 +221,7 @@ fn build(
             cloth::plan(table, &context, &library, curves)
         })
         .collect();
-    let materials = mesh::materials(&root);
+    let materials = mesh::materials(&root, &context);
     let mesh_plans = mesh::meshes(&root, &context, &materials);
     let camera_plan = view::camera(&root, &context, options.frame);
     let light_plans = view::lights(&root, &context);
@@ -266,12 +267,19 @@ fn build(
     let aspect = f64::from(render.width) / f64::from(render.height);
     let frame = f64::from(render.frame.unwrap_or(1));
     let (camera, camera_path) = camera_plan?.make(&fabrics, &objects, middle, aspect, frame);
-    let ground = ground_plan.map(|plan| {
+    let ground = ground_plan.and_then(|plan| {
         let height = plan.height.map(|h| h * unit - middle.y);
         let lowest = [bounds(&fabrics), around(&objects)].into_iter().flatten().map(|(low, _)| low.y);
         let lowest = lowest.reduce(f64::min).unwrap_or(0.0);
-        Ground { height: height.unwrap_or(lowest) as f32, material: plan.material.make(&mut made) }
+        if let Some(span) = plan.material.texture_span() {
+            context.error(span, "the ground has no texture coordinates: give this material to a plane", None);
+        }
+        let material = plan.material.make(&context, &mut made)?;
+        Some(Ground { height: height.unwrap_or(lowest) as f32, material })
     });
+    if diagnostics.has_errors() {
+        return None;
+    }
     let mut scene = Scene {
         path: name.to_owned(),
         render,

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Context, Range, Reader, cloth::Yarns};
+use super::{Context, Range, Reader, cloth::Yarns, color::Grid};
 use crate::{
     geometry::{
         curve::Curve,
@@ -31,10 +31,10 @@ impl KnitPlan {
         format!("{}, {} x {}", self.name, self.knit.stitches, self.knit.rows)
     }
 
-    /// The courses; what is wrong with the chart is told.
-    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<Vec<Curve>> {
+    /// The courses with their places; what is wrong with the chart is told.
+    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<(Vec<Curve>, Grid)> {
         match self.knit.strands(diameter) {
-            Ok(strands) => Some(strands.into_iter().map(|s| s.curve).collect()),
+            Ok(strands) => Some(Grid::of(strands, [self.knit.stitches, self.knit.rows])),
             Err(error) => {
                 let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
                 context.error(*span, error.problem, Some(error.hint));
@@ -157,13 +157,13 @@ impl WeavePlan {
         format!("{}, {} x {}", self.name, self.weave.warps, self.weave.wefts)
     }
 
-    /// Warps and wefts.
-    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[Vec<Curve>; 2]> {
+    /// Warps and wefts with their places.
+    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[(Vec<Curve>, Grid); 2]> {
         match self.weave.strands() {
             Ok(strands) => {
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-                Some([warps, wefts].map(|side| side.into_iter().map(|s| s.curve).collect()))
+                Some([warps, wefts].map(|side| Grid::of(side, [self.weave.warps, self.weave.wefts])))
             }
             Err(tight) => {
                 let (key, least) =

@@ -1,0 +1,134 @@
+//! Pictures that are looked up place by place, filtered: through OpenImageIO's texture system.
+
+use std::path::Path;
+
+use super::ImageError;
+
+/// A texture of linear colours. (0, 0) is the lower left corner of the picture, which repeats beyond 0 to 1.
+#[derive(Debug)]
+pub struct Texture {
+    #[cfg(feature = "oiio")]
+    file: crate::ffi::oiio::TextureFile,
+    /// Holds the copy that OpenImageIO reads, until this is dropped.
+    #[cfg(feature = "oiio")]
+    _folder: tempfile::TempDir,
+    #[cfg(not(feature = "oiio"))]
+    never: std::convert::Infallible,
+}
+
+impl Texture {
+    /// Opens any picture that OpenImageIO reads; integer samples are made linear.
+    ///
+    /// # Errors
+    /// [`ImageError`]: the file cannot be read, or there is no OpenImageIO.
+    #[cfg(feature = "oiio")]
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        use crate::ffi::oiio::{OiioError, TextureFile};
+        // What is no file at all is told in the words of every other picture.
+        std::fs::File::open(path).map_err(|e| ImageError::unreadable(path, &e))?;
+        let failed = |reason: String| ImageError::Read { path: path.into(), reason };
+        let folder = tempfile::Builder::new()
+            .prefix("yarnray-texture-")
+            .tempdir()
+            .map_err(|e| failed(format!("no place for a copy with smaller levels: {e}")))?;
+        let file = TextureFile::open(path, &folder.path().join("texture.exr")).map_err(|error| match error {
+            OiioError::Missing(_) => ImageError::Unsupported { path: path.into(), reason: error.to_string() },
+            _ => failed(error.to_string()),
+        })?;
+        Ok(Self { file, _folder: folder })
+    }
+
+    /// Without the feature: an error that says how to get it.
+    ///
+    /// # Errors
+    /// Always.
+    #[cfg(not(feature = "oiio"))]
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        let reason = "textures need OpenImageIO: build with the feature `oiio`".to_owned();
+        Err(ImageError::Unsupported { path: path.into(), reason })
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        #[cfg(feature = "oiio")]
+        return self.file.size();
+        #[cfg(not(feature = "oiio"))]
+        match self.never {}
+    }
+
+    /// The colour at (u, v), filtered over a square of this width.
+    #[inline]
+    pub fn sample(&self, u: f32, v: f32, width: f32) -> [f32; 3] {
+        #[cfg(feature = "oiio")]
+        return self.file.sample(u, v, width);
+        #[cfg(not(feature = "oiio"))]
+        {
+            let _ = (u, v, width);
+            match self.never {}
+        }
+    }
+}
+
+/// Bytes that textures take in memory now.
+pub fn bytes() -> u64 {
+    #[cfg(feature = "oiio")]
+    return crate::ffi::oiio::texture_bytes();
+    #[cfg(not(feature = "oiio"))]
+    0
+}
+
+#[cfg(all(test, feature = "oiio"))]
+mod tests {
+    use super::*;
+
+    /// A PNG of 8-bit RGB rows, the top one first.
+    fn picture(width: u32, rows: &[&[[u8; 3]]]) -> (tempfile::TempDir, std::path::PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.png");
+        let file = std::fs::File::create(&path).unwrap();
+        let mut encoder = png::Encoder::new(file, width, rows.len() as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        let bytes: Vec<u8> = rows.iter().flat_map(|r| r.iter().flatten().copied()).collect();
+        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn a_texture_stands_upright_and_is_linear() {
+        let (red, green, blue, grey) = ([255, 0, 0], [0, 255, 0], [0, 0, 255], [188, 188, 188]);
+        let (_folder, path) = picture(2, &[&[red, green], &[blue, grey]]);
+        let texture = Texture::open(&path).unwrap();
+        assert_eq!(texture.size(), [2, 2]);
+        let close = |at: [f32; 2], want: [f32; 3]| {
+            let got = texture.sample(at[0], at[1], 0.0);
+            assert!(got.iter().zip(want).all(|(g, w)| (g - w).abs() < 3e-3), "{at:?}: {got:?}, not {want:?}");
+        };
+        close([0.25, 0.75], [1.0, 0.0, 0.0]);
+        close([0.75, 0.75], [0.0, 1.0, 0.0]);
+        close([0.25, 0.25], [0.0, 0.0, 1.0]);
+        // 188 is half the light, and the picture goes on beyond its edges.
+        close([1.75, -0.75], [0.503, 0.503, 0.503]);
+    }
+
+    #[test]
+    fn wide_lookups_are_means_of_light() {
+        let row: Vec<[u8; 3]> = (0..64).map(|x| if x % 2 == 0 { [255; 3] } else { [0; 3] }).collect();
+        let rows: Vec<&[[u8; 3]]> = (0..64).map(|_| row.as_slice()).collect();
+        let (_folder, path) = picture(64, &rows);
+        let texture = Texture::open(&path).unwrap();
+        for i in 0..40 {
+            let got = texture.sample(0.013 * i as f32, 0.017 * i as f32, 0.25);
+            assert!(got.iter().all(|c| (c - 0.5).abs() < 0.02), "{got:?}");
+        }
+        assert!(bytes() > 0);
+    }
+
+    #[test]
+    fn what_is_no_picture_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("noise.png");
+        std::fs::write(&path, b"not a picture at all").unwrap();
+        assert!(Texture::open(&path).is_err());
+        assert!(Texture::open(&folder.path().join("absent.png")).unwrap_err().to_string().contains("no such file"));
+    }
+}
