@@ -26,7 +26,7 @@
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files.
 //! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`integrator`]: light along a path.
-//! * [`film`]: what pixels have collected. [`render`]: the driver, and pictures from films.
+//! * [`film`]: what pixels have collected. [`render`]: the driver, films in files, and pictures from films.
 //! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was, and what many were.
 //! * [`experiment`]: what parts and pictures say, held against what is true. [`cli`]: the program.
 //!
