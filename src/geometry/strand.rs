@@ -13,6 +13,7 @@ use super::{
     curve::{Basis, Curve},
     section::Place,
     spline::{SplinePoint, evaluate, evaluate_f32},
+    tube::curve_of,
 };
 
 /// What a curve must satisfy on its way to Embree.
@@ -248,6 +249,15 @@ impl Strands {
     /// The segments of one yarn.
     pub fn segments_of(&self, yarn: usize) -> std::ops::Range<u32> {
         self.first_segments[yarn]..self.first_segments[yarn + 1]
+    }
+
+    /// The yarns as curves with radii, to be written to a file; closed ones are cut at their seam.
+    pub fn curves(&self) -> impl Iterator<Item = Curve> + '_ {
+        (0..self.yarns()).filter(|&yarn| !self.segments_of(yarn).is_empty()).map(|yarn| {
+            let segments = self.segments_of(yarn);
+            let first = self.segments[segments.start as usize] as usize;
+            curve_of(self.basis, &self.points[first..first + segments.len() + 3])
+        })
     }
 
     /// Length of one yarn in scene units, from step to step.

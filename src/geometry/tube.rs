@@ -109,16 +109,20 @@ impl Tubes {
     pub fn curves(&self) -> impl Iterator<Item = Curve> + '_ {
         self.first_segments.windows(2).map(|w| {
             let first = self.segments[w[0] as usize] as usize;
-            let points = &self.points[first..first + (w[1] - w[0]) as usize + 3];
-            // Catmull-Rom ends are mirrored points, which every reader makes for itself.
-            let kept = if self.basis == Basis::BSpline { points } else { &points[1..points.len() - 1] };
-            Curve {
-                basis: self.basis,
-                closed: false,
-                points: kept.iter().map(|p| p.truncate().as_dvec3()).collect(),
-                radii: Some(kept.iter().map(|p| f64::from(p.w)).collect()),
-            }
+            curve_of(self.basis, &self.points[first..first + (w[1] - w[0]) as usize + 3])
         })
+    }
+}
+
+/// The open curve of some control points with their radii.
+pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
+    // Catmull-Rom ends are mirrored points, which every reader makes for itself.
+    let kept = if basis == Basis::BSpline { points } else { &points[1..points.len() - 1] };
+    Curve {
+        basis,
+        closed: false,
+        points: kept.iter().map(|p| p.truncate().as_dvec3()).collect(),
+        radii: Some(kept.iter().map(|p| f64::from(p.w)).collect()),
     }
 }
 

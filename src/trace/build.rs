@@ -150,6 +150,16 @@ impl<'a> Preparation<'a> {
         Self { scene, fabrics }
     }
 
+    /// As [`Self::new`], refused if all would take more memory than the scene may.
+    pub(super) fn checked(scene: &'a Scene) -> Result<Self, BuildError> {
+        let preparation = Self::new(scene);
+        let needed: Estimate = preparation.estimates().sum();
+        match scene.render.max_memory {
+            Some(limit) if needed.bytes() > limit => Err(BuildError::Memory { needed, limit }),
+            _ => Ok(preparation),
+        }
+    }
+
     /// What each fabric will take.
     pub(super) fn estimates(&self) -> impl Iterator<Item = Estimate> {
         self.fabrics.iter().map(|prepared| {

@@ -18,7 +18,7 @@ use glam::{Vec3A, Vec4};
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, Ray, SceneBuilder},
     geometry::{
-        curve::Basis,
+        curve::{Basis, Curve},
         section::{Crossings, Section},
         strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
@@ -134,13 +134,7 @@ impl World {
     /// What Embree says, mostly that memory is short; or that the scene would take more than it may.
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
         let started = Instant::now();
-        let preparation = Preparation::new(scene);
-        let needed: Estimate = preparation.estimates().sum();
-        if let Some(limit) = scene.render.max_memory
-            && needed.bytes() > limit
-        {
-            return Err(BuildError::Memory { needed, limit });
-        }
+        let preparation = Preparation::checked(scene)?;
         let threads_made = preparation.threads();
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
@@ -350,6 +344,25 @@ impl Weave {
 /// What the curves of each fabric will take, without making them.
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
     Preparation::new(scene).estimates().collect()
+}
+
+/// The curves that a scene's cloth is in its mode, as Embree would get them: millimetres, where the scene's file has them.
+///
+/// # Errors
+/// If they would take more memory than the scene may.
+pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
+    let threads = Preparation::checked(scene)?.threads();
+    let mut curves: Vec<Curve> = threads
+        .iter()
+        .flat_map(|threads| match threads {
+            Threads::Yarns(weave) => weave.strands.curves().collect::<Vec<_>>(),
+            Threads::Fibers(fleece) => fleece.tubes.curves().collect(),
+        })
+        .collect();
+    for point in curves.iter_mut().flat_map(|c| &mut c.points) {
+        *point += scene.middle;
+    }
+    Ok(curves)
 }
 
 /// A yarn with one of the models.

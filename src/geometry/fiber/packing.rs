@@ -10,8 +10,9 @@ pub const DENSEST: f64 = 0.78;
 /// Centres of `count` discs of radius `radius` in a ply, in units of the core radius, within which the centres lie: even
 /// over the core as far as discs that do not overlap can be. Where they do not fit they overlap as little as possible.
 ///
-/// Random points are pushed apart until no two overlap, then shaken: a random walk of many steps for each disc in which
-/// steps that would overlap are refused, whose distribution is that of hard discs in equilibrium.
+/// Random points are pushed apart until no two overlap. A random walk from there to the equilibrium of hard discs would
+/// gather them at the outline: at 70 discs and an area fraction of 0.5 the outer tenth of the area holds 17 % of the centres
+/// as they are, 21 % in equilibrium, and the aggregated model takes them as even.
 pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
     let n = count as usize;
     let mut centres: Vec<DVec2> = (0..n)
@@ -23,9 +24,7 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
     if n < 2 {
         return centres;
     }
-    let diameter = 2.0 * radius;
-    push_apart(&mut centres, diameter);
-    shake(&mut centres, diameter, stream);
+    push_apart(&mut centres, 2.0 * radius);
     centres
 }
 
@@ -66,14 +65,6 @@ impl Grid {
             .flat_map(move |y| range(x).map(move |x| (y * self.side + x) as usize))
             .flat_map(|cell| self.cells[cell].iter().map(|&i| i as usize))
     }
-
-    fn move_disc(&mut self, disc: usize, from: DVec2, to: DVec2) {
-        let (a, b) = (self.cell(from), self.cell(to));
-        if a != b {
-            self.cells[a].retain(|&i| i as usize != disc);
-            self.cells[b].push(disc as u32);
-        }
-    }
 }
 
 /// Moves overlapping discs apart, each pair by half of what it overlaps, until none does or nothing more is gained.
@@ -107,36 +98,6 @@ fn push_apart(centres: &mut [DVec2], diameter: f64) {
     }
 }
 
-/// Steps of the random walk for each disc.
-const SHAKES: usize = 200;
-
-fn shake(centres: &mut [DVec2], diameter: f64, stream: &mut Stream) {
-    let mut grid = Grid::new(centres, diameter);
-    let n = centres.len() as f64;
-    // A step about as long as the room that a disc has.
-    let spacing = (std::f64::consts::PI / n).sqrt();
-    let reach = (spacing - diameter).max(0.05 * diameter).max(0.02 * spacing);
-    for _ in 0..SHAKES {
-        for i in 0..centres.len() {
-            let step = DVec2::new(f64::from(stream.next()) - 0.5, f64::from(stream.next()) - 0.5);
-            let from = centres[i];
-            let to = from + 2.0 * reach * step;
-            if to.length_squared() > 1.0 {
-                continue;
-            }
-            // Where discs overlap from the start a step is taken if it makes no overlap worse.
-            let free = grid.near(to).filter(|&j| j != i).all(|j| {
-                let there = to.distance_squared(centres[j]);
-                there >= diameter * diameter || there >= from.distance_squared(centres[j])
-            });
-            if free {
-                grid.move_disc(i, from, to);
-                centres[i] = to;
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -162,7 +123,7 @@ mod tests {
             }
             // Half of the core's area holds about half of the centres; discs line up at the wall when dense.
             let share = inner / total;
-            assert!(count < 10 || (0.36..0.56).contains(&share), "{count} discs at {density}: {share}");
+            assert!(count < 10 || (0.44..0.56).contains(&share), "{count} discs at {density}: {share}");
         }
     }
 

@@ -1,0 +1,79 @@
+//! `yarnray make fibers`: the explicit fibres or plies of a scene's cloth as curve files.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Failure, SceneArgs, make::write_curves};
+use crate::{
+    geometry::curve::CurveSet,
+    geometry::curve_file,
+    scene::Mode,
+    trace::{self, Estimate},
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray make fibers scenes/woven_silk.toml -o silk.txt          every fibre, as x y z radius for Mitsuba's bsplinecurve
+  yarnray make fibers scenes/knit.toml --mode ply -o plies.hair   one curve for each ply
+  yarnray make fibers scenes/knit.toml --estimate                 how many there would be
+
+The extension names the format: .bcc (no radii), .hair, .txt (x y z radius). Positions are millimetres.";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct FibersArgs {
+    /// The scene (.toml).
+    scene: PathBuf,
+    /// Where to write; the extension names the format (.bcc, .hair, .txt). Repeatable.
+    #[arg(short, long = "out", value_name = "PATH", required_unless_present = "estimate")]
+    out: Vec<PathBuf>,
+    /// Only tell how many curves' points there would be, and how much memory they take.
+    #[arg(long)]
+    estimate: bool,
+    /// Say nothing.
+    #[arg(long)]
+    quiet: bool,
+    #[command(flatten)]
+    options: SceneArgs,
+}
+
+pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
+    let mut scene = args.options.load(&args.scene)?;
+    // Yarns are what the scene's own curve files hold: this command is for what is in them.
+    if scene.render.mode == Mode::Yarn {
+        scene.render.mode = Mode::Fiber;
+    }
+    if args.estimate {
+        let total: Estimate = trace::estimates(&scene).into_iter().sum();
+        println!(
+            "{} control points, {} segments; {} of curves and {} of BVH when rendered",
+            total.points,
+            total.segments,
+            super::bytes_in_words(total.geometry_bytes),
+            super::bytes_in_words(total.bvh_bytes)
+        );
+    }
+    for path in &args.out {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if !curve_file::can_write(path) || extension.as_deref() == Some("obj") {
+            let problem = format!("error: {}: expected a name that ends in .bcc, .hair or .txt", path.display());
+            return Err(Failure::Input(problem));
+        }
+    }
+    if args.out.is_empty() {
+        return Ok(());
+    }
+    let curves = trace::curves(&scene)?;
+    let set = CurveSet { curves, unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
+    for path in &args.out {
+        write_curves(path, &set)?;
+    }
+    if !args.quiet {
+        for path in &args.out {
+            eprintln!("wrote {}", path.display());
+        }
+        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+        eprintln!("{} curves, {points} control points", set.curves.len());
+    }
+    Ok(())
+}
