@@ -175,3 +175,35 @@ fn a_lobe_that_is_left_out_is_dark_in_every_mode() {
         assert!(lobe(&whole) > 0.0 && lobe(&without) == 0.0, "{mode}");
     }
 }
+
+#[test]
+fn fibers_are_written_for_other_programs_and_come_back_as_the_same_cloth() {
+    let (directory, path) = weave(12, "");
+    let scene = path.to_str().unwrap();
+    let args = ["make", "fibers", scene, "-o", "fibers.txt", "-o", "fibers.hair", "-o", "fibers.bcc", "--quiet"];
+    yarnray(directory.path(), &args).good();
+    let info = |file: &str| -> serde_json::Value {
+        let run = yarnray(directory.path(), &["info", file, "--json"]).good();
+        serde_json::from_str(&run.stdout).unwrap()
+    };
+    for file in ["fibers.txt", "fibers.hair", "fibers.bcc"] {
+        assert_eq!(info(file)["curves"], 12 * 3 * 12, "{file}");
+    }
+    // The same camera and light on the fibres of the file: each pixel sees the same fibres.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let source = "source = { type = \"file\", path = \"fibers.txt\", basis = \"b-spline\" }";
+    let again = text
+        .replace("yarn = \"y\"", "fiber = \"silk\"")
+        .replace("source = { type = \"file\", path = \"weave.txt\" }", source)
+        .replace("direction = [0.3, 0.2, 1]\n        margin = -0.3", "position = [3, 2, 40]\n        fov = 20");
+    let first =
+        text.replace("direction = [0.3, 0.2, 1]\n        margin = -0.3", "position = [3, 2, 40]\n        fov = 20");
+    let first = picture(&write(directory.path(), "first.toml", first), &["--mode", "fiber", "--spp", "32"]);
+    let again = picture(&write(directory.path(), "again.toml", again), &["--spp", "32"]);
+    for (a, b) in first.mean().into_iter().zip(again.mean()) {
+        assert!((a / b - 1.0).abs() < 0.01, "{a} and {b}");
+    }
+    let wrong = yarnray(directory.path(), &["make", "fibers", scene, "-o", "fibers.xyz"]);
+    assert_eq!(wrong.status, Some(2));
+    assert!(wrong.stderr.contains("fibers.xyz: expected a name that ends in"), "{}", wrong.stderr);
+}

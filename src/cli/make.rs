@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use glam::DVec2;
 
-use super::Failure;
+use super::{
+    Failure,
+    fibers::{self, FibersArgs},
+};
 use crate::{
     geometry::{
         curve::CurveSet,
@@ -44,6 +47,8 @@ enum What {
     Knit(KnitArgs),
     /// Woven cloth from a draft.
     Weave(WeaveArgs),
+    /// The explicit fibres or plies of a scene's cloth.
+    Fibers(Box<FibersArgs>),
 }
 
 /// What all of them share.
@@ -147,6 +152,7 @@ pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
     match &args.what {
         What::Knit(args) => knit(args),
         What::Weave(args) => weave(args),
+        What::Fibers(args) => fibers::run(args),
     }
 }
 
@@ -258,7 +264,7 @@ fn write(strands: Vec<PatternStrand>, output: &Output, weft_radius: f64) -> Resu
 }
 
 /// Writes curves to a file that appears whole or not at all.
-fn write_curves(path: &Path, set: &CurveSet) -> Result<(), Failure> {
+pub(super) fn write_curves(path: &Path, set: &CurveSet) -> Result<(), Failure> {
     Ok(output::write_file(path, |file| {
         let mut file = std::io::BufWriter::new(file);
         curve_file::write(path, set, &mut file)?;

@@ -6,6 +6,7 @@
 mod bench;
 mod compare;
 mod converge;
+mod fibers;
 mod info;
 mod log;
 mod make;
