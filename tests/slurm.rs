@@ -152,7 +152,7 @@ fn a_requeued_array_of_shards_makes_the_frame_of_one_machine() {
         }
     };
     write(d, "s.toml", SWATCH);
-    let options = ["--spp", "6000", "--crop", "10,10,30,22"];
+    let options = ["--spp", "4000", "--crop", "10,10,30,22"];
     let submit = project("tools/slurm/submit");
     let args = [&["3", "s.toml", "frame.exr"], &options[..], &["--checkpoint-every", "0.2"]].concat();
     let merge = slurm.tool(submit, &args).expect("the jobs are accepted");
