@@ -24,7 +24,7 @@ fn noise_falls_as_one_over_time() {
     ];
     let run = yarnray(d, &args).good();
     assert_eq!(run.stdout.lines().count(), 2, "{}", run.stdout);
-    assert!(run.stderr.contains("converged picture of yarn:two-stream: half 2 of 2, 128 spp"), "{}", run.stderr);
+    assert!(run.stderr.contains("converged picture of yarn:two-stream: half 2 of 2, 96 spp"), "{}", run.stderr);
     assert_eq!(listing(&d.join("out/converge")), ["converge.csv", "converge.json", "converge.svg"]);
     assert_eq!(listing(&d.join("out/cache")).len(), 2);
 

@@ -66,9 +66,6 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         text => Some(Method::parse(text).map_err(|e| Failure::Input(format!("error: --reference {text}: {e}")))?),
     };
     let files = ["converge.csv", "converge.json", "converge.svg"].map(|name| args.out.join(name));
-    for file in &files {
-        output::check_target(file)?;
-    }
     let cache = args.cache.clone().unwrap_or_else(|| args.out.parent().unwrap_or(&args.out).join("cache"));
     let load = |method: Method| {
         let mut options = args.options.clone();
@@ -79,6 +76,9 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         options.load(&args.scene).map_err(|error| error.to_string())
     };
     let plain = args.options.load(&args.scene)?;
+    for file in &files {
+        output::check_target(file)?;
+    }
     let methods = if args.methods.is_empty() {
         let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };
         reference.into_iter().filter(|method| *method != yarn).chain([yarn]).collect()
