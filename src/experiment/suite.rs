@@ -32,7 +32,7 @@ pub struct Suite {
     pub repeats: u32,
     /// Converged pictures have at most the target over this as their estimated relMSE.
     pub converged: f64,
-    /// Timed runs take at least this long, by more samples than the target needs.
+    /// Timed runs that take less are made more often, until they take this long together.
     pub min_seconds: f64,
     /// Most samples per pixel of any run.
     pub max_spp: u32,

@@ -3,8 +3,7 @@
 //! For each case and method: two halves of a converged picture, until the sample variance promises a fraction of the target;
 //! from their noise the samples that the target needs; then timed runs, methods by turns, so that a machine that
 //! slows down slows both. A timed run's error is measured against its own converged picture of other seeds, without the latter's
-//! noise, and its time is scaled by error over target: error falls as one over time, and the runs are near the target, or take the
-//! suite's shortest time.
+//! noise, and its time is scaled by error over target, from which it is not far: error falls about as one over time.
 //! Every run is a process of its own, so that its memory is its own.
 
 use std::{
@@ -211,6 +210,9 @@ impl Figures {
 /// Seeds: the first halves of converged pictures have 1, the second 2, timed runs 3 and on.
 const FIRST_TIMED_SEED: u32 = 3;
 
+/// Most runs in a row of what is over in a moment.
+const MOST_OFTEN: f64 = 10.0;
+
 /// Runs a suite. Rows that `directory` holds already, from the same program and of the same scenes, are taken from there;
 /// new ones are kept there. After every row `saved` gets the table so far; `say` is told what is being done.
 ///
@@ -313,34 +315,34 @@ fn measure(
     }
     let methods = [suite.reference, suite.tested];
     let truths = [&reference, &tested];
-    let spp = truths.map(|truth| {
-        // What is over in a moment cannot be timed.
-        let needed = (sample_noise(truth) / suite.target).max(suite.min_seconds / truth.sample_seconds.max(1e-9));
-        needed.ceil().clamp(1.0, f64::from(suite.max_spp)) as u32
-    });
+    let spp =
+        truths.map(|truth| (sample_noise(truth) / suite.target).ceil().clamp(1.0, f64::from(suite.max_spp)) as u32);
     let mut timed: [Vec<(Figures, f64)>; 2] = [Vec::new(), Vec::new()];
+    // What is over in a moment is timed more often: more samples would not do, for stratified samples gain more than one over
+    // their number.
+    let often = [0, 1].map(|side| {
+        let seconds = f64::from(spp[side]) * truths[side].sample_seconds;
+        (suite.min_seconds / seconds.max(1e-9)).ceil().clamp(1.0, MOST_OFTEN) as u32
+    });
     for repeat in 0..suite.repeats {
         for side in 0..2 {
             let method = methods[side];
-            say(&format!("{}: {method}, timed run {} of {}, {} spp", case.name, repeat + 1, suite.repeats, spp[side]));
-            let job = Job {
-                case,
-                method,
-                set: &[],
-                spp: spp[side],
-                noise: None,
-                seed: FIRST_TIMED_SEED + repeat,
-                lobes: false,
-            };
-            let done = renderer.render(suite, &job)?;
-            let error = truths[side].halves.rel_mse(&colors(&done.image)?);
-            let expected = sample_noise(truths[side]) / f64::from(spp[side]);
-            if error.is_nan() || error <= 0.2 * expected {
-                return Err(BenchError::Case(format!(
-                    "the error of a run by {method} cannot be measured: {error:.2e}, expected {expected:.2e}"
-                )));
+            for again in 0..often[side] {
+                let number = repeat * often[side] + again;
+                let all = suite.repeats * often[side];
+                say(&format!("{}: {method}, timed run {} of {all}, {} spp", case.name, number + 1, spp[side]));
+                let seed = FIRST_TIMED_SEED + number;
+                let job = Job { case, method, set: &[], spp: spp[side], noise: None, seed, lobes: false };
+                let done = renderer.render(suite, &job)?;
+                let error = truths[side].halves.rel_mse(&colors(&done.image)?);
+                let expected = sample_noise(truths[side]) / f64::from(spp[side]);
+                if error.is_nan() || error <= 0.2 * expected {
+                    return Err(BenchError::Case(format!(
+                        "the error of a run by {method} cannot be measured: {error:.2e}, expected {expected:.2e}"
+                    )));
+                }
+                timed[side].push((Figures::of(&done.stats)?, error));
             }
-            timed[side].push((Figures::of(&done.stats)?, error));
         }
     }
     let size = [reference.halves.width, reference.halves.alpha.len() / reference.halves.width.max(1)];
@@ -365,9 +367,9 @@ fn measure(
     })
 }
 
-/// The relMSE of one sample per pixel. One half has half of the samples, and noise falls as one over their number.
+/// The relMSE of one sample per pixel, if noise falls as one over their number, from that of one half with half of the samples.
 fn sample_noise(truth: &Converged) -> f64 {
-    0.5 * truth.spp * truth.half_noise
+    0.5 * truth.spp * truth.halves.half_rel_mse()
 }
 
 /// Means over timed runs, each scaled to the target.

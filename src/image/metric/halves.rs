@@ -32,6 +32,15 @@ impl Halves {
         a.iter().zip(b).map(|(a, b)| std::array::from_fn(|k| 0.25 * (a[k] - b[k]).powi(2))).collect()
     }
 
+    /// relMSE of one half, from the difference of the two: what its samples leave, stratified as they are.
+    pub fn half_rel_mse(&self) -> f64 {
+        let (mean, variance) = (self.mean(), self.variance());
+        let channels = mean.as_flattened().iter().zip(variance.as_flattened());
+        // The mean of two varies half as much as each.
+        let relative = channels.map(|(m, v)| 2.0 * f64::from(*v) / (f64::from(*m).powi(2) + EPSILON));
+        relative.sum::<f64>() / (3 * mean.len()) as f64
+    }
+
     /// relMSE of a picture against what the halves converge to, over all pixels. May be slightly negative where there is
     /// no error.
     pub fn rel_mse(&self, picture: &[[f32; 3]]) -> f64 {
@@ -108,6 +117,8 @@ mod tests {
         // The noise of the picture itself: 0.01 / (0.25 + 0.01).
         let found = reference.rel_mse(&picture(90_000_000, 0.1, false));
         assert!((found - 0.01 / 0.26).abs() < 0.1 * 0.01 / 0.26, "{found}");
+        let half = reference.half_rel_mse();
+        assert!((half - 0.0016 / 0.26).abs() < 0.1 * 0.0016 / 0.26, "{half}");
         let exact = reference.rel_mse(&vec![[0.5; 3]; 64 * 64]);
         assert!(exact.abs() < 3e-4, "a single half has 0.006: {exact}");
         let variance = reference.variance().as_flattened().iter().map(|v| f64::from(*v)).sum::<f64>() / 12288.0;

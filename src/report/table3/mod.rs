@@ -202,9 +202,9 @@ impl Table {
         vec![
             format!("Machine: {}. Program: {}.", self.machine, self.commit),
             format!(
-                "Equal quality: every time is the time of rendering to an error of {} in {}. Each figure is the mean of {} runs of each kind, \
-                 taken by turns, each a process of its own; a run takes about the samples that the target needs, or more if \
-                 that is too short to be timed, and its time is scaled by its own error over the target.",
+                "Equal quality: every time is the time of rendering to an error of {} in {}. Each figure is the mean of {} runs of each kind (more of what is over in a moment), \
+                 taken by turns, each a process of its own; a run takes about the samples that the target needs, and its time is \
+                 scaled by its own error over the target.",
                 self.target,
                 self.metric,
                 self.repeats
