@@ -86,7 +86,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
             }
             curve.push(DVec3::from_array(p));
         }
-        let radii = if has(THICKNESS) == 1 {
+        let mut radii = if has(THICKNESS) == 1 {
             let mut radii = Vec::with_capacity(count);
             for point in first..first + count {
                 let at = thickness_start + 4 * point;
@@ -102,6 +102,10 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         };
         // As in text files: who repeats the first point means a ring.
         let ring = count >= 4 && curve.first() == curve.last();
+        if ring {
+            curve.pop();
+            radii.iter_mut().for_each(|r| r.truncate(count - 1));
+        }
         repair.add(
             options.basis.unwrap_or(Basis::CatmullRom),
             if ring { Ends::Closed } else { Ends::Open },
@@ -207,7 +211,7 @@ mod tests {
         let bytes = written(&set);
         assert_eq!(bytes.len(), 128 + 3 * 2 + 11 * 16);
         let again = parse(&bytes, &ReadOptions::default()).unwrap();
-        assert_eq!(again.curves, set.curves);
+        assert_eq!(again, set);
         assert_eq!(written(&again), bytes);
     }
 

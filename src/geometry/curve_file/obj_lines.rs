@@ -23,6 +23,9 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
             return;
         }
         let ring = chain.len() >= 4 && chain.first() == chain.last();
+        if ring {
+            chain.pop();
+        }
         let points = chain.drain(..).map(|i| vertices[i]).collect();
         repair.add(basis, if ring { Ends::Closed } else { Ends::Open }, points, None);
     };

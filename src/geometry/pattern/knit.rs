@@ -66,7 +66,7 @@ const LARGEST_CELL: u32 = 2048;
 /// A periodic cell is at least this wide and high, in diameters: neighbours must not meet their own images.
 const SMALLEST_CELL: f64 = 9.0;
 const CELL_ROUNDS: usize = 500;
-const PIECE_ROUNDS: usize = 112;
+const PIECE_ROUNDS: usize = 160;
 
 impl Knit {
     /// How many control points the cloth would have at most if it kept its width.

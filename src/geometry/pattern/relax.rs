@@ -284,7 +284,7 @@ mod tests {
         let rest = 16.0 / n as f64;
         let ropes = vec![Rope { first: 0, count: n, ends: Ends::Joined(DVec3::ZERO), rest }];
         let mut r = Relaxation { pinned: vec![false; n], points, ropes, period: None };
-        r.run(1000, |_| {});
+        r.run(6000, |_| {});
         let middle = r.points.iter().sum::<DVec3>() / n as f64;
         let radii: Vec<f64> = r.points.iter().map(|p| p.distance(middle)).collect();
         let (low, high) = radii.iter().fold((f64::MAX, 0.0_f64), |(l, h), &x| (l.min(x), h.max(x)));
