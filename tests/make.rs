@@ -33,7 +33,7 @@ fn the_same_knit_is_the_same_file_and_keeps_its_yarns_apart() {
     for file in ["a.bcc", "b.bcc"] {
         yarnray(
             d,
-            &["make", "knit", "--pattern", "rib1x1", "--stitches", "12", "--rows", "6", "--form", "tube", "-o", file],
+            &["make", "knit", "--pattern", "rib2x2", "--stitches", "24", "--rows", "6", "--form", "tube", "-o", file],
         )
         .good();
     }

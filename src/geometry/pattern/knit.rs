@@ -65,6 +65,9 @@ pub const POINTS: u32 = 24;
 const LARGEST_CELL: u32 = 2048;
 /// A periodic cell is at least this wide and high, in diameters: neighbours must not meet their own images.
 const SMALLEST_CELL: f64 = 9.0;
+/// Tubes of a smaller radius, in diameters, are relaxed as a whole if they have no more than so many stitches.
+const NARROW_TUBE: f64 = 60.0;
+const LARGEST_NARROW_TUBE: u64 = 20_000;
 const CELL_ROUNDS: usize = 500;
 const PIECE_ROUNDS: usize = 160;
 
@@ -110,8 +113,14 @@ impl Knit {
         let even = rows.iter().all(|r| r.len() == rows[0].len());
         let cell_width = self.chart.even_width(LARGEST_CELL);
         let repeats = even && cell_width.is_some_and(|w| w * self.chart.rows() <= LARGEST_CELL);
+        // A cell bent round a narrow tube is pressed together on the inside: relax such a tube as a whole.
+        let narrow = self.form == Form::Tube
+            && width * f64::from(self.stitches) / TAU < NARROW_TUBE
+            && u64::from(self.stitches) * u64::from(self.rows) <= LARGEST_NARROW_TUBE;
         let made = match (&self.form, cell_width) {
-            (Form::Flat | Form::Tube, Some(cell_width)) if repeats => self.repeat_cell(cell_width, [width, height]),
+            (Form::Flat | Form::Tube, Some(cell_width)) if repeats && !narrow => {
+                self.repeat_cell(cell_width, [width, height])
+            }
             (form, _) => {
                 let natural = f64::from(self.rows) * height;
                 let surface = match form {
