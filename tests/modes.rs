@@ -195,9 +195,14 @@ fn fibers_are_written_for_other_programs_and_come_back_as_the_same_cloth() {
     let again = text
         .replace("yarn = \"y\"", "fiber = \"silk\"")
         .replace("source = { type = \"file\", path = \"weave.txt\" }", source)
-        .replace("direction = [0.3, 0.2, 1]\n        margin = -0.3", "position = [3, 2, 40]\n        fov = 20");
-    let first =
-        text.replace("direction = [0.3, 0.2, 1]\n        margin = -0.3", "position = [3, 2, 40]\n        fov = 20");
+        .replace(
+            "direction = [0.3, 0.2, 1]\n        margin = -0.3",
+            "type = \"perspective\"\n        position = [3, 2, 40]\n        fov = 20",
+        );
+    let first = text.replace(
+        "direction = [0.3, 0.2, 1]\n        margin = -0.3",
+        "type = \"perspective\"\n        position = [3, 2, 40]\n        fov = 20",
+    );
     let first = picture(&write(directory.path(), "first.toml", first), &["--mode", "fiber", "--spp", "32"]);
     let again = picture(&write(directory.path(), "again.toml", again), &["--spp", "32"]);
     for (a, b) in first.mean().into_iter().zip(again.mean()) {
