@@ -106,14 +106,8 @@ pub fn run(
             if interrupt.load(Ordering::Relaxed) {
                 return Err(ConvergeError::Interrupted);
             }
-            let noise = rendered.film.noise().map_or(0.0, |n| n.estimate);
             let seconds = rendered.elapsed.as_secs_f64();
-            halves.push(Half {
-                image: image_of(&rendered.film),
-                spp: f64::from(options.converged_spp),
-                noise,
-                seconds,
-            });
+            halves.push(Half { image: image_of(&rendered.film), spp: f64::from(options.converged_spp), seconds });
         }
         let converged = Converged::new(&halves[0], &halves[1])
             .ok_or_else(|| ConvergeError::Failed("error: a picture without colours".to_owned()))?;

@@ -26,8 +26,6 @@ pub struct Converged {
     pub halves: Halves,
     /// Samples per pixel of both together.
     pub spp: f64,
-    /// The relMSE that the sample variance of one half promises, for choosing sample counts.
-    pub half_noise: f64,
     /// Seconds that a sample per pixel took, for choosing sample counts.
     pub sample_seconds: f64,
     /// Light by lobe, as [`LOBES`], where it was asked for; of the first half.
@@ -41,8 +39,6 @@ pub struct Half {
     pub image: Image,
     /// Samples per pixel.
     pub spp: f64,
-    /// Estimated relMSE.
-    pub noise: f64,
     /// Seconds of rendering.
     pub seconds: f64,
 }
@@ -62,9 +58,9 @@ impl Converged {
             colors: [colors(&first.image)?, colors(&second.image)?],
             alpha: a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect(),
         };
-        let (spp, half_noise) = (first.spp + second.spp, 0.5 * (first.noise + second.noise));
+        let spp = first.spp + second.spp;
         let sample_seconds = (first.seconds + second.seconds) / spp;
-        Some(Self { halves, spp, half_noise, sample_seconds, lobes: lobes(&first.image) })
+        Some(Self { halves, spp, sample_seconds, lobes: lobes(&first.image) })
     }
 
     /// Reads what [`Self::store`] has written; `None` if there is no such file, or another program has written it.
@@ -87,7 +83,6 @@ impl Converged {
         Some(Self {
             halves: Halves { width: image.width, colors, alpha: image.channel("A")?.to_vec() },
             spp: number("yarnray.spp")?,
-            half_noise: number("yarnray.half_noise")?,
             sample_seconds: number("yarnray.sample_seconds")?,
             lobes: lobes.try_into().ok(),
         })
@@ -115,7 +110,6 @@ impl Converged {
         let mut layout = ExrLayout::new(width, mean.len() / width.max(1), channels);
         layout.attributes = vec![
             ("yarnray.spp".to_owned(), Attribute::Double(self.spp)),
-            ("yarnray.half_noise".to_owned(), Attribute::Double(self.half_noise)),
             ("yarnray.sample_seconds".to_owned(), Attribute::Double(self.sample_seconds)),
         ];
         exr::write(path, &layout, |y, lines| {
@@ -183,7 +177,7 @@ mod tests {
             let samples = (0..20).map(|p| level + p as f32 + 0.1 * i as f32).collect();
             image.channels.push(Channel { name, samples });
         }
-        Half { image, spp: 32.0, noise: 0.125, seconds: 8.0 }
+        Half { image, spp: 32.0, seconds: 8.0 }
     }
 
     #[test]
@@ -192,7 +186,7 @@ mod tests {
         let path = path(directory.path(), &["a", "b"]);
         assert_eq!(Converged::load(&path), None);
         let converged = Converged::new(&half(1.0), &half(2.0)).unwrap();
-        assert_eq!((converged.spp, converged.half_noise, converged.sample_seconds), (64.0, 0.125, 0.25));
+        assert_eq!((converged.spp, converged.sample_seconds), (64.0, 0.25));
         converged.store(&path).unwrap();
         assert_eq!(Converged::load(&path), Some(converged.clone()));
         let image = image::read(&path).unwrap();

@@ -184,7 +184,6 @@ struct Figures {
     bounces: f64,
     spp: f64,
     rays: f64,
-    noise: f64,
 }
 
 impl Figures {
@@ -202,7 +201,6 @@ impl Figures {
             bounces: number("/mean_bounces")?,
             spp: number("/image/spp_mean")?,
             rays: number("/rays/camera")? + number("/rays/bounce")? + number("/rays/shadow")?,
-            noise: number("/noise/rel_mse_estimate")?,
         })
     }
 }
@@ -424,7 +422,7 @@ fn converge(
         say(&format!("{}: {label}, converged picture, half {number} of 2", job.case.name));
         let done = renderer.render(suite, &Job { spp, noise, seed: number, ..job.clone() })?;
         let figures = Figures::of(&done.stats)?;
-        Ok(Half { image: done.image, spp: figures.spp, noise: figures.noise, seconds: figures.seconds })
+        Ok(Half { image: done.image, spp: figures.spp, seconds: figures.seconds })
     };
     let first = half(1, job.spp, Some(limit))?;
     let second = half(2, first.spp.round() as u32, None)?;

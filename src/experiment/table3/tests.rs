@@ -65,7 +65,6 @@ impl Renderer for Fake {
             "memory": {"geometry_bytes": bytes, "bvh_bytes": 2 * bytes, "peak_rss_bytes": 100 * bytes},
             "mean_bounces": if side == 0 { 8.0 } else { 2.0 }, "image": {"spp_mean": spp},
             "rays": {"camera": spp, "bounce": 2.0 * spp, "shadow": spp},
-            "noise": {"rel_mse_estimate": relative / spp},
         });
         Ok(Done { image, stats })
     }
