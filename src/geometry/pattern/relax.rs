@@ -54,11 +54,17 @@ struct Pair {
     second: u32,
     /// What is added to the second to bring it beside the first.
     shift: DVec3,
+    /// Rounds until they could touch: not looked at before.
+    rest: u8,
 }
 
 /// Contacts are looked for this much beyond touching, and again after so many rounds.
 const MARGIN: f64 = 0.3;
 const ROUNDS_PER_SEARCH: usize = 8;
+/// After so many rounds little moves, and half as many searches do.
+const SETTLED: usize = 32;
+/// Two yarns come nearer by less than this in a round, but for the first few.
+const STEP: f64 = 0.04;
 /// Yarns are kept this far apart: a little more than they need, for what a spline does between points.
 const APART: f64 = 1.025;
 /// How firmly curves straighten, 0 to 1.
@@ -75,7 +81,8 @@ impl Relaxation {
         let segments = self.segments();
         let mut pairs = Vec::new();
         for round in 0..rounds {
-            if round % ROUNDS_PER_SEARCH == 0 {
+            let often = if round < SETTLED { ROUNDS_PER_SEARCH } else { 2 * ROUNDS_PER_SEARCH };
+            if round % often == 0 {
                 pairs = self.search(&segments);
             }
             let settling = round as f64 > (1.0 - SETTLING) * rounds as f64;
@@ -84,11 +91,11 @@ impl Relaxation {
             if round % 2 == 0 {
                 self.straighten(stiffness, false);
                 self.keep_length(segments.iter(), firmness);
-                self.part(&segments, pairs.iter());
+                self.part(&segments, pairs.iter_mut());
             } else {
                 self.straighten(stiffness, true);
                 self.keep_length(segments.iter().rev(), firmness);
-                self.part(&segments, pairs.iter().rev());
+                self.part(&segments, pairs.iter_mut().rev());
             }
             tidy(&mut self.points);
         }
@@ -118,7 +125,7 @@ impl Relaxation {
     fn search(&self, segments: &[Segment]) -> Vec<Pair> {
         let middles: Vec<DVec3> = segments.iter().map(|s| 0.5 * (self.ends(s).0 + self.ends(s).1)).collect();
         let halves: Vec<f64> = segments.iter().map(|s| 0.5 * self.ends(s).0.distance(self.ends(s).1)).collect();
-        let longest = 2.0 * halves.iter().copied().fold(0.1, f64::max).min(1.0);
+        let longest = 2.0 * halves.iter().copied().fold(0.1, f64::max).min(0.5);
         let reach = 1.0 + MARGIN + longest;
         let grid = Grid::new(&middles, reach, self.period);
         let of_segment = |i: usize| -> Vec<Pair> {
@@ -158,7 +165,7 @@ impl Relaxation {
                 let (q0, q1) = self.ends(b);
                 let d = nearest(p0, p1, q0 + shift, q1 + shift).between.length_squared();
                 if d < (1.0 + MARGIN) * (1.0 + MARGIN) {
-                    found.push(Pair { first: i as u32, second: j, shift });
+                    found.push(Pair { first: i as u32, second: j, shift, rest: 0 });
                 }
             });
             found
@@ -216,14 +223,19 @@ impl Relaxation {
         }
     }
 
-    fn part<'a>(&mut self, segments: &[Segment], pairs: impl Iterator<Item = &'a Pair>) {
+    fn part<'a>(&mut self, segments: &[Segment], pairs: impl Iterator<Item = &'a mut Pair>) {
         for pair in pairs {
+            if pair.rest > 0 {
+                pair.rest -= 1;
+                continue;
+            }
             let (a, b) = (&segments[pair.first as usize], &segments[pair.second as usize]);
             let (p0, p1) = self.ends(a);
             let (q0, q1) = self.ends(b);
             let near = nearest(p0, p1, q0 + pair.shift, q1 + pair.shift);
             let distance = near.between.length();
             if !(1e-9..APART).contains(&distance) {
+                pair.rest = ((distance - APART) / STEP).clamp(0.0, 255.0) as u8;
                 continue;
             }
             let (s, t) = (near.s, near.t);
