@@ -13,7 +13,8 @@
 //! | several plies | in order | in order | Eq. 14 |
 //!
 //! [`ChordModel::DualScattering`] is the classical form that the paper starts from (Zinke et al. 2008, Yuksel 2008): as
-//! `Paper`, but the averaged fibre has no D, and light turns back among infinitely many fibres.
+//! `Paper`, but the averaged fibre has no D, and light that meets a fibre turns back among infinitely many. It is not missed
+//! in what passes, so that thin yarns of pale fibres return more than they get.
 //!
 //! In order: B_1 + F_1^2 B_2 + F_1^2 F_2^2 B_3 ..., which is what Eq. 14 seems to mean; as printed it counts each ply
 //! twice and dims none. Forward, plies multiply (Eq. 14). All three use the kernel of [`super::kernel`] for every
@@ -239,7 +240,8 @@ impl ChordYarn {
                 }
                 ChordModel::DualScattering => {
                     let (once, thrice) = endless_back(loss, back);
-                    (once + thrice, poisson_passed(loss, n), -(-n).exp_m1())
+                    let met = -(-n).exp_m1();
+                    ((once + thrice) * met, poisson_passed(loss, n), met)
                 }
                 ChordModel::Printed => {
                     (back * once_back(loss, n) + back.powi(3) * thrice_back(loss, n), passed(loss, n), 1.0)

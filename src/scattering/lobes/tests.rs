@@ -341,7 +341,7 @@ fn samples_fall_where_the_density_says() {
 
 #[test]
 fn no_number_of_fibers_plies_or_albedo_makes_light_but_in_the_printed_model() {
-    let mut largest = [0f64; 3];
+    let mut largest = [0f64; MODELS.len()];
     for (k, model) in MODELS.into_iter().enumerate() {
         for albedo in [
             [0.0, 0.0, 0.0],
@@ -386,7 +386,10 @@ fn no_number_of_fibers_plies_or_albedo_makes_light_but_in_the_printed_model() {
         }
     }
     eprintln!("largest energies: {largest:?}");
-    assert!(largest[0] <= 1.0 + 1e-9 && largest[1] <= 1.0 + 1e-9 && largest[2] > 1.9, "{largest:?}");
+    let [two_stream, paper, dual, printed] = largest;
+    assert!(two_stream <= 1.0 + 1e-9 && paper <= 1.0 + 1e-9 && printed > 1.9, "{largest:?}");
+    // Light that turns back among endlessly many fibres is not missed in what passes the few that there are.
+    assert!(dual < 1.6, "{largest:?}");
 }
 
 #[test]
