@@ -389,7 +389,7 @@ fn no_number_of_fibers_plies_or_albedo_makes_light_but_in_the_printed_model() {
     let [two_stream, paper, dual, printed] = largest;
     assert!(two_stream <= 1.0 + 1e-9 && paper <= 1.0 + 1e-9 && printed > 1.9, "{largest:?}");
     // Light that turns back among endlessly many fibres is not missed in what passes the few that there are.
-    assert!(dual < 1.6, "{largest:?}");
+    assert!((1.5..1.8).contains(&dual), "{largest:?}");
 }
 
 #[test]
