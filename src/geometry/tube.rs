@@ -129,7 +129,7 @@ pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
 /// The control points of the uniform cubic B-spline that passes through `knots` (at least two), with the radius `w`
 /// of each knot. At its ends the curve does not bend.
 ///
-/// Control points c obey (c[i-1] + 4 c[i] + c[i+1]) / 6 = knot i; the tridiagonal system is solved in one sweep each way.
+/// Control points c obey `(c[i-1] + 4 c[i] + c[i+1]) / 6 = knot[i]`; the tridiagonal system is solved in one sweep each way.
 pub fn spline_through(knots: &[Vec3], radii: impl Fn(usize) -> f32) -> Vec<Vec4> {
     let n = knots.len();
     debug_assert!(n >= 2, "a curve has two points");

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::{
-    Attribute, Compression, Image, ImageError,
+    Attribute, Image, ImageError,
     exr::{ChannelSpec, ExrLayout, Line, Sample},
     output::{self, Format},
     png::{self, Display, ToneMap, linear_to_srgb, srgb_to_linear},
@@ -501,7 +501,7 @@ mod with_openimageio {
     fn our_exr_reads_the_same_through_openimageio() {
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("picture.exr");
-        for (name, compression) in Compression::NAMES {
+        for (name, compression) in super::super::Compression::NAMES {
             super::super::exr::write(&path, &ExrLayout { compression, ..layout() }, fill).expect("a writable EXR");
             let (ours, theirs) = (read(&path).expect("ours"), facade::read(&path).expect("theirs"));
             assert_eq!((ours.width, ours.height, ours.origin), (theirs.width, theirs.height, theirs.origin), "{name}");

@@ -3,7 +3,7 @@
 //! A path tracer with next event estimation and multiple importance sampling. The one special thing is cloth: a ray
 //! that meets a yarn is let through with the chance that it meets no fibre (which is no scattering event), else it
 //! scatters at a vertex of the yarn's model, and goes on from inside the yarn, whose own plies the model has already
-//! put in its way. An explicit fibre scatters at its surface ([`fiber`]).
+//! put in its way. An explicit fibre scatters at its surface (`fiber`).
 
 pub(crate) mod fiber;
 mod parts;

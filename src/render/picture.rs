@@ -105,7 +105,7 @@ pub fn denoised_path(path: &Path) -> Option<PathBuf> {
 /// Writes a denoised picture as a file of its own.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_denoised(path: &Path, frame: &Frame, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
     output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {

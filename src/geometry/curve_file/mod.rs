@@ -222,7 +222,7 @@ fn written_as(path: &Path) -> Option<Format> {
     }
 }
 
-/// Whether [`write`] knows a format by this name.
+/// Whether [`write()`] knows a format by this name.
 pub fn can_write(path: &Path) -> bool {
     written_as(path).is_some()
 }

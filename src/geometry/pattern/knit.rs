@@ -3,7 +3,7 @@
 //! Each stitch begins as a closed form (after Crane, "A Simple Parametric Model of Plain-Knit Yarns", 2023:
 //! x = t + a sin 2t, y = -h cos t, z = -d cos 2t) whose depth takes its sign from the stitch at its feet and from the
 //! stitch drawn through its head: that fixes which strand is in front wherever two cross. Then yarns find room:
-//! [`super::relax`] keeps their length, straightens them and parts them until they touch. Cloth that repeats is relaxed
+//! `super::relax` keeps their length, straightens them and parts them until they touch. Cloth that repeats is relaxed
 //! once, as one cell with periodic borders; shaped cloth as a whole. Inside this file the unit is the yarn's diameter.
 
 use std::f64::consts::TAU;
