@@ -21,10 +21,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("render", &["ffi", "film", "image", "integrator", "math", "scene", "trace"]),
     ("plan", &["film", "geometry", "image", "math", "scattering", "scene"]),
     ("report", &["geometry", "image", "math", "plan", "render", "scene", "trace"]),
-    (
-        "experiment",
-        &["ffi", "film", "geometry", "image", "integrator", "math", "render", "report", "scattering", "scene", "trace"],
-    ),
+    ("experiment", &["ffi", "film", "geometry", "image", "math", "render", "report", "scattering", "scene", "trace"]),
     ("cli", &["experiment", "ffi", "geometry", "image", "plan", "render", "report", "scene", "trace"]),
 ];
 

@@ -14,6 +14,13 @@ use super::{
     strand::Chain,
 };
 
+/// How far off its surface a ray leaves a tube, in its radii: enough for rounding, too little to meet another.
+const OFFSET: f32 = 1e-4;
+/// The same in units of the distance from the origin, by which single precision rounds positions.
+const ROUNDING: f32 = 4e-7;
+/// The longest way through a tube, in its radii, that is taken in one step as if the tube were straight.
+const LONGEST_CHORD: f32 = 6.0;
+
 /// Tubes of one material in one geometry of Embree.
 #[derive(Clone, Debug)]
 pub struct Tubes {
@@ -33,6 +40,29 @@ pub struct TubePlace {
     pub tangent: Vec3A,
     /// Radius there.
     pub radius: f32,
+}
+
+impl TubePlace {
+    /// Where a ray in `direction` leaves a tube met at its surface, outward unit normal `normal`: outside of it, for what
+    /// scatters there has already dealt with the way through.
+    #[inline]
+    pub fn leave(&self, normal: Vec3A, direction: Vec3A) -> Vec3A {
+        let lift = self.radius * (1.0 + OFFSET) + ROUNDING * self.centre.abs().max_element();
+        let outward = direction.dot(normal);
+        if outward >= 0.0 {
+            return self.centre + lift * normal;
+        }
+        let along = direction.dot(self.tangent);
+        let across = 1.0 - along * along;
+        let chord = -2.0 * outward / across.max(1e-6);
+        if chord > LONGEST_CHORD {
+            // Too far to know where a bent tube ends: from just inside; the way out never counts as a hit.
+            return self.centre + (2.0 * self.radius - lift).max(0.0) * normal;
+        }
+        let exit = normal + chord * direction;
+        let beside = exit - exit.dot(self.tangent) * self.tangent;
+        self.centre + self.radius * chord * along * self.tangent + lift * beside.normalize_or(direction)
+    }
 }
 
 impl Tubes {
@@ -163,6 +193,7 @@ pub fn spline_through(knots: &[Vec3], radii: impl Fn(usize) -> f32) -> Vec<Vec4>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::frame::orthonormal_basis;
 
     #[test]
     fn the_spline_passes_its_knots_and_follows_a_helix() {
@@ -201,5 +232,32 @@ mod tests {
         assert!((place.centre - Vec3A::new(1.0, 1.25, 0.0)).length() < 1e-6 && (place.radius - 0.2).abs() < 1e-6);
         let back: Vec<Curve> = tubes.curves().collect();
         assert_eq!(back[1].points, line(1.0).points);
+    }
+
+    #[test]
+    fn rays_leave_a_tube_outside_of_it_on_the_side_where_they_go() {
+        let place = TubePlace { centre: Vec3A::new(3.0, -2.0, 5.0), tangent: Vec3A::new(0.0, 0.6, 0.8), radius: 0.01 };
+        let (s, t) = orthonormal_basis(place.tangent);
+        for i in 0..2000 {
+            let turn = i as f32 * 2.399_963;
+            let normal = turn.cos() * s + turn.sin() * t;
+            let z = 1.0 - 2.0 * (i as f32 + 0.5) / 2000.0;
+            let r = (1.0 - z * z).sqrt();
+            let w = Vec3A::new(r * (7.0 * turn).cos(), r * (7.0 * turn).sin(), z);
+            let from = place.leave(normal, w);
+            let rel = from - place.centre;
+            let axial = rel.dot(place.tangent);
+            let distance = (rel - axial * place.tangent).length() / place.radius;
+            let along = w.dot(place.tangent);
+            let long = w.dot(normal) < 0.0 && -2.0 * w.dot(normal) / (1.0 - along * along) > LONGEST_CHORD;
+            if long {
+                assert!(distance < 1.0 && distance > 0.99, "{distance}");
+            } else {
+                assert!((1.000_05..1.002).contains(&distance), "{distance}");
+                // It moves away from the axis.
+                assert!((rel - axial * place.tangent).dot(w) >= -1e-6 * place.radius, "{w}");
+            }
+            assert!(axial.abs() <= LONGEST_CHORD * place.radius * 1.001);
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! scatters at a vertex of the yarn's model, and goes on from inside the yarn, whose own plies the model has already
 //! put in its way. An explicit fibre scatters at its surface (`fiber`).
 
-pub(crate) mod fiber;
+mod fiber;
 mod parts;
 mod surface;
 

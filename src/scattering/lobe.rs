@@ -1,4 +1,4 @@
-//! What all lobes of plies share: the frame about an axis, and choosing between a few.
+//! What all lobes share: the frame about an axis, and choosing between a few.
 
 use glam::Vec3A;
 
@@ -33,6 +33,7 @@ impl LobeFrame {
         let sin = axis.dot(camera).clamp(-1.0, 1.0);
         let across = camera - sin * axis;
         let cos = across.length();
+        // Seen end on, every azimuth is as good as another.
         let x = if cos > 1e-6 { across / cos } else { orthonormal_basis(axis).0 };
         Self { x, y: axis.cross(x), z: axis, sin, cos }
     }
@@ -43,6 +44,18 @@ impl LobeFrame {
         let (w, c) = (shape.ply_rate, crossing.centre);
         let bent = section.bent(section.travel(c.x));
         Self::new((Vec3A::new(-w * c.y, w * c.x, 1.0) + bent).normalize(), camera)
+    }
+
+    /// A vector of the world in this frame.
+    #[inline]
+    pub(crate) fn to_local(self, v: Vec3A) -> Vec3A {
+        Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// A vector of this frame in the world.
+    #[inline]
+    pub(crate) fn to_world(self, v: Vec3A) -> Vec3A {
+        v.x * self.x + v.y * self.y + v.z * self.z
     }
 
     /// Latitudes of the camera and of `w`, and the cosine of `w`'s latitude.

@@ -23,7 +23,7 @@ pub mod aggregated;
 pub mod closed_forms;
 pub mod fiber;
 pub mod kernel;
-mod lobe;
+pub(crate) mod lobe;
 pub mod lobes;
 pub mod medium;
 pub mod surface;

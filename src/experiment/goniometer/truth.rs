@@ -17,12 +17,11 @@ use crate::{
         fiber::Plies,
         strand::{StrandOptions, Strands},
     },
-    integrator::fiber::{Frame, start},
     math::{
         Rgb,
         sampler::{Stream, hash2},
     },
-    scattering::{LobeValues, fiber::FiberBcsdf},
+    scattering::{LobeValues, fiber::FiberBcsdf, lobe::LobeFrame},
     scene::Yarn,
     trace::{BuildError, Fleece, HitPlace, Threads, World},
 };
@@ -134,9 +133,9 @@ impl Sample<'_> {
                 break;
             };
             events += 1;
-            let frame = Frame::new(place.tangent, -ray.direction);
+            let frame = LobeFrame::new(place.tangent, -ray.direction);
             let u = [0; 4].map(|_| stream.next());
-            let Some(next) = fleece.fiber.sample(frame.sin_o, frame.cos_o, throughput, u, stream) else {
+            let Some(next) = fleece.fiber.sample(frame.sin, frame.cos, throughput, u, stream) else {
                 return Outcome { unscattered: 0.0, scattered: None };
             };
             throughput *= next.weight;
@@ -148,7 +147,7 @@ impl Sample<'_> {
                 throughput /= keep;
             }
             let direction = frame.to_world(next.wi);
-            ray = Ray::new(start(place, hit.normal, direction), direction);
+            ray = Ray::new(place.leave(hit.normal, direction), direction);
         }
         if events == 0 {
             return Outcome { unscattered: 1.0, scattered: None };
