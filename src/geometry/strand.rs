@@ -232,7 +232,7 @@ impl Strands {
     /// What was picked for a segment, if anything was for any.
     #[inline]
     pub fn pick(&self, segment: u32) -> Option<u16> {
-        if self.picks.is_empty() { None } else { Some(self.picks[segment as usize]) }
+        self.picks.get(segment as usize).copied()
     }
 
     /// Takes what was picked for every segment from elsewhere; nothing, or one for each.

@@ -28,6 +28,25 @@ pub struct PlyParameters {
     pub fiber_twist: f64,
 }
 
+impl PlyParameters {
+    /// The longer semi-axis of the cross-section.
+    pub fn long_axis(&self) -> f64 {
+        self.radius / self.aspect.sqrt()
+    }
+
+    /// The same ply as the only one of a yarn that is as wide as it: lengths in units of its longer semi-axis.
+    pub fn alone(&self) -> Self {
+        let unit = self.long_axis();
+        Self {
+            radius: self.radius / unit,
+            distance: 0.0,
+            angle: 0.0,
+            fiber_radius: self.fiber_radius / unit,
+            ..self.clone()
+        }
+    }
+}
+
 /// A ply made ready for rays.
 #[derive(Clone, Debug)]
 pub struct PlyShape {

@@ -174,7 +174,7 @@ impl<'a> Preparation<'a> {
                 }
                 Of::Yarns { yarn, shape, strands } => {
                     estimate.tight_bends = strands.tight_bends().len();
-                    let plies = prepared.plies(yarn, shape, strands);
+                    let plies = Plies::new(strands, &yarn.plies, shape, prepared.fabric.seed);
                     match self.scene.render.mode {
                         Mode::Yarn => {
                             let (points, segments) = (strands.points().len(), strands.segments().len());
@@ -218,9 +218,9 @@ impl<'a> Preparation<'a> {
                     variants: Vec::new(),
                     picks: Vec::new(),
                 })),
-                Of::Yarns { yarn, ref shape, ref strands } => {
-                    let plies = prepared.plies(yarn, shape, strands);
+                Of::Yarns { yarn, shape, strands } => {
                     let kinds = &prepared.fabric.variants;
+                    let plies = Plies::new(&strands, &yarn.plies, &shape, prepared.fabric.seed);
                     let fleece = |ply: usize, tubes, first_tubes, picks| {
                         let fiber = |of: &Yarn| FiberBcsdf::new(&of.fibers[ply].1);
                         let (fiber, variants) = (fiber(yarn), kinds.iter().map(fiber).collect());
@@ -230,18 +230,16 @@ impl<'a> Preparation<'a> {
                     match mode {
                         Mode::Yarn => {}
                         Mode::Ply => all.extend(slots.clone().map(|ply| {
-                            let (mut strands, shape) = ply_strands(&plies, &yarn.plies[ply], shape, ply);
+                            let (mut strands, shape) = ply_strands(&plies, &yarn.plies[ply], &shape, ply);
                             strands.set_picks(plies.picks_along(1));
                             let scatterer = |of: &Yarn| yarn_scatterer(shape.clone(), &[&of.fibers[ply].1], model);
                             let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
                             Threads::Yarns(Weave { fabric: index, first_ply: ply, strands, yarn, variants })
                         })),
-                        Mode::Fiber => {
-                            all.extend(slots.clone().map(|ply| {
-                                let (tubes, first) = plies.fibers(ply, yarn.placement);
-                                fleece(ply, tubes, first, plies.picks_along(yarn.plies[ply].fibers as usize))
-                            }));
-                        }
+                        Mode::Fiber => all.extend(slots.clone().map(|ply| {
+                            let (tubes, first) = plies.fibers(ply, yarn.placement);
+                            fleece(ply, tubes, first, plies.picks_along(yarn.plies[ply].fibers as usize))
+                        })),
                     }
                     if let Some(flyaways) = &yarn.flyaways {
                         all.extend(slots.map(|ply| {
@@ -251,10 +249,9 @@ impl<'a> Preparation<'a> {
                             fleece(ply, tubes, first, picks)
                         }));
                     }
-                    if let (Mode::Yarn, Of::Yarns { shape, strands, .. }) = (mode, prepared.of) {
-                        let variants = kinds.iter().map(|yarn| scatterer(yarn, model)).collect();
-                        let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
-                        let yarn = yarn_scatterer(*shape, &materials, model);
+                    if mode == Mode::Yarn {
+                        let scatterer = |of: &Yarn| scatterer(of, model);
+                        let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
                         all.push(Threads::Yarns(Weave { fabric: index, first_ply: 0, strands, yarn, variants }));
                     }
                 }
@@ -263,12 +260,6 @@ impl<'a> Preparation<'a> {
         // A yarn too short to hold a hair leaves nothing for Embree.
         all.retain(|threads| threads.count() > 0);
         all
-    }
-}
-
-impl Prepared<'_> {
-    fn plies<'b>(&self, yarn: &'b Yarn, shape: &'b YarnShape, strands: &'b Strands) -> Plies<'b> {
-        Plies::new(strands, &yarn.plies, shape, self.fabric.seed)
     }
 }
 
@@ -299,18 +290,12 @@ fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usi
     // A ply at angle alpha is longer than its yarn by 1 / cos(alpha), and its rotation-minimising frame turns with the
     // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
     let cos = 1.0 / (wp * ply.distance).hypot(1.0);
-    let wide = ply.radius / ply.aspect.sqrt();
+    let wide = ply.long_axis();
     let axis_rate = wp * cos * cos * wide;
     let fiber_rate = (wf - wp) * cos * wide + axis_rate;
-    let parameters = PlyParameters {
-        radius: ply.radius / wide,
-        distance: 0.0,
-        angle: 0.0,
-        fiber_radius: ply.fiber_radius / wide,
-        fiber_twist: (fiber_rate * ply.radius / wide).atan(),
-        ..ply.clone()
-    };
-    let mut shape = YarnShape::new(&[parameters], 0.0, of.tilted);
+    let alone = ply.alone();
+    let fiber_twist = (fiber_rate * alone.radius).atan();
+    let mut shape = YarnShape::new(&[PlyParameters { fiber_twist, ..alone }], 0.0, of.tilted);
     let mut strands = Strands::new(
         &curves,
         &StrandOptions {

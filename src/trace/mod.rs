@@ -270,7 +270,7 @@ impl Fleece {
     /// Which of the fabric's variants a segment is of, if it has any.
     #[inline]
     pub fn pick(&self, segment: u32) -> Option<u16> {
-        if self.picks.is_empty() { None } else { Some(self.picks[segment as usize]) }
+        self.picks.get(segment as usize).copied()
     }
 
     /// How the fibre of a segment scatters.

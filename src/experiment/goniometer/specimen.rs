@@ -4,10 +4,7 @@ use glam::Vec3A;
 
 use super::{Outcome, View};
 use crate::{
-    geometry::{
-        section::{Crossings, Place, Section},
-        yarn::PlyParameters,
-    },
+    geometry::section::{Crossings, Place, Section},
     math::{Rgb, sampler::Sampler},
     scattering::{
         LobeValues,
@@ -36,18 +33,10 @@ pub(crate) enum Prepared {
 /// A yarn that is one ply of another, as thick as the ply is wide.
 pub fn ply_alone(yarn: &Yarn, ply: usize) -> Yarn {
     let of = &yarn.plies[ply];
-    // The longer semi-axis of an ellipse becomes the yarn's radius.
-    let scale = of.aspect.sqrt() / of.radius;
     Yarn {
         name: format!("{} ply {ply}", yarn.name),
-        radius: yarn.radius / scale,
-        plies: vec![PlyParameters {
-            radius: of.radius * scale,
-            distance: 0.0,
-            angle: 0.0,
-            fiber_radius: of.fiber_radius * scale,
-            ..of.clone()
-        }],
+        radius: yarn.radius * of.long_axis(),
+        plies: vec![of.alone()],
         ply_twist: 0.0,
         fibers: vec![yarn.fibers[ply].clone()],
         ..yarn.clone()
@@ -78,11 +67,16 @@ pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> 
 }
 
 impl Prepared {
-    fn section(&self, yarn: &YarnScatterer, view: &View, sampler: &mut Sampler) -> Section {
+    /// Where a ray meets a yarn, the plies on its way, and the share of light that meets no fibre of them.
+    fn meet(yarn: &YarnScatterer, view: &View, sampler: &mut Sampler) -> (Section, Crossings, f32) {
         let [u_offset, u_phase, _, _] = sampler.next4();
         let h = view.offset.map_or(2.0 * u_offset - 1.0, |h| h as f32);
         let phase = view.phase.unwrap_or(f64::from(u_phase) * std::f64::consts::TAU);
-        straight_section(view.theta, h, phase, yarn.shape().tilted)
+        let section = straight_section(view.theta, h, phase, yarn.shape().tilted);
+        let mut crossings = Crossings::new();
+        section.crossings(yarn.shape(), &mut crossings);
+        let unscattered = yarn.transparency(&crossings);
+        (section, crossings, unscattered)
     }
 
     /// One ray: what passes, and where the rest goes.
@@ -98,10 +92,7 @@ impl Prepared {
                 Outcome { unscattered: 0.0, scattered }
             }
             Self::Yarn(yarn) => {
-                let section = self.section(yarn, view, sampler);
-                let mut crossings = Crossings::new();
-                section.crossings(yarn.shape(), &mut crossings);
-                let unscattered = yarn.transparency(&crossings);
+                let (section, crossings, unscattered) = Self::meet(yarn, view, sampler);
                 if unscattered >= 1.0 {
                     return Outcome { unscattered, scattered: None };
                 }
@@ -122,10 +113,7 @@ impl Prepared {
         match self {
             Self::Fiber(bcsdf) => bcsdf.evaluate(view.theta.sin() as f32, view.theta.cos() as f32, w, Rgb::ONE).0,
             Self::Yarn(yarn) => {
-                let section = self.section(yarn, view, sampler);
-                let mut crossings = Crossings::new();
-                section.crossings(yarn.shape(), &mut crossings);
-                let unscattered = yarn.transparency(&crossings);
+                let (section, crossings, unscattered) = Self::meet(yarn, view, sampler);
                 if unscattered >= 1.0 {
                     return LobeValues::default();
                 }

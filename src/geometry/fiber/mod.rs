@@ -254,7 +254,7 @@ impl<'a> Plies<'a> {
     /// from the yarn's axis.
     pub fn ply_curves(&self, ply: usize) -> Vec<(Curve, Vec<f64>, Vec<Vec3A>)> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
-        let wide = (parameters.radius / parameters.aspect.sqrt()) as f32;
+        let wide = parameters.long_axis() as f32;
         (0..self.strands.yarns())
             .into_par_iter()
             .map(|yarn| {
