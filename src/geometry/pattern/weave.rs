@@ -47,7 +47,7 @@ pub struct TooTight {
 const SLACK: f64 = 1.015;
 
 /// Control points between crossings unless asked otherwise.
-pub const POINTS: u32 = 8;
+pub const POINTS: u32 = 6;
 
 impl Weave {
     fn reach(&self) -> f64 {
