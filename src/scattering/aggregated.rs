@@ -17,7 +17,10 @@
 //! Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light sampling
 //! and direction sampling (balance heuristic), all given the node and the direction drawn.
 
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::{
+    cell::OnceCell,
+    f32::consts::{FRAC_1_PI, PI, TAU},
+};
 
 use glam::{Vec2, Vec3A};
 
@@ -41,6 +44,9 @@ use crate::{
 const LEAN_SIDEWAYS: f32 = 1.2;
 /// The most that the light's own way may brighten F against its mean: keeps sampled weights bounded.
 const MAX_FORWARD_GAIN: f32 = 3.0;
+/// Density of F (1/steradian) below which it is as the camera's chord has it: most light comes from elsewhere, and pays
+/// nothing for F.
+const FORWARD_TAIL: f32 = 1e-4;
 /// Sine of the steepest latitude at which the mean of that gain is looked at.
 const STEEPEST_MEAN: f32 = 0.99;
 /// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
@@ -146,7 +152,7 @@ struct Again {
 }
 
 /// Light that passes as TT.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Forward {
     frame: LobeFrame,
     energy: Rgb,
@@ -156,14 +162,25 @@ struct Forward {
     sigma: [f32; 3],
     /// Half way through the fibres on the camera's chord.
     middle: f32,
-    /// Optical depths of the camera's half, and by how much the light's plain chords count.
+    /// Expected fibres on the camera's chord.
+    fibers: f32,
+    /// Optical depths of the camera's half.
     half_depth: Rgb,
     half_depth_unscattered: f32,
+    /// e^-depth - e^-depth_unscattered of the whole chord.
+    passed: Rgb,
+    /// What the light's own way adds, made when first asked for: most light comes from elsewhere. `None` where the lobe
+    /// is as the camera's chord has it.
+    far_half: OnceCell<Option<FarHalf>>,
+}
+
+/// The half of F's way that is the light's.
+#[derive(Clone, Copy, Debug)]
+struct FarHalf {
+    /// By how much the light's plain chords count.
     scale: f32,
-    /// 1 / (e^-depth - e^-depth_unscattered) of the whole chord, over the lobe's mean gain.
+    /// What F's gain is over: that of the camera's chord, and the gain's mean over the lobe.
     norm: Rgb,
-    /// Whether the light's own way counts; else the lobe is as the camera's chord has it.
-    follows: bool,
 }
 
 /// One place of scattering, for one camera direction: see the module's notes.
@@ -607,7 +624,7 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of F leaves: the middle of the fibres on the chord.
     #[inline]
     pub fn forward_start(&self) -> f32 {
-        self.forward.map_or(self.section.enter, |f| f.middle)
+        self.forward.as_ref().map_or(self.section.enter, |f| f.middle)
     }
 
     #[inline]
@@ -636,11 +653,15 @@ impl<'a> Vertex<'a> {
         let around = Rgb::from(forward.sigma.map(|s| wrapped_normal(off, s)));
         let density = m * around;
         let pdf = (density * Rgb::from(forward.channel)).mean() * 3.0;
-        let mut value = forward.energy * density;
-        if forward.follows {
-            value *= forward.gain(self.yarn, self.section, w);
+        let value = forward.energy * density;
+        if density.max_channel() < FORWARD_TAIL {
+            return (value, pdf);
         }
-        (value, pdf)
+        let far_half = forward.far_half.get_or_init(|| forward.far_half(self.yarn, self.section, self.camera));
+        match far_half {
+            Some(far_half) => (value * forward.gain(far_half, self.yarn, self.section, w), pdf),
+            None => (value, pdf),
+        }
     }
 }
 
@@ -717,65 +738,66 @@ impl Forward {
                 }
             }
         }
-        let mut plain = 0.0;
-        let start = Vec2::new(middle, section.h);
-        section.chords_ahead(
-            &yarn.shape,
-            start,
-            section.travel(middle),
-            -camera,
-            PlyParts::Whole,
-            |ply, from, to, _| {
-                plain += yarn.plies[ply].sigma * (to - from);
-            },
-        );
-        let scale = if plain > 0.0 { (0.5 * fibers / plain).clamp(0.3, 2.0) } else { 1.0 };
-        let mut forward = Self {
+        Some(Self {
             frame: LobeFrame::of_ply(&yarn.shape, section, front, camera),
             energy: energy / scattered,
             channel: normalised((energy * weight).to_array()),
             kappa: kappa_of_variance(events * optics.beta_tt_squared),
             sigma,
             middle,
+            fibers,
             half_depth,
             half_depth_unscattered,
-            scale,
-            norm: Rgb::ONE / energy.max(Rgb::splat(1e-12)),
-            follows: !yarn.plain,
-        };
-        if !yarn.plain && energy.max_channel() > 1e-3 {
-            // The gain must not make or lose light: over its mean, by three-point Gauss-Hermite quadrature in azimuth.
-            let spread = sigma.iter().sum::<f32>() / 3.0;
-            // Along the yarn there is no azimuth; the gain hardly hangs on the latitude.
-            let latitude = (-forward.frame.sin).clamp(-STEEPEST_MEAN, STEEPEST_MEAN);
-            let towards = |off: f32| forward.gain(yarn, section, forward.frame.direction(latitude, PI + off));
-            let reach = 3f32.sqrt() * spread;
-            let mean = (towards(reach) + towards(-reach)) * (1.0 / 6.0) + towards(0.0) * (2.0 / 3.0);
-            // Where hardly anything seems to leave forward, the chords ahead know nothing of the few fibres there are.
-            let mean = energy.select_below(1e-3, Rgb::ONE, mean);
-            forward.follows = mean.min_channel() > 1.0 / MAX_FORWARD_GAIN;
-            if forward.follows {
-                forward.norm = forward.norm / mean;
-            }
+            passed: energy,
+            far_half: OnceCell::new(),
+        })
+    }
+
+    /// The light's half of the way.
+    fn far_half(&self, yarn: &AggregatedYarn, section: &Section, camera: Vec3A) -> Option<FarHalf> {
+        if yarn.plain {
+            return None;
         }
-        Some(forward)
+        let mut plain = 0.0;
+        let start = Vec2::new(self.middle, section.h);
+        let travel = section.travel(self.middle);
+        section.chords_ahead(&yarn.shape, start, travel, -camera, PlyParts::Whole, |ply, from, to, _| {
+            plain += yarn.plies[ply].sigma * (to - from);
+        });
+        let far_half = FarHalf {
+            scale: if plain > 0.0 { (0.5 * self.fibers / plain).clamp(0.3, 2.0) } else { 1.0 },
+            norm: Rgb::ONE / self.passed.max(Rgb::splat(1e-12)),
+        };
+        if self.passed.max_channel() <= 1e-3 {
+            return Some(far_half);
+        }
+        // The gain must not make or lose light: over its mean, by three-point Gauss-Hermite quadrature in azimuth.
+        let spread = self.sigma.iter().sum::<f32>() / 3.0;
+        // Along the yarn there is no azimuth; the gain hardly hangs on the latitude.
+        let latitude = (-self.frame.sin).clamp(-STEEPEST_MEAN, STEEPEST_MEAN);
+        let towards = |off: f32| self.gain(&far_half, yarn, section, self.frame.direction(latitude, PI + off));
+        let reach = 3f32.sqrt() * spread;
+        let mean = (towards(reach) + towards(-reach)) * (1.0 / 6.0) + towards(0.0) * (2.0 / 3.0);
+        // Where hardly anything seems to leave forward, the chords ahead know nothing of the few fibres there are.
+        let mean = self.passed.select_below(1e-3, Rgb::ONE, mean);
+        (mean.min_channel() > 1.0 / MAX_FORWARD_GAIN).then(|| FarHalf { norm: far_half.norm / mean, ..far_half })
     }
 
     /// F was weighed by the camera's chord alone; here its far half is that of the light's own way.
     #[inline]
-    fn gain(&self, yarn: &AggregatedYarn, section: &Section, w: Vec3A) -> Rgb {
+    fn gain(&self, far_half: &FarHalf, yarn: &AggregatedYarn, section: &Section, w: Vec3A) -> Rgb {
         let mut depth = self.half_depth;
         let mut unscattered = self.half_depth_unscattered;
         let start = Vec2::new(self.middle, section.h);
         let travel = section.travel(self.middle);
         section.chords_ahead(&yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
             let optics = &yarn.plies[ply];
-            let fibers = self.scale * optics.sigma * (to - from);
+            let fibers = far_half.scale * optics.sigma * (to - from);
             depth += optics.rho * fibers;
             unscattered += optics.rho_unscattered * fibers;
         });
         let passed = ((-depth).exp() - (-unscattered).exp()).max(Rgb::ZERO);
-        (passed * self.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
+        (passed * far_half.norm).min(Rgb::splat(MAX_FORWARD_GAIN))
     }
 }
 
