@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, signals::interrupt_flag, write_text};
+use super::{Failure, signals::interrupt_flag, thread_pool, write_text};
 use crate::{
     experiment::{
-        converge::{self, ConvergeError},
-        converged::{Converged, LOBES, key},
+        LOBES, converge,
+        converged::{Converged, key},
         suite::{ConvergePlan, Suite},
         table3::{self, BenchError, Processes},
     },
@@ -82,7 +82,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
             Failure::Interrupted => BenchError::Interrupted,
         })
     };
-    let table = table3::run(&suite, &mut processes, &out, threads, say, saved).map_err(failure)?;
+    let table = table3::run(&suite, &mut processes, &out, threads, say, saved)?;
     let mut plots = Vec::new();
     for name in suite.converge.iter().flat_map(|plan| &plan.cases) {
         if let Some(plan) = &suite.converge
@@ -103,13 +103,6 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
         .map(|missing| format!("{} was not measured: {}", missing.name, missing.reason))
         .collect();
     if failed.is_empty() { Ok(()) } else { Err(Failure::Check(failed.join("\n"))) }
-}
-
-fn failure(error: BenchError) -> Failure {
-    match error {
-        BenchError::Case(message) | BenchError::Suite(message) => Failure::Input(message),
-        BenchError::Interrupted => Failure::Interrupted,
-    }
 }
 
 /// Writes the table in all its forms, and the page.
@@ -157,8 +150,7 @@ fn plot(
         return Ok(Plot { caption: text, svg });
     }
     say(&format!("{name}: error against time, {} seeds", plan.seeds));
-    let all = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = threads.unwrap_or(all);
+    let (pool, threads) = thread_pool(threads)?;
     let options = converge::Options {
         methods: vec![suite.reference, suite.tested],
         reference: Some(suite.reference),
@@ -169,16 +161,7 @@ fn plot(
         target: suite.target,
         threads,
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
-    let result = pool.install(|| converge::run(load, &options, &out.join("cache"), interrupt, &say)).map_err(
-        |error| match error {
-            ConvergeError::Failed(message) => Failure::Input(message),
-            ConvergeError::Interrupted => Failure::Interrupted,
-        },
-    )?;
+    let result = pool.install(|| converge::run(load, &options, &out.join("cache"), interrupt, &say))?;
     let text = format!(
         "{name}. Solid: noise, against the method's own converged picture; dashed: noise and model error, against explicit fibres. Bars: 95 % \
          over {} seeds. {}",

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, signals::interrupt_flag, write_text};
+use super::{Failure, SceneArgs, signals::interrupt_flag, thread_pool, write_text};
 use crate::{
     experiment::{
-        converge::{self, ConvergeError, Options},
+        converge::{self, Options},
         method::Method,
     },
     image::output,
@@ -85,7 +85,7 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     } else {
         args.methods.clone()
     };
-    let threads = plain.render.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let (pool, threads) = thread_pool(plain.render.threads)?;
     let options = Options {
         methods,
         reference,
@@ -96,21 +96,13 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         target: args.target,
         threads,
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
     let interrupt = interrupt_flag();
     let say = |text: &str| {
         if !args.quiet {
             eprintln!("{text}");
         }
     };
-    let result =
-        pool.install(|| converge::run(load, &options, &cache, &interrupt, say)).map_err(|error| match error {
-            ConvergeError::Failed(message) => Failure::Input(message),
-            ConvergeError::Interrupted => Failure::Interrupted,
-        })?;
+    let result = pool.install(|| converge::run(load, &options, &cache, &interrupt, say))?;
     let json = serde_json::to_string_pretty(&result.to_json()).expect("numbers and text become JSON") + "\n";
     for (file, text) in files.iter().zip([result.to_csv(), json, result.to_svg()]) {
         write_text(file, &text)?;

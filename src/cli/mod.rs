@@ -21,6 +21,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Args, Parser, Subcommand};
 
 use crate::{
+    experiment::{converge::ConvergeError, table3::BenchError},
     geometry::pattern::overlap::{self, Overlap},
     image::output,
     plan,
@@ -108,6 +109,33 @@ impl From<BuildError> for Failure {
 impl From<crate::ffi::oidn::OidnError> for Failure {
     fn from(error: crate::ffi::oidn::OidnError) -> Self {
         Self::Input(format!("error: {error}"))
+    }
+}
+
+impl From<ConvergeError> for Failure {
+    fn from(error: ConvergeError) -> Self {
+        match error {
+            ConvergeError::Failed(message) => Self::Input(message),
+            ConvergeError::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+impl From<BenchError> for Failure {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Case(message) | BenchError::Suite(message) => Self::Input(message),
+            BenchError::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+/// So many threads, or as many as there are cores; and how many that is.
+fn thread_pool(threads: Option<usize>) -> Result<(rayon::ThreadPool, usize), Failure> {
+    let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => Ok((pool, threads)),
+        Err(error) => Err(Failure::Input(format!("error: cannot start {threads} threads: {error}"))),
     }
 }
 

@@ -14,7 +14,7 @@ use super::{
     Failure, SceneArgs, bytes_in_words,
     log::{self, LogArgs},
     signals::interrupt_flag,
-    write_text,
+    thread_pool, write_text,
 };
 use crate::{
     ffi::oidn::Denoiser,
@@ -140,11 +140,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     if let Some(exposure) = args.exposure {
         scene.display.exposure = exposure;
     }
-    let threads = scene.render.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Failure::Input(format!("error: cannot start {threads} threads: {e}")))?;
+    let (pool, threads) = thread_pool(scene.render.threads)?;
     let old = old_checkpoint(args)?;
     let load = started.elapsed();
     log::phase("load", load);

@@ -7,10 +7,13 @@ use serde_json::{Value, json};
 
 use super::{Failure, names, write_text};
 use crate::{
-    experiment::goniometer::{
-        self, Effort, LOBES, Mean, Measurement, Specimen, View,
-        picture::{self, SweepRow},
-        ply_alone,
+    experiment::{
+        LOBES,
+        goniometer::{
+            self, Effort, Mean, Measurement, Specimen, View,
+            picture::{self, SweepRow},
+            ply_alone,
+        },
     },
     image::output,
     scene::{

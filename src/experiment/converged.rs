@@ -6,18 +6,16 @@ use std::{
     time::UNIX_EPOCH,
 };
 
+use super::LOBES;
 use crate::{
     image::{
         self, Attribute, Image, ImageError,
         exr::{self, ChannelSpec, ExrLayout, Line, Sample},
+        interleaved,
         metric::Halves,
     },
     render::picture::PART_NAMES,
 };
-
-/// Names of the parts of light that are kept where the picture has them: direct and indirect light by the lobe of its first
-/// scattering at cloth.
-pub const LOBES: [&str; 5] = ["R", "TT", "D", "F", "B"];
 
 /// A converged picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +26,8 @@ pub struct Converged {
     pub spp: f64,
     /// Seconds that a sample per pixel took, for choosing sample counts.
     pub sample_seconds: f64,
-    /// Light by lobe, as [`LOBES`], where it was asked for; of the first half.
+    /// Direct and indirect light by the lobe of its first scattering at cloth, in the order of [`LOBES`], where
+    /// it was asked for; of the first half.
     pub lobes: Option<[Vec<[f32; 3]>; 5]>,
 }
 
@@ -46,10 +45,7 @@ pub struct Half {
 impl Converged {
     /// Puts two halves together; `None` if a picture lacks colours.
     pub fn new(first: &Half, second: &Half) -> Option<Self> {
-        let colors = |image: &Image| {
-            let [r, g, b] = image.rgb()?;
-            Some(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect::<Vec<_>>())
-        };
+        let colors = |image: &Image| image.rgb().map(interleaved);
         let alpha =
             |image: &Image| image.channel("A").map_or_else(|| vec![1.0; image.width * image.height], <[f32]>::to_vec);
         let (a, b) = (alpha(&first.image), alpha(&second.image));
@@ -66,10 +62,7 @@ impl Converged {
     /// Reads what [`Self::store`] has written; `None` if there is no such file, or another program has written it.
     pub fn load(path: &Path) -> Option<Self> {
         let image = image::read(path).ok()?;
-        let plane = |layer: &str| -> Option<Vec<[f32; 3]>> {
-            let [r, g, b] = image.layer_rgb(layer)?;
-            Some(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect())
-        };
+        let plane = |layer: &str| image.layer_rgb(layer).map(interleaved);
         let number = |name: &str| match image.attribute(name)? {
             Attribute::Double(value) => Some(*value),
             _ => None,

@@ -10,3 +10,6 @@ pub mod method;
 pub mod stress;
 pub mod suite;
 pub mod table3;
+
+/// Names of the lobes in the files that experiments write.
+pub const LOBES: [&str; 5] = crate::scattering::LobeValues::NAMES;

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     image::{
-        self, Image,
+        self, Image, interleaved,
         metric::{Comparison, Halves, Pair},
         output,
     },
@@ -433,8 +433,7 @@ fn converge(
 }
 
 fn colors(image: &Image) -> Result<Vec<[f32; 3]>, BenchError> {
-    let [r, g, b] = image.rgb().ok_or_else(|| BenchError::Case("a picture without colours".to_owned()))?;
-    Ok(r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect())
+    image.rgb().map(interleaved).ok_or_else(|| BenchError::Case("a picture without colours".to_owned()))
 }
 
 /// How far one converged picture is from another, on the cloth.

@@ -59,6 +59,11 @@ pub struct Image {
     pub attributes: Vec<(String, Attribute)>,
 }
 
+/// Three planes as one list of colours.
+pub fn interleaved([r, g, b]: [&[f32]; 3]) -> Vec<[f32; 3]> {
+    r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect()
+}
+
 impl Image {
     /// A picture without channels or metadata that fills its display window.
     pub fn new(width: usize, height: usize) -> Self {

@@ -147,7 +147,8 @@ fn number(v: f64) -> String {
     if (1e-3..1e4).contains(&v) { format!("{}", (v * 1e6).round() / 1e6) } else { format!("{v:.0e}") }
 }
 
-fn escaped(text: &str) -> String {
+/// Text as it stands in SVG.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

@@ -53,13 +53,16 @@ pub struct LobeValues {
 }
 
 impl LobeValues {
+    /// Names of the lobes in files, in the order of [`Self::to_array`].
+    pub const NAMES: [&str; 5] = ["R", "TT", "D", "F", "B"];
+
     /// All lobes together.
     #[inline]
     pub fn sum(&self) -> Rgb {
         self.r + self.tt + self.d + self.f + self.b
     }
 
-    /// In the order of their names in files: R, TT, D, F, B.
+    /// In the order of [`Self::NAMES`].
     #[inline]
     pub fn to_array(self) -> [Rgb; 5] {
         [self.r, self.tt, self.d, self.f, self.b]

@@ -19,6 +19,7 @@ pub(crate) use specimen::straight_section;
 pub use specimen::{Specimen, ply_alone};
 pub use truth::truth;
 
+use super::LOBES;
 use crate::{math::sampler::Sampler, scattering::LobeValues};
 use glam::Vec3A;
 
@@ -270,9 +271,6 @@ pub fn value(specimen: &Specimen<'_>, view: &View, light: (f64, f64), effort: Ef
         .collect();
     std::array::from_fn(|lobe| std::array::from_fn(|c| Mean::of(batches.iter().map(|b| b[lobe][c]))))
 }
-
-/// Names of the lobes in files, in the order of [`LobeValues::to_array`].
-pub const LOBES: [&str; 5] = ["R", "TT", "D", "F", "B"];
 
 fn means(m: &[Mean; 3]) -> Value {
     json!(m.map(|m| m.mean))

@@ -3,7 +3,10 @@
 use std::{f64::consts::TAU, fmt::Write as _, path::Path};
 
 use super::{COLUMNS, Distribution, Mean, Measurement, ROWS};
-use crate::image::{ImageError, png, png::Display};
+use crate::{
+    image::{ImageError, png, png::Display},
+    report::plot::escaped,
+};
 
 /// Edge of a cell in the map, pixels.
 const CELL: usize = 8;
@@ -197,7 +200,7 @@ pub fn sweep_svg(title: &str, key: &str, names: &[&str], rows: &[SweepRow]) -> S
             r#"<text x="{:.1}" y="{:.1}" text-anchor="middle">{}</text>"#,
             x0 + WIDTH / 2.0,
             top + HEIGHT + 34.0,
-            escape(key)
+            escaped(key)
         );
         for (m, name) in names.iter().enumerate() {
             for (channel, color) in CHANNELS.iter().enumerate() {
@@ -245,7 +248,7 @@ fn header(width: f64, height: f64, title: &str) -> String {
     format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/><text x="12" y="18" font-size="14">{}</text>
 "##,
-        escape(title)
+        escaped(title)
     )
 }
 
@@ -256,7 +259,7 @@ fn legend(svg: &mut String, x: f64, y: f64, index: usize, name: &str) {
         y - 4.0,
         dashes(index),
         x + 48.0,
-        escape(name)
+        escaped(name)
     );
 }
 
@@ -266,10 +269,6 @@ fn dashes(index: usize) -> String {
         0 => String::new(),
         i => format!(r#" stroke-dasharray="{} {}""#, 8 / i.min(4), 3),
     }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// A number with as many digits as an axis needs.

@@ -14,7 +14,7 @@ use std::fmt;
 
 pub use halves::Halves;
 
-use super::Image;
+use super::{Image, interleaved};
 
 /// Added to the square of the reference in [relMSE](Errors::rel_mse): errors in what is nearly black count less.
 pub const EPSILON: f64 = 1e-2;
@@ -196,11 +196,6 @@ impl<'a> Boxes<'a> {
     fn counted(&self) -> Vec<bool> {
         self.pixels().map(|pixels| 2 * pixels.count() >= self.factor * self.factor).collect()
     }
-}
-
-/// Three planes as one list of colours.
-fn interleaved([r, g, b]: [&[f32]; 3]) -> Vec<[f32; 3]> {
-    r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect()
 }
 
 /// The square error of a channel over the square of its reference, with [`EPSILON`].

@@ -364,12 +364,11 @@ impl LightPlan {
                 return None;
             }
         };
-        let Some([r, g, b]) = picture.rgb() else {
+        let Some(planes) = picture.rgb() else {
             context.error(span, format!("{}: no colour channels", path.display()), None);
             return None;
         };
-        let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-        let map = EnvironmentMap::new(picture.width, picture.height, pixels, rotation);
+        let map = EnvironmentMap::new(picture.width, picture.height, image::interleaved(planes), rotation);
         Some(Light::Environment(Environment { image: Some(Arc::new(map)), ..environment }))
     }
 }
