@@ -98,7 +98,8 @@ impl OpenCurve {
 /// Writes curves as text, every number with as many digits as reading it back exactly takes.
 ///
 /// The format has no place for the basis, the unit of length and the direction of up: they are left out. A closed
-/// curve ends with its first line again, so an open curve that ends where it began is read back as closed.
+/// curve ends with its first line again, so an open curve that ends where it began is read back as closed. There is no
+/// comment that says what the columns are: Mitsuba refuses files with comments.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`], before anything is written, if only some curves have radii or a curve has not one
@@ -114,7 +115,6 @@ pub fn write_text(set: &CurveSet, out: &mut impl Write) -> io::Result<()> {
             return Err(invalid("a curve needs one radius for each point"));
         }
     }
-    writeln!(out, "# x y z{}", if has_radii { " radius" } else { "" })?;
     for (index, curve) in set.curves.iter().enumerate() {
         if index > 0 {
             writeln!(out)?;
@@ -236,6 +236,7 @@ mod tests {
             let set = CurveSet { curves: vec![curve(true, radii.clone()), curve(false, radii)], ..CurveSet::default() };
             let mut bytes = Vec::new();
             write_text(&set, &mut bytes).expect("a vector takes everything");
+            assert!(!bytes.contains(&b'#'), "Mitsuba refuses comments");
             assert_eq!(parse(&bytes, &ReadOptions::default()).expect("a readable file"), set);
         }
     }
