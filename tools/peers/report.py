@@ -5,6 +5,7 @@ import os
 import platform
 import statistics
 import subprocess
+import sys
 from pathlib import Path
 
 NAMES = {
@@ -21,11 +22,16 @@ def machine():
     return f"{cpu}, {os.cpu_count()} threads, {memory:.0f} GB, {platform.system().lower()} {platform.machine()}"
 
 
-def commit():
-    folder = Path(__file__).resolve().parent
-    return subprocess.run(
-        ["git", "-C", folder, "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
-    ).stdout.strip()
+def versions(options):
+    """What was measured."""
+    asked = {"": [options.yarnray, "--version"], "Mitsuba ": [sys.executable, "-c", "import mitsuba; print(mitsuba.__version__)"]}
+    if options.cycles:
+        asked["Cycles of Blender "] = [options.cycles, "-c", "import bpy; print(bpy.app.version_string)"]
+    answers = (
+        name + subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[0]
+        for name, command in asked.items()
+    )
+    return ", ".join(answers)
 
 
 def with_spread(values):
@@ -111,7 +117,7 @@ def markdown(options, cases, fiber, lobes):
 What a path through explicit fibres costs, per unit of error, in the reference mode `--mode fiber` and in two renderers in wide
 use. `tools/peers/peers.py` measures and writes this page; `tools/peers/README.md` says how to install what it needs.
 
-Machine: {machine()}. Program: {commit()}. {options.note}
+Machine: {machine()}. Programs: {versions(options)}. {options.note}
 
 {summary(cases)}
 
