@@ -123,6 +123,9 @@ Machine: {machine()}. Programs: {versions(options)}. {options.note}
 
 More than 1 means that yarnray is faster. "To equal error" is (relMSE x seconds of rendering) over yarnray's in the same round, which
 stays the same however many samples a run takes; "for equal samples" is the time alone, which says how fast paths are traced.
+The two differ by noise, and noise in part by the model of the fibre: the peers' is a dielectric seen at an offset, whose lobes are sharper from
+one place to the next than yarnray's, which are averaged over the width. How large that part is has not been measured; "for
+equal samples" is nearly free of it.
 
 ## What is equal
 - The fibres: `yarnray make fibers` of `scenes/table3/silk.toml` and `knit.toml`. Mitsuba reads that file (`bsplinecurve`); Cycles, whose
@@ -136,8 +139,9 @@ stays the same however many samples a run takes; "for equal samples" is the time
 ## What is not
 - yarnray's fibre has R, TT and D, averaged over its width, not a dielectric seen at an offset. Its albedos are those of the dielectric,
   averaged over width and directions (R {lists(lobes.r[:1])}; TT {lists(lobes.tt)}; D for the rest {lists(lobes.d)}), its widths the
-  same standard deviations ({lobes.beta_r:.1f}, {lobes.beta_tt:.1f} and {lobes.beta_n:.1f} degrees). Pictures thus differ a little
-  (see the means), and part of the difference in error is the model's: light that is averaged over a fibre's width is less noisy.
+  same standard deviations ({lobes.beta_r:.1f}, {lobes.beta_tt:.1f} and {lobes.beta_n:.1f} degrees). Pictures thus differ a little (see the
+  means), and so does their noise.
+- Under the even sky yarnray lets paths find the light; the peers also send shadow rays.
 - The probability of survival in Russian roulette: the largest channel of the throughput, at least 0.05 (yarnray), at most 0.95 (Mitsuba), its
   square root (Cycles).
 - Sampling patterns are each renderer's own: Mitsuba's `independent`, Cycles' `TABULATED_SOBOL`. Cycles keeps its light tree and its
