@@ -1,6 +1,9 @@
-//! Which pieces of yarn are near each other: a hashed grid over segments, and the distance of two segments.
+//! Which pieces of yarn are near each other: a grid over segments, and the distance of two segments.
 
-use glam::{DVec2, DVec3, IVec3};
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// The nearest points of two segments: how far along each (0 to 1), and the vector from the first to the second.
 #[derive(Clone, Copy, Debug)]
@@ -11,97 +14,132 @@ pub(super) struct Nearest {
 }
 
 /// The nearest points of the segments `p0 p1` and `q0 q1`.
-#[inline]
+#[inline(always)] // a call costs as much as the work
 pub(super) fn nearest(p0: DVec3, p1: DVec3, q0: DVec3, q1: DVec3) -> Nearest {
     const TINY: f64 = 1e-18;
     let (d1, d2, r) = (p1 - p0, q1 - q0, p0 - q0);
     let (a, e, f) = (d1.length_squared().max(TINY), d2.length_squared().max(TINY), d2.dot(r));
     let (b, c) = (d1.dot(d2), d1.dot(r));
     let det = a * e - b * b;
-    let mut s = if det > 1e-9 * a * e { ((b * f - c * e) / det).clamp(0.0, 1.0) } else { 0.5 };
-    let mut t = (b * s + f) / e;
-    if !(0.0..=1.0).contains(&t) {
-        t = t.clamp(0.0, 1.0);
-        s = ((b * t - c) / a).clamp(0.0, 1.0);
-    }
+    let s = if det > 1e-9 * a * e { ((b * f - c * e) / det).clamp(0.0, 1.0) } else { 0.5 };
+    // Of s the nearest t, and of that the nearest s again: another one where t met its bounds, else the same.
+    let t = ((b * s + f) * (1.0 / e)).clamp(0.0, 1.0);
+    let s = ((b * t - c) * (1.0 / a)).clamp(0.0, 1.0);
     Nearest { s, t, between: (q0 + d2 * t) - (p0 + d1 * s) }
 }
 
-/// Points sorted into the cells of a hashed grid. With a period in x and y, neighbours are found across its borders.
+/// Points sorted into the cells of a grid, those that hold any. With a period in x and y, neighbours are found across its
+/// borders.
 pub(super) struct Grid {
-    cell: DVec3,
     /// Cells per period along x and y, where there is one.
     wrap: Option<[i32; 2]>,
-    mask: usize,
-    /// For each bucket where its entries begin; one more at the end.
-    starts: Vec<u32>,
-    entries: Vec<(IVec3, u32)>,
+    /// Points by their cells; cells that follow each other along x do so here.
+    entries: Vec<Entry>,
+    /// The cells in order, each with its first entry; one more at the end.
+    cells: Vec<(Key, u32)>,
+    /// The cell of each point.
+    cell_of: Vec<u32>,
 }
+
+/// A point in a [`Grid`].
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) at: DVec3,
+    pub(super) index: u32,
+}
+
+/// Where a cell is along z, y and x.
+type Key = [i32; 3];
 
 impl Grid {
     /// Sorts points into cells at least `reach` wide, so that all within `reach` of a point are in the 27 cells around
     /// it. `period` must be at least three times `reach`.
     pub(super) fn new(points: &[DVec3], reach: f64, period: Option<DVec2>) -> Self {
         let wrap = period.map(|p| [(p.x / reach).floor().max(1.0) as i32, (p.y / reach).floor().max(1.0) as i32]);
-        let cell = match (period, wrap) {
+        let size = match (period, wrap) {
             (Some(p), Some([nx, ny])) => DVec3::new(p.x / f64::from(nx), p.y / f64::from(ny), reach),
             _ => DVec3::splat(reach),
         };
-        let buckets = points.len().next_power_of_two().max(16);
-        let mut grid = Self { cell, wrap, mask: buckets - 1, starts: vec![0; buckets + 1], entries: Vec::new() };
-        let cells: Vec<IVec3> = points.iter().map(|&p| grid.cell_of(p)).collect();
-        for &c in &cells {
-            let bucket = grid.bucket(c);
-            grid.starts[bucket + 1] += 1;
+        let key = |p: DVec3| {
+            let mut c = (p / size).floor().as_ivec3();
+            if let Some([nx, ny]) = wrap {
+                (c.x, c.y) = (c.x.rem_euclid(nx), c.y.rem_euclid(ny));
+            }
+            [c.z, c.y, c.x]
+        };
+        let mut order: Vec<(Key, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key(p), i as u32)).collect();
+        order.par_sort_unstable();
+        let mut cells: Vec<(Key, u32)> = Vec::new();
+        let mut cell_of = vec![0; points.len()];
+        for (at, &(key, index)) in order.iter().enumerate() {
+            if cells.last().is_none_or(|last| last.0 != key) {
+                cells.push((key, at as u32));
+            }
+            cell_of[index as usize] = cells.len() as u32 - 1;
         }
-        for i in 0..buckets {
-            grid.starts[i + 1] += grid.starts[i];
-        }
-        let mut next = grid.starts.clone();
-        grid.entries = vec![(IVec3::ZERO, 0); points.len()];
-        for (i, &c) in cells.iter().enumerate() {
-            let slot = &mut next[grid.bucket(c)];
-            grid.entries[*slot as usize] = (c, i as u32);
-            *slot += 1;
-        }
-        grid
+        cells.push(([i32::MAX; 3], points.len() as u32));
+        let entries = order.iter().map(|&(_, index)| Entry { at: points[index as usize], index }).collect();
+        Self { wrap, entries, cells, cell_of }
     }
 
-    fn cell_of(&self, p: DVec3) -> IVec3 {
-        self.wrapped((p / self.cell).floor().as_ivec3())
+    /// What finds neighbours: quickest of points that follow each other in space.
+    pub(super) fn walk(&self) -> Walk<'_> {
+        Walk { grid: self, cell: None, runs: Vec::with_capacity(9) }
     }
 
-    fn wrapped(&self, mut c: IVec3) -> IVec3 {
-        if let Some([nx, ny]) = self.wrap {
-            c.x = c.x.rem_euclid(nx);
-            c.y = c.y.rem_euclid(ny);
-        }
-        c
-    }
-
-    fn bucket(&self, c: IVec3) -> usize {
-        let h = (c.x as u32).wrapping_mul(0x9e37_79b1)
-            ^ (c.y as u32).wrapping_mul(0x85eb_ca77)
-            ^ (c.z as u32).wrapping_mul(0xc2b2_ae3d);
-        (h ^ (h >> 15)) as usize & self.mask
-    }
-
-    /// Calls `found` with every point in the 27 cells around `p`, in an order that depends on the points alone.
-    pub(super) fn around(&self, p: DVec3, mut found: impl FnMut(u32)) {
-        let middle = (p / self.cell).floor().as_ivec3();
+    /// The entries of the 27 cells around a cell, as few runs.
+    fn runs_around(&self, cell: u32, runs: &mut Vec<Range<u32>>) {
+        runs.clear();
+        let [z, y, x] = self.cells[cell as usize].0;
+        let mut run = |z: i32, y: i32, from: i32, to: i32| {
+            let first = self.cells.partition_point(|c| c.0 < [z, y, from]);
+            let after = first + self.cells[first..].iter().take_while(|c| c.0 <= [z, y, to]).count();
+            // The last cell is none; only a point as far away as numbers reach could be taken for it.
+            let after = after.min(self.cells.len() - 1);
+            if first < after {
+                runs.push(self.cells[first].1..self.cells[after].1);
+            }
+        };
         for dz in -1..=1 {
             for dy in -1..=1 {
-                for dx in -1..=1 {
-                    let c = self.wrapped(middle + IVec3::new(dx, dy, dz));
-                    let bucket = self.bucket(c);
-                    for &(cell, i) in &self.entries[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-                        if cell == c {
-                            found(i);
+                let z = z.saturating_add(dz);
+                let (from, to) = (x.saturating_sub(1), x.saturating_add(1));
+                match self.wrap {
+                    None => run(z, y.saturating_add(dy), from, to),
+                    Some([nx, ny]) => {
+                        let y = (y + dy).rem_euclid(ny);
+                        run(z, y, from.max(0), to.min(nx - 1));
+                        if from < 0 {
+                            run(z, y, nx - 1, nx - 1);
+                        }
+                        if to >= nx {
+                            run(z, y, 0, 0);
                         }
                     }
                 }
             }
         }
+    }
+}
+
+/// Finds the neighbours of points in a [`Grid`].
+pub(super) struct Walk<'a> {
+    grid: &'a Grid,
+    /// The cell last asked for, and the entries around it.
+    cell: Option<u32>,
+    runs: Vec<Range<u32>>,
+}
+
+impl<'a> Walk<'a> {
+    /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
+    pub(super) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
+        let cell = self.grid.cell_of[point];
+        if self.cell != Some(cell) {
+            self.grid.runs_around(cell, &mut self.runs);
+            self.cell = Some(cell);
+        }
+        let entries = &self.grid.entries;
+        self.runs.iter().flat_map(|run| &entries[run.start as usize..run.end as usize])
     }
 }
 
@@ -134,16 +172,24 @@ mod tests {
         let points: Vec<DVec3> = (0..400)
             .map(|_| DVec3::new(f64::from(stream.next()) * 4.0, f64::from(stream.next()) * 5.0, stream.next().into()))
             .collect();
-        let grid = Grid::new(&points, 1.0, Some(period));
-        for p in &points {
-            let mut found = vec![0; points.len()];
-            grid.around(*p, |i| found[i as usize] += 1);
-            for (q, count) in points.iter().zip(&found) {
-                let mut d = *q - *p;
-                d.x -= period.x * (d.x / period.x).round();
-                d.y -= period.y * (d.y / period.y).round();
-                assert!(*count <= 1);
-                assert!(*count == 1 || d.length() > 1.0);
+        for period in [Some(period), None] {
+            let grid = Grid::new(&points, 1.0, period);
+            let mut walk = grid.walk();
+            for (i, p) in points.iter().enumerate() {
+                let mut found = vec![0; points.len()];
+                for entry in walk.around(i) {
+                    assert_eq!(entry.at, points[entry.index as usize]);
+                    found[entry.index as usize] += 1;
+                }
+                for (q, count) in points.iter().zip(&found) {
+                    let mut d = *q - *p;
+                    if let Some(period) = period {
+                        d.x -= period.x * (d.x / period.x).round();
+                        d.y -= period.y * (d.y / period.y).round();
+                    }
+                    assert!(*count <= 1);
+                    assert!(*count == 1 || d.length() > 1.0);
+                }
             }
         }
     }

@@ -9,6 +9,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
@@ -69,7 +70,7 @@ const SMALLEST_CELL: f64 = 9.0;
 const NARROW_TUBE: f64 = 60.0;
 const LARGEST_NARROW_TUBE: u64 = 20_000;
 const CELL_ROUNDS: usize = 500;
-const PIECE_ROUNDS: usize = 160;
+const PIECE_ROUNDS: usize = 100;
 
 impl Knit {
     /// How many control points the cloth would have at most if it kept its width.
@@ -173,13 +174,13 @@ impl Knit {
         }
         relaxation.period = Some(period);
         let order = Order::new(&rows, [cell_width, chart_rows], [width, height], self.points);
-        relaxation.run(CELL_ROUNDS, |points| order.tidy(points));
-        Cell { wide, high, period, points: relaxation.points }
+        relaxation.run(CELL_ROUNDS, |ropes| order.tidy(ropes));
+        Cell { wide, high, period, rows: relaxation.ropes.into_iter().map(|rope| rope.points).collect() }
     }
 
     /// Lays a relaxed cell out over the piece.
     fn repeat_cell(&self, cell_width: u32, [width, height]: [f64; 2]) -> Vec<Course> {
-        let Cell { wide, high, period, points: cell } = self.cell(cell_width, [width, height]);
+        let Cell { wide, high, period, rows: cell } = self.cell(cell_width, [width, height]);
         let per_stitch = self.points as usize;
         let per_row = wide as usize * per_stitch;
         let total = DVec2::new(f64::from(self.stitches) * width, f64::from(self.rows) * height);
@@ -188,13 +189,13 @@ impl Knit {
         let count = self.stitches as usize * per_stitch;
         (0..self.rows)
             .map(|row| {
-                let first = (row % high) as usize * per_row;
+                let own = &cell[(row % high) as usize];
                 let up = f64::from(row / high) * period.y;
                 let last = if round { count } else { count + 1 };
                 let mut course = Course::new(last, round);
                 for i in 0..last {
                     // Cells begin at their left border, pieces at their middle.
-                    let p = cell[first + i % per_row] + DVec3::new((i / per_row) as f64 * period.x, up, 0.0);
+                    let p = own[i % per_row] + DVec3::new((i / per_row) as f64 * period.x, up, 0.0);
                     let place = if round {
                         let (sin, cos) = (TAU * (p.x / total.x)).sin_cos();
                         DVec3::new((radius + p.z) * sin, p.y, (radius + p.z) * cos)
@@ -224,10 +225,10 @@ impl Knit {
             .iter()
             .enumerate()
             .map(|(row, rope)| {
-                let mut course = Course::new(rope.count, round);
-                for i in 0..rope.count {
+                let mut course = Course::new(rope.points.len(), round);
+                for (i, &p) in rope.points.iter().enumerate() {
                     let wale = i as f64 / f64::from(self.points);
-                    course.push(relaxation.points[rope.first + i] + shift, wale, row as u32, self.points, i);
+                    course.push(p + shift, wale, row as u32, self.points, i);
                 }
                 course
             })
@@ -259,7 +260,7 @@ impl Knit {
             Some(knit.cell(kind.len() as u32, knit.gauge()))
         };
         known.truncate(MOST_KINDS);
-        (known.iter().filter_map(cell).collect(), of_row)
+        (known.par_iter().filter_map(cell).collect(), of_row)
     }
 
     /// The stitches on the surface: in their closed form, or as `cell` has them for their row.
@@ -268,13 +269,10 @@ impl Knit {
         rows: &[Vec<Stitch>],
         layout: &Layout,
         surface: &Surface,
-        cell: &dyn Fn(usize) -> Option<&'a Cell>,
+        cell: &(dyn Fn(usize) -> Option<&'a Cell> + Sync),
     ) -> Relaxation {
-        let mut points = Vec::new();
-        let mut pinned = Vec::new();
-        let mut ropes = Vec::with_capacity(rows.len());
-        for (r, row) in rows.iter().enumerate() {
-            let first = points.len();
+        let rope = |(r, row): (usize, &Vec<Stitch>)| {
+            let (mut points, mut pinned) = (Vec::new(), Vec::new());
             let relaxed = cell(r);
             for (j, stitch) in row.iter().enumerate() {
                 let form = layout.form(rows, r, j);
@@ -289,11 +287,10 @@ impl Knit {
                     pinned.push(!layout.periodic && ((r == 0 && head < 0.1) || (r + 1 == rows.len() && head > 0.9)));
                 }
             }
-            let count = points.len() - first;
             let ends = if layout.ring { Ends::Joined(DVec3::ZERO) } else { Ends::Open };
-            ropes.push(Rope { first, count, ends, rest: self.yarn_per_stitch / f64::from(self.points) });
-        }
-        Relaxation { points, ropes, pinned, period: None }
+            Rope { points, pinned, ends, rest: self.yarn_per_stitch / f64::from(self.points) }
+        };
+        Relaxation { ropes: rows.par_iter().enumerate().map(rope).collect(), period: None }
     }
 }
 
@@ -311,8 +308,8 @@ struct Cell {
     wide: u32,
     high: u32,
     period: DVec2,
-    /// Row by row; rows begin at the left border of the first stitch, half a row above the lower border.
-    points: Vec<DVec3>,
+    /// Points of each row; it begins at the left border of the first stitch, half a row above the lower border.
+    rows: Vec<Vec<DVec3>>,
 }
 
 impl Cell {
@@ -322,7 +319,7 @@ impl Cell {
         let j = j % self.wide as usize;
         let per_row = (self.wide * points) as usize;
         let i = j * points as usize + k as usize;
-        let p = self.points[i % per_row] + DVec3::X * (i / per_row) as f64 * self.period.x;
+        let p = self.rows[0][i % per_row] + DVec3::X * (i / per_row) as f64 * self.period.x;
         let (width, height) = (self.period.x / f64::from(self.wide), self.period.y / f64::from(self.high));
         DVec3::new(p.x / width - (j as f64 + 0.5), p.y / height - 0.5, p.z)
     }
@@ -342,7 +339,7 @@ impl Order {
         Self { size: [rows[0].len(), rows.len()], chart: chart.map(|c| c as usize), gauge, points: points as usize }
     }
 
-    fn tidy(&self, points: &mut [DVec3]) {
+    fn tidy(&self, ropes: &mut [Rope]) {
         let [n, rows] = self.size;
         let per_row = n * self.points;
         let [wide, high] = [self.chart[0] * self.points, self.chart[1]];
@@ -351,11 +348,16 @@ impl Order {
         for r in 0..high {
             for i in 0..wide {
                 let copies = || (0..up).flat_map(move |b| (0..across).map(move |a| (a, b)));
-                let place = |(a, b): (usize, usize)| (r + b * high) * per_row + i + a * wide;
+                let place = |(a, b): (usize, usize)| (r + b * high, i + a * wide);
                 let moved = |(a, b): (usize, usize)| DVec3::new(a as f64 * step.x, b as f64 * step.y, 0.0);
-                let mean = copies().map(|c| points[place(c)] - moved(c)).sum::<DVec3>() / (across * up) as f64;
+                let at = |c| {
+                    let (row, point) = place(c);
+                    ropes[row].points[point] - moved(c)
+                };
+                let mean = copies().map(at).sum::<DVec3>() / (across * up) as f64;
                 for c in copies() {
-                    points[place(c)] = mean + moved(c);
+                    let (row, point) = place(c);
+                    ropes[row].points[point] = mean + moved(c);
                 }
             }
         }

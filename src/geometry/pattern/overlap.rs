@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::{Grid, nearest};
+use super::contact::{Grid, Walk, nearest};
 use crate::geometry::{curve::Curve, strand::Chain};
 
 /// How far yarns run into each other.
@@ -60,26 +60,27 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
         return Some(Overlap { length: 0.0, share: 0.0, deepest: 0.0, nearest: f64::INFINITY });
     }
     let grid = Grid::new(&middles, reach, None);
-    let nearest_of = |i: usize| {
+    let nearest_of = |walk: &mut Walk<'_>, i: usize| {
         let a = &pieces[i];
         let mut best = f64::INFINITY;
-        grid.around(middles[i], |j| {
-            let b = &pieces[j as usize];
+        for near in walk.around(i) {
+            if middles[i].distance_squared(near.at) > reach * reach {
+                continue;
+            }
+            let b = &pieces[near.index as usize];
             let both = a.radius + b.radius;
             if a.curve == b.curve {
                 let along = (a.along - b.along).abs();
                 if along.min(rings[a.curve as usize] - along) < ALONG * both {
-                    return;
+                    continue;
                 }
             }
-            if middles[i].distance_squared(middles[j as usize]) > reach * reach {
-                return;
-            }
             best = best.min(nearest(a.from, a.to, b.from, b.to).between.length() / both);
-        });
-        best
+        }
+        best as f32
     };
-    let found: Vec<f32> = (0..pieces.len()).into_par_iter().with_min_len(512).map(|i| nearest_of(i) as f32).collect();
+    let all = (0..pieces.len()).into_par_iter().with_min_len(512);
+    let found: Vec<f32> = all.map_init(|| grid.walk(), nearest_of).collect();
     let (mut length, mut over, mut near) = (0.0, 0.0, f64::INFINITY);
     for (piece, distance) in pieces.iter().zip(found) {
         let here = piece.from.distance(piece.to);
