@@ -1,5 +1,6 @@
 //! Shapes, no light: yarn curves and their files, frames along them, plies in the cross-section.
 
+mod chain;
 pub mod curve;
 pub mod curve_file;
 pub mod fiber;

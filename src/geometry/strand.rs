@@ -6,13 +6,14 @@
 
 use std::{f64::consts::TAU, sync::Arc};
 
-use glam::{DVec3, DVec4, Vec3, Vec3A, Vec4};
+use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
+    chain::{Chain, Fit, LENGTH_STEPS, picked, resample},
     curve::{Basis, Curve},
     section::Place,
-    spline::{SplinePoint, evaluate, evaluate_f32},
+    spline::{SplinePoint, evaluate_f32},
     tube::curve_of,
 };
 
@@ -351,87 +352,6 @@ impl Strands {
     }
 }
 
-/// A curve as a chain of segments that can be evaluated.
-pub(super) struct Chain {
-    basis: Basis,
-    pub(super) points: Vec<DVec4>,
-}
-
-impl Chain {
-    /// Adds the points that the ends need: closed curves repeat theirs, open Catmull-Rom curves reach their end
-    /// points (a mirrored point beyond), B-splines with too few points repeat their ends.
-    pub(super) fn new(curve: &Curve, radii: &[f64]) -> Self {
-        Self::at_time(curve, radii, &curve.points)
-    }
-
-    /// The chain of the same curve while its points are elsewhere.
-    fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
-        assert_eq!(points.len(), curve.points.len(), "a curve has as many points at all times");
-        let all = points.iter().zip(radii).map(|(p, &r)| p.extend(r));
-        // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
-        let repeated = |i: usize| curve.basis != Basis::BSpline && i > 0 && curve.points[i] == curve.points[i - 1];
-        let mut given: Vec<DVec4> = all.enumerate().filter(|(i, _)| !repeated(*i)).map(|(_, p)| p).collect();
-        let n = given.len();
-        if n == 1 {
-            let p = given[0];
-            given.push(p + DVec4::new(1e-6 * p.w.max(1e-12), 0.0, 0.0, 0.0));
-        }
-        let n = n.max(2);
-        let mut points = Vec::with_capacity(n + 3);
-        if curve.closed && n >= 3 {
-            points.push(given[n - 1]);
-            points.extend(&given);
-            points.extend([given[0], given[1]]);
-        } else if curve.basis == Basis::BSpline {
-            points.extend(&given);
-            while points.len() < 4 {
-                points.insert(0, given[0]);
-                points.push(given[n - 1]);
-            }
-        } else {
-            let beyond = |end: DVec4, next: DVec4| (2.0 * end - next).truncate().extend(end.w);
-            points.push(beyond(given[0], given[1]));
-            points.extend(&given);
-            points.push(beyond(given[n - 1], given[n - 2]));
-        }
-        Self { basis: curve.basis, points }
-    }
-
-    pub(super) fn segments(&self) -> usize {
-        self.points.len() - 3
-    }
-
-    pub(super) fn at(&self, segment: usize, u: f64) -> SplinePoint {
-        let p = &self.points[segment..segment + 4];
-        evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
-    }
-
-    /// A chain in the wanted basis through places of this one.
-    fn through(&self, knots: &[(usize, f64)], closed: bool, basis: Basis) -> Self {
-        let knots: Vec<DVec4> = knots.iter().map(|&(segment, u)| self.at(segment, u).at).collect();
-        interpolate(&knots, closed, basis)
-    }
-
-    /// Arc length at `steps` points of each segment, from the chain's start.
-    fn lengths(&self, steps: usize) -> Vec<f64> {
-        let mut lengths = Vec::with_capacity(self.segments() * steps + 1);
-        lengths.push(0.0);
-        let mut sum = 0.0;
-        for segment in 0..self.segments() {
-            for step in 0..steps {
-                // Two-point Gauss quadrature of the speed.
-                let h = 1.0 / steps as f64;
-                let at = |x: f64| self.at(segment, (step as f64 + x) * h).d1.truncate().length();
-                sum += 0.5 * h * (at(0.211_324_865_405_187_1) + at(0.788_675_134_594_812_9));
-                lengths.push(sum);
-            }
-        }
-        lengths
-    }
-}
-
-/// Steps per given segment at which arc length is known.
-const LENGTH_STEPS: usize = 8;
 /// Steps per resampled segment along which frames are carried.
 const FRAME_STEPS: usize = 16;
 
@@ -454,7 +374,12 @@ impl Strand {
         let knots = if kept || total <= 0.0 || total.is_nan() {
             None
         } else {
-            resample(&chain, &lengths, closed, mean_radius, options)
+            let fit = Fit {
+                basis: options.basis,
+                tolerance: options.tolerance * mean_radius,
+                longest: options.longest_segment * mean_radius,
+            };
+            resample(&chain, &lengths, closed, &fit)
         };
         let picks = if picks.is_empty() { Vec::new() } else { picked(curve, picks, &chain, knots.as_deref()) };
         // The same places of the yarn at all times: points move with it.
@@ -559,28 +484,6 @@ impl Winding {
     }
 }
 
-/// The pick nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
-fn picked(curve: &Curve, picks: &[u16], chain: &Chain, knots: Option<&[(usize, f64)]>) -> Vec<u16> {
-    let count = knots.map_or(chain.segments(), |knots| knots.len() - 1);
-    // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
-    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
-    let points = curve.points.len();
-    let steps = if curve.closed { picks.len() / points } else { (picks.len() - 1) / (points - 1).max(1) } as f64;
-    (0..count)
-        .map(|segment| {
-            let place = match knots {
-                None => segment as f64 + 0.5,
-                Some(knots) => {
-                    let at = |knot: usize| knots[knot].0 as f64 + knots[knot].1;
-                    0.5 * (at(segment) + at(segment + 1))
-                }
-            };
-            let pick = ((place + shift) * steps).round() as usize;
-            picks[if curve.closed { pick % picks.len() } else { pick.min(picks.len() - 1) }]
-        })
-        .collect()
-}
-
 /// Carries `normal` from one point of a curve to the next without turning it about the tangent.
 fn double_reflection(from: DVec3, tangent: DVec3, to: DVec3, next_tangent: DVec3, normal: DVec3) -> DVec3 {
     let reflect = |v: DVec3, plane: DVec3, square: f64| v - 2.0 / square * plane.dot(v) * plane;
@@ -595,109 +498,6 @@ fn double_reflection(from: DVec3, tangent: DVec3, to: DVec3, next_tangent: DVec3
     let carried = if c2 > 1e-300 { reflect(n, turn, c2) } else { n };
     // Rounding must not accumulate over thousands of segments.
     (carried - carried.dot(next_tangent) * next_tangent).try_normalize().unwrap_or(normal)
-}
-
-/// Places on the chain (segment, and where in it) at equal arc length, as few as keep the curve through them within the
-/// tolerance of the old one; `None` if that takes the chain's own points.
-fn resample(
-    chain: &Chain,
-    lengths: &[f64],
-    closed: bool,
-    radius: f64,
-    options: &StrandOptions,
-) -> Option<Vec<(usize, f64)>> {
-    let total = lengths[lengths.len() - 1];
-    let place_at = |s: f64| {
-        let i = lengths.partition_point(|&l| l <= s).clamp(1, lengths.len() - 1) - 1;
-        let span = lengths[i + 1] - lengths[i];
-        let t = if span > 0.0 { ((s - lengths[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
-        let place = i as f64 + t;
-        let segment = ((place / LENGTH_STEPS as f64) as usize).min(chain.segments() - 1);
-        (segment, place / LENGTH_STEPS as f64 - segment as f64)
-    };
-    let point_at = |s: f64| {
-        let (segment, u) = place_at(s);
-        chain.at(segment, u)
-    };
-    let longest = (options.longest_segment * radius).max(total * 1e-7);
-    let fewest = if closed { 4 } else { 1 };
-    let mut count = ((total / longest).ceil() as usize).max(fewest);
-    // With as many points as were given, those given are exact; another basis may need some more.
-    let exact = chain.basis == options.basis;
-    let most = if exact { chain.segments() } else { 2 * chain.segments() }.max(fewest);
-    count = count.min(most);
-    loop {
-        let knots: Vec<_> = (0..=count).map(|i| place_at(total * i as f64 / count as f64)).collect();
-        let made = chain.through(&knots, closed, options.basis);
-        let allowed = options.tolerance * radius;
-        let worst = (0..count)
-            .flat_map(|i| [0.25, 0.5, 0.75].map(|u| (i, u)))
-            .map(|(i, u)| {
-                let want = point_at(total * (i as f64 + u) / count as f64);
-                let off = made.at(i, u).at.truncate() - want.at.truncate();
-                // A shift along the yarn is no error of its shape.
-                let t = want.d1.truncate().try_normalize().unwrap_or(DVec3::ZERO);
-                (off - off.dot(t) * t).length()
-            })
-            .fold(0.0, f64::max);
-        if worst <= allowed || (count >= most && !exact) {
-            return Some(knots);
-        }
-        if count >= most {
-            return None;
-        }
-        // The error of a cubic falls with the third power of the spacing at least.
-        let grow = (worst / allowed).powf(1.0 / 3.0).clamp(1.1, 2.0);
-        count = ((count as f64 * grow).ceil() as usize).min(most);
-    }
-}
-
-/// A chain through `knots` in the wanted basis; for closed curves the last knot is the first again.
-fn interpolate(knots: &[DVec4], closed: bool, basis: Basis) -> Chain {
-    let n = knots.len();
-    let curve = |points: Vec<DVec4>| Curve {
-        basis,
-        closed,
-        points: points.iter().map(|p| p.truncate()).collect(),
-        radii: None,
-    };
-    let distinct = if closed { &knots[..n - 1] } else { knots };
-    let radii: Vec<f64> = distinct.iter().map(|p| p.w).collect();
-    if basis != Basis::BSpline {
-        return Chain::new(&curve(distinct.to_vec()), &radii);
-    }
-    // Control points c with (c[i-1] + 4 c[i] + c[i+1]) / 6 = knot i. The matrix is dominated by its diagonal, so
-    // Gauss-Seidel gains a digit in two rounds.
-    let m = distinct.len();
-    let mut c = distinct.to_vec();
-    let mirrored = |c: &[DVec4], i: isize| -> DVec4 {
-        if closed {
-            c[i.rem_euclid(m as isize) as usize]
-        } else if i < 0 {
-            2.0 * c[0] - c[1]
-        } else if i >= m as isize {
-            2.0 * c[m - 1] - c[m - 2]
-        } else {
-            c[i as usize]
-        }
-    };
-    for _ in 0..24 {
-        for i in 0..m {
-            let (a, b) = (mirrored(&c, i as isize - 1), mirrored(&c, i as isize + 1));
-            c[i] = if !closed && (i == 0 || i == m - 1) { distinct[i] } else { (6.0 * distinct[i] - a - b) / 4.0 };
-        }
-    }
-    let mut points = Vec::with_capacity(m + 3);
-    points.push(mirrored(&c, -1));
-    points.extend(&c);
-    points.push(mirrored(&c, m as isize));
-    if closed {
-        points.push(mirrored(&c, m as isize + 1));
-    }
-    for p in &mut points {
-        p.w = p.w.max(0.0);
-    }
-    Chain { basis, points }
 }
 
 #[cfg(test)]

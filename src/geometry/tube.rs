@@ -5,13 +5,13 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3, Vec3A, Vec4};
+use glam::{Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
+    chain::{self, Chain},
     curve::{Basis, Curve},
     spline::evaluate_f32,
-    strand::Chain,
 };
 
 /// How far off its surface a ray leaves a tube, in its radii: enough for rounding, too little to meet another.
@@ -158,40 +158,16 @@ pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
 
 /// The control points of the uniform cubic B-spline that passes through `knots` (at least two), with the radius `w`
 /// of each knot. At its ends the curve does not bend.
-///
-/// Control points c obey `(c[i-1] + 4 c[i] + c[i+1]) / 6 = knot[i]`; the tridiagonal system is solved in one sweep each way.
 pub fn spline_through(knots: &[Vec3], radii: impl Fn(usize) -> f32) -> Vec<Vec4> {
-    let n = knots.len();
-    debug_assert!(n >= 2, "a curve has two points");
-    // Ends without bending: c[-1] = 2 c[0] - c[1] makes the first row c[0] = knot 0.
-    let mut c: Vec<DVec3> = Vec::with_capacity(n);
-    let mut factors = Vec::with_capacity(n);
-    for (i, knot) in knots.iter().enumerate() {
-        let knot = knot.as_dvec3();
-        if i == 0 || i == n - 1 {
-            c.push(knot);
-            factors.push(0.0);
-            continue;
-        }
-        let pivot = 1.0 / (4.0 - factors[i - 1]);
-        let before: DVec3 = c[i - 1];
-        c.push((6.0 * knot - before) * pivot);
-        factors.push(pivot);
-    }
-    for i in (1..n - 1).rev() {
-        let after = c[i + 1];
-        c[i] -= factors[i] * after;
-    }
-    let mut points = Vec::with_capacity(n + 2);
-    let with = |p: DVec3, i: usize| p.as_vec3().extend(radii(i));
-    points.push(with(2.0 * c[0] - c[1], 0));
-    points.extend(c.iter().enumerate().map(|(i, &p)| with(p, i)));
-    points.push(with(2.0 * c[n - 1] - c[n - 2], n - 1));
-    points
+    let points = chain::spline_through(knots.iter().map(|knot| knot.as_dvec3()));
+    let knot_of = |i: usize| i.saturating_sub(1).min(knots.len() - 1);
+    points.iter().enumerate().map(|(i, p)| p.as_vec3().extend(radii(knot_of(i)))).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::math::frame::orthonormal_basis;
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::{Grid, Walk, nearest};
-use crate::geometry::{curve::Curve, strand::Chain};
+use crate::geometry::{chain::Chain, curve::Curve};
 
 /// How far yarns run into each other.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,294 @@
+//! Curves as chains of cubic segments: evaluated, measured, and put through fewer points or into another basis.
+
+use std::ops::{Mul, Sub};
+
+use glam::{DVec3, DVec4};
+
+use super::{
+    curve::{Basis, Curve},
+    spline::{SplinePoint, evaluate},
+};
+
+/// A curve as a chain of segments that can be evaluated.
+pub(super) struct Chain {
+    pub(super) basis: Basis,
+    pub(super) points: Vec<DVec4>,
+}
+
+impl Chain {
+    /// Adds the points that the ends need: closed curves repeat theirs, open Catmull-Rom curves reach their end
+    /// points (a mirrored point beyond), B-splines with too few points repeat their ends.
+    pub(super) fn new(curve: &Curve, radii: &[f64]) -> Self {
+        Self::at_time(curve, radii, &curve.points)
+    }
+
+    /// The chain of the same curve while its points are elsewhere.
+    pub(super) fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
+        assert_eq!(points.len(), curve.points.len(), "a curve has as many points at all times");
+        let all = points.iter().zip(radii).map(|(p, &r)| p.extend(r));
+        // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
+        let repeated = |i: usize| curve.basis != Basis::BSpline && i > 0 && curve.points[i] == curve.points[i - 1];
+        let mut given: Vec<DVec4> = all.enumerate().filter(|(i, _)| !repeated(*i)).map(|(_, p)| p).collect();
+        let n = given.len();
+        if n == 1 {
+            let p = given[0];
+            given.push(p + DVec4::new(1e-6 * p.w.max(1e-12), 0.0, 0.0, 0.0));
+        }
+        let n = n.max(2);
+        let mut points = Vec::with_capacity(n + 3);
+        if curve.closed && n >= 3 {
+            points.push(given[n - 1]);
+            points.extend(&given);
+            points.extend([given[0], given[1]]);
+        } else if curve.basis == Basis::BSpline {
+            points.extend(&given);
+            while points.len() < 4 {
+                points.insert(0, given[0]);
+                points.push(given[n - 1]);
+            }
+        } else {
+            let beyond = |end: DVec4, next: DVec4| (2.0 * end - next).truncate().extend(end.w);
+            points.push(beyond(given[0], given[1]));
+            points.extend(&given);
+            points.push(beyond(given[n - 1], given[n - 2]));
+        }
+        Self { basis: curve.basis, points }
+    }
+
+    pub(super) fn segments(&self) -> usize {
+        self.points.len() - 3
+    }
+
+    pub(super) fn at(&self, segment: usize, u: f64) -> SplinePoint {
+        let p = &self.points[segment..segment + 4];
+        evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
+    }
+
+    /// A chain in the wanted basis through places of this one; the last of a closed one is the first again.
+    pub(super) fn through(&self, knots: &[(usize, f64)], closed: bool, basis: Basis) -> Self {
+        let knots: Vec<DVec4> = knots.iter().map(|&(segment, u)| self.at(segment, u).at).collect();
+        let distinct = if closed { &knots[..knots.len() - 1] } else { &knots[..] };
+        if basis != Basis::BSpline {
+            let curve = Curve { basis, closed, points: distinct.iter().map(|p| p.truncate()).collect(), radii: None };
+            return Self::new(&curve, &distinct.iter().map(|p| p.w).collect::<Vec<f64>>());
+        }
+        let mut points = if closed {
+            // An open curve that has gone round before and goes on round after: what is beyond its ends does not reach here.
+            let (count, far) = (distinct.len(), FORGOTTEN);
+            let around = (0..count + 2 * far).map(|i| distinct[(i + far * (count - 1)) % count]);
+            spline_through(around)[far..far + count + 3].to_vec()
+        } else {
+            spline_through(distinct.iter().copied())
+        };
+        for p in &mut points {
+            p.w = p.w.max(0.0);
+        }
+        Self { basis, points }
+    }
+
+    /// Arc length at `steps` points of each segment, from the chain's start.
+    pub(super) fn lengths(&self, steps: usize) -> Vec<f64> {
+        let mut lengths = Vec::with_capacity(self.segments() * steps + 1);
+        lengths.push(0.0);
+        let mut sum = 0.0;
+        for segment in 0..self.segments() {
+            for step in 0..steps {
+                // Two-point Gauss quadrature of the speed.
+                let h = 1.0 / steps as f64;
+                let at = |x: f64| self.at(segment, (step as f64 + x) * h).d1.truncate().length();
+                sum += 0.5 * h * (at(0.211_324_865_405_187_1) + at(0.788_675_134_594_812_9));
+                lengths.push(sum);
+            }
+        }
+        lengths
+    }
+}
+
+/// Steps per given segment at which arc length is known.
+pub(super) const LENGTH_STEPS: usize = 8;
+/// How a chain is resampled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fit {
+    /// The basis wanted.
+    pub(super) basis: Basis,
+    /// How far from the old chain it may lie.
+    pub(super) tolerance: f64,
+    /// The longest segment.
+    pub(super) longest: f64,
+}
+
+/// Places on the chain (segment, and where in it) at equal arc length, as few as keep the curve through them within the
+/// tolerance of the old one; `None` if that takes the chain's own points.
+pub(super) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) -> Option<Vec<(usize, f64)>> {
+    let total = lengths[lengths.len() - 1];
+    let place_at = |s: f64| {
+        let i = lengths.partition_point(|&l| l <= s).clamp(1, lengths.len() - 1) - 1;
+        let span = lengths[i + 1] - lengths[i];
+        let t = if span > 0.0 { ((s - lengths[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let place = i as f64 + t;
+        let segment = ((place / LENGTH_STEPS as f64) as usize).min(chain.segments() - 1);
+        (segment, place / LENGTH_STEPS as f64 - segment as f64)
+    };
+    let point_at = |s: f64| {
+        let (segment, u) = place_at(s);
+        chain.at(segment, u)
+    };
+    let longest = fit.longest.max(total * 1e-7);
+    let fewest = if closed { 4 } else { 1 };
+    let mut count = ((total / longest).ceil() as usize).max(fewest);
+    // With as many points as were given, those given are exact; another basis may need some more.
+    let exact = chain.basis == fit.basis;
+    let most = if exact { chain.segments() } else { 2 * chain.segments() }.max(fewest);
+    count = count.min(most);
+    loop {
+        let knots: Vec<_> = (0..=count).map(|i| place_at(total * i as f64 / count as f64)).collect();
+        let made = chain.through(&knots, closed, fit.basis);
+        let worst = (0..count)
+            .flat_map(|i| [0.25, 0.5, 0.75].map(|u| (i, u)))
+            .map(|(i, u)| {
+                let want = point_at(total * (i as f64 + u) / count as f64);
+                let off = made.at(i, u).at.truncate() - want.at.truncate();
+                // A shift along the yarn is no error of its shape.
+                let t = want.d1.truncate().try_normalize().unwrap_or(DVec3::ZERO);
+                (off - off.dot(t) * t).length()
+            })
+            .fold(0.0, f64::max);
+        if worst <= fit.tolerance || (count >= most && !exact) {
+            return Some(knots);
+        }
+        if count >= most {
+            return None;
+        }
+        // The error of a cubic falls with the third power of the spacing at least.
+        let grow = (worst / fit.tolerance).powf(1.0 / 3.0).clamp(1.1, 2.0);
+        count = ((count as f64 * grow).ceil() as usize).min(most);
+    }
+}
+
+/// The pick nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
+pub(super) fn picked(curve: &Curve, picks: &[u16], chain: &Chain, knots: Option<&[(usize, f64)]>) -> Vec<u16> {
+    let count = knots.map_or(chain.segments(), |knots| knots.len() - 1);
+    // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
+    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
+    let points = curve.points.len();
+    let steps = if curve.closed { picks.len() / points } else { (picks.len() - 1) / (points - 1).max(1) } as f64;
+    (0..count)
+        .map(|segment| {
+            let place = match knots {
+                None => segment as f64 + 0.5,
+                Some(knots) => {
+                    let at = |knot: usize| knots[knot].0 as f64 + knots[knot].1;
+                    0.5 * (at(segment) + at(segment + 1))
+                }
+            };
+            let pick = ((place + shift) * steps).round() as usize;
+            picks[if curve.closed { pick % picks.len() } else { pick.min(picks.len() - 1) }]
+        })
+        .collect()
+}
+
+/// After so many knots a B-spline has forgotten another: (2 - sqrt 3)^28 is 1e-16.
+const FORGOTTEN: usize = 28;
+
+/// The control points of the uniform cubic B-spline that passes through `knots` (at least two) and does not bend at its
+/// ends: one for each knot, and one beyond each end.
+///
+/// Control points c obey `(c[i-1] + 4 c[i] + c[i+1]) / 6 = knot[i]`; the tridiagonal system is solved in one sweep each way.
+pub(super) fn spline_through<V>(knots: impl ExactSizeIterator<Item = V>) -> Vec<V>
+where
+    V: Copy + Sub<Output = V> + Mul<f64, Output = V>,
+{
+    let n = knots.len();
+    debug_assert!(n >= 2, "a curve has two points");
+    // Ends without bending: c[-1] = 2 c[0] - c[1] makes the first row c[0] = knot 0. The point before is put in at last.
+    let mut c: Vec<V> = Vec::with_capacity(n + 2);
+    let mut factors = Vec::with_capacity(n);
+    for (i, knot) in knots.enumerate() {
+        if i == 0 {
+            c.push(knot);
+        }
+        if i == 0 || i == n - 1 {
+            c.push(knot);
+            factors.push(0.0);
+            continue;
+        }
+        let pivot = 1.0 / (4.0 - factors[i - 1]);
+        let before = c[i];
+        c.push((knot * 6.0 - before) * pivot);
+        factors.push(pivot);
+    }
+    for i in (1..n - 1).rev() {
+        c[i + 1] = c[i + 1] - c[i + 2] * factors[i];
+    }
+    c[0] = c[1] * 2.0 - c[2];
+    c.push(c[n] * 2.0 - c[n - 1]);
+    c
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(n: usize, closed: bool, basis: Basis) -> (Curve, Vec<f64>) {
+        let at = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+        let points = (0..n).map(|i| DVec3::new(3.0 * at(i).cos(), 2.0 * at(i).sin(), (2.0 * at(i)).sin())).collect();
+        (Curve { basis, closed, points, radii: None }, (0..n).map(|i| 0.2 + 0.1 * at(i).cos()).collect())
+    }
+
+    #[test]
+    fn chains_in_either_basis_pass_their_knots() {
+        for closed in [false, true] {
+            for n in [4, 7, 50] {
+                let (curve, radii) = wave(n, closed, Basis::CatmullRom);
+                let chain = Chain::new(&curve, &radii);
+                let knots: Vec<(usize, f64)> =
+                    (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]).collect();
+                for basis in [Basis::CatmullRom, Basis::BSpline] {
+                    let made = chain.through(&knots, closed, basis);
+                    assert_eq!(made.segments(), chain.segments());
+                    for i in 0..made.segments() {
+                        assert!(
+                            (made.at(i, 0.0).at - chain.at(i, 0.0).at).length() < 1e-12,
+                            "{basis:?} {closed} {n} {i}"
+                        );
+                        assert!(
+                            (made.at(i, 1.0).at - chain.at(i, 1.0).at).length() < 1e-12,
+                            "{basis:?} {closed} {n} {i}"
+                        );
+                    }
+                    if closed {
+                        let (first, last) = (made.at(0, 0.0), made.at(made.segments() - 1, 1.0));
+                        assert!((first.d1 - last.d1).length() < 1e-12, "{basis:?} is smooth at its seam");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_straight_chain_is_as_long_as_it_is() {
+        let points = [0.0, 1.0, 1.5, 4.0].map(|x| DVec3::new(0.6 * x, 0.8 * x, 0.0)).to_vec();
+        let curve = Curve { basis: Basis::Linear, closed: false, points, radii: None };
+        let lengths = Chain::new(&curve, &[0.1; 4]).lengths(LENGTH_STEPS);
+        assert_eq!(lengths.len(), 3 * LENGTH_STEPS + 1);
+        for (segment, end) in [(1, 1.0), (2, 1.5), (3, 4.0)] {
+            assert!((lengths[segment * LENGTH_STEPS] - end).abs() < 1e-9, "{lengths:?}");
+        }
+    }
+
+    #[test]
+    fn fewer_places_stay_within_the_tolerance() {
+        let (curve, radii) = wave(200, true, Basis::CatmullRom);
+        let chain = Chain::new(&curve, &radii);
+        let fit = Fit { basis: Basis::CatmullRom, tolerance: 0.01, longest: 2.0 };
+        let lengths = chain.lengths(LENGTH_STEPS);
+        let knots = resample(&chain, &lengths, true, &fit).expect("fewer than given");
+        assert!(knots.len() < 60, "{}", knots.len());
+        let made = chain.through(&knots, true, fit.basis);
+        for i in 0..made.segments() {
+            let p = made.at(i, 0.5).at.truncate();
+            let near = (0..2000).map(|k| chain.at(k / 10, f64::from(k as u32 % 10) / 10.0).at.truncate().distance(p));
+            assert!(near.fold(f64::MAX, f64::min) < 0.05);
+        }
+    }
+}
