@@ -65,6 +65,8 @@ const STEP: f64 = 0.02;
 const APART: f64 = 1.025;
 /// How firmly curves straighten, 0 to 1.
 const STIFFNESS: f64 = 0.3;
+/// Yarns do not bend more tightly than to this radius: half a diameter and a little, for a spline bends more at its points.
+const TIGHTEST: f64 = 0.7;
 /// The share of rounds at the end in which contact counts most.
 const SETTLING: f64 = 0.3;
 /// Along a yarn, closer than this is not contact but bending.
@@ -91,6 +93,7 @@ impl Relaxation {
             each(&mut self.ropes, parallel, |rope| {
                 rope.straighten(stiffness, backwards);
                 rope.keep_length(firmness, backwards);
+                rope.unbend(backwards);
             });
             if backwards {
                 contacts.iter_mut().rev().for_each(|group| self.part(group, true, parallel));
@@ -282,6 +285,34 @@ impl Rope {
         }
     }
 
+    /// Opens bends that are too tight: a point and the middle of its neighbours come nearer to each other.
+    fn unbend(&mut self, backwards: bool) {
+        let n = self.points.len();
+        let bends = if self.ends == Ends::Open { 1..n.saturating_sub(1) } else { 0..n };
+        for k in bends.clone() {
+            let i = if backwards { bends.end - 1 - (k - bends.start) } else { k };
+            let (next, after) = self.next(i, n);
+            let (last, before) = match self.ends {
+                Ends::Joined(jump) if i == 0 => (n - 1, -jump),
+                _ => (i - 1, DVec3::ZERO),
+            };
+            let (a, b) = (self.points[last] + before - self.points[i], self.points[next] + after - self.points[i]);
+            // On an arc of that radius the chord over two segments would be so far away.
+            let most = a.length_squared() * b.length_squared() / (4.0 * TIGHTEST * TIGHTEST);
+            let away = -0.5 * (a + b);
+            let square = away.length_squared();
+            if square <= most {
+                continue;
+            }
+            let by = away * ((1.0 - (most / square).sqrt()) / 1.5);
+            for (point, by) in [(i, -by), (last, 0.5 * by), (next, 0.5 * by)] {
+                if !self.pinned[point] {
+                    self.points[point] += by;
+                }
+            }
+        }
+    }
+
     /// Brings every segment nearer to its length.
     fn keep_length(&mut self, firmness: f64, backwards: bool) {
         let segments = self.segments();
@@ -400,6 +431,26 @@ mod tests {
         for i in 0..n as usize {
             let gap = (r.ropes[1].points[i] + DVec3::Y * period.y).distance(r.ropes[0].points[i]);
             assert!((1.0..1.3).contains(&gap), "{i}: {gap}");
+        }
+    }
+
+    #[test]
+    fn a_bend_that_is_too_tight_opens() {
+        // A hairpin of half circles a quarter of a diameter wide.
+        let at = |i: i32| match i {
+            0..10 => DVec3::new(f64::from(i) * 0.5, 0.0, 0.0),
+            _ => DVec3::new(f64::from(19 - i) * 0.5, 0.25, 0.0),
+        };
+        let points: Vec<DVec3> = (0..20).map(at).collect();
+        let mut rope = Rope { pinned: vec![false; 20], points, ends: Ends::Open, rest: 0.5 };
+        for round in 0..200 {
+            rope.keep_length(1.0, round % 2 == 1);
+            rope.unbend(round % 2 == 1);
+        }
+        for w in rope.points.windows(3) {
+            let (a, b) = (w[1] - w[0], w[2] - w[1]);
+            let radius = a.length() * b.length() / (b - a).length();
+            assert!(radius > 0.95 * TIGHTEST, "{radius}");
         }
     }
 
