@@ -89,6 +89,13 @@ impl Stream {
         self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
         unit(hash(self.state ^ self.weyl))
     }
+
+    /// A stream of its own, independent of what this one still gives.
+    #[inline]
+    pub fn fork(&mut self) -> Self {
+        self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
+        Self::new(hash(self.state ^ self.weyl))
+    }
 }
 
 #[cfg(test)]

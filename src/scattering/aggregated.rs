@@ -96,6 +96,8 @@ impl AggregatedYarn {
 struct Node {
     /// The ply.
     ply: usize,
+    /// The camera's ray in it.
+    crossing: PlyCrossing,
     /// Where, in the section.
     point: Vec2,
     /// How far along the yarn.
@@ -192,7 +194,10 @@ pub struct Vertex<'a> {
     forward: Option<Forward>,
     forward_chance: f32,
     node: Option<Node>,
-    backward: Option<Backward>,
+    /// Multiply scattered light, made when first asked for: a path that goes on from the node may never do.
+    backward: OnceCell<Backward>,
+    /// What is random about it.
+    backward_stream: Stream,
     /// The direction drawn from the node's lobes, their value there (with the way out), density, and chance to escape.
     drawn: Drawn,
 }
@@ -270,7 +275,8 @@ impl<'a> Vertex<'a> {
             forward,
             forward_chance: if forward_energy > 0.0 { forward_energy / (forward_energy + total) } else { 0.0 },
             node: None,
-            backward: None,
+            backward: OnceCell::new(),
+            backward_stream: stream.fork(),
             drawn: Drawn {
                 direction: Vec3A::ZERO,
                 value: NodeValue {
@@ -287,7 +293,7 @@ impl<'a> Vertex<'a> {
         if let Some((i, reaching, energy)) = chosen {
             let share = energy / total * scattered;
             vertex.draw_node(crossings, i, reaching / share, weight, throughput, u[1], pick);
-            vertex.draw_direction(crossings, i, [u[2], u[3]], stream);
+            vertex.draw_direction([u[2], u[3]], stream);
         }
         vertex
     }
@@ -346,6 +352,7 @@ impl<'a> Vertex<'a> {
         let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
         Node {
             ply: crossing.ply,
+            crossing: *crossing,
             point,
             travel,
             tangent,
@@ -363,13 +370,12 @@ impl<'a> Vertex<'a> {
 
     /// Draws a direction from the node's lobes; whether it escapes says how much light stays for B.
     #[inline]
-    fn draw_direction(&mut self, crossings: &Crossings, index: usize, u: [f32; 2], stream: &mut Stream) {
+    fn draw_direction(&mut self, u: [f32; 2], stream: &mut Stream) {
         let Some(node) = self.node else { return };
         if node.chance.iter().sum::<f32>() <= 0.0 {
             self.node = None;
             return;
         }
-        let crossing = &crossings[index];
         let optics = &self.yarn.plies[node.ply];
         let lobe = choose(node.chance, stream.next());
         let sin = match lobe {
@@ -382,21 +388,31 @@ impl<'a> Vertex<'a> {
         let value = self.node_value(&node, direction);
         let escape = self.escape_chance(&node, optics, value.clear);
         self.drawn = Drawn { direction, value, escape };
+    }
 
+    /// Lobe B of a node.
+    #[inline]
+    fn backward(&self, node: &Node) -> &Backward {
+        self.backward.get_or_init(|| self.backward_at(node))
+    }
+
+    fn backward_at(&self, node: &Node) -> Backward {
+        let optics = &self.yarn.plies[node.ply];
+        let Drawn { value, escape, .. } = self.drawn;
         let energy = node.amplitude * optics.albedo * optics.leaves_ply * (Rgb::ONE - value.clear);
-        let mut backward = self.backward_of(crossing, energy, 1.0 - escape);
+        let mut backward = self.backward_of(&node.crossing, energy, 1.0 - escape);
         if self.yarn.shape.plies.len() > 1 && backward.chance > 0.0 {
-            let w = backward.draw(stream);
+            let w = backward.draw(&mut self.backward_stream.clone());
             let (value, pdf) = self.backward_value(&backward, node.ply, w);
             if pdf > 0.0 {
-                let open = (-self.optical_depth(&node, w).1).exp();
+                let open = (-self.optical_depth(node, w).1).exp();
                 let weight = value / pdf;
                 let energy = weight * (Rgb::ONE - open) * optics.leaves_yarn;
-                let chance = self.open_chance(&node, optics, open);
+                let chance = self.open_chance(node, optics, open);
                 backward.again = Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy });
             }
         }
-        self.backward = Some(backward);
+        backward
     }
 
     /// The chance, given how open a direction is, that multiply scattered light goes on in it.
@@ -535,20 +551,19 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            if let Some(backward) = &self.backward {
-                let optics = &self.yarn.plies[node.ply];
-                let (first, pdf) = self.backward_value(backward, node.ply, w);
-                let chance = at_node * backward.chance;
-                lobes.b = match &backward.again {
-                    None => first * mis_weight(light_pdf, chance * pdf),
-                    Some(again) => {
-                        let open = self.open_chance(node, optics, value.open);
-                        let even = even_over_fibers(backward.frame.latitudes(w).1);
-                        first * value.open * mis_weight(light_pdf, chance * open * pdf)
-                            + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even)
-                    }
-                };
-            }
+            let backward = self.backward(node);
+            let optics = &self.yarn.plies[node.ply];
+            let (first, pdf) = self.backward_value(backward, node.ply, w);
+            let chance = at_node * backward.chance;
+            lobes.b = match &backward.again {
+                None => first * mis_weight(light_pdf, chance * pdf),
+                Some(again) => {
+                    let open = self.open_chance(node, optics, value.open);
+                    let even = even_over_fibers(backward.frame.latitudes(w).1);
+                    first * value.open * mis_weight(light_pdf, chance * open * pdf)
+                        + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even)
+                }
+            };
         }
         let total = lobes.sum().mean();
         Direct { lobes, forward_share: if total > 0.0 { forward_part / total } else { 0.0 } }
@@ -591,7 +606,7 @@ impl<'a> Vertex<'a> {
                 start,
             });
         }
-        let backward = self.backward.as_ref()?;
+        let backward = self.backward(node);
         let shares = LobeValues { b: Rgb::ONE, ..LobeValues::default() };
         let chance = at_node * backward.chance;
         let (direction, value, pdf) = match &backward.again {

@@ -310,10 +310,10 @@ fn sample_densities_match_where_samples_fall() {
         }
     }
     let mut expected = [[0f64; 96]; 2];
-    let backward = vertex.backward.unwrap();
+    let backward = vertex.backward(vertex.node.as_ref().unwrap());
     for (w, dw) in sphere(1600, 1200) {
         let f = vertex.forward_value(vertex.forward.as_ref().unwrap(), w).1 * vertex.forward_chance;
-        let b = vertex.backward_value(&backward, vertex.node.unwrap().ply, w).1
+        let b = vertex.backward_value(backward, vertex.node.unwrap().ply, w).1
             * (1.0 - vertex.forward_chance)
             * backward.chance;
         expected[0][cell(w)] += f64::from(f) * dw * f64::from(n);
