@@ -152,14 +152,19 @@ fn path(signs: &[f64], spacing: f64, reach: f64, offset: f64, points: u32) -> Ve
         let rest = s - reach * turned;
         (reach * turned.sin() + rest * turned.cos(), reach * turned.cos() - offset - rest * turned.sin())
     };
+    // Floats and ends have points as far apart as bends have: a spline through uneven ones has kinks.
+    let even = |length: f64| (f64::from(points) * length / (2.0 * half_length)).round().max(1.0) as u32;
     let n = signs.len();
     let mut out = Vec::with_capacity((n + 1) * points as usize + 1);
     let end = |along: f64, sign: f64| PathPoint { along, height: sign * own, place: (along / spacing) as f32 };
-    out.push(end(0.0, signs[0]));
+    let ends = even(half);
+    let within = |k: u32| half * f64::from(k) / f64::from(ends);
+    out.extend((0..ends).map(|k| end(within(k), signs[0])));
     for (i, pair) in signs.windows(2).enumerate() {
         let start = (i as f64 + 0.5) * spacing;
-        for k in 0..points {
-            let share = f64::from(k) / f64::from(points);
+        let steps = if pair[0] == pair[1] { even(spacing) } else { points };
+        for k in 0..steps {
+            let share = f64::from(k) / f64::from(steps);
             let (along, height) = if pair[0] == pair[1] {
                 (share * spacing, own)
             } else {
@@ -178,8 +183,7 @@ fn path(signs: &[f64], spacing: f64, reach: f64, offset: f64, points: u32) -> Ve
             });
         }
     }
-    out.push(end((n as f64 - 0.5) * spacing, signs[n - 1]));
-    out.push(end(n as f64 * spacing, signs[n - 1]));
+    out.extend((0..=ends).map(|k| end((n as f64 - 0.5) * spacing + within(k), signs[n - 1])));
     out
 }
 
@@ -187,6 +191,7 @@ fn path(signs: &[f64], spacing: f64, reach: f64, offset: f64, points: u32) -> Ve
 mod tests {
     use super::super::overlap::overlap;
     use super::*;
+    use crate::geometry::strand::{StrandOptions, Strands};
 
     fn weave(draft: &str) -> Weave {
         Weave {
@@ -219,6 +224,24 @@ mod tests {
     fn yarns_touch_and_do_not_cut() {
         for draft in ["plain", "twill 2/1", "twill 2/2", "satin 5", "satin 8/3", "basket 2"] {
             does_not_overlap(&weave(draft), draft);
+        }
+    }
+
+    #[test]
+    fn yarns_bend_no_more_tightly_than_around_each_other() {
+        for draft in ["plain", "twill 3/1", "satin 8/3", "basket 2"] {
+            let strands = weave(draft).strands().unwrap();
+            let curves: Vec<(Curve, Vec<f64>)> =
+                strands.into_iter().map(|s| (s.curve.clone(), vec![1.0; s.curve.points.len()])).collect();
+            let options = StrandOptions {
+                basis: Basis::CatmullRom,
+                tolerance: 0.005,
+                longest_segment: 6.0,
+                ply_rate: 0.0,
+                symmetry: 1.0,
+                phases: Vec::new(),
+            };
+            assert_eq!(Strands::new(&curves, &options).tight_bends(), [], "{draft}");
         }
     }
 
