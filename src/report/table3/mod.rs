@@ -190,11 +190,14 @@ const COLUMNS: [Column; 13] = [
     ("bounces", |r| format!("{} / {}", short(r.reference.mean_bounces), short(r.aggregated.mean_bounces))),
     ("rays, millions", |r| format!("{} / {}", short(r.reference.rays / 1e6), short(r.aggregated.rays / 1e6))),
     ("mean ratio R G B", |r| ratios(r.model_error.mean_ratio)),
-    ("relMSE 8x8, FLIP", |r| {
-        let relmse = r.model_error.relmse_8.map_or("–".to_owned(), |v| format!("{v:.4}"));
-        format!("{relmse}, {:.3}", r.model_error.flip)
-    }),
+    ("relMSE 8x8, FLIP", |r| distance(&r.model_error)),
 ];
+
+/// How far a picture is from the reference, in two figures.
+fn distance(error: &ModelError) -> String {
+    let relmse = error.relmse_8.map_or("–".to_owned(), |v| format!("{v:.4}"));
+    format!("{relmse}, {:.3}", error.flip)
+}
 
 impl Table {
     /// What a reader must know before the figures.
@@ -227,6 +230,25 @@ impl Table {
         }
         for missing in &self.missing {
             let _ = writeln!(out, "\nMissing: {}: {}", missing.name, missing.reason);
+        }
+        out + &self.others_to_markdown()
+    }
+
+    /// Other ways beside the aggregated model, if there are any: how far each is from explicit fibres.
+    fn others_to_markdown(&self) -> String {
+        let mut out = String::new();
+        let Some(first) = self.rows.iter().find(|row| !row.others.is_empty()) else { return out };
+        let names: Vec<&str> = first.others.iter().map(|other| other.name.as_str()).collect();
+        let _ = writeln!(out, "\n## Other ways\n\nDistance from explicit fibres: relMSE 8x8, FLIP.\n");
+        let _ = writeln!(out, "| row | aggregated | {} |", names.join(" | "));
+        let _ = writeln!(out, "|{}", " --- |".repeat(2 + names.len()));
+        for row in &self.rows {
+            let of = |name: &&str| {
+                let other = row.others.iter().find(|other| other.name == **name);
+                other.map_or("–".to_owned(), |other| distance(&other.model_error))
+            };
+            let cells: Vec<String> = names.iter().map(of).collect();
+            let _ = writeln!(out, "| {} | {} | {} |", row.name, distance(&row.model_error), cells.join(" | "));
         }
         out
     }
@@ -364,8 +386,12 @@ pub(super) mod tests {
             "{text}"
         );
         assert!(text.contains("Missing: glove: no file"));
-        let lines: Vec<&str> = text.lines().filter(|l| l.starts_with('|')).collect();
-        assert!(lines.iter().all(|l| l.matches('|').count() == COLUMNS.len() + 1), "{text}");
+        let (rows, others) = text.split_once("## Other ways").unwrap();
+        for (part, columns) in [(rows, COLUMNS.len()), (others, 3)] {
+            let mut lines = part.lines().filter(|l| l.starts_with('|'));
+            assert!(lines.all(|l| l.matches('|').count() == columns + 1), "{text}");
+        }
+        assert!(others.contains("| silk, front | 0.0100, 0.050 | 0.0100, 0.050 |"), "{text}");
         let csv = table.to_csv();
         let columns: Vec<usize> = csv.lines().map(|l| l.replace("\"silk, front\"", "x").matches(',').count()).collect();
         assert_eq!(columns, [columns[0]; 2]);
