@@ -166,12 +166,12 @@ fn configuration(v: &serde_json::Value) -> (Yarn, View) {
 }
 
 /// Mean errors over cases and channels: of reflected and of transmitted (with unscattered) energy as shares of the
-/// incident light, and the same relative to the truth.
-fn errors(model: Model, cases: &[&serde_json::Value]) -> [f64; 4] {
+/// incident light, and the same relative to the truth. Each case has its own seed, so that noise is averaged over.
+fn errors(model: Model, cases: &[&serde_json::Value], paths: u64) -> [f64; 4] {
     let mut sums = [0.0; 4];
-    for v in cases {
+    for (seed, v) in cases.iter().enumerate() {
         let (yarn, view) = configuration(v);
-        let m = measure(&Specimen::Yarn(&yarn, model), &view, Effort { paths: 16_000, seed: 11 });
+        let m = measure(&Specimen::Yarn(&yarn, model), &view, Effort { paths, seed: seed as u32 });
         let (reflected, transmitted) = m.energies();
         let t0 = v["T0"].as_f64().unwrap();
         for c in 0..3 {
@@ -193,13 +193,13 @@ fn the_recommended_model_keeps_its_distance_from_the_oracle() {
             .filter(|v| plies(v["n_plies"].as_u64().unwrap()) && v["density_area"].as_f64().unwrap() >= 0.3 - 1e-9)
             .collect()
     };
-    // Measured: one ply 0.0098, 0.0121, 0.065, 0.110; several plies 0.0062, 0.0070, 0.029, 0.024.
-    for (name, cases, bounds) in [
-        ("one ply", dense(&|n| n == 1), [0.0105, 0.0130, 0.070, 0.115]),
-        ("several plies", dense(&|n| n > 1), [0.007, 0.0078, 0.032, 0.026]),
+    // With 16,000 paths and one seed for all cases, noise alone moves these means by 0.001 (relative ones by 0.005).
+    for (name, cases, paths, bounds) in [
+        ("one ply", dense(&|n| n == 1), 128_000, [0.0095, 0.0125, 0.070, 0.115]),
+        ("several plies", dense(&|n| n > 1), 512_000, [0.006, 0.0065, 0.030, 0.022]),
     ] {
-        let ours = errors(Model::Aggregated, &cases);
-        let printed = errors(Model::Printed, &cases);
+        let ours = errors(Model::Aggregated, &cases, paths);
+        let printed = errors(Model::Printed, &cases, 16_000);
         eprintln!("{name}, {} cases of density 0.3 to 0.9: {ours:.4?}; printed {printed:.3?}", cases.len());
         assert!(ours.iter().zip(bounds).all(|(e, bound)| *e <= bound), "{name}: {ours:?}");
         assert!(printed.iter().zip(ours).all(|(p, o)| *p > 5.0 * o), "the printed model has become good: {printed:?}");
