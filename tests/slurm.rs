@@ -172,14 +172,19 @@ fn a_requeued_array_of_shards_makes_the_frame_of_one_machine() {
         .unwrap_or(array);
     let task = format!("{array}_2");
     slurm.tool("scontrol", &["requeue", &task]).unwrap_or_else(|e| panic!("the shard is over already: {e}\n{}", log()));
-    // Slurm would let it wait for two minutes.
+    // Slurm would let it wait for two minutes; it takes some, for a node refuses what it killed within the same second.
+    std::thread::sleep(Duration::from_secs(3));
     let out = d.join("frame.exr");
     slurm
         .until("no frame", 90, |s| {
             let _ = s.tool("scontrol", &["update", &format!("jobid={task}"), "StartTime=now"]);
             out.exists()
         })
-        .unwrap_or_else(|e| panic!("{e}\n{}\n{}", slurm.tool("squeue", &[]).unwrap_or_default(), log()));
+        .unwrap_or_else(|e| {
+            let jobs = slurm.tool("scontrol", &["show", "jobs"]).unwrap_or_default();
+            let node = std::fs::read_to_string(d.join("slurmd.log")).unwrap_or_default();
+            panic!("{e}\n{jobs}\n{node}\n{}", log())
+        });
     let said = std::fs::read_to_string(d.join("frame.exr.parts/2.log")).unwrap_or_default();
     assert!(said.contains("resumed from"), "the shard was started twice: {said}");
     yarnray(d, &[&["render", "s.toml", "-q", "-o", "want.exr"], &options[..]].concat()).good();
