@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
-use super::{Guide, Plies};
+use super::{Guide, Plies, point};
 use crate::{
     geometry::{
         curve::Basis,
@@ -81,8 +81,8 @@ impl Plies<'_> {
 
     fn flyaways_of(&self, yarn: usize, ply: usize, of: &Flyaways) -> Vec<(Vec<Vec4>, u32)> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
-        let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
-        let length = guide.along.last().copied().unwrap_or(0.0);
+        let guide = Guide::new(self.strands, yarn);
+        let length = guide.length();
         let mut stream = Stream::new(hash2(hash2(self.seed ^ 0x5eed_f1a5, yarn as u32), ply as u32));
         let own_rate = f64::from(shape.fiber_rate - self.shape.ply_rate);
         let radius = parameters.fiber_radius as f32;
@@ -96,12 +96,10 @@ impl Plies<'_> {
             let knots: Vec<_> = (0..points)
                 .map(|i| {
                     let (along, at) = path(i as f64 / (points - 1) as f64);
-                    let place = guide.place_at(self.strands, along);
+                    let place = guide.place_at(along);
                     let axis = self.axis(&place, shape);
-                    let across = place.tangent.cross(place.normal);
                     let at = axis * (f64::from(shape.distance) + at.x) + axis.perp() * at.y;
-                    let point = place.centre + place.radius * (at.x as f32 * place.normal + at.y as f32 * across);
-                    (point.into(), place.radius)
+                    (point(&place, at), place.radius)
                 })
                 .collect();
             let points: Vec<_> = knots.iter().map(|k| k.0).collect();

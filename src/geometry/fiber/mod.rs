@@ -55,21 +55,19 @@ pub const TOLERANCE: f64 = 0.02;
 /// Largest turn of a fibre or ply between two points, radians: beyond, the spline's error is no longer of fourth order.
 const LARGEST_TURN: f64 = 0.8;
 
-/// A yarn at even steps: what the curves wound around it are made from.
-struct Guide {
-    places: Vec<Place>,
-    /// Arc length from the yarn's start, in yarn radii.
-    along: Vec<f64>,
-    /// The yarn's first segment, and the steps on each.
+/// Places of a yarn by the way to them: what the curves wound around it are made from.
+struct Guide<'a> {
+    strands: &'a Strands,
+    /// The yarn's first segment.
     first: u32,
-    steps: usize,
+    /// Arc length in yarn radii from the yarn's start to [`LENGTH_STEPS`] places of each of its segments.
+    lengths: Vec<f64>,
 }
 
-/// Points that a guide has on each segment of a yarn whose segments are `length` yarn radii long: the same number for
-/// all, so that the size of the result is known before it is made.
-fn steps_per_segment(length: f64, step: f64) -> usize {
-    ((length / step).ceil()).clamp(1.0, 4096.0) as usize
-}
+/// Places of each segment of a yarn to which its length is known.
+const LENGTH_STEPS: usize = 4;
+/// The most steps along one yarn.
+const MOST_STEPS: f64 = 1e7;
 
 /// The longest step in yarn radii with which a cubic spline follows curves that turn at `rate` (radians per yarn radius)
 /// at `distance` from their axis to within `tolerance` (both in yarn radii).
@@ -80,50 +78,61 @@ fn step_for(rate: f64, distance: f64, tolerance: f64) -> f64 {
     turn / rate.abs().max(1e-9)
 }
 
-impl Guide {
-    fn new(strands: &Strands, yarn: usize, steps: usize) -> Self {
+impl<'a> Guide<'a> {
+    fn new(strands: &'a Strands, yarn: usize) -> Self {
         let segments = strands.segments_of(yarn);
-        let n = segments.len() * steps + 1;
-        let (mut places, mut along) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut distance = 0.0;
-        for (i, segment) in segments.clone().enumerate() {
-            for k in usize::from(i > 0)..=steps {
-                let place = strands.place(segment, k as f32 / steps as f32);
-                if let Some(before) = places.last().map(|p: &Place| p.centre) {
-                    distance += f64::from((place.centre - before).length()) / f64::from(place.radius.max(1e-20));
+        let mut lengths = Vec::with_capacity(segments.len() * LENGTH_STEPS + 1);
+        let (mut length, mut before) = (0.0, None);
+        for segment in segments.clone() {
+            for k in usize::from(before.is_some())..=LENGTH_STEPS {
+                let place = strands.place(segment, k as f32 / LENGTH_STEPS as f32);
+                if let Some(before) = before {
+                    length += f64::from(place.centre.distance(before)) / f64::from(place.radius.max(1e-20));
                 }
-                places.push(place);
-                along.push(distance);
+                before = Some(place.centre);
+                lengths.push(length);
             }
         }
-        Self { places, along, first: segments.start, steps }
+        Self { strands, first: segments.start, lengths }
+    }
+
+    /// The yarn's length in its radii.
+    fn length(&self) -> f64 {
+        self.lengths.last().copied().unwrap_or(0.0)
+    }
+
+    /// The yarn's segment, and how much of it has passed, after so many yarn radii along the yarn.
+    fn find(&self, along: f64) -> (u32, f32) {
+        let last = self.lengths.len() - 1;
+        let i = self.lengths.partition_point(|&a| a <= along).clamp(1, last) - 1;
+        let span = self.lengths[i + 1] - self.lengths[i];
+        let t = if span > 0.0 { ((along - self.lengths[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let u = ((i % LENGTH_STEPS) as f64 + t) / LENGTH_STEPS as f64;
+        (self.first + (i / LENGTH_STEPS) as u32, u as f32)
     }
 
     /// The yarn's segment after so many yarn radii along it.
     fn segment_at(&self, along: f64) -> u32 {
-        let last = self.along.len() - 1;
-        let step = self.along.partition_point(|&a| a <= along).clamp(1, last) - 1;
-        self.first + (step / self.steps) as u32
+        self.find(along).0
     }
 
     /// The place after so many yarn radii along the yarn.
-    fn place_at(&self, strands: &Strands, along: f64) -> Place {
-        let last = self.along.len() - 1;
-        let i = self.along.partition_point(|&a| a <= along).clamp(1, last) - 1;
-        let span = self.along[i + 1] - self.along[i];
-        let t = if span > 0.0 { ((along - self.along[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
-        let step = i as f64 + t;
-        let segment = (i / self.steps) as u32;
-        strands.place(self.first + segment, (step / self.steps as f64 - f64::from(segment)) as f32)
+    fn place_at(&self, along: f64) -> Place {
+        let (segment, u) = self.find(along);
+        self.strands.place(segment, u)
     }
 
-    /// The point at `at` (yarn radii) of the section at a step.
-    #[inline]
-    fn point(&self, step: usize, at: DVec2) -> Vec3 {
-        let p = &self.places[step];
-        let across = p.tangent.cross(p.normal);
-        (p.centre + p.radius * (at.x as f32 * p.normal + at.y as f32 * across)).into()
+    /// So many even steps along the yarn: where each begins, in yarn radii from the yarn's start, and the end of the last.
+    fn steps(&self, count: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..=count).map(move |i| self.length() * i as f64 / count as f64)
     }
+}
+
+/// The point at `at` (yarn radii) of the section at a place.
+#[inline]
+fn point(place: &Place, at: DVec2) -> Vec3 {
+    let across = place.tangent.cross(place.normal);
+    (place.centre + place.radius * (at.x as f32 * place.normal + at.y as f32 * across)).into()
 }
 
 /// The plies of a yarn, wound around its strands.
@@ -131,7 +140,7 @@ pub struct Plies<'a> {
     strands: &'a Strands,
     plies: &'a [PlyParameters],
     shape: &'a YarnShape,
-    /// Steps on each segment of each yarn.
+    /// Steps along each yarn: at least one for each of its segments.
     steps: Vec<usize>,
     seed: u32,
 }
@@ -150,17 +159,11 @@ impl<'a> Plies<'a> {
             .fold(f64::MAX, f64::min);
         let steps = (0..strands.yarns())
             .map(|yarn| {
-                let segments = strands.segments_of(yarn);
                 let radii = strands.length_of(yarn) / strands.mean_radius_of(yarn);
-                steps_per_segment(radii / segments.len().max(1) as f64, step)
+                strands.segments_of(yarn).len().max((radii / step).ceil().min(MOST_STEPS) as usize)
             })
             .collect();
         Self { strands, plies, shape, steps, seed }
-    }
-
-    /// Points of one curve along a yarn.
-    fn points_along(&self, yarn: usize) -> usize {
-        self.strands.segments_of(yarn).len() * self.steps[yarn] + 1
     }
 
     /// Control points and segments of all fibres together, before any is made.
@@ -175,9 +178,8 @@ impl<'a> Plies<'a> {
     }
 
     fn counts(&self, curves: u64) -> (u64, u64) {
-        let knots: u64 = (0..self.strands.yarns()).map(|yarn| self.points_along(yarn) as u64).sum();
-        let yarns = self.strands.yarns() as u64;
-        (curves * (knots + 2 * yarns), curves * (knots - yarns))
+        let steps: u64 = self.steps.iter().map(|&steps| steps as u64).sum();
+        (curves * (steps + 3 * self.steps.len() as u64), curves * steps)
     }
 
     /// Direction from the yarn's axis to a ply at a step, in the section.
@@ -202,7 +204,8 @@ impl<'a> Plies<'a> {
 
     fn fibers_of(&self, yarn: usize, ply: usize, placement: Placement) -> Vec<Vec<Vec4>> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
-        let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
+        let guide = Guide::new(self.strands, yarn);
+        let places: Vec<(f64, Place)> = guide.steps(self.steps[yarn]).map(|s| (s, guide.place_at(s))).collect();
         let mut stream = Stream::new(hash2(hash2(self.seed, yarn as u32), ply as u32));
         let start = TAU * f64::from(stream.next());
         let core = f64::from(shape.core_radius);
@@ -212,7 +215,7 @@ impl<'a> Plies<'a> {
             Placement::Regular => packing::hard_discs(parameters.fibers, parameters.fiber_radius / core, &mut stream),
             Placement::Measured(_) => Vec::new(),
         };
-        let mut knots = Vec::with_capacity(guide.places.len());
+        let mut knots = Vec::with_capacity(places.len());
         (0..parameters.fibers as usize)
             .map(|fiber| {
                 let wander: Box<dyn Fn(f64) -> DVec2> = match placement {
@@ -223,16 +226,14 @@ impl<'a> Plies<'a> {
                     Placement::Measured(d) => d.wanderer(core, parameters.fiber_radius, own_rate, &mut stream),
                 };
                 knots.clear();
-                knots.extend((0..guide.places.len()).map(|step| {
-                    let place = &guide.places[step];
-                    let along = guide.along[step];
+                knots.extend(places.iter().map(|(along, place)| {
                     // On the circle that the ply's section becomes; then in the ply's own axes, then in the yarn's.
-                    let q = DVec2::from_angle(start + own_rate * along).rotate(wander(along));
+                    let q = DVec2::from_angle(start + own_rate * along).rotate(wander(*along));
                     let axis = self.axis(place, shape);
                     let in_ply = q / shape.stretch.as_dvec2();
-                    guide.point(step, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
+                    point(place, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
                 }));
-                spline_through(&knots, |step| guide.places[step].radius * radius)
+                spline_through(&knots, |step| places[step].1.radius * radius)
             })
             .collect()
     }
@@ -242,10 +243,11 @@ impl<'a> Plies<'a> {
     pub fn picks_along(&self, curves: usize) -> Vec<u16> {
         let mut picks = Vec::new();
         for yarn in 0..self.strands.yarns() {
-            for _ in 0..curves {
-                let below = self.strands.segments_of(yarn).filter_map(|segment| self.strands.pick(segment));
-                picks.extend(below.flat_map(|pick| std::iter::repeat_n(pick, self.steps[yarn])));
-            }
+            let (guide, steps) = (Guide::new(self.strands, yarn), self.steps[yarn]);
+            let half = 0.5 * guide.length() / steps.max(1) as f64;
+            let below = guide.steps(steps).take(steps).map(|start| guide.segment_at(start + half));
+            let along: Vec<u16> = below.filter_map(|segment| self.strands.pick(segment)).collect();
+            picks.extend(std::iter::repeat_n(along, curves).flatten());
         }
         picks
     }
@@ -258,15 +260,16 @@ impl<'a> Plies<'a> {
         (0..self.strands.yarns())
             .into_par_iter()
             .map(|yarn| {
-                let guide = Guide::new(self.strands, yarn, self.steps[yarn]);
+                let guide = Guide::new(self.strands, yarn);
+                let places: Vec<Place> = guide.steps(self.steps[yarn]).map(|s| guide.place_at(s)).collect();
                 let (mut knots, mut axes) = (Vec::new(), Vec::new());
-                for (step, place) in guide.places.iter().enumerate() {
+                for place in &places {
                     let axis = self.axis(place, shape);
-                    knots.push(guide.point(step, f64::from(shape.distance) * axis));
+                    knots.push(point(place, f64::from(shape.distance) * axis));
                     let across = place.tangent.cross(place.normal);
                     axes.push(axis.x as f32 * place.normal + axis.y as f32 * across);
                 }
-                let points = spline_through(&knots, |step| guide.places[step].radius * wide);
+                let points = spline_through(&knots, |step| places[step].radius * wide);
                 let curve = Curve {
                     basis: Basis::BSpline,
                     closed: false,
