@@ -86,6 +86,14 @@ impl Chain {
         Self { basis, points }
     }
 
+    /// The curve that makes this chain, without radii.
+    pub(super) fn curve(&self, closed: bool) -> Curve {
+        let points = self.points.iter().map(|p| p.truncate());
+        let added = if closed { [1, 2] } else { [usize::from(self.basis != Basis::BSpline); 2] };
+        let points = points.take(self.points.len() - added[1]).skip(added[0]).collect();
+        Curve { basis: self.basis, closed, points, radii: None }
+    }
+
     /// Arc length at `steps` points of each segment, from the chain's start.
     pub(super) fn lengths(&self, steps: usize) -> Vec<f64> {
         let mut lengths = Vec::with_capacity(self.segments() * steps + 1);
@@ -255,6 +263,12 @@ mod tests {
                             (made.at(i, 1.0).at - chain.at(i, 1.0).at).length() < 1e-12,
                             "{basis:?} {closed} {n} {i}"
                         );
+                    }
+                    let again = Chain::new(&made.curve(closed), &vec![0.0; made.points.len()]);
+                    assert_eq!(again.segments(), made.segments());
+                    for i in 0..made.segments() {
+                        let (a, b) = (again.at(i, 0.4).at.truncate(), made.at(i, 0.4).at.truncate());
+                        assert!((a - b).length() < 1e-12, "{basis:?} {closed} {n} {i}");
                     }
                     if closed {
                         let (first, last) = (made.at(0, 0.0), made.at(made.segments() - 1, 1.0));

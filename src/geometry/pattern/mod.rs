@@ -15,7 +15,10 @@ pub mod weave;
 
 use glam::DVec3;
 
-use super::curve::{Basis, Curve};
+use super::{
+    chain::Chain,
+    curve::{Basis, Curve},
+};
 
 /// The most control points that a generator makes, as many as a curve file may hold.
 pub const MAX_POINTS: u64 = 1 << 26;
@@ -45,6 +48,24 @@ pub struct PatternStrand {
     pub coordinates: Vec<[f32; 2]>,
 }
 
+impl PatternStrand {
+    /// With the smoothest curve through the same points, a B-spline. Embree meets it sooner than a Catmull-Rom curve, it
+    /// has no jumps of curvature where segments join, and so fewer points follow it.
+    pub fn smooth(mut self) -> Self {
+        let curve = &self.curve;
+        let chain = Chain::new(curve, &vec![0.0; curve.points.len()]);
+        let knots: Vec<(usize, f64)> =
+            (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]).collect();
+        self.curve = chain.through(&knots, curve.closed, Basis::BSpline).curve(curve.closed);
+        if !self.curve.closed {
+            // An open one has a control point beyond each end.
+            self.coordinates.insert(0, self.coordinates[0]);
+            self.coordinates.extend(self.coordinates.last().copied());
+        }
+        self
+    }
+}
+
 /// Parallel straight yarns along x, `spacing` apart along y, centred.
 pub fn straight(count: u32, length: f64, spacing: f64) -> Vec<Curve> {
     (0..count)
@@ -59,6 +80,29 @@ pub fn straight(count: u32, length: f64, spacing: f64) -> Vec<Curve> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn smooth_strands_pass_the_same_points() {
+        let points: Vec<DVec3> = (0..12).map(|i| DVec3::new(f64::from(i), f64::from(i * i % 5), 0.0)).collect();
+        for closed in [false, true] {
+            let strand = PatternStrand {
+                curve: Curve { basis: Basis::CatmullRom, closed, points: points.clone(), radii: None },
+                kind: StrandKind::Course,
+                index: 0,
+                coordinates: (0..12).map(|i| [i as f32, 0.5]).collect(),
+            };
+            let smooth = strand.smooth();
+            let count = smooth.curve.points.len();
+            assert_eq!(smooth.coordinates.len(), count);
+            let chain = Chain::new(&smooth.curve, &vec![0.0; count]);
+            for (i, want) in points.iter().enumerate() {
+                let at = if i < chain.segments() { chain.at(i, 0.0) } else { chain.at(i - 1, 1.0) };
+                assert!((at.at.truncate() - *want).length() < 1e-12, "closed {closed}: point {i} is at {}", at.at);
+                // The control point that stands for it.
+                assert_eq!(smooth.coordinates[i + usize::from(!closed)][0], i as f32);
+            }
+        }
+    }
 
     #[test]
     fn straight_yarns_are_straight_and_centred() {

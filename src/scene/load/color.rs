@@ -54,7 +54,7 @@ impl Grid {
     /// That of cloth that the program makes, and its curves.
     pub(super) fn of(strands: Vec<PatternStrand>, extent: [u32; 2]) -> (Vec<Curve>, Self) {
         let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent: extent.map(|n| n as f32) };
-        let curves = strands.into_iter().map(|strand| {
+        let curves = strands.into_iter().map(PatternStrand::smooth).map(|strand| {
             grid.points.push(strand.coordinates);
             grid.kinds.push(strand.kind);
             strand.curve
