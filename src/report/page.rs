@@ -3,7 +3,10 @@
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::image::png::{self, Display};
+use crate::image::{
+    metric,
+    png::{self, Display},
+};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -27,6 +30,15 @@ impl Picture {
     pub fn of_map(values: &[f32], width: usize, color: impl Fn(f32) -> [u8; 3]) -> Self {
         let linear = |byte: u8| png::srgb_to_linear(f32::from(byte) / 255.0);
         Self { width, colors: values.iter().map(|v| color(*v).map(linear)).collect() }
+    }
+
+    /// Half as wide and as high, but for pictures of a single row or column.
+    pub fn halved(&self) -> Self {
+        if self.width < 2 || self.height() < 2 {
+            return self.clone();
+        }
+        let (width, colors) = metric::halved(&self.colors, self.width);
+        Self { width, colors }
     }
 
     /// A PNG for a screen, as the address of an image.
@@ -146,6 +158,16 @@ mod tests {
                 assert!((found - f64::from(*value)).abs() <= 0.004 * most + 1e-30, "{color:?}: {found}");
             }
         }
+    }
+
+    #[test]
+    fn halved_pictures_keep_their_mean() {
+        let colors = (0..15).map(|i| [i as f32, 0.0, 2.0]).collect();
+        let half = Picture { width: 5, colors }.halved();
+        assert_eq!((half.width, half.height()), (2, 1));
+        assert_eq!(half.colors, [[3.0, 0.0, 2.0], [5.0, 0.0, 2.0]]);
+        let line = Picture { width: 1, colors: vec![[1.0; 3]; 4] };
+        assert_eq!(line.halved(), line);
     }
 
     #[test]

@@ -152,6 +152,12 @@ impl Pair {
     }
 }
 
+/// Half of a picture's width, and its colours at half its width and height: means of four. A last odd row or column is left
+/// out.
+pub fn halved(colors: &[[f32; 3]], width: usize) -> (usize, Vec<[f32; 3]>) {
+    (width / 2, Boxes::new(width, &vec![true; colors.len()], 2).mean(colors, 1))
+}
+
 /// The whole boxes of `factor` x `factor` pixels of a picture, row by row.
 struct Boxes<'a> {
     width: usize,

@@ -113,7 +113,8 @@ fn section(id: &str, row: &Row, pictures: &RowPictures) -> Markup {
     let (reference, aggregated) = (&pictures.reference, &pictures.aggregated);
     let stops = exposure(reference);
     let display = Display { exposure: stops, ..Display::default() };
-    let shown = |picture: &Picture, caption: &str| page::figure_shown(picture, &display, caption);
+    // The slider has every pixel; beside it small copies do, and the page is a third as large.
+    let shown = |picture: &Picture, caption: &str| page::figure_shown(&picture.halved(), &display, caption);
     let flip_of = |picture: &Picture| {
         let values = flip::hdr(&picture.colors, &reference.colors, reference.width);
         Picture::of_map(&values.unwrap_or_else(|| vec![0.0; reference.colors.len()]), reference.width, map::magma)
