@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{Counters, Integrator, Path, Sample, Scratch, add};
+use super::{Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Sample, Scratch, add};
 use crate::{
     ffi::embree::Ray,
     geometry::tube::TubePlace,
@@ -73,6 +73,6 @@ impl Integrator<'_> {
         path.pdf = next.pdf;
         let direction = frame.to_world(next.wi);
         path.ray = Ray::new(place.leave(hit.normal, direction), direction);
-        (self.survives(path, next.weight, u_roulette), true)
+        (self.survives(path, next.weight, u_roulette, ROULETTE_AFTER_FIBERS), true)
     }
 }

@@ -25,8 +25,12 @@ use crate::{
     trace::{Hit, HitPlace, SurfacePlace, Threads, Weave, World},
 };
 
-/// Scattering events before paths may end by chance.
-const ROULETTE_AFTER: u32 = 4;
+/// Scattering events after which paths may end by chance, at yarns and surfaces. One event at a yarn stands for many at
+/// fibres: after the first instead of the fourth, noise times time is 4 to 14 % less on most scenes measured, 3 to 6 % more
+/// under back light.
+const ROULETTE_AFTER: u32 = 1;
+/// The same at single fibres, where it makes no difference.
+const ROULETTE_AFTER_FIBERS: u32 = 4;
 /// Most yarns a path may pass unscattered in a row: a guard against geometry that repeats a hit for ever.
 const MOST_PASSES: u32 = 10_000;
 /// Where a ray that passes a yarn starts again, in yarn radii behind the surface.
@@ -308,9 +312,9 @@ impl<'a> Integrator<'a> {
         false
     }
 
-    /// Whether a path may go on, along its new ray, after a scattering event of weight `weight`.
+    /// Whether a path may go on, along its new ray, after a scattering event of weight `weight`; surely for the first `sure`.
     #[inline]
-    fn survives(&self, path: &mut Path<'_>, weight: Rgb, u: f32) -> bool {
+    fn survives(&self, path: &mut Path<'_>, weight: Rgb, u: f32, sure: u32) -> bool {
         path.from = path.ray.origin;
         path.throughput *= weight;
         path.bounces += 1;
@@ -319,7 +323,7 @@ impl<'a> Integrator<'a> {
             // At the limit the path still collects what its last ray meets: only its scattering ends.
             return largest > 0.0 && path.bounces == self.max_bounces;
         }
-        if path.bounces > ROULETTE_AFTER && largest < 1.0 {
+        if path.bounces > sure && largest < 1.0 {
             let keep = largest.max(0.05);
             if u >= keep {
                 return false;
@@ -392,7 +396,7 @@ impl<'a> Integrator<'a> {
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
-        (self.survives(path, next.weight, u_roulette), true)
+        (self.survives(path, next.weight, u_roulette, ROULETTE_AFTER), true)
     }
 
     /// Notes of what cloth a camera path met first.

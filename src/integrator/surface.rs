@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::{Counters, Integrator, Path, Sample, Scratch, add};
+use super::{Counters, Integrator, Path, ROULETTE_AFTER, Sample, Scratch, add};
 use crate::{
     ffi::embree::Ray,
     math::{Rgb, frame::orthonormal_basis},
@@ -72,6 +72,6 @@ impl Integrator<'_> {
         }
         path.ray = Ray::new(start, direction);
         path.pdf = next.pdf;
-        self.survives(path, next.weight, u_roulette)
+        self.survives(path, next.weight, u_roulette, ROULETTE_AFTER)
     }
 }
