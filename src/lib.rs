@@ -7,7 +7,7 @@
 //!
 //! # The way of a picture
 //! ```text
-//! scene.toml   --scene::document, scene::load-->  Scene     checked; millimetres, radians; no TOML, no Embree
+//! scene.toml   --input, scene::load------------>  Scene     checked; millimetres, radians; no TOML, no Embree
 //! Scene        --trace::World------------------>  strands in Embree, a scattering model for each yarn
 //! camera ray   --trace------------------------->  Hit       place on a yarn, seen in its cross-section
 //! Hit          --geometry::section------------->  plies crossed, in order, with their fibres
@@ -22,9 +22,9 @@
 //! # The rooms, from ground to top
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
 //! * [`ffi`]: Embree, OpenImageIO and Open Image Denoise behind a safe face; the only `unsafe` code.
-//! * [`math`]: numbers, not yarns. [`image`]: pictures at rest.
+//! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
-//! * [`scattering`]: light at one crossing; pure functions, no rays, no files.
+//! * [`scattering`]: light at one crossing; pure functions, no rays, no files. [`light`]: light sources.
 //! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`integrator`]: light along a path.
 //! * [`film`]: what pixels have collected. [`render`]: the driver, films in files, and pictures from films.
 //! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was, and what many were.
@@ -47,7 +47,9 @@ pub mod ffi;
 pub mod film;
 pub mod geometry;
 pub mod image;
+pub mod input;
 pub mod integrator;
+pub mod light;
 pub mod math;
 pub mod plan;
 pub mod render;

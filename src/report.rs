@@ -17,7 +17,7 @@ use crate::{
     plan::Plan,
     render::{Job, Rendered},
     scene::Scene,
-    trace::{BuildTimes, Threads, World},
+    trace::{BuildTimes, CurveGeometry, World},
 };
 
 /// Seconds of each phase.
@@ -67,14 +67,18 @@ impl RunRecord<'_> {
         let film = &self.rendered.film;
         let counters = &self.rendered.counters;
         let (spp_min, spp_mean, spp_max) = film.samples();
-        let threads = self.world.threads();
+        let geometries = self.world.geometries();
         let yarns = || {
-            threads.iter().filter_map(|t| match t {
-                Threads::Yarns(weave) => Some(&weave.strands),
-                Threads::Fibers(_) => None,
+            geometries.iter().filter_map(|t| match t {
+                CurveGeometry::Yarns(yarns) => Some(&yarns.strands),
+                CurveGeometry::Fibers(_) => None,
             })
         };
-        let fibers = threads.iter().filter(|t| matches!(t, Threads::Fibers(_))).map(Threads::count).sum::<usize>();
+        let fibers = geometries
+            .iter()
+            .filter(|t| matches!(t, CurveGeometry::Fibers(_)))
+            .map(CurveGeometry::count)
+            .sum::<usize>();
         let plan = Plan::new(scene);
         let geometry = self.world.geometry_bytes();
         let bvh = self.world.bvh_bytes();
@@ -82,7 +86,7 @@ impl RunRecord<'_> {
             .lights
             .iter()
             .map(|l| match l {
-                crate::scene::Light::Environment(e) => e.image.as_ref().map_or(0, |m| m.bytes()),
+                crate::light::Light::Environment(e) => e.image.as_ref().map_or(0, |m| m.bytes()),
                 _ => 0,
             })
             .sum();
@@ -122,8 +126,8 @@ impl RunRecord<'_> {
             "curves": {
                 "yarns": yarns().map(crate::geometry::strand::Strands::yarns).sum::<usize>(),
                 "fibers": fibers,
-                "control_points": threads.iter().map(|t| t.curves().1.len()).sum::<usize>(),
-                "segments": threads.iter().map(|t| t.curves().2.len()).sum::<usize>(),
+                "control_points": geometries.iter().map(|t| t.curves().1.len()).sum::<usize>(),
+                "segments": geometries.iter().map(|t| t.curves().2.len()).sum::<usize>(),
                 "given_points": scene.fabrics.iter().map(crate::scene::Fabric::control_points).sum::<usize>(),
                 "length_mm": yarns().map(crate::geometry::strand::Strands::length).sum::<f64>(),
             },
@@ -138,7 +142,7 @@ impl RunRecord<'_> {
 
     /// The metadata of an EXR.
     pub fn attributes(&self, command_line: &str) -> Vec<(String, Attribute)> {
-        let mut out = story(self.scene, self.world);
+        let mut out = metadata(self.scene, self.world);
         let film = &self.rendered.film;
         let noise = film.noise().map(|n| [n.estimate, n.low, n.high]);
         out.extend(measured(film.samples().1, noise, self.rendered.elapsed, command_line));
@@ -149,7 +153,7 @@ impl RunRecord<'_> {
 }
 
 /// The metadata that all parts of a render share: what the picture is of.
-pub fn story(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
+pub fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
     [
         ("scene", scene.path.clone()),
         ("fingerprint", scene.fingerprint.clone()),
@@ -164,12 +168,12 @@ pub fn story(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
 
 /// The metadata of a picture that was merged from so many parts.
 pub fn merged_attributes(
-    story: &[(String, Attribute)],
+    metadata: &[(String, Attribute)],
     job: &Job,
     parts: usize,
     command_line: &str,
 ) -> Vec<(String, Attribute)> {
-    let mut out = story.to_vec();
+    let mut out = metadata.to_vec();
     let noise = job.film.noise().map(|n| [n.estimate, n.low, n.high]);
     out.extend(measured(job.film.samples().1, noise, job.elapsed, command_line));
     out.push(("yarnray.parts".to_owned(), Attribute::Whole(parts as i32)));

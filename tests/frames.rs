@@ -5,7 +5,7 @@ use std::path::Path;
 use yarnray::{
     image::{self, Image},
     scene::load::{LoadOptions, load},
-    trace::{Threads, World},
+    trace::{CurveGeometry, World},
 };
 
 use crate::support::{SWATCH, directory, listing, write, yarnray};
@@ -221,14 +221,14 @@ fn plies_move_with_a_yarn_that_stretches() {
         let options = LoadOptions { assignments: vec![format!("render.frame={frame}")], ..LoadOptions::default() };
         let scene = load(&path, &options).unwrap();
         let (world, _) = World::new(&scene, 1).unwrap();
-        let Threads::Yarns(weave) = &world.threads()[0] else { panic!("yarns") };
+        let CurveGeometry::Yarns(yarns) = &world.geometries()[0] else { panic!("yarns") };
         let (low, high) = scene.bounds().unwrap();
-        let segments = weave.strands.segments().len() as u32;
+        let segments = yarns.strands.segments().len() as u32;
         // The phase, and the share of the yarn at which it is.
         let ends = (low.x as f32 + 1.0, high.x as f32 - 1.0);
         (0..segments)
             .map(|i| {
-                let place = weave.strands.place(i, 0.5);
+                let place = yarns.strands.frame(i, 0.5);
                 ((place.centre.x - ends.0) / (ends.1 - ends.0), place.phase)
             })
             .collect()

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec3, Vec3A};
 use yarnray::geometry::{
     curve::{Basis, Curve},
-    section::Place,
+    section::YarnFrame,
     strand::{StrandOptions, Strands},
 };
 
@@ -103,13 +103,13 @@ fn the_ways_to_intersect_plies_agree_where_they_must() {
 }
 
 /// The direction in which a ply lies that starts at `angle`.
-fn ply(place: &Place, angle: f64) -> Vec3A {
+fn ply(place: &YarnFrame, angle: f64) -> Vec3A {
     let (sin, cos) = (f64::from(place.phase) + angle).sin_cos();
     place.normal * cos as f32 + place.tangent.cross(place.normal) * sin as f32
 }
 
 /// The angle between a ply direction at one place and at another, about the tangent.
-fn turn(from: &Place, to: &Place) -> f64 {
+fn turn(from: &YarnFrame, to: &YarnFrame) -> f64 {
     let (a, b) = (ply(from, 0.0), ply(to, 0.0));
     f64::from(a.cross(b).dot(to.tangent)).atan2(f64::from(a.dot(b)))
 }
@@ -145,7 +145,7 @@ fn plies_are_continuous_along_a_yarn_and_across_its_seam() {
             let count = strands.segments().len() as u32;
             for segment in 0..count {
                 let next = (segment + 1) % count;
-                let (end, begin) = (strands.place(segment, 1.0), strands.place(next, 0.0));
+                let (end, begin) = (strands.frame(segment, 1.0), strands.frame(next, 0.0));
                 assert!(end.centre.distance(begin.centre) < 1e-3, "segment {segment} of {count}");
                 assert!(end.tangent.dot(begin.tangent) > 1.0 - 1e-4, "segment {segment} of {count}");
                 let mut turned = turn(&end, &begin);
@@ -178,7 +178,7 @@ fn plies_turn_evenly_between_points() {
     let mut total = 0.0;
     for segment in 0..strands.segments().len() as u32 {
         for step in 0..8 {
-            let place = |u: i32| strands.place(segment, u as f32 / 8.0);
+            let place = |u: i32| strands.frame(segment, u as f32 / 8.0);
             total += turn(&place(step), &place(step + 1));
         }
     }

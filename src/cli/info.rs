@@ -15,7 +15,7 @@ use crate::{
     },
     plan::Plan,
     render::film_file,
-    scene::{Fabric, Scene, Thread},
+    scene::{CurveKind, Fabric, Scene},
     trace::{self, Estimate},
 };
 
@@ -171,9 +171,9 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         .iter()
         .zip(&estimates)
         .map(|(f, estimate)| {
-            let (kind, number, name) = match f.thread {
-                Thread::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
-                Thread::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
+            let (kind, number, name) = match f.kind {
+                CurveKind::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
+                CurveKind::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
             };
             json!({
                 "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
@@ -210,12 +210,12 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         render.model.name()
     );
     for (f, estimate) in scene.fabrics.iter().zip(&estimates) {
-        let what = match f.thread {
-            Thread::Yarn(yarn) => {
+        let what = match f.kind {
+            CurveKind::Yarn(yarn) => {
                 let yarn = &scene.yarns[yarn];
                 format!("yarns of `{}` ({} plies of {} fibres)", yarn.name, yarn.plies.len(), yarn.plies[0].fibers)
             }
-            Thread::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
+            CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
         };
         text += &format!(
             "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",

@@ -50,7 +50,7 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     }
     let (about, job) = merge(&args.parts, args.partial).map_err(|error| Failure::Input(format!("error: {error}")))?;
     let command = std::env::args().collect::<Vec<_>>().join(" ");
-    let attributes = report::merged_attributes(&about.story, &job, args.parts.len(), &command);
+    let attributes = report::merged_attributes(&about.metadata, &job, args.parts.len(), &command);
     for path in &args.out {
         if is_film_path(path) {
             film_file::write(path, &about, &job)?;

@@ -24,10 +24,10 @@ use crate::{
     experiment::{converge::ConvergeError, table3::BenchError},
     geometry::pattern::overlap::{self, Overlap},
     image::output,
+    input::document::Value,
     plan,
     scene::{
         Mode, Model, Scene,
-        document::Value,
         load::{LoadError, LoadOptions, load},
     },
     trace::BuildError,

@@ -150,7 +150,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);
         log::phase("build", made.build);
-        let about = About::new(&scene, &world.embree_version(), report::story(&scene, &world), args.shard);
+        let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, &world), args.shard);
         let job = match old {
             Some(old) => resumed(old, &about, args)?,
             None => Job::new(&scene, args.shard),

@@ -16,9 +16,9 @@ use crate::{
         },
     },
     image::output,
+    input::document::Value as Setting,
     scene::{
         Model, Yarn,
-        document::Value as Setting,
         load::{Definitions, LoadOptions, load_definitions},
     },
 };

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::method::Method;
 use crate::{
-    report::table3::Paper,
-    scene::{
+    input::{
         diagnostic::{Diagnostics, Sources, unknown_name},
         document::Document,
-        load::{LoadError, LoadOptions, read_text},
         reader::{Range, Reader},
     },
+    report::table3::Paper,
+    scene::load::{LoadError, LoadOptions, read_text},
 };
 
 /// A checked suite.

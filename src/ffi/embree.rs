@@ -319,31 +319,19 @@ impl SceneBuilder {
     }
 }
 
-/// A ray, and the stretch of it that counts.
+/// A ray as Embree takes it; no field may be NaN.
 #[derive(Clone, Copy, Debug)]
-pub struct Ray {
+pub struct RawRay {
     /// Where it starts.
     pub origin: Vec3A,
-    /// Where it goes; of unit length wherever distances matter.
+    /// Where it goes, of any length: the unit of distances along the ray.
     pub direction: Vec3A,
     /// Hits nearer than this do not count.
     pub t_near: f32,
     /// Hits farther than this do not count.
     pub t_far: f32,
-    /// When it is there, from 0 to 1: where what moves is.
+    /// Time from 0 to 1, at which moving geometry is met.
     pub time: f32,
-}
-
-impl Ray {
-    /// A ray without an end.
-    pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        Self { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0 }
-    }
-
-    /// Whether Embree can trace it: a NaN in a ray makes one query four hundred times as slow.
-    pub fn is_finite(&self) -> bool {
-        self.origin.is_finite() && self.direction.is_finite() && !self.t_near.is_nan() && !self.t_far.is_nan()
-    }
 }
 
 /// A point where a ray meets the outside or the inside of a curve's tube, or a triangle from either side.
@@ -435,9 +423,9 @@ unsafe impl Sync for CommittedScene {}
 impl CommittedScene {
     /// The nearest hit that `filter` lets stand.
     #[inline]
-    pub fn intersect<F: HitFilter>(&self, ray: &Ray, filter: &mut F) -> Option<RawHit> {
+    pub fn intersect<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> Option<RawHit> {
         let mut context = QueryContext::new(filter);
-        let mut query = sys::RTCRayHit { ray: raw_ray(ray), hit: no_hit() };
+        let mut query = sys::RTCRayHit { ray: embree_ray(ray), hit: no_hit() };
         let mut args = sys::RTCIntersectArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER,
             feature_mask: sys::RTC_FEATURE_FLAG_ALL,
@@ -464,9 +452,9 @@ impl CommittedScene {
 
     /// Whether any hit stands that `filter` is asked about.
     #[inline]
-    pub fn occluded<F: HitFilter>(&self, ray: &Ray, filter: &mut F) -> bool {
+    pub fn occluded<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> bool {
         let mut context = QueryContext::new(filter);
-        let mut query = raw_ray(ray);
+        let mut query = embree_ray(ray);
         let mut args = sys::RTCOccludedArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER,
             feature_mask: sys::RTC_FEATURE_FLAG_ALL,
@@ -484,7 +472,7 @@ impl CommittedScene {
 }
 
 #[inline]
-fn raw_ray(ray: &Ray) -> sys::RTCRay {
+fn embree_ray(ray: &RawRay) -> sys::RTCRay {
     sys::RTCRay {
         org_x: ray.origin.x,
         org_y: ray.origin.y,
@@ -534,10 +522,14 @@ mod tests {
         let scene = builder.commit().unwrap();
         let mut filter = Counting { guard: 0, calls: 0, accept: true };
         for (time, y) in [(0.0, 0.0), (0.25, 1.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0)] {
-            let ray = Ray { time, ..Ray::new(Vec3A::new(3.2, 5.0, 0.0), Vec3A::new(0.01, -1.0, 0.002)) };
+            let ray = RawRay { time, ..endless(Vec3A::new(3.2, 5.0, 0.0), Vec3A::new(0.01, -1.0, 0.002)) };
             let hit = scene.intersect(&ray, &mut filter).unwrap();
             assert!((hit.t - (4.75 - y)).abs() < 2e-3, "at {time}: {}", hit.t);
         }
+    }
+
+    fn endless(origin: Vec3A, direction: Vec3A) -> RawRay {
+        RawRay { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0 }
     }
 
     /// Counts hits behind a guard value, where a context that Embree thinks larger would be overwritten.
@@ -562,7 +554,7 @@ mod tests {
         let mut hits = 0;
         while filter.calls < 1_000_000 {
             let x = 2.0 + (hits % 1000) as f32 * 3e-3;
-            let ray = Ray::new(Vec3A::new(x, 1.0, 0.1), Vec3A::new(0.03, -1.0, 0.01));
+            let ray = endless(Vec3A::new(x, 1.0, 0.1), Vec3A::new(0.03, -1.0, 0.01));
             assert!(scene.intersect(&ray, &mut filter).is_some(), "ray {hits} misses the yarn");
             hits += 1;
         }
@@ -573,7 +565,7 @@ mod tests {
     fn a_rejected_hit_lets_the_ray_pass() {
         let device = Device::new(1).unwrap();
         let scene = straight_yarn(&device);
-        let ray = Ray::new(Vec3A::new(3.2, 1.0, 0.0), Vec3A::new(0.01, -1.0, 0.02));
+        let ray = endless(Vec3A::new(3.2, 1.0, 0.0), Vec3A::new(0.01, -1.0, 0.02));
         let mut reject = Counting { guard: 0, calls: 0, accept: false };
         assert!(scene.intersect(&ray, &mut reject).is_none());
         assert!(reject.calls >= 2, "entry and exit are both offered");
@@ -594,12 +586,12 @@ mod tests {
         let scene = builder.commit().unwrap();
         let mut filter = Counting { guard: 0, calls: 0, accept: true };
         for (from, towards) in [(5.0, Vec3A::NEG_Z), (-5.0, Vec3A::Z)] {
-            let hit = scene.intersect(&Ray::new(Vec3A::new(0.25, 0.5, from), towards), &mut filter).unwrap();
+            let hit = scene.intersect(&endless(Vec3A::new(0.25, 0.5, from), towards), &mut filter).unwrap();
             assert!((hit.t - 5.0).abs() < 1e-5 && (hit.u - 0.25).abs() < 1e-5 && (hit.v - 0.5).abs() < 1e-5);
             assert!(hit.normal.z > 0.0, "counter-clockwise is outside");
         }
         assert_eq!(filter.calls, 2);
-        assert!(scene.intersect(&Ray::new(Vec3A::new(0.7, 0.7, 5.0), Vec3A::NEG_Z), &mut filter).is_none());
+        assert!(scene.intersect(&endless(Vec3A::new(0.7, 0.7, 5.0), Vec3A::NEG_Z), &mut filter).is_none());
     }
 
     #[test]
@@ -612,7 +604,7 @@ mod tests {
         }
         let device = Device::new(1).unwrap();
         let scene = straight_yarn(&device);
-        let ray = Ray::new(Vec3A::new(3.2, 1.0, 0.0), Vec3A::new(0.01, -1.0, 0.02));
+        let ray = endless(Vec3A::new(3.2, 1.0, 0.0), Vec3A::new(0.01, -1.0, 0.02));
         let caught = catch_unwind(AssertUnwindSafe(|| scene.intersect(&ray, &mut Panicking)));
         assert_eq!(caught.unwrap_err().downcast_ref::<&str>(), Some(&"parked"));
     }

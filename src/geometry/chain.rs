@@ -173,13 +173,20 @@ pub(super) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) 
     }
 }
 
-/// The pick nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
-pub(super) fn picked(curve: &Curve, picks: &[u16], chain: &Chain, knots: Option<&[(usize, f64)]>) -> Vec<u16> {
+/// The material index nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
+pub(super) fn nearest_indices(
+    curve: &Curve,
+    material_indices: &[u16],
+    chain: &Chain,
+    knots: Option<&[(usize, f64)]>,
+) -> Vec<u16> {
     let count = knots.map_or(chain.segments(), |knots| knots.len() - 1);
     // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
     let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
     let points = curve.points.len();
-    let steps = if curve.closed { picks.len() / points } else { (picks.len() - 1) / (points - 1).max(1) } as f64;
+    let steps =
+        if curve.closed { material_indices.len() / points } else { (material_indices.len() - 1) / (points - 1).max(1) }
+            as f64;
     (0..count)
         .map(|segment| {
             let place = match knots {
@@ -189,8 +196,9 @@ pub(super) fn picked(curve: &Curve, picks: &[u16], chain: &Chain, knots: Option<
                     0.5 * (at(segment) + at(segment + 1))
                 }
             };
-            let pick = ((place + shift) * steps).round() as usize;
-            picks[if curve.closed { pick % picks.len() } else { pick.min(picks.len() - 1) }]
+            let index = ((place + shift) * steps).round() as usize;
+            material_indices
+                [if curve.closed { index % material_indices.len() } else { index.min(material_indices.len() - 1) }]
         })
         .collect()
 }

@@ -7,6 +7,7 @@ pub mod fiber;
 pub mod mesh;
 pub mod obj;
 pub mod pattern;
+pub mod ray;
 pub mod section;
 mod spline;
 pub mod strand;

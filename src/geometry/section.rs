@@ -28,7 +28,7 @@ const MAX_LIGHT_TRAVEL: f32 = 1.2;
 
 /// The place where a ray meets a yarn.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct YarnFrame {
     /// The yarn's centre.
     pub centre: Vec3A,
     /// Unit tangent of the yarn.
@@ -150,7 +150,7 @@ fn rotate(v: Vec2, sin: f32, cos: f32) -> Vec2 {
 impl Section {
     /// The section at `place` for a ray from `origin` along the unit vector `direction`.
     #[inline]
-    pub fn new(place: &Place, origin: Vec3A, direction: Vec3A, tilted: bool) -> Self {
+    pub fn new(place: &YarnFrame, origin: Vec3A, direction: Vec3A, tilted: bool) -> Self {
         let z = place.tangent;
         let to_camera = -direction;
         let sin = to_camera.dot(z).clamp(-1.0, 1.0);
@@ -408,8 +408,8 @@ mod tests {
     use super::*;
     use crate::geometry::yarn::{PlyParameters, tests::touching_yarn};
 
-    fn place() -> Place {
-        Place {
+    fn place() -> YarnFrame {
+        YarnFrame {
             centre: Vec3A::ZERO,
             tangent: Vec3A::Z,
             curvature: Vec3A::ZERO,

@@ -10,9 +10,9 @@ use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    chain::{Chain, Fit, LENGTH_STEPS, picked, resample},
+    chain::{Chain, Fit, LENGTH_STEPS, nearest_indices, resample},
     curve::{Basis, Curve},
-    section::Place,
+    section::YarnFrame,
     spline::{SplinePoint, evaluate_f32},
     tube::curve_of,
 };
@@ -78,8 +78,8 @@ pub struct Strands {
     frames: Vec<PointFrame>,
     /// The same points and frames at later times; empty where yarns stand still.
     later: Vec<Pose>,
-    /// What was picked for each segment; empty where nothing was.
-    picks: Vec<u16>,
+    /// What was nearest_indices for each segment; empty where nothing was.
+    material_indices: Vec<u16>,
     /// The first segment of each yarn, and the number of all segments at the end.
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
@@ -95,7 +95,7 @@ struct Pose {
 
 /// Where the points of curves are at other times: for each time, for each curve, its points.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Movement<'a> {
+pub struct StrandMotion<'a> {
     /// At times that follow the curves' own, evenly spaced until the shutter closes.
     pub later: &'a [Vec<Vec<DVec3>>],
     /// At rest: by lengths along these, plies wind about the yarn, so that stretching carries them along.
@@ -106,7 +106,7 @@ pub struct Movement<'a> {
 struct Strand {
     /// Points and frames at each time.
     poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
-    picks: Vec<u16>,
+    material_indices: Vec<u16>,
     tight: Option<(usize, f64)>,
     length: f64,
 }
@@ -114,27 +114,27 @@ struct Strand {
 impl Strands {
     /// Prepares `curves`, each with its radii in the same unit; yarns are independent and made in parallel.
     pub fn new(curves: &[(Curve, Vec<f64>)], options: &StrandOptions) -> Self {
-        Self::moving(curves, Movement::default(), options)
+        Self::moving(curves, StrandMotion::default(), options)
     }
 
     /// Prepares curves that move.
     ///
     /// # Panics
     /// If curves or their points have other numbers at other times.
-    pub fn moving(curves: &[(Curve, Vec<f64>)], movement: Movement<'_>, options: &StrandOptions) -> Self {
-        Self::with_picks(curves, &[], movement, options)
+    pub fn moving(curves: &[(Curve, Vec<f64>)], motion: StrandMotion<'_>, options: &StrandOptions) -> Self {
+        Self::with_material_indices(curves, &[], motion, options)
     }
 
-    /// As [`Self::moving`], with picks for each curve, so many evenly from each given point to the next (a closed curve
-    /// goes on to its first point, an open one ends with its last), of which each segment gets that nearest to its
+    /// As [`Self::moving`], with material indices for each curve, so many evenly from each given point to the next (a closed
+    /// curve goes on to its first point, an open one ends with its last), of which each segment gets that nearest to its
     /// middle; or without any.
     ///
     /// # Panics
     /// As [`Self::moving`].
-    pub fn with_picks(
+    pub fn with_material_indices(
         curves: &[(Curve, Vec<f64>)],
-        picks: &[Vec<u16>],
-        movement: Movement<'_>,
+        material_indices: &[Vec<u16>],
+        motion: StrandMotion<'_>,
         options: &StrandOptions,
     ) -> Self {
         let made: Vec<Strand> = curves
@@ -142,10 +142,10 @@ impl Strands {
             .enumerate()
             .map(|(yarn, (curve, radii))| {
                 let phase = if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
-                let later: Vec<&[DVec3]> = movement.later.iter().map(|curves| curves[yarn].as_slice()).collect();
-                let rest = movement.rest.map(|curves| curves[yarn].as_slice());
-                let picks = picks.get(yarn).map_or(&[][..], Vec::as_slice);
-                Strand::new(curve, radii, picks, &later, rest, options, phase)
+                let later: Vec<&[DVec3]> = motion.later.iter().map(|curves| curves[yarn].as_slice()).collect();
+                let rest = motion.rest.map(|curves| curves[yarn].as_slice());
+                let material_indices = material_indices.get(yarn).map_or(&[][..], Vec::as_slice);
+                Strand::new(curve, radii, material_indices, &later, rest, options, phase)
             })
             .collect();
         let mut strands = Self {
@@ -154,7 +154,7 @@ impl Strands {
             segments: Arc::new([]),
             frames: Vec::new(),
             later: Vec::new(),
-            picks: Vec::with_capacity(made.iter().map(|s| s.picks.len()).sum()),
+            material_indices: Vec::with_capacity(made.iter().map(|s| s.material_indices.len()).sum()),
             first_segments: Vec::with_capacity(made.len() + 1),
             tight_bends: Vec::new(),
             length: 0.0,
@@ -162,7 +162,7 @@ impl Strands {
         let count: usize = made.iter().map(|s| s.poses[0].0.len()).sum();
         let mut segments = Vec::with_capacity(count.saturating_sub(3 * made.len()));
         let mut poses: Vec<(Vec<Vec4>, Vec<PointFrame>)> =
-            (0..=movement.later.len()).map(|_| (Vec::with_capacity(count), Vec::with_capacity(count))).collect();
+            (0..=motion.later.len()).map(|_| (Vec::with_capacity(count), Vec::with_capacity(count))).collect();
         for (yarn, strand) in made.into_iter().enumerate() {
             strands.first_segments.push(segments.len() as u32);
             let first = poses[0].0.len() as u32;
@@ -171,7 +171,7 @@ impl Strands {
                 all.0.extend(points);
                 all.1.extend(frames);
             }
-            strands.picks.extend(strand.picks);
+            strands.material_indices.extend(strand.material_indices);
             strands.length += strand.length;
             strands.tight_bends.extend(strand.tight.map(|(segment, tightness)| TightBend { yarn, segment, tightness }));
         }
@@ -226,20 +226,23 @@ impl Strands {
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
             + self.later.iter().map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames)).sum::<usize>()
-            + size_of_val(&*self.picks)
+            + size_of_val(&*self.material_indices)
             + size_of_val(&*self.first_segments)) as u64
     }
 
-    /// What was picked for a segment, if anything was for any.
+    /// What was nearest_indices for a segment, if anything was for any.
     #[inline]
-    pub fn pick(&self, segment: u32) -> Option<u16> {
-        self.picks.get(segment as usize).copied()
+    pub fn material_index(&self, segment: u32) -> Option<u16> {
+        self.material_indices.get(segment as usize).copied()
     }
 
-    /// Takes what was picked for every segment from elsewhere; nothing, or one for each.
-    pub fn set_picks(&mut self, picks: Vec<u16>) {
-        assert!(picks.is_empty() || picks.len() == self.segments.len(), "a pick for each segment");
-        self.picks = picks;
+    /// Takes what was nearest_indices for every segment from elsewhere; nothing, or one for each.
+    pub fn set_material_indices(&mut self, material_indices: Vec<u16>) {
+        assert!(
+            material_indices.is_empty() || material_indices.len() == self.segments.len(),
+            "a material index for each segment"
+        );
+        self.material_indices = material_indices;
     }
 
     /// The yarn that a segment belongs to.
@@ -264,7 +267,7 @@ impl Strands {
     /// Length of one yarn in scene units, from step to step.
     pub fn length_of(&self, yarn: usize) -> f64 {
         const STEPS: u8 = 4;
-        let centre = |segment, k| self.place(segment, f32::from(k) / f32::from(STEPS)).centre;
+        let centre = |segment, k| self.frame(segment, f32::from(k) / f32::from(STEPS)).centre;
         self.segments_of(yarn)
             .flat_map(|segment| (0..STEPS).map(move |k| (segment, k)))
             .map(|(segment, k)| f64::from(centre(segment, k).distance(centre(segment, k + 1))))
@@ -288,7 +291,7 @@ impl Strands {
             let angles: Vec<f32> = (0..=segments.len())
                 .map(|knot| {
                     let (segment, u) = if knot < segments.len() { (knot, 0.0) } else { (knot - 1, 1.0) };
-                    let place = self.place(segments.start + segment as u32, u);
+                    let place = self.frame(segments.start + segment as u32, u);
                     let axis = axes[knot];
                     axis.dot(place.tangent.cross(place.normal)).atan2(axis.dot(place.normal))
                 })
@@ -305,19 +308,19 @@ impl Strands {
 
     /// Everything a ray needs to know at `u` (0 to 1) of a segment.
     #[inline]
-    pub fn place(&self, segment: u32, u: f32) -> Place {
+    pub fn frame(&self, segment: u32, u: f32) -> YarnFrame {
         let first = self.segments[segment as usize] as usize;
         let p: &[Vec4; 4] = self.points[first..first + 4].try_into().expect("a segment has four points");
-        self.place_of(p, &self.frames[first + 1], &self.frames[first + 2], u)
+        self.frame_of(p, &self.frames[first + 1], &self.frames[first + 2], u)
     }
 
     /// As [`Self::place`], at a time from 0, when the shutter opens, to 1, when it closes.
     #[inline]
-    pub fn place_at(&self, segment: u32, u: f32, time: f32) -> Place {
-        if self.later.is_empty() { self.place(segment, u) } else { self.place_between(segment, u, time) }
+    pub fn frame_at(&self, segment: u32, u: f32, time: f32) -> YarnFrame {
+        if self.later.is_empty() { self.frame(segment, u) } else { self.frame_between(segment, u, time) }
     }
 
-    fn place_between(&self, segment: u32, u: f32, time: f32) -> Place {
+    fn frame_between(&self, segment: u32, u: f32, time: f32) -> YarnFrame {
         let x = (time * self.later.len() as f32).clamp(0.0, self.later.len() as f32);
         let step = (x as usize).min(self.later.len() - 1);
         let s = x - step as f32;
@@ -330,18 +333,18 @@ impl Strands {
         // As Embree moves them.
         let p = std::array::from_fn(|i| points[first + i].lerp(next_points[first + i], s));
         let frame = |i: usize| frames[first + i].towards(&next_frames[first + i], s);
-        self.place_of(&p, &frame(1), &frame(2), u)
+        self.frame_of(&p, &frame(1), &frame(2), u)
     }
 
     #[inline]
-    fn place_of(&self, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> Place {
+    fn frame_of(&self, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> YarnFrame {
         let (at, d1, d2) = evaluate_f32(self.basis, p, u);
         let speed_squared = d1.length_squared().max(1e-30);
         let tangent = d1 / speed_squared.sqrt();
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
         let normal = Vec3A::from(a.normal + u * (b.normal - a.normal));
         let normal = normal - normal.dot(tangent) * tangent;
-        Place {
+        YarnFrame {
             centre: Vec3A::from_vec4(at),
             tangent,
             curvature,
@@ -359,7 +362,7 @@ impl Strand {
     fn new(
         curve: &Curve,
         radii: &[f64],
-        picks: &[u16],
+        material_indices: &[u16],
         later: &[&[DVec3]],
         rest: Option<&[DVec3]>,
         options: &StrandOptions,
@@ -381,7 +384,11 @@ impl Strand {
             };
             resample(&chain, &lengths, closed, &fit)
         };
-        let picks = if picks.is_empty() { Vec::new() } else { picked(curve, picks, &chain, knots.as_deref()) };
+        let material_indices = if material_indices.is_empty() {
+            Vec::new()
+        } else {
+            nearest_indices(curve, material_indices, &chain, knots.as_deref())
+        };
         // The same places of the yarn at all times: points move with it.
         let resampled = |chain: Chain| match &knots {
             Some(knots) => chain.through(knots, closed, options.basis),
@@ -407,7 +414,7 @@ impl Strand {
         let tight = wound[0].tight;
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
         let poses = poses.iter().zip(&wound).map(|(chain, winding)| (points(chain), frames(winding))).collect();
-        Self { poses, picks, tight, length: total }
+        Self { poses, material_indices, tight, length: total }
     }
 }
 
@@ -524,25 +531,30 @@ mod tests {
     }
 
     #[test]
-    fn segments_take_what_is_picked_at_their_place() {
+    fn segments_take_the_material_index_nearest_to_their_middle() {
         for basis in [Basis::CatmullRom, Basis::BSpline] {
             for (closed, tolerance) in [(false, 0.01), (true, 0.01), (false, 0.0), (true, 0.0)] {
                 let curve = Curve { basis, ..knit_like(400, closed) };
                 // Three from point to point.
                 let count = if closed { 1200 } else { 1198 };
-                let picks: Vec<u16> = (0..count).map(|i| u16::from((300..750).contains(&i))).collect();
+                let material_indices: Vec<u16> = (0..count).map(|i| u16::from((300..750).contains(&i))).collect();
                 let of = StrandOptions { tolerance, ..options(basis) };
-                let s = Strands::with_picks(&[(curve.clone(), vec![0.5; 400])], &[picks], Movement::default(), &of);
+                let s = Strands::with_material_indices(
+                    &[(curve.clone(), vec![0.5; 400])],
+                    &[material_indices],
+                    StrandMotion::default(),
+                    &of,
+                );
                 for segment in 0..s.segments().len() as u32 {
-                    let at = s.place(segment, 0.5).centre.as_dvec3();
+                    let at = s.frame(segment, 0.5).centre.as_dvec3();
                     let angle = at.y.atan2(at.x).rem_euclid(TAU) / TAU * 400.0;
                     // Not where one changes into the other.
                     if [0.0, 100.0, 250.0, 400.0].iter().all(|edge: &f64| (angle - edge).abs() > 3.0) {
                         let want = u16::from((100.0..250.0).contains(&angle));
-                        assert_eq!(s.pick(segment), Some(want), "{basis:?} {closed} {tolerance}: at {angle}");
+                        assert_eq!(s.material_index(segment), Some(want), "{basis:?} {closed} {tolerance}: at {angle}");
                     }
                 }
-                assert_eq!(strands(curve, 0.5, &of).pick(0), None);
+                assert_eq!(strands(curve, 0.5, &of).material_index(0), None);
             }
         }
     }
@@ -561,7 +573,7 @@ mod tests {
                         (0..s.segments().len() as u32)
                             .flat_map(|i| (0..=8).map(move |k| (i, k as f32 / 8.0)))
                             .map(|(i, u)| {
-                                let place = s.place(i, u);
+                                let place = s.frame(i, u);
                                 let off = p.as_vec3a() - place.centre;
                                 (off - off.dot(place.tangent) * place.tangent).length()
                                     + if off.length() > 1.0 { 9.0 } else { 0.0 }
@@ -581,9 +593,9 @@ mod tests {
             let last = s.segments().len() as u32 - 1;
             for i in 0..=last {
                 let next = if i == last { 0 } else { i + 1 };
-                let (a, b) = (s.place(i, 1.0), s.place(next, 0.0));
+                let (a, b) = (s.frame(i, 1.0), s.frame(next, 0.0));
                 assert!((a.centre - b.centre).length() < 1e-4);
-                let ply = |p: &Place| {
+                let ply = |p: &YarnFrame| {
                     let across = p.tangent.cross(p.normal);
                     p.normal * p.phase.cos() + across * p.phase.sin()
                 };
@@ -605,16 +617,16 @@ mod tests {
             let pose = |s: f64| -> Vec<Vec<DVec3>> { vec![curve.points.iter().map(|p| move_by(s, p)).collect()] };
             let later = [pose(0.5), pose(1.0)];
             let rest = [curve.points.clone()];
-            let movement = Movement { later: &later, rest: Some(&rest) };
+            let motion = StrandMotion { later: &later, rest: Some(&rest) };
             let o = options(basis);
-            let moving = Strands::moving(&[(curve.clone(), radii.clone())], movement, &o);
+            let moving = Strands::moving(&[(curve.clone(), radii.clone())], motion, &o);
             let still = strands(curve.clone(), 0.5, &o);
             for i in (0..still.segments().len() as u32).step_by(7) {
-                let (a, b) = (moving.place_at(i, 0.3, 0.0), still.place(i, 0.3));
+                let (a, b) = (moving.frame_at(i, 0.3, 0.0), still.frame(i, 0.3));
                 assert_eq!((a.centre, a.phase), (b.centre, b.phase), "it starts where it is");
                 let centre = b.centre.as_dvec3();
                 for s in [0.25, 0.5, 0.75, 1.0] {
-                    let place = moving.place_at(i, 0.3, s as f32);
+                    let place = moving.frame_at(i, 0.3, s as f32);
                     let want = move_by(s, &centre).as_vec3a();
                     assert!((place.centre - want).length() < 0.03, "{basis:?} {s}: {} {want}", place.centre);
                     let turn = (place.phase - b.phase) / std::f32::consts::TAU;
@@ -630,10 +642,10 @@ mod tests {
     fn a_seam_of_equal_plies_closes_on_a_part_of_a_turn() {
         let mut o = options(Basis::CatmullRom);
         o.symmetry = TAU / 3.0;
-        let free = strands(knit_like(200, false), 0.5, &o).place(0, 0.0).phase;
+        let free = strands(knit_like(200, false), 0.5, &o).frame(0, 0.0).phase;
         let s = strands(knit_like(200, true), 0.5, &o);
         let last = s.segments().len() as u32 - 1;
-        let (a, b) = (s.place(last, 1.0), s.place(0, 0.0));
+        let (a, b) = (s.frame(last, 1.0), s.frame(0, 0.0));
         let across = a.tangent.cross(a.normal);
         let ply = a.normal * a.phase.cos() + across * a.phase.sin();
         let angle = ply.dot(b.tangent.cross(b.normal)).atan2(ply.dot(b.normal)) - b.phase;
@@ -653,8 +665,8 @@ mod tests {
         let s = strands(curve, 0.5, &options(Basis::CatmullRom));
         let total: f32 = (0..s.segments().len()).map(|i| s.frames[i + 1].growth).sum();
         assert!((f64::from(total) - 0.4 * 49.0 * 0.4 / 0.5).abs() < 1e-3, "{total}");
-        assert_eq!(s.place(0, 0.0).phase, 0.7);
-        assert!((s.place(3, 0.3).normal - Vec3A::Z).length() < 1e-6, "a straight yarn carries +z along");
+        assert_eq!(s.frame(0, 0.0).phase, 0.7);
+        assert!((s.frame(3, 0.3).normal - Vec3A::Z).length() < 1e-6, "a straight yarn carries +z along");
         assert!((s.length() - 19.6).abs() < 1e-9);
     }
 
@@ -670,7 +682,7 @@ mod tests {
         let s = strands(curve, 0.5, &options(Basis::CatmullRom));
         assert_eq!(s.tight_bends().len(), 1);
         let bend = s.tight_bends()[0];
-        let place = s.place(bend.segment as u32, 0.5);
+        let place = s.frame(bend.segment as u32, 0.5);
         assert!(place.centre.x.abs() < 1.5 && bend.tightness > 1.0, "{bend:?} at {}", place.centre);
     }
 
@@ -689,7 +701,7 @@ mod tests {
                 let curve = Curve { basis, closed, points: points.clone(), radii: None };
                 let s = strands(curve, 0.3, &options(target));
                 for i in 0..s.segments().len() as u32 {
-                    let place = s.place(i, 0.5);
+                    let place = s.frame(i, 0.5);
                     assert!(
                         place.centre.is_finite() && place.normal.is_finite() && place.phase.is_finite(),
                         "{points:?}"

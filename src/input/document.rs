@@ -282,7 +282,7 @@ impl Document {
             diagnostics.push(too_deep(span(last)));
             return;
         }
-        let mut place = Place::Table(&mut self.root);
+        let mut place = Container::Table(&mut self.root);
         for (position, step) in way.iter().enumerate() {
             let next_is_index = steps[position + 1].index.is_some();
             match place.find(step) {
@@ -305,8 +305,8 @@ impl Document {
             }
             let Ok(Some(inner)) = place.into_found(step) else { return };
             place = match &mut inner.value {
-                Value::Table(table) => Place::Table(table),
-                Value::Array(array) => Place::Array(array),
+                Value::Table(table) => Container::Table(table),
+                Value::Array(array) => Container::Array(array),
                 other => {
                     let name = path_text(&steps[..=position]);
                     let message = format!("`{name}` is {}, so it has no keys", other.kind());
@@ -384,25 +384,25 @@ fn path_text(steps: &[Step]) -> String {
 }
 
 /// Where a walk along a path has come to.
-enum Place<'a> {
+enum Container<'a> {
     Table(&'a mut Table),
     Array(&'a mut Vec<Node>),
 }
 
-impl<'a> Place<'a> {
+impl<'a> Container<'a> {
     /// What is under the step; `None` is a key that is not there. The error is the end of a sentence.
     fn find<'b>(&'b mut self, step: &Step) -> Result<Option<&'b mut Node>, String> {
         match self {
-            Place::Table(table) => Place::Table(table).into_found(step),
-            Place::Array(array) => Place::Array(array).into_found(step),
+            Container::Table(table) => Container::Table(table).into_found(step),
+            Container::Array(array) => Container::Array(array).into_found(step),
         }
     }
 
-    /// Puts a value under a step that [`Place::find`] has accepted.
+    /// Puts a value under a step that [`Container::find`] has accepted.
     fn insert(&mut self, step: &Step, key_span: Span, node: Node) {
         match self {
-            Place::Table(table) => table.insert(step.name.clone(), key_span, node),
-            Place::Array(_) => {
+            Container::Table(table) => table.insert(step.name.clone(), key_span, node),
+            Container::Array(_) => {
                 if let Ok(Some(element)) = self.find(step) {
                     *element = node;
                 }
@@ -412,8 +412,8 @@ impl<'a> Place<'a> {
 
     fn into_found(self, step: &Step) -> Result<Option<&'a mut Node>, String> {
         match self {
-            Place::Table(table) => Ok(table.get_mut(&step.name).map(|entry| &mut entry.node)),
-            Place::Array(array) => {
+            Container::Table(table) => Ok(table.get_mut(&step.name).map(|entry| &mut entry.node)),
+            Container::Array(array) => {
                 let count = array.len();
                 let Some(index) = step.index else {
                     return Err(format!("is an array: expected an index, found `{}`", shortened(&step.name)));

@@ -4,11 +4,11 @@ use glam::Vec2;
 
 use super::{Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Sample, Scratch, add};
 use crate::{
-    ffi::embree::Ray,
+    geometry::ray::Ray,
     geometry::tube::TubePlace,
     math::Rgb,
     scattering::{lobe::LobeFrame, mis_weight},
-    trace::{Fleece, Hit},
+    trace::{FiberGeometry, Hit},
 };
 
 impl Integrator<'_> {
@@ -19,7 +19,7 @@ impl Integrator<'_> {
         &self,
         hit: &Hit,
         place: &TubePlace,
-        fleece: &Fleece,
+        fibers: &FiberGeometry,
         path: &mut Path<'_>,
         sample: &mut Sample,
         scratch: &mut Scratch,
@@ -30,11 +30,13 @@ impl Integrator<'_> {
         }
         if path.bounces == 0 {
             sample.normal = hit.normal;
-            self.describe(sample, fleece.fabric, fleece.pick(hit.segment), fleece.ply, || fleece.yarn_of(hit.segment));
+            self.describe(sample, fibers.fabric, fibers.material_index(hit.segment), fibers.ply, || {
+                fibers.yarn_of(hit.segment)
+            });
         }
         let [u_choice, u_x, u_y, u_roulette] = path.sampler.next4();
         let u = path.sampler.next4();
-        let fiber = fleece.fiber_at(hit.segment);
+        let fiber = fibers.fiber_at(hit.segment);
         let frame = LobeFrame::new(place.tangent, -path.ray.direction);
 
         if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())

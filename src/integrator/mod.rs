@@ -14,15 +14,15 @@ pub use parts::LightParts;
 use glam::{Vec2, Vec3A};
 
 use crate::{
-    ffi::embree::Ray,
-    geometry::section::{Crossings, Section},
+    geometry::{
+        ray::Ray,
+        section::{Crossings, Section},
+    },
+    light::{AreaLight, Environment, Light},
     math::{Rgb, sampler::Sampler},
     scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnVertex},
-    scene::{
-        Fabric, Ground, Light, Material, Scene, Thread,
-        light::{AreaLight, Environment},
-    },
-    trace::{Hit, HitPlace, SurfacePlace, Threads, Weave, World},
+    scene::{CurveKind, Fabric, Ground, Material, Scene},
+    trace::{CurveGeometry, Hit, HitPlace, SurfacePlace, World, YarnGeometry},
 };
 
 /// Scattering events after which paths may end by chance, at yarns and surfaces. One event at a yarn stands for many at
@@ -101,10 +101,10 @@ pub struct Integrator<'a> {
     world: &'a World,
     ground: Option<Ground>,
     materials: &'a [Material],
-    /// The sky; several are added up.
-    skies: Vec<(&'a Environment, f32)>,
+    /// Environment lights; several are added up.
+    environments: Vec<(&'a Environment, f32)>,
     /// Surfaces that shine, each with its chance of being chosen.
-    surfaces: Vec<(&'a AreaLight, f32)>,
+    area_lights: Vec<(&'a AreaLight, f32)>,
     /// Lights for shadow rays: each with its chance, summed up.
     lights: Vec<(&'a Light, f32, f32)>,
     max_bounces: u32,
@@ -132,7 +132,7 @@ pub struct Scratch {
 struct Path<'s> {
     ray: Ray,
     throughput: Rgb,
-    /// Density of the ray's direction, for weighing the sky against its shadow rays; infinite from the camera.
+    /// Density of the ray's direction, for weighing environment lights against their shadow rays; infinite from the camera.
     pdf: f32,
     /// Where that direction was drawn.
     from: Vec3A,
@@ -159,12 +159,12 @@ impl<'a> Integrator<'a> {
             .collect();
         let chance_of =
             |light: &Light| lights.iter().find(|(l, _, _)| std::ptr::eq(*l, light)).map_or(0.0, |(_, c, _)| *c);
-        let mut skies = Vec::new();
-        let mut surfaces = Vec::new();
+        let mut environments = Vec::new();
+        let mut area_lights = Vec::new();
         for light in &scene.lights {
             match light {
-                Light::Environment(sky) => skies.push((sky, chance_of(light))),
-                Light::Area(surface) => surfaces.push((surface, chance_of(light))),
+                Light::Environment(environment) => environments.push((environment, chance_of(light))),
+                Light::Area(area) => area_lights.push((area, chance_of(light))),
                 Light::Distant { .. } | Light::Point { .. } | Light::Spot { .. } => {}
             }
         }
@@ -172,8 +172,8 @@ impl<'a> Integrator<'a> {
             world,
             ground: scene.ground,
             materials: &scene.materials,
-            skies,
-            surfaces,
+            environments,
+            area_lights,
             lights,
             max_bounces: scene.render.max_bounces,
             albedos: if scene.collected().albedo {
@@ -210,9 +210,9 @@ impl<'a> Integrator<'a> {
             let hit = self.world.intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;
-            if !self.surfaces.is_empty() {
+            if !self.area_lights.is_empty() {
                 let end = hit.as_ref().map_or(f32::INFINITY, |h| h.t).min(ground.map_or(f32::INFINITY, |g| g.1));
-                if self.shining_surfaces(&path, end, &mut sample) {
+                if self.area_lights(&path, end, &mut sample) {
                     break;
                 }
             }
@@ -225,12 +225,12 @@ impl<'a> Integrator<'a> {
                     self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
                 }
                 (Some(hit), _) => {
-                    let (go_on, scattered) = match (&hit.place, &self.world.threads()[hit.threads]) {
-                        (HitPlace::Yarn(section), Threads::Yarns(weave)) => {
-                            self.scatter_at_yarn(&hit, section, weave, &mut path, &mut sample, scratch, counters)
+                    let (go_on, scattered) = match (&hit.place, &self.world.geometries()[hit.geometry]) {
+                        (HitPlace::Yarn(section), CurveGeometry::Yarns(yarns)) => {
+                            self.scatter_at_yarn(&hit, section, yarns, &mut path, &mut sample, scratch, counters)
                         }
-                        (HitPlace::Fiber(place), Threads::Fibers(fleece)) => {
-                            self.scatter_at_fiber(&hit, place, fleece, &mut path, &mut sample, scratch, counters)
+                        (HitPlace::Fiber(place), CurveGeometry::Fibers(fibers)) => {
+                            self.scatter_at_fiber(&hit, place, fibers, &mut path, &mut sample, scratch, counters)
                         }
                         _ => unreachable!("a hit is of the kind of what it hit"),
                     };
@@ -249,7 +249,7 @@ impl<'a> Integrator<'a> {
                     go_on
                 }
                 _ => {
-                    let light = self.sky(&path);
+                    let light = self.environment(&path);
                     add(&mut sample, path.bounces, &path, path.throughput * light);
                     false
                 }
@@ -266,33 +266,33 @@ impl<'a> Integrator<'a> {
         sample
     }
 
-    /// What a ray that meets nothing sees, weighed against shadow rays towards the same sky.
+    /// What a ray that meets nothing sees, weighed against shadow rays towards the same environment lights.
     #[inline]
-    fn sky(&self, path: &Path<'_>) -> Rgb {
+    fn environment(&self, path: &Path<'_>) -> Rgb {
         let mut light = Rgb::ZERO;
-        for &(sky, chance) in &self.skies {
+        for &(environment, chance) in &self.environments {
             if path.pdf == f32::INFINITY {
-                if sky.visible {
-                    light += sky.radiance(path.ray.direction);
+                if environment.visible {
+                    light += environment.radiance(path.ray.direction);
                 }
                 continue;
             }
-            let other = if chance > 0.0 { chance * sky.pdf(path.ray.direction) } else { 0.0 };
-            light += sky.radiance(path.ray.direction) * mis_weight(path.pdf, other);
+            let other = if chance > 0.0 { chance * environment.pdf(path.ray.direction) } else { 0.0 };
+            light += environment.radiance(path.ray.direction) * mis_weight(path.pdf, other);
         }
         light
     }
 
-    /// Adds what comes from shining surfaces nearer than `end`, weighed against shadow rays towards them. Whether the
+    /// Adds what comes from area lights nearer than `end`, weighed against shadow rays towards them. Whether the
     /// camera sees one, which hides what is behind it.
     #[inline]
-    fn shining_surfaces(&self, path: &Path<'_>, end: f32, sample: &mut Sample) -> bool {
+    fn area_lights(&self, path: &Path<'_>, end: f32, sample: &mut Sample) -> bool {
         let met = |light: &AreaLight| {
             let t = light.shape.intersect(path.ray.origin, path.ray.direction, light.two_sided);
             t.filter(|&t| t < end)
         };
         if path.pdf == f32::INFINITY {
-            let seen = self.surfaces.iter().filter(|(light, _)| light.visible);
+            let seen = self.area_lights.iter().filter(|(light, _)| light.visible);
             let nearest = seen.filter_map(|(light, _)| Some((met(light)?, light))).min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, light)) = nearest {
                 sample.alpha = 1.0;
@@ -302,7 +302,7 @@ impl<'a> Integrator<'a> {
             }
             return nearest.is_some();
         }
-        for &(light, chance) in &self.surfaces {
+        for &(light, chance) in &self.area_lights {
             if met(light).is_some() {
                 let other = chance * light.shape.pdf(path.from, path.ray.direction, light.two_sided);
                 let weight = mis_weight(path.pdf, other);
@@ -340,13 +340,13 @@ impl<'a> Integrator<'a> {
         &self,
         hit: &Hit,
         section: &Section,
-        weave: &Weave,
+        yarns: &YarnGeometry,
         path: &mut Path<'_>,
         sample: &mut Sample,
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> (bool, bool) {
-        let yarn = weave.yarn_at(hit.segment);
+        let yarn = yarns.yarn_at(hit.segment);
         section.crossings(yarn.shape(), &mut scratch.crossings);
         let unscattered = yarn.transparency(&scratch.crossings);
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
@@ -364,9 +364,9 @@ impl<'a> Integrator<'a> {
             && let Some(front) = scratch.crossings.first()
         {
             sample.normal = section.to_world(front.normal(section));
-            let ply = weave.first_ply + front.ply;
-            let pick = weave.strands.pick(hit.segment);
-            self.describe(sample, weave.fabric, pick, ply, || weave.strands.yarn_of(hit.segment));
+            let ply = yarns.first_ply + front.ply;
+            let index = yarns.strands.material_index(hit.segment);
+            self.describe(sample, yarns.fabric, index, ply, || yarns.strands.yarn_of(hit.segment));
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
@@ -405,12 +405,12 @@ impl<'a> Integrator<'a> {
         &self,
         sample: &mut Sample,
         fabric: usize,
-        pick: Option<u16>,
+        index: Option<u16>,
         ply: usize,
         yarn: impl FnOnce() -> usize,
     ) {
         if let Some(variants) = self.albedos.get(fabric) {
-            sample.albedo = variants[pick.map_or(0, |pick| 1 + usize::from(pick))][ply];
+            sample.albedo = variants[index.map_or(0, |index| 1 + usize::from(index))][ply];
         }
         if self.identify {
             sample.cloth = Some(ClothId { fabric: fabric as u32, yarn: yarn() as u32, ply: ply as u32 });
@@ -459,9 +459,9 @@ impl<'a> Integrator<'a> {
 
 /// Albedo of one fibre of each ply of a fabric's yarn, or of the one fibre it is made of; then of all its variants.
 fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Vec<Rgb>> {
-    let fibers = match fabric.thread {
-        Thread::Yarn(yarn) => &scene.yarns[yarn].fibers[..],
-        Thread::Fiber(fiber) => std::slice::from_ref(&scene.fibers[fiber]),
+    let fibers = match fabric.kind {
+        CurveKind::Yarn(yarn) => &scene.yarns[yarn].fibers[..],
+        CurveKind::Fiber(fiber) => std::slice::from_ref(&scene.fibers[fiber]),
     };
     let albedo = |m: &FiberMaterial| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]));
     let variants = fabric.variants.iter().map(|yarn| &yarn.fibers[..]);

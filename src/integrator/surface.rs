@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3A};
 
 use super::{Counters, Integrator, Path, ROULETTE_AFTER, Sample, Scratch, add};
 use crate::{
-    ffi::embree::Ray,
+    geometry::ray::Ray,
     math::{Rgb, frame::orthonormal_basis},
     scattering::mis_weight,
     trace::SurfacePlace,

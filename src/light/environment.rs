@@ -1,4 +1,4 @@
-//! The sky: one radiance, or an image in latitude and longitude with tables for importance sampling.
+//! Environment lights: one radiance, or an image in latitude and longitude with tables for importance sampling.
 
 use std::{f32::consts::PI, sync::Arc};
 
@@ -6,7 +6,7 @@ use glam::{Mat3A, Vec2, Vec3A};
 
 use crate::math::{Rgb, frame::sin_cos};
 
-/// The sky: one radiance, or an image in latitude and longitude.
+/// An environment light: one radiance, or an image in latitude and longitude.
 #[derive(Clone, Debug)]
 pub struct Environment {
     /// Factor on the image, or the radiance itself.

@@ -1,6 +1,6 @@
 //! Lights: how to draw a direction towards one, with what density, and what it sends.
 //!
-//! Units: surfaces and the sky have a radiance, distant lights the irradiance on a surface that faces them, points
+//! Units: area and environment lights have a radiance, distant lights the irradiance on a surface that faces them, points
 //! and spots a radiant intensity (in a scene file per square of its unit, here radiance times square millimetres).
 //! No light blocks another or casts a shadow; one that the camera sees hides from it what is behind.
 
@@ -50,18 +50,18 @@ pub enum Light {
         /// Cosine of the angle at which it is dark.
         cos_outer: f32,
     },
-    /// Light from a surface, the same from all directions.
+    /// Light from a surface, the same radiance in all directions.
     Area(AreaLight),
 }
 
-/// A surface that shines.
+/// A surface that emits light.
 #[derive(Clone, Copy, Debug)]
 pub struct AreaLight {
     /// Where it is.
     pub shape: Shape,
     /// Its radiance.
     pub radiance: Rgb,
-    /// Whether what is flat shines to both sides.
+    /// Whether a flat shape emits to both sides.
     pub two_sided: bool,
     /// Whether the camera sees it; it lights the cloth in any case.
     pub visible: bool,
@@ -108,7 +108,8 @@ impl Light {
         }
     }
 
-    /// Whether shadow rays must look for it. An even sky is left to the sampled directions, which all end in it.
+    /// Whether shadow rays must look for it. An even environment is left to the
+    /// sampled directions, which all end in it.
     pub fn needs_shadow_rays(&self) -> bool {
         match self {
             Self::Environment(environment) => environment.image.is_some(),

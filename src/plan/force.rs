@@ -7,13 +7,10 @@ use glam::{DVec3, Mat3A, Vec3A};
 
 use crate::{
     geometry::{fiber::flyaway::Flyaways, mesh::Mesh},
+    light::{AreaLight, EnvironmentMap, Light, Shape},
     math::Rgb,
     scattering::surface::SurfaceMaterial,
-    scene::{
-        Light, Material, Object, Scene,
-        camera::Lens,
-        light::{AreaLight, EnvironmentMap, Shape},
-    },
+    scene::{Material, Object, Scene, camera::Lens},
 };
 
 /// Light that shines on nothing anybody could see, but that shadow rays look for.

@@ -8,7 +8,8 @@ pub use force::{FORCEABLE, force};
 
 use crate::{
     film::Tile,
-    scene::{Layers, Light, Mode, Scene, Thread},
+    light::Light,
+    scene::{CurveKind, Layers, Mode, Scene},
 };
 
 /// One feature of the renderer.
@@ -43,7 +44,7 @@ impl Plan {
             features.push(Feature { name, used, reason: if used { yes } else { no }, bytes: None });
         };
         let of_yarns = |mode: &dyn Fn(Mode) -> bool| {
-            mode(scene.render.mode) && scene.fabrics.iter().any(|f| matches!(f.thread, Thread::Yarn(_)))
+            mode(scene.render.mode) && scene.fabrics.iter().any(|f| matches!(f.kind, CurveKind::Yarn(_)))
         };
         add(
             "aggregated_yarns",

@@ -50,7 +50,7 @@ pub struct About {
     /// What the film collects: the layers of the picture, and what guides a denoiser.
     pub collected: Layers,
     /// Metadata of the picture that do not depend on the run.
-    pub story: Vec<(String, Attribute)>,
+    pub metadata: Vec<(String, Attribute)>,
     /// Samples per pixel of the whole render.
     pub spp: u32,
     /// Which part of it this is, if it is a part.
@@ -59,7 +59,7 @@ pub struct About {
 
 impl About {
     /// Of a scene's render, or of a part of it.
-    pub fn new(scene: &Scene, embree: &str, story: Vec<(String, Attribute)>, shard: Option<Shard>) -> Self {
+    pub fn new(scene: &Scene, embree: &str, metadata: Vec<(String, Attribute)>, shard: Option<Shard>) -> Self {
         let collected = scene.collected();
         let mut keys = vec![("yarnray".to_owned(), exr::SOFTWARE.to_owned()), ("embree".to_owned(), embree.to_owned())];
         keys.extend(scene.identity.iter().cloned());
@@ -68,7 +68,7 @@ impl About {
         if shard.is_some() {
             keys.push(("render.spp".to_owned(), scene.render.spp.to_string()));
         }
-        Self { keys, frame: Frame::new(scene), collected, story, spp: scene.render.spp, shard }
+        Self { keys, frame: Frame::new(scene), collected, metadata, spp: scene.render.spp, shard }
     }
 
     /// What stands in the way of going on with a job about `there`: keys with their values, none if nothing does.
@@ -259,8 +259,8 @@ fn in_words(error: &io::Error) -> String {
 
 fn header_json(about: &About, job: &Job) -> Value {
     let Frame { width, height, layers, storage, display, fabrics } = about.frame.clone();
-    let story: Vec<Value> = about
-        .story
+    let metadata: Vec<Value> = about
+        .metadata
         .iter()
         .map(|(name, value)| match value {
             Attribute::Text(v) => json!([name, "text", v]),
@@ -285,7 +285,7 @@ fn header_json(about: &About, job: &Job) -> Value {
             "fabrics": fabrics,
         },
         "collected": layer_names(about.collected),
-        "story": story,
+        "story": metadata,
         "spp": about.spp,
         "shard": about.shard.map(|s| [s.index, s.count]),
         "crop": [x, y, x + job.film.width, y + job.film.height],
@@ -309,7 +309,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let text = |v: &Value| v.as_str().map(str::to_owned);
     let keys =
         v["keys"].as_array()?.iter().map(|pair| Some((text(&pair[0])?, text(&pair[1])?))).collect::<Option<_>>()?;
-    let story = v["story"].as_array()?.iter().map(|item| {
+    let metadata = v["story"].as_array()?.iter().map(|item| {
         let value = match item[1].as_str()? {
             "text" => Attribute::Text(text(&item[2])?),
             "float" => Attribute::Float(f32::from_bits(word(&item[2])?)),
@@ -363,7 +363,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
             keys,
             frame,
             collected: layers_of(&v["collected"])?,
-            story: story.collect::<Option<_>>()?,
+            metadata: metadata.collect::<Option<_>>()?,
             spp: word(&v["spp"])?,
             shard,
         },

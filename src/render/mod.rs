@@ -28,8 +28,8 @@ use self::{
     stop::{WARM_UP, wave_end},
 };
 use crate::{
-    ffi::embree::Ray,
     film::{Film, Noise, Tile},
+    geometry::ray::Ray,
     integrator::{Counters, Integrator, Scratch},
     math::{
         sampler::{Sampler, hash2},

@@ -1,4 +1,4 @@
-//! From a film to files: layers, their names, and the story an EXR tells about itself.
+//! From a film to files: layers, their names, and the metadata of an EXR.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

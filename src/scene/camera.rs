@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, Vec2, Vec3, Vec3A};
 
-use crate::{ffi::embree::Ray, math::warp};
+use crate::{geometry::ray::Ray, math::warp};
 
 /// How far the view opens.
 #[derive(Clone, Copy, Debug, PartialEq)]

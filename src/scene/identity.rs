@@ -5,7 +5,8 @@
 
 use std::fmt::{Debug, Write as _};
 
-use super::{Fabric, Light, Object, Scene, Thread, light::Environment};
+use super::{CurveKind, Fabric, Object, Scene};
+use crate::light::{Environment, Light};
 
 /// Values longer than this are told by their hash.
 const LONGEST_VALUE: usize = 120;
@@ -53,17 +54,17 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
     }
     for (i, fabric) in scene.fabrics.iter().enumerate() {
         let mut of_fabric = |name: &str, value: &dyn Debug| add(format!("fabric.{i}.{name}"), value);
-        match fabric.thread {
-            Thread::Yarn(i) => of_fabric("yarn", &scene.yarns[i].name),
-            Thread::Fiber(i) => of_fabric("fiber", &scene.fibers[i].0),
+        match fabric.kind {
+            CurveKind::Yarn(i) => of_fabric("yarn", &scene.yarns[i].name),
+            CurveKind::Fiber(i) => of_fabric("fiber", &scene.fibers[i].0),
         }
         of_fabric("phase", &fabric.phases);
         of_fabric("seed", &fabric.seed);
         if !fabric.variants.is_empty() {
-            of_fabric("colors", &(&fabric.variants, &fabric.picks));
+            of_fabric("colors", &(&fabric.variants, &fabric.material_indices));
         }
         of_fabric("curves", &curves(fabric));
-        of_fabric("shutter", &fabric.movement);
+        of_fabric("shutter", &fabric.motion);
         of_fabric("curve_basis", &fabric.basis);
         of_fabric("curve_tolerance", &(fabric.tolerance, fabric.longest_segment));
     }

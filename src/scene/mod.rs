@@ -1,25 +1,18 @@
-//! What the user asked for: from TOML text to a checked [`Scene`], and every message on the way.
+//! What the user asked for: a checked [`Scene`].
 //!
-//! [`document`] turns text and `--set` options into one tree that knows where everything was written; [`reader`]
-//! reads it key by key and collects what is wrong; [`diagnostic`] shows that to the user; [`load`] knows the
-//! renderer's keys, their ranges and units, and reads the files that a scene names. A [`Scene`] is a plain value in
-//! millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or Embree.
+//! [`load`] knows the renderer's keys, their ranges and units, and reads the files that a scene names. A [`Scene`] is a
+//! plain value in millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or Embree.
 
 pub mod animation;
 pub mod camera;
-pub mod diagnostic;
-pub mod document;
 pub mod identity;
-pub mod light;
 pub mod load;
-pub mod reader;
 
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2};
 
 pub use camera::Camera;
-pub use light::Light;
 
 use crate::{
     geometry::{
@@ -29,6 +22,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     image::{Compression, png::Display, texture::Texture},
+    light::Light,
     scattering::{fiber::FiberMaterial, surface::SurfaceMaterial},
 };
 
@@ -283,7 +277,7 @@ impl Yarn {
 
 /// What a fabric's curves are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Thread {
+pub enum CurveKind {
     /// Yarns: index into [`Scene::yarns`].
     Yarn(usize),
     /// Single fibres, explicit in every mode: index into [`Scene::fibers`].
@@ -298,15 +292,15 @@ pub struct Fabric {
     /// Where the curves came from, for messages.
     pub origin: String,
     /// What they are.
-    pub thread: Thread,
+    pub kind: CurveKind,
     /// Curves and their radii, millimetres, about the scene's middle.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.
-    pub movement: Movement,
+    pub motion: FabricMotion,
     /// What the yarn turns into here and there: its colours; empty for a fabric of one.
     pub variants: Vec<Yarn>,
-    /// Indices into `variants` along each curve, as many from each control point to the next; empty if that is.
-    pub picks: Vec<Vec<u16>>,
+    /// Indices into `variants` along each curve, as many from each control point to the next; empty without variants.
+    pub material_indices: Vec<Vec<u16>>,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
     /// Start of what is random in it: where explicit fibres lie.
@@ -321,7 +315,7 @@ pub struct Fabric {
 
 /// The points of a fabric's curves at other times: for each time, for each curve, millimetres.
 #[derive(Clone, Debug, Default)]
-pub struct Movement {
+pub struct FabricMotion {
     /// Evenly spaced from the opening of the shutter, which `curves` shows, to its closing. Empty if nothing moves.
     pub later: Vec<Vec<Vec<DVec3>>>,
     /// At rest: plies wind by lengths along these. `None` if the curves are at rest.
@@ -332,7 +326,7 @@ impl Fabric {
     /// Moves curves, at all times, by a transform whose scale is the same along all axes; radii grow with it.
     pub fn transform(&mut self, by: &DAffine3) {
         transform_curves(&mut self.curves, by);
-        for curve in self.movement.later.iter_mut().flatten().chain(self.movement.rest.iter_mut().flatten()) {
+        for curve in self.motion.later.iter_mut().flatten().chain(self.motion.rest.iter_mut().flatten()) {
             for p in curve {
                 *p = by.transform_point3(*p);
             }
@@ -429,7 +423,7 @@ pub struct Scene {
 impl Scene {
     /// Whether cloth moves while the shutter is open.
     pub fn cloth_moves(&self) -> bool {
-        self.fabrics.iter().any(|f| !f.movement.later.is_empty())
+        self.fabrics.iter().any(|f| !f.motion.later.is_empty())
     }
 
     /// The camera at a time from 0, when the shutter opens, to 1, when it closes.

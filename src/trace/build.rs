@@ -2,18 +2,18 @@
 
 use std::{f64::consts::TAU, fmt, iter::Sum};
 
-use super::{Fleece, Threads, Weave, scatterer, yarn_scatterer};
+use super::{CurveGeometry, FiberGeometry, YarnGeometry, scatterer, yarn_scatterer};
 use crate::{
     ffi::embree::EmbreeError,
     geometry::{
         curve::Basis,
         fiber::Plies,
-        strand::{Movement, StrandOptions, Strands},
+        strand::{StrandMotion, StrandOptions, Strands},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
     },
     scattering::fiber::FiberBcsdf,
-    scene::{Fabric, Mode, Scene, Thread, Yarn},
+    scene::{CurveKind, Fabric, Mode, Scene, Yarn},
 };
 
 /// Bytes of Embree's BVH for a cubic segment: compact and fast, measured on fibres and on yarns.
@@ -24,8 +24,8 @@ const POINT_BYTES: u64 = 16;
 const FRAME_BYTES: u64 = 20;
 /// As `POINT_BYTES`.
 const SEGMENT_BYTES: u64 = 4;
-/// Of what says which variant a segment is of, in a fabric that has any.
-const PICK_BYTES: u64 = 2;
+/// Bytes of the material index of each segment, in a fabric with variants.
+const MATERIAL_INDEX_BYTES: u64 = 2;
 
 /// Why a scene could not be made ready for rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,14 +135,14 @@ impl<'a> Preparation<'a> {
             .iter()
             .enumerate()
             .map(|(index, fabric)| {
-                let of = match fabric.thread {
-                    Thread::Yarn(yarn) => {
+                let of = match fabric.kind {
+                    CurveKind::Yarn(yarn) => {
                         let yarn = &scene.yarns[yarn];
                         let shape = Box::new(yarn.shape());
                         let strands = strands(fabric, &shape);
                         Of::Yarns { yarn, shape, strands }
                     }
-                    Thread::Fiber(fiber) => Of::Fibers { material: FiberBcsdf::new(&scene.fibers[fiber].1) },
+                    CurveKind::Fiber(fiber) => Of::Fibers { material: FiberBcsdf::new(&scene.fibers[fiber].1) },
                 };
                 Prepared { index, fabric, of }
             })
@@ -196,78 +196,98 @@ impl<'a> Preparation<'a> {
                 }
             }
             if colored {
-                estimate.geometry_bytes += estimate.segments * PICK_BYTES;
+                estimate.geometry_bytes += estimate.segments * MATERIAL_INDEX_BYTES;
             }
             estimate
         })
     }
 
     /// The curves for Embree, one entry for each geometry.
-    pub(super) fn threads(self) -> Vec<Threads> {
+    pub(super) fn geometries(self) -> Vec<CurveGeometry> {
         let (mode, model) = (self.scene.render.mode, self.scene.render.model);
         let mut all = Vec::new();
         for prepared in self.fabrics {
             let index = prepared.index;
             match prepared.of {
-                Of::Fibers { material } => all.push(Threads::Fibers(Fleece {
+                Of::Fibers { material } => all.push(CurveGeometry::Fibers(FiberGeometry {
                     fabric: index,
                     ply: 0,
                     first_tubes: Vec::new(),
                     tubes: Tubes::new(&prepared.fabric.curves),
                     fiber: material,
                     variants: Vec::new(),
-                    picks: Vec::new(),
+                    material_indices: Vec::new(),
                 })),
                 Of::Yarns { yarn, shape, strands } => {
                     let kinds = &prepared.fabric.variants;
                     let plies = Plies::new(&strands, &yarn.plies, &shape, prepared.fabric.seed);
-                    let fleece = |ply: usize, tubes, first_tubes, picks| {
+                    let fibers = |ply: usize, tubes, first_tubes, material_indices| {
                         let fiber = |of: &Yarn| FiberBcsdf::new(&of.fibers[ply].1);
                         let (fiber, variants) = (fiber(yarn), kinds.iter().map(fiber).collect());
-                        Threads::Fibers(Fleece { fabric: index, ply, first_tubes, tubes, fiber, variants, picks })
+                        CurveGeometry::Fibers(FiberGeometry {
+                            fabric: index,
+                            ply,
+                            first_tubes,
+                            tubes,
+                            fiber,
+                            variants,
+                            material_indices,
+                        })
                     };
                     let slots = 0..yarn.plies.len();
                     match mode {
                         Mode::Yarn => {}
                         Mode::Ply => all.extend(slots.clone().map(|ply| {
                             let (mut strands, shape) = ply_strands(&plies, &yarn.plies[ply], &shape, ply);
-                            strands.set_picks(plies.picks_along(1));
+                            strands.set_material_indices(plies.material_indices_along(1));
                             let scatterer = |of: &Yarn| yarn_scatterer(shape.clone(), &[&of.fibers[ply].1], model);
                             let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
-                            Threads::Yarns(Weave { fabric: index, first_ply: ply, strands, yarn, variants })
+                            CurveGeometry::Yarns(YarnGeometry {
+                                fabric: index,
+                                first_ply: ply,
+                                strands,
+                                yarn,
+                                variants,
+                            })
                         })),
                         Mode::Fiber => all.extend(slots.clone().map(|ply| {
                             let (tubes, first) = plies.fibers(ply, yarn.placement);
-                            fleece(ply, tubes, first, plies.picks_along(yarn.plies[ply].fibers as usize))
+                            fibers(ply, tubes, first, plies.material_indices_along(yarn.plies[ply].fibers as usize))
                         })),
                     }
                     if let Some(flyaways) = &yarn.flyaways {
                         all.extend(slots.map(|ply| {
                             let (tubes, first, from) = plies.flyaways(ply, flyaways);
-                            let pick = |segment| strands.pick(from[tubes.tube_of(segment)]);
-                            let picks = (0..tubes.segments().len() as u32).filter_map(pick).collect();
-                            fleece(ply, tubes, first, picks)
+                            let index = |segment| strands.material_index(from[tubes.tube_of(segment)]);
+                            let material_indices = (0..tubes.segments().len() as u32).filter_map(index).collect();
+                            fibers(ply, tubes, first, material_indices)
                         }));
                     }
                     if mode == Mode::Yarn {
                         let scatterer = |of: &Yarn| scatterer(of, model);
                         let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
-                        all.push(Threads::Yarns(Weave { fabric: index, first_ply: 0, strands, yarn, variants }));
+                        all.push(CurveGeometry::Yarns(YarnGeometry {
+                            fabric: index,
+                            first_ply: 0,
+                            strands,
+                            yarn,
+                            variants,
+                        }));
                     }
                 }
             }
         }
         // A yarn too short to hold a hair leaves nothing for Embree.
-        all.retain(|threads| threads.count() > 0);
+        all.retain(|geometry| geometry.count() > 0);
         all
     }
 }
 
 fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
-    Strands::with_picks(
+    Strands::with_material_indices(
         &fabric.curves,
-        &fabric.picks,
-        Movement { later: &fabric.movement.later, rest: fabric.movement.rest.as_deref() },
+        &fabric.material_indices,
+        StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref() },
         &StrandOptions {
             basis: fabric.basis,
             tolerance: fabric.tolerance,

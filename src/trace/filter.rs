@@ -1,9 +1,12 @@
 //! What Embree asks during traversal.
 
-use super::{Threads, Weave, section_at};
+use super::{CurveGeometry, YarnGeometry, section_at};
 use crate::{
-    ffi::embree::{HitFilter, RawHit, Ray},
-    geometry::section::{Crossings, Section},
+    ffi::embree::{HitFilter, RawHit},
+    geometry::{
+        ray::Ray,
+        section::{Crossings, Section},
+    },
 };
 
 /// Below this a shadow ray counts as blocked.
@@ -17,27 +20,27 @@ fn leaves(ray: &Ray, hit: &RawHit) -> bool {
 
 /// Lets rays through between the plies.
 pub(super) struct GapFilter<'a> {
-    threads: &'a [Threads],
+    geometries: &'a [CurveGeometry],
     ray: &'a Ray,
     /// The hit accepted last and its section: mostly the one that stands in the end.
     last: Option<(RawHit, Section)>,
 }
 
 impl<'a> GapFilter<'a> {
-    pub(super) fn new(threads: &'a [Threads], ray: &'a Ray) -> Self {
-        Self { threads, ray, last: None }
+    pub(super) fn new(geometries: &'a [CurveGeometry], ray: &'a Ray) -> Self {
+        Self { geometries, ray, last: None }
     }
 
     /// The section at a hit: the one made when it was accepted, or made anew.
     #[inline]
-    pub(super) fn section(&self, weave: &Weave, hit: &RawHit) -> Section {
+    pub(super) fn section(&self, yarns: &YarnGeometry, hit: &RawHit) -> Section {
         match &self.last {
             Some((last, section))
                 if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u =>
             {
                 *section
             }
-            _ => section_at(weave, self.ray, hit),
+            _ => section_at(yarns, self.ray, hit),
         }
     }
 }
@@ -46,16 +49,16 @@ impl HitFilter for GapFilter<'_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
         // Meshes count from both sides.
-        let Some(threads) = self.threads.get(hit.geometry as usize) else { return true };
+        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
         if leaves(self.ray, hit) {
             return false;
         }
-        let Threads::Yarns(weave) = threads else { return true };
-        let shape = weave.yarn_at(hit.segment).shape();
+        let CurveGeometry::Yarns(yarns) = geometry else { return true };
+        let shape = yarns.yarn_at(hit.segment).shape();
         if shape.filled {
             return true;
         }
-        let section = section_at(weave, self.ray, hit);
+        let section = section_at(yarns, self.ray, hit);
         let stands = section.meets_ply(shape);
         if stands {
             self.last = Some((*hit, section));
@@ -69,7 +72,7 @@ const REMEMBERED: usize = 8;
 
 /// Multiplies what each yarn on a shadow ray lets pass; one hit counts once, however often Embree offers it.
 pub(super) struct ShadowFilter<'a> {
-    threads: &'a [Threads],
+    geometries: &'a [CurveGeometry],
     ray: &'a Ray,
     crossings: &'a mut Crossings,
     passed: f32,
@@ -78,8 +81,8 @@ pub(super) struct ShadowFilter<'a> {
 }
 
 impl<'a> ShadowFilter<'a> {
-    pub(super) fn new(threads: &'a [Threads], ray: &'a Ray, crossings: &'a mut Crossings) -> Self {
-        Self { threads, ray, crossings, passed: 1.0, seen: [(u32::MAX, 0, 0.0); REMEMBERED], next: 0 }
+    pub(super) fn new(geometries: &'a [CurveGeometry], ray: &'a Ray, crossings: &'a mut Crossings) -> Self {
+        Self { geometries, ray, crossings, passed: 1.0, seen: [(u32::MAX, 0, 0.0); REMEMBERED], next: 0 }
     }
 
     /// The share of light that all hits so far let pass.
@@ -106,13 +109,13 @@ impl<'a> ShadowFilter<'a> {
 impl HitFilter for ShadowFilter<'_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
-        let Some(threads) = self.threads.get(hit.geometry as usize) else { return true };
+        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
         if leaves(self.ray, hit) {
             return false;
         }
-        let Threads::Yarns(weave) = threads else { return true };
-        let section = section_at(weave, self.ray, hit);
-        let yarn = weave.yarn_at(hit.segment);
+        let CurveGeometry::Yarns(yarns) = geometry else { return true };
+        let section = section_at(yarns, self.ray, hit);
+        let yarn = yarns.yarn_at(hit.segment);
         section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {
             return false;

@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec3A};
 
-use crate::{
-    ffi::embree::{RawHit, Ray},
-    scene::Object,
-};
+use crate::{ffi::embree::RawHit, geometry::ray::Ray, scene::Object};
 
 /// A mesh in single precision.
 #[derive(Debug)]

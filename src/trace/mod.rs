@@ -16,9 +16,10 @@ use std::{
 use glam::{Vec3A, Vec4};
 
 use crate::{
-    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, Ray, SceneBuilder},
+    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
     geometry::{
         curve::{Basis, Curve},
+        ray::Ray,
         section::{Crossings, Section},
         strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
@@ -40,7 +41,7 @@ use mesh::TriangleMesh;
 
 /// Curves of one kind of yarn with all that its rays need.
 #[derive(Debug)]
-pub struct Weave {
+pub struct YarnGeometry {
     /// The fabric of the scene that it belongs to.
     pub fabric: usize,
     /// Which ply of the scene's yarn the first ply of `yarn` is: not 0 where each ply is a curve of its own.
@@ -55,7 +56,7 @@ pub struct Weave {
 
 /// Explicit fibres of one material.
 #[derive(Debug)]
-pub struct Fleece {
+pub struct FiberGeometry {
     /// The fabric of the scene that they belong to.
     pub fabric: usize,
     /// The ply of the scene's yarn that they belong to.
@@ -68,18 +69,18 @@ pub struct Fleece {
     pub fiber: FiberBcsdf,
     /// The same for each variant of the fabric, in place of `fiber` where there are any.
     pub variants: Vec<FiberBcsdf>,
-    /// Which of them each segment is of; empty without.
-    pub picks: Vec<u16>,
+    /// Material indices: which of `variants` each segment is made of; empty without variants.
+    pub material_indices: Vec<u16>,
 }
 
 /// What one geometry of Embree stands for.
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "there are few of them, and rays look at them all the time")]
-pub enum Threads {
+pub enum CurveGeometry {
     /// Yarns (or plies, each as a yarn of one ply) with a model for the fibres inside.
-    Yarns(Weave),
+    Yarns(YarnGeometry),
     /// Fibres.
-    Fibers(Fleece),
+    Fibers(FiberGeometry),
 }
 
 /// The scene's cloth, ready for rays.
@@ -87,7 +88,7 @@ pub enum Threads {
 pub struct World {
     scene: CommittedScene,
     device: Arc<Device>,
-    threads: Vec<Threads>,
+    geometries: Vec<CurveGeometry>,
     /// Their geometries in Embree come after those of the cloth.
     meshes: Vec<TriangleMesh>,
 }
@@ -106,8 +107,8 @@ pub struct BuildTimes {
 pub struct Hit {
     /// Distance along the ray.
     pub t: f32,
-    /// Index into [`World::threads`]; no index of it where a mesh was met.
-    pub threads: usize,
+    /// Index into [`World::geometries`]; no index of it where a mesh was met.
+    pub geometry: usize,
     /// Segment or triangle within it.
     pub segment: u32,
     /// Outward unit normal of the yarn, fibre or triangle.
@@ -135,11 +136,11 @@ impl World {
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
         let started = Instant::now();
         let preparation = Preparation::checked(scene)?;
-        let threads_made = preparation.threads();
+        let curves = preparation.geometries();
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
         let started = Instant::now();
-        let world = Self::of(threads_made, meshes, scene.render.compact_bvh, threads)?;
+        let world = Self::of(curves, meshes, scene.render.compact_bvh, threads)?;
         Ok((world, BuildTimes { generate, build: started.elapsed() }))
     }
 
@@ -147,12 +148,12 @@ impl World {
     ///
     /// # Errors
     /// What Embree says.
-    pub fn of_threads(cloth: Vec<Threads>, threads: usize) -> Result<Self, BuildError> {
+    pub fn of_curves(cloth: Vec<CurveGeometry>, threads: usize) -> Result<Self, BuildError> {
         Self::of(cloth, Vec::new(), true, threads)
     }
 
     fn of(
-        cloth: Vec<Threads>,
+        cloth: Vec<CurveGeometry>,
         meshes: Vec<TriangleMesh>,
         compact_bvh: bool,
         threads: usize,
@@ -160,34 +161,34 @@ impl World {
         let device = Device::new(threads)?;
         let layout = if compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;
-        for threads in &cloth {
-            let (basis, _, segments) = threads.curves();
+        for geometry in &cloth {
+            let (basis, _, segments) = geometry.curves();
             let basis = match basis {
                 Basis::BSpline => CurveBasis::BSpline,
                 Basis::CatmullRom | Basis::Linear => CurveBasis::CatmullRom,
             };
-            builder.add_round_curves(basis, threads.points_in_time(), Arc::clone(segments))?;
+            builder.add_round_curves(basis, geometry.points_in_time(), Arc::clone(segments))?;
         }
         for mesh in &meshes {
             builder.add_triangles(Arc::clone(&mesh.points), Arc::clone(&mesh.triangles))?;
         }
-        Ok(Self { scene: builder.commit()?, device, threads: cloth, meshes })
+        Ok(Self { scene: builder.commit()?, device, geometries: cloth, meshes })
     }
 
     /// The cloth, one entry for each geometry of Embree.
-    pub fn threads(&self) -> &[Threads] {
-        &self.threads
+    pub fn geometries(&self) -> &[CurveGeometry] {
+        &self.geometries
     }
 
     /// The cloth of one fabric of the scene.
-    pub fn of_fabric(&self, fabric: usize) -> impl Iterator<Item = &Threads> {
-        self.threads.iter().filter(move |threads| threads.fabric() == fabric)
+    pub fn of_fabric(&self, fabric: usize) -> impl Iterator<Item = &CurveGeometry> {
+        self.geometries.iter().filter(move |geometry| geometry.fabric() == fabric)
     }
 
     /// Bytes of control points, indices and what is kept for each point, of cloth and meshes.
     pub fn geometry_bytes(&self) -> u64 {
         let meshes: u64 = self.meshes.iter().map(TriangleMesh::bytes).sum();
-        meshes + self.threads.iter().map(Threads::bytes).sum::<u64>()
+        meshes + self.geometries.iter().map(CurveGeometry::bytes).sum::<u64>()
     }
 
     /// Bytes that Embree reports for its BVH.
@@ -206,21 +207,21 @@ impl World {
         if !ray.is_finite() {
             return None;
         }
-        let mut filter = GapFilter::new(&self.threads, ray);
-        let raw = self.scene.intersect(ray, &mut filter)?;
+        let mut filter = GapFilter::new(&self.geometries, ray);
+        let raw = self.scene.intersect(&raw_ray(ray), &mut filter)?;
         Some(self.hit(ray, &raw, &filter))
     }
 
     #[inline]
     fn hit(&self, ray: &Ray, raw: &RawHit, filter: &GapFilter<'_>) -> Hit {
-        let threads = raw.geometry as usize;
-        let place = match self.threads.get(threads) {
-            Some(Threads::Yarns(weave)) => HitPlace::Yarn(filter.section(weave, raw)),
-            Some(Threads::Fibers(fleece)) => HitPlace::Fiber(fleece.tubes.place(raw.segment, raw.u)),
-            None => HitPlace::Surface(self.meshes[threads - self.threads.len()].place(ray, raw)),
+        let geometry = raw.geometry as usize;
+        let place = match self.geometries.get(geometry) {
+            Some(CurveGeometry::Yarns(yarns)) => HitPlace::Yarn(filter.section(yarns, raw)),
+            Some(CurveGeometry::Fibers(fibers)) => HitPlace::Fiber(fibers.tubes.place(raw.segment, raw.u)),
+            None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, raw)),
         };
         let normal = raw.normal.normalize_or(-ray.direction);
-        Hit { t: raw.t, threads, segment: raw.segment, normal, place }
+        Hit { t: raw.t, geometry, segment: raw.segment, normal, place }
     }
 
     /// As [`Self::intersect`] and [`Self::transmittance`], with the number of hits that Embree offered each: what a ray
@@ -229,11 +230,11 @@ impl World {
         if !ray.is_finite() {
             return (None, 0.0, [0; 2]);
         }
-        let mut nearest = Counting { filter: GapFilter::new(&self.threads, ray), calls: 0 };
-        let raw = self.scene.intersect(ray, &mut nearest);
+        let mut nearest = Counting { filter: GapFilter::new(&self.geometries, ray), calls: 0 };
+        let raw = self.scene.intersect(&raw_ray(ray), &mut nearest);
         let hit = raw.map(|raw| self.hit(ray, &raw, &nearest.filter));
-        let mut shadow = Counting { filter: ShadowFilter::new(&self.threads, ray, crossings), calls: 0 };
-        let passed = if self.scene.occluded(ray, &mut shadow) { 0.0 } else { shadow.filter.passed() };
+        let mut shadow = Counting { filter: ShadowFilter::new(&self.geometries, ray, crossings), calls: 0 };
+        let passed = if self.scene.occluded(&raw_ray(ray), &mut shadow) { 0.0 } else { shadow.filter.passed() };
         (hit, passed, [nearest.calls, shadow.calls])
     }
 
@@ -243,42 +244,49 @@ impl World {
         if !ray.is_finite() {
             return 0.0;
         }
-        let mut filter = ShadowFilter::new(&self.threads, ray, crossings);
-        if self.scene.occluded(ray, &mut filter) { 0.0 } else { filter.passed() }
+        let mut filter = ShadowFilter::new(&self.geometries, ray, crossings);
+        if self.scene.occluded(&raw_ray(ray), &mut filter) { 0.0 } else { filter.passed() }
     }
 
     /// Places where a yarn bends more tightly than its radius allows: the scene's fabric, then the place.
     pub fn tight_bends(&self) -> impl Iterator<Item = (usize, &TightBend)> {
-        self.threads.iter().flat_map(|threads| {
-            let bends = match threads {
-                Threads::Yarns(weave) => weave.strands.tight_bends(),
-                Threads::Fibers(_) => &[],
+        self.geometries.iter().flat_map(|geometry| {
+            let bends = match geometry {
+                CurveGeometry::Yarns(yarns) => yarns.strands.tight_bends(),
+                CurveGeometry::Fibers(_) => &[],
             };
-            bends.iter().map(move |bend| (threads.fabric(), bend))
+            bends.iter().map(move |bend| (geometry.fabric(), bend))
         })
     }
 }
 
-/// The cross-section at a candidate hit: what filter and shading both look at.
+/// The ray as Embree takes it.
 #[inline]
-fn section_at(weave: &Weave, ray: &Ray, raw: &RawHit) -> Section {
-    let place = weave.strands.place_at(raw.segment, raw.u, ray.time);
-    Section::new(&place, ray.origin, ray.direction, weave.yarn.shape().tilted)
+fn raw_ray(ray: &Ray) -> RawRay {
+    let &Ray { origin, direction, t_near, t_far, time } = ray;
+    RawRay { origin, direction, t_near, t_far, time }
 }
 
-impl Fleece {
-    /// Which of the fabric's variants a segment is of, if it has any.
+/// The cross-section at a candidate hit: what filter and shading both look at.
+#[inline]
+fn section_at(yarns: &YarnGeometry, ray: &Ray, raw: &RawHit) -> Section {
+    let place = yarns.strands.frame_at(raw.segment, raw.u, ray.time);
+    Section::new(&place, ray.origin, ray.direction, yarns.yarn.shape().tilted)
+}
+
+impl FiberGeometry {
+    /// Material index of a segment: which of `variants` it is made of, if there are any.
     #[inline]
-    pub fn pick(&self, segment: u32) -> Option<u16> {
-        self.picks.get(segment as usize).copied()
+    pub fn material_index(&self, segment: u32) -> Option<u16> {
+        self.material_indices.get(segment as usize).copied()
     }
 
     /// How the fibre of a segment scatters.
     #[inline]
     pub fn fiber_at(&self, segment: u32) -> &FiberBcsdf {
-        match self.pick(segment) {
+        match self.material_index(segment) {
             None => &self.fiber,
-            Some(pick) => &self.variants[usize::from(pick)],
+            Some(index) => &self.variants[usize::from(index)],
         }
     }
 
@@ -289,7 +297,7 @@ impl Fleece {
     }
 }
 
-impl Threads {
+impl CurveGeometry {
     /// The fabric of the scene that they belong to.
     pub fn fabric(&self) -> usize {
         match self {
@@ -325,18 +333,18 @@ impl Threads {
     fn bytes(&self) -> u64 {
         match self {
             Self::Yarns(w) => w.strands.bytes(),
-            Self::Fibers(f) => f.tubes.bytes() + size_of_val(&*f.picks) as u64,
+            Self::Fibers(f) => f.tubes.bytes() + size_of_val(&*f.material_indices) as u64,
         }
     }
 }
 
-impl Weave {
+impl YarnGeometry {
     /// The yarn that a segment is of.
     #[inline]
     pub fn yarn_at(&self, segment: u32) -> &YarnScatterer {
-        match self.strands.pick(segment) {
+        match self.strands.material_index(segment) {
             None => &self.yarn,
-            Some(pick) => &self.variants[usize::from(pick)],
+            Some(index) => &self.variants[usize::from(index)],
         }
     }
 }
@@ -351,12 +359,12 @@ pub fn estimates(scene: &Scene) -> Vec<Estimate> {
 /// # Errors
 /// If they would take more memory than the scene may.
 pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
-    let threads = Preparation::checked(scene)?.threads();
-    let mut curves: Vec<Curve> = threads
+    let geometries = Preparation::checked(scene)?.geometries();
+    let mut curves: Vec<Curve> = geometries
         .iter()
-        .flat_map(|threads| match threads {
-            Threads::Yarns(weave) => weave.strands.curves().collect::<Vec<_>>(),
-            Threads::Fibers(fleece) => fleece.tubes.curves().collect(),
+        .flat_map(|geometry| match geometry {
+            CurveGeometry::Yarns(yarns) => yarns.strands.curves().collect::<Vec<_>>(),
+            CurveGeometry::Fibers(fibers) => fibers.tubes.curves().collect(),
         })
         .collect();
     for point in curves.iter_mut().flat_map(|c| &mut c.points) {

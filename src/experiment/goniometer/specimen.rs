@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use super::{Outcome, View};
 use crate::{
-    geometry::section::{Crossings, Place, Section},
+    geometry::section::{Crossings, Section, YarnFrame},
     math::{Rgb, sampler::Sampler},
     scattering::{
         LobeValues,
@@ -54,7 +54,7 @@ impl Specimen<'_> {
 
 /// A straight yarn along z, seen from `theta` at azimuth 0: the section where a ray of offset `h` meets it.
 pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> Section {
-    let place = Place {
+    let place = YarnFrame {
         centre: Vec3A::ZERO,
         tangent: Vec3A::Z,
         curvature: Vec3A::ZERO,

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{Effort, Measurement, Outcome, Tally, View};
 use crate::{
-    ffi::embree::Ray,
+    geometry::ray::Ray,
     geometry::{
         curve::{Basis, Curve},
         fiber::Plies,
@@ -23,7 +23,7 @@ use crate::{
     },
     scattering::{LobeValues, fiber::FiberBcsdf, lobe::LobeFrame},
     scene::Yarn,
-    trace::{BuildError, Fleece, HitPlace, Threads, World},
+    trace::{BuildError, CurveGeometry, FiberGeometry, HitPlace, World},
 };
 
 /// Packings that a truth is averaged over.
@@ -71,22 +71,22 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
     for packing in 0..PACKINGS.min(effort.paths) {
         let seed = hash2(effort.seed ^ 0x7275_7468, packing as u32);
         let plies = Plies::new(&strands, &yarn.plies, &shape, seed);
-        let threads: Vec<Threads> = (0..yarn.plies.len())
+        let geometries: Vec<CurveGeometry> = (0..yarn.plies.len())
             .filter(|&ply| yarn.plies[ply].fibers > 0)
             .map(|ply| {
                 let (tubes, first_tubes) = plies.fibers(ply, yarn.placement);
-                Threads::Fibers(Fleece {
+                CurveGeometry::Fibers(FiberGeometry {
                     fabric: 0,
                     ply,
                     first_tubes,
                     tubes,
                     fiber: FiberBcsdf::new(&yarn.fibers[ply].1),
                     variants: Vec::new(),
-                    picks: Vec::new(),
+                    material_indices: Vec::new(),
                 })
             })
             .collect();
-        let world = World::of_threads(threads, rayon::current_num_threads())?;
+        let world = World::of_curves(geometries, rayon::current_num_threads())?;
         let sample = Sample { world: &world, strands: &strands, view, seed };
         let count = effort.paths / PACKINGS + u64::from(packing < effort.paths % PACKINGS);
         let parts: Vec<Tally> = (0..CHUNKS).into_par_iter().map(|chunk| sample.run(chunk, count)).collect();
@@ -128,14 +128,15 @@ impl Sample<'_> {
         let mut ray = Ray::new((entry + towards).as_vec3a(), (-towards).as_vec3a());
         let (mut throughput, mut events) = (Rgb::ONE, 0);
         while let Some(hit) = self.world.intersect(&ray) {
-            let (HitPlace::Fiber(place), Threads::Fibers(fleece)) = (&hit.place, &self.world.threads()[hit.threads])
+            let (HitPlace::Fiber(place), CurveGeometry::Fibers(fibers)) =
+                (&hit.place, &self.world.geometries()[hit.geometry])
             else {
                 break;
             };
             events += 1;
             let frame = LobeFrame::new(place.tangent, -ray.direction);
             let u = [0; 4].map(|_| stream.next());
-            let Some(next) = fleece.fiber.sample(frame.sin, frame.cos, throughput, u, stream) else {
+            let Some(next) = fibers.fiber.sample(frame.sin, frame.cos, throughput, u, stream) else {
                 return Outcome { unscattered: 0.0, scattered: None };
             };
             throughput *= next.weight;
@@ -162,7 +163,7 @@ impl Sample<'_> {
         let segments = self.strands.segments().len() as f64;
         let along = (z + HALF_LENGTH) / (2.0 * HALF_LENGTH) * segments;
         let segment = along.clamp(0.0, segments - 1.0).floor();
-        let place = self.strands.place(segment as u32, (along - segment) as f32);
+        let place = self.strands.frame(segment as u32, (along - segment) as f32);
         f64::from(place.normal.y.atan2(place.normal.x)) + f64::from(place.phase)
     }
 }

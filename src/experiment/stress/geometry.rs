@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3A};
 
 use super::{Case, Checks, Group::Geometry, Scale};
 use crate::{
-    ffi::embree::Ray,
+    geometry::ray::Ray,
     geometry::{
         curve::{Basis, Curve},
         section::Crossings,
@@ -311,9 +311,9 @@ fn degenerate(scale: Scale, checks: &mut Checks) {
                 scene.fabrics[0].basis = basis;
                 let world = world(&scene);
                 checks.never("a hit that is not sound", !sound_hits(&world, DVec3::ZERO, 6.0, n), &at);
-                let segments = world.threads()[0].curves().2.len();
+                let segments = world.geometries()[0].curves().2.len();
                 checks.at_most("segments made", segments as f64, 5000.0, &at);
-                let points = world.threads()[0].curves().1;
+                let points = world.geometries()[0].curves().1;
                 checks.never("a control point that is not finite", points.iter().any(|p| !p.is_finite()), &at);
             }
         }
@@ -347,11 +347,11 @@ fn exact_rays(scale: Scale, checks: &mut Checks) {
                     continue;
                 };
                 // What the crossing itself says of the same ray.
-                if let (HitPlace::Yarn(section), crate::trace::Threads::Yarns(weave)) =
-                    (&hit.place, &world.threads()[0])
+                if let (HitPlace::Yarn(section), crate::trace::CurveGeometry::Yarns(yarns)) =
+                    (&hit.place, &world.geometries()[0])
                 {
-                    section.crossings(weave.yarn.shape(), &mut crossings);
-                    let want = weave.yarn.transparency(&crossings);
+                    section.crossings(yarns.yarn.shape(), &mut crossings);
+                    let want = yarns.yarn.transparency(&crossings);
                     // Below a thousandth, a shadow ray counts as blocked.
                     let want = if want < 1e-3 { 0.0 } else { want };
                     checks.at_most(
@@ -533,7 +533,7 @@ fn many(scale: Scale, checks: &mut Checks) {
         let started = std::time::Instant::now();
         let world = world(&scene);
         let seconds = started.elapsed().as_secs_f64();
-        let segments = world.threads()[0].curves().2.len() as f64;
+        let segments = world.geometries()[0].curves().2.len() as f64;
         let at = || format!("{name}: {segments} segments in {seconds:.2} s");
         checks.at_least("segments for each point", segments / f64::from(loops), 0.99, &at);
         checks.at_most(

@@ -109,7 +109,7 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
 const MODELS: [Model; 4] = [Model::Aggregated, Model::TwoStream, Model::Paper, Model::Printed];
 
 /// What one ray on one yarn is asked.
-struct Ray {
+struct SectionRay {
     theta: f64,
     h: f32,
     phase: f64,
@@ -119,7 +119,7 @@ struct Ray {
 fn examine(
     scatterer: &YarnScatterer,
     model: Model,
-    ray: &Ray,
+    ray: &SectionRay,
     n: u32,
     floor: Option<f64>,
     checks: &mut Checks,
@@ -221,7 +221,7 @@ fn counts(scale: Scale, checks: &mut Checks) {
             let scatterer = scatterer(&yarn(1, fibers, density, 0.0, 0.0, &white()), model);
             for h in [0.0, 0.5, 0.99, 0.999_999, 1.0] {
                 let at = || format!("{fibers} fibres, density {density:e}, {}, h {h}", model.name());
-                examine(&scatterer, model, &Ray { theta: 0.3, h, phase: 0.0 }, n, Some(0.97), checks, &at);
+                examine(&scatterer, model, &SectionRay { theta: 0.3, h, phase: 0.0 }, n, Some(0.97), checks, &at);
             }
         }
     }
@@ -235,7 +235,7 @@ fn packing(scale: Scale, checks: &mut Checks) {
                 let scatterer = scatterer(&yarn(plies, 50, density, 0.0, 0.2, &white()), model);
                 for (h, phase) in [(0.0, 0.0), (0.6, 1.0), (-0.97, 2.0)] {
                     let at = || format!("density {density}, {plies} plies, {}, h {h}", model.name());
-                    examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
+                    examine(&scatterer, model, &SectionRay { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
                 }
             }
         }
@@ -251,7 +251,7 @@ fn twist(scale: Scale, checks: &mut Checks) {
                 let scatterer = scatterer(&yarn(3, 40, 0.3, ply, fiber, &white()), model);
                 for (theta, h, phase) in [(0.0, 0.1, 0.5), (0.9, -0.5, 2.0), (-1.5, 0.8, 4.0)] {
                     let at = || format!("ply {ply:.3}, fibre {fiber:.3} rad, {}, theta {theta}, h {h}", model.name());
-                    examine(&scatterer, model, &Ray { theta, h, phase }, n, Some(0.9), checks, &at);
+                    examine(&scatterer, model, &SectionRay { theta, h, phase }, n, Some(0.9), checks, &at);
                 }
             }
         }
@@ -276,7 +276,15 @@ fn albedos(scale: Scale, checks: &mut Checks) {
                                     model.name()
                                 )
                             };
-                            examine(&scatterer, model, &Ray { theta: 0.3, h, phase: 0.8 }, n, floor, checks, &at);
+                            examine(
+                                &scatterer,
+                                model,
+                                &SectionRay { theta: 0.3, h, phase: 0.8 },
+                                n,
+                                floor,
+                                checks,
+                                &at,
+                            );
                         }
                     }
                 }
@@ -294,7 +302,7 @@ fn widths(scale: Scale, checks: &mut Checks) {
                 let scatterer = scatterer(&yarn(2, 60, 0.3, 0.2, -0.3, &m), model);
                 for (theta, h) in [(0.0, 0.0), (1.2, 0.5)] {
                     let at = || format!("beta {beta:e}, beta_n {beta_n:e}, {}, theta {theta}, h {h}", model.name());
-                    examine(&scatterer, model, &Ray { theta, h, phase: 1.0 }, n, Some(0.9), checks, &at);
+                    examine(&scatterer, model, &SectionRay { theta, h, phase: 1.0 }, n, Some(0.9), checks, &at);
                 }
             }
         }
@@ -310,7 +318,7 @@ fn rays(scale: Scale, checks: &mut Checks) {
                 for h in [-1.0, -0.999_999_9, -0.5, 0.0, 0.3, 0.999, 1.0] {
                     let theta = FRAC_PI_2 - off;
                     let at = || format!("{off:e} rad from the yarn, h {h}, {plies} plies, {}", model.name());
-                    examine(&scatterer, model, &Ray { theta, h, phase: 0.3 }, n, Some(0.9), checks, &at);
+                    examine(&scatterer, model, &SectionRay { theta, h, phase: 0.3 }, n, Some(0.9), checks, &at);
                 }
             }
         }
@@ -325,7 +333,7 @@ fn plies(scale: Scale, checks: &mut Checks) {
             for i in 0..9 {
                 let (h, phase) = (-0.96 + 0.24 * i as f32, 0.7 * f64::from(i));
                 let at = || format!("{count} plies, {}, h {h}", model.name());
-                examine(&scatterer, model, &Ray { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
+                examine(&scatterer, model, &SectionRay { theta: 0.4, h, phase }, n, Some(0.9), checks, &at);
             }
         }
     }
@@ -350,7 +358,7 @@ fn plies(scale: Scale, checks: &mut Checks) {
             for i in 0..40 {
                 let (h, phase) = (-0.975 + 0.05 * i as f32, 0.37 * f64::from(i));
                 let at = || format!("{name}, {}, h {h}, phase {phase:.2}", model.name());
-                examine(&scatterer, model, &Ray { theta: 0.2, h, phase }, n, None, checks, &at);
+                examine(&scatterer, model, &SectionRay { theta: 0.2, h, phase }, n, None, checks, &at);
             }
         }
     }

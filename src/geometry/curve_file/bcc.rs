@@ -19,7 +19,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, Place, ReadOptions, counted, quoted};
+use super::{CurveFileError, FileLocation, ReadOptions, counted, quoted};
 use crate::geometry::curve::{Basis, CurveSet};
 
 /// The first bytes of every BCC file.
@@ -69,7 +69,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         return Err(CurveFileError::byte(16, problem).hint(CUT_SHORT));
     }
     if found > options.max_points {
-        return Err(CurveFileError::too_many_points(Place::Byte(16), found, options));
+        return Err(CurveFileError::too_many_points(FileLocation::Byte(16), found, options));
     }
 
     let mut repair = Repair::default();

@@ -19,7 +19,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, Place, ReadOptions};
+use super::{CurveFileError, FileLocation, ReadOptions};
 use crate::geometry::curve::{Basis, CurveSet};
 
 /// The first bytes of every cyHair file.
@@ -57,7 +57,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         return Err(CurveFileError::byte(4, problem).hint(CUT_SHORT));
     }
     if u64::from(points) > options.max_points {
-        return Err(CurveFileError::too_many_points(Place::Byte(8), points, options));
+        return Err(CurveFileError::too_many_points(FileLocation::Byte(8), points, options));
     }
     let segments_end = HEADER_BYTES + if has(SEGMENTS) == 1 { 2 * strands as usize } else { 0 };
     let thickness_start = segments_end + 12 * points as usize;

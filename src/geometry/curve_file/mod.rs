@@ -64,7 +64,7 @@ pub enum Format {
 
 /// Where in a file something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum FileLocation {
     /// No particular place: the file as a whole.
     File,
     /// Byte offset from the beginning, counted from 0.
@@ -79,7 +79,7 @@ pub struct CurveFileError {
     /// The file as the caller named it; absent when the bytes came from elsewhere.
     pub file: Option<PathBuf>,
     /// Where the trouble begins.
-    pub place: Place,
+    pub location: FileLocation,
     /// What was expected and what was found.
     pub problem: String,
     /// What the user might try.
@@ -87,16 +87,16 @@ pub struct CurveFileError {
 }
 
 impl CurveFileError {
-    fn new(place: Place, problem: impl Into<String>) -> Self {
-        Self { file: None, place, problem: problem.into(), hint: None }
+    fn new(location: FileLocation, problem: impl Into<String>) -> Self {
+        Self { file: None, location, problem: problem.into(), hint: None }
     }
 
     fn byte(offset: usize, problem: impl Into<String>) -> Self {
-        Self::new(Place::Byte(offset as u64), problem)
+        Self::new(FileLocation::Byte(offset as u64), problem)
     }
 
     fn line(number: u64, problem: impl Into<String>) -> Self {
-        Self::new(Place::Line(number), problem)
+        Self::new(FileLocation::Line(number), problem)
     }
 
     fn hint(mut self, hint: impl Into<String>) -> Self {
@@ -109,8 +109,8 @@ impl CurveFileError {
         self
     }
 
-    fn too_many_points(place: Place, found: impl fmt::Display, options: &ReadOptions) -> Self {
-        Self::new(place, format!("{found} points are more than the {} allowed", options.max_points))
+    fn too_many_points(location: FileLocation, found: impl fmt::Display, options: &ReadOptions) -> Self {
+        Self::new(location, format!("{found} points are more than the {} allowed", options.max_points))
     }
 }
 
@@ -119,10 +119,10 @@ impl fmt::Display for CurveFileError {
         if let Some(file) = &self.file {
             write!(out, "{}: ", file.display())?;
         }
-        match self.place {
-            Place::File => {}
-            Place::Byte(offset) => write!(out, "byte {offset}: ")?,
-            Place::Line(number) => write!(out, "line {number}: ")?,
+        match self.location {
+            FileLocation::File => {}
+            FileLocation::Byte(offset) => write!(out, "byte {offset}: ")?,
+            FileLocation::Line(number) => write!(out, "line {number}: ")?,
         }
         out.write_str(&self.problem)?;
         match &self.hint {
@@ -152,17 +152,17 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
             std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
             _ => format!("cannot be read: {error}"),
         };
-        CurveFileError::new(Place::File, problem)
+        CurveFileError::new(FileLocation::File, problem)
     };
     let metadata = fs::metadata(path).map_err(|error| unreadable(error).hint("is the path right?"))?;
     // A pipe or a device may never end.
     if !metadata.is_file() {
-        return Err(CurveFileError::new(Place::File, "expected a regular file, found a folder, pipe or device"));
+        return Err(CurveFileError::new(FileLocation::File, "expected a regular file, found a folder, pipe or device"));
     }
     let bytes = fs::read(path).map_err(unreadable)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
         CurveFileError::new(
-            Place::File,
+            FileLocation::File,
             "expected a curve file, found neither the letters BCC or HAIR nor a known extension",
         )
         .hint("name it .bcc, .hair, .pyp, .obj, .txt or .curves after its content")

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, Place, ReadOptions, lines, number, quoted};
+use super::{CurveFileError, FileLocation, ReadOptions, lines, number, quoted};
 use crate::geometry::curve::{Basis, CurveSet};
 
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
@@ -55,7 +55,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
                     chain.push(index);
                     total += 1;
                     if total > options.max_points {
-                        return Err(CurveFileError::too_many_points(Place::Line(line.number), total, options));
+                        return Err(CurveFileError::too_many_points(FileLocation::Line(line.number), total, options));
                     }
                 }
             }

@@ -15,7 +15,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, Place, ReadOptions, counted, lines, number, quoted};
+use super::{CurveFileError, FileLocation, ReadOptions, counted, lines, number, quoted};
 use crate::geometry::curve::{Basis, CurveSet};
 
 const MILLIMETRES_PER_METRE: f64 = 1000.0;
@@ -28,13 +28,13 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
     let [columns, rows] = options.tile;
     if columns == 0 || rows == 0 {
         let problem = format!("expected tile counts of 1 or more, found {columns} x {rows}");
-        return Err(CurveFileError::new(Place::File, problem));
+        return Err(CurveFileError::new(FileLocation::File, problem));
     }
     let cell = PatternCell::parse(bytes)?;
     let total = cell.vertices.len() as u128 * u128::from(columns) * u128::from(rows);
     if total > u128::from(options.max_points) {
         let found = format!("{columns} x {rows} cells of {}", cell.vertices.len());
-        return Err(CurveFileError::too_many_points(Place::File, found, options));
+        return Err(CurveFileError::too_many_points(FileLocation::File, found, options));
     }
 
     let mut repair = Repair::default();
@@ -123,9 +123,8 @@ impl PatternCell {
 
         for (&(name, _), heading_line) in SECTION_NAMES.iter().zip(heading_lines) {
             if heading_line == 0 {
-                return Err(
-                    CurveFileError::new(Place::File, format!("expected a section {name}, found none")).hint(CUT_SHORT)
-                );
+                return Err(CurveFileError::new(FileLocation::File, format!("expected a section {name}, found none"))
+                    .hint(CUT_SHORT));
             }
         }
         let [pattern_line, vertices_line, edges_line] = heading_lines;
@@ -301,7 +300,7 @@ fn place(cell: &PatternCell, vertex: usize, at: Cell) -> Result<DVec3, CurveFile
     }
     let problem =
         format!("expected finite coordinates, found {point} for vertex {vertex} in cell {}, {}", at[0], at[1]);
-    Err(CurveFileError::new(Place::File, problem))
+    Err(CurveFileError::new(FileLocation::File, problem))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, Place, ReadOptions, lines, number, quoted};
+use super::{CurveFileError, FileLocation, ReadOptions, lines, number, quoted};
 use crate::geometry::curve::{Basis, CurveSet};
 
 /// A triangle and its first point again: the shortest loop that can be told from a line walked back and forth.
@@ -38,7 +38,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         }
         total += 1;
         if total > options.max_points {
-            return Err(CurveFileError::too_many_points(Place::Line(line.number), total, options));
+            return Err(CurveFileError::too_many_points(FileLocation::Line(line.number), total, options));
         }
         curve.points.push(point);
         curve.radii.extend(radius);

@@ -96,7 +96,7 @@ impl Plies<'_> {
             let knots: Vec<_> = (0..points)
                 .map(|i| {
                     let (along, at) = path(i as f64 / (points - 1) as f64);
-                    let place = guide.place_at(along);
+                    let place = guide.frame_at(along);
                     let axis = self.axis(&place, shape);
                     let at = axis * (f64::from(shape.distance) + at.x) + axis.perp() * at.y;
                     (point(&place, at), place.radius)

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::{
     curve::{Basis, Curve},
-    section::Place,
+    section::YarnFrame,
     strand::Strands,
     tube::{Tubes, spline_through},
     yarn::{PlyParameters, PlyShape, YarnShape},
@@ -85,7 +85,7 @@ impl<'a> Guide<'a> {
         let (mut length, mut before) = (0.0, None);
         for segment in segments.clone() {
             for k in usize::from(before.is_some())..=LENGTH_STEPS {
-                let place = strands.place(segment, k as f32 / LENGTH_STEPS as f32);
+                let place = strands.frame(segment, k as f32 / LENGTH_STEPS as f32);
                 if let Some(before) = before {
                     length += f64::from(place.centre.distance(before)) / f64::from(place.radius.max(1e-20));
                 }
@@ -117,9 +117,9 @@ impl<'a> Guide<'a> {
     }
 
     /// The place after so many yarn radii along the yarn.
-    fn place_at(&self, along: f64) -> Place {
+    fn frame_at(&self, along: f64) -> YarnFrame {
         let (segment, u) = self.find(along);
-        self.strands.place(segment, u)
+        self.strands.frame(segment, u)
     }
 
     /// So many even steps along the yarn: where each begins, in yarn radii from the yarn's start, and the end of the last.
@@ -130,7 +130,7 @@ impl<'a> Guide<'a> {
 
 /// The point at `at` (yarn radii) of the section at a place.
 #[inline]
-fn point(place: &Place, at: DVec2) -> Vec3 {
+fn point(place: &YarnFrame, at: DVec2) -> Vec3 {
     let across = place.tangent.cross(place.normal);
     (place.centre + place.radius * (at.x as f32 * place.normal + at.y as f32 * across)).into()
 }
@@ -184,7 +184,7 @@ impl<'a> Plies<'a> {
 
     /// Direction from the yarn's axis to a ply at a step, in the section.
     #[inline]
-    fn axis(&self, place: &Place, ply: &PlyShape) -> DVec2 {
+    fn axis(&self, place: &YarnFrame, ply: &PlyShape) -> DVec2 {
         let turned = DVec2::from_angle(f64::from(place.phase));
         turned.rotate(ply.direction.as_dvec2())
     }
@@ -205,7 +205,7 @@ impl<'a> Plies<'a> {
     fn fibers_of(&self, yarn: usize, ply: usize, placement: Placement) -> Vec<Vec<Vec4>> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
         let guide = Guide::new(self.strands, yarn);
-        let places: Vec<(f64, Place)> = guide.steps(self.steps[yarn]).map(|s| (s, guide.place_at(s))).collect();
+        let places: Vec<(f64, YarnFrame)> = guide.steps(self.steps[yarn]).map(|s| (s, guide.frame_at(s))).collect();
         let mut stream = Stream::new(hash2(hash2(self.seed, yarn as u32), ply as u32));
         let start = TAU * f64::from(stream.next());
         let core = f64::from(shape.core_radius);
@@ -238,18 +238,18 @@ impl<'a> Plies<'a> {
             .collect()
     }
 
-    /// For each segment of so many curves along each yarn, what was picked for the yarn's segment below it; nothing if
+    /// For each segment of so many curves along each yarn, the material index of the yarn's segment below it; nothing if
     /// nothing was.
-    pub fn picks_along(&self, curves: usize) -> Vec<u16> {
-        let mut picks = Vec::new();
+    pub fn material_indices_along(&self, curves: usize) -> Vec<u16> {
+        let mut material_indices = Vec::new();
         for yarn in 0..self.strands.yarns() {
             let (guide, steps) = (Guide::new(self.strands, yarn), self.steps[yarn]);
             let half = 0.5 * guide.length() / steps.max(1) as f64;
             let below = guide.steps(steps).take(steps).map(|start| guide.segment_at(start + half));
-            let along: Vec<u16> = below.filter_map(|segment| self.strands.pick(segment)).collect();
-            picks.extend(std::iter::repeat_n(along, curves).flatten());
+            let along: Vec<u16> = below.filter_map(|segment| self.strands.material_index(segment)).collect();
+            material_indices.extend(std::iter::repeat_n(along, curves).flatten());
         }
-        picks
+        material_indices
     }
 
     /// One curve for each yarn along the middle of a ply, as wide as the ply, and at each of its points the direction
@@ -261,7 +261,7 @@ impl<'a> Plies<'a> {
             .into_par_iter()
             .map(|yarn| {
                 let guide = Guide::new(self.strands, yarn);
-                let places: Vec<Place> = guide.steps(self.steps[yarn]).map(|s| guide.place_at(s)).collect();
+                let places: Vec<YarnFrame> = guide.steps(self.steps[yarn]).map(|s| guide.frame_at(s)).collect();
                 let (mut knots, mut axes) = (Vec::new(), Vec::new());
                 for place in &places {
                     let axis = self.axis(place, shape);

@@ -31,7 +31,7 @@ fn anywhere(stream: &mut Stream) -> DVec2 {
 /// Random sequential addition; `None` if a disc finds no room.
 fn put_down(count: u32, diameter: f64, stream: &mut Stream) -> Option<Vec<DVec2>> {
     let mut centres: Vec<DVec2> = Vec::with_capacity(count as usize);
-    let mut grid = Grid::new(count as usize, diameter);
+    let mut grid = DiscGrid::new(count as usize, diameter);
     for disc in 0..count {
         let free = |at: &DVec2| grid.near(*at).all(|j| at.distance_squared(centres[j]) >= diameter * diameter);
         let at = (0..TRIES).map(|_| anywhere(stream)).find(free)?;
@@ -45,13 +45,13 @@ fn put_down(count: u32, diameter: f64, stream: &mut Stream) -> Option<Vec<DVec2>
 const TRIES: u32 = 2000;
 
 /// A grid of cells as wide as a disc.
-struct Grid {
+struct DiscGrid {
     cells: Vec<Vec<u32>>,
     side: i32,
     inverse: f64,
 }
 
-impl Grid {
+impl DiscGrid {
     fn new(discs: usize, diameter: f64) -> Self {
         // No finer than a few discs to a cell, however thin they are.
         let width = diameter.max(2.0 / (discs as f64).sqrt().max(1.0));
@@ -88,7 +88,7 @@ fn push_apart(centres: &mut [DVec2], diameter: f64) {
     // A little farther than needed, or the last of them would take for ever.
     let wanted = diameter * 1.005;
     for round in 0..3000 {
-        let mut grid = Grid::new(centres.len(), wanted);
+        let mut grid = DiscGrid::new(centres.len(), wanted);
         for (i, &c) in centres.iter().enumerate() {
             grid.add(i as u32, c);
         }

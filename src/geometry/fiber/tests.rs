@@ -45,11 +45,11 @@ fn arch(shape: &YarnShape) -> Strands {
 }
 
 /// Where a point lies in the section of the nearest place of a yarn: the place, and the point in yarn radii from it.
-fn locate(strands: &Strands, point: Vec3A) -> (Place, DVec2) {
+fn locate(strands: &Strands, point: Vec3A) -> (YarnFrame, DVec2) {
     let place = strands
         .segments_of(0)
         .flat_map(|s| (0..64).map(move |k| (s, k as f32 / 64.0)))
-        .map(|(s, u)| strands.place(s, u))
+        .map(|(s, u)| strands.frame(s, u))
         .min_by(|a, b| (a.centre - point).length().total_cmp(&(b.centre - point).length()))
         .unwrap();
     let off = (point - place.centre) / place.radius;

@@ -30,7 +30,7 @@ pub(super) fn nearest(p0: DVec3, p1: DVec3, q0: DVec3, q1: DVec3) -> Nearest {
 
 /// Points sorted into the cells of a grid, those that hold any. With a period in x and y, neighbours are found across its
 /// borders.
-pub(super) struct Grid {
+pub(super) struct PointGrid {
     /// Cells per period along x and y, where there is one.
     wrap: Option<[i32; 2]>,
     /// Points by their cells; cells that follow each other along x do so here.
@@ -41,7 +41,7 @@ pub(super) struct Grid {
     cell_of: Vec<u32>,
 }
 
-/// A point in a [`Grid`].
+/// A point in a [`PointGrid`].
 #[derive(Clone, Copy)]
 pub(super) struct Entry {
     pub(super) at: DVec3,
@@ -51,7 +51,7 @@ pub(super) struct Entry {
 /// Where a cell is along z, y and x.
 type Key = [i32; 3];
 
-impl Grid {
+impl PointGrid {
     /// Sorts points into cells at least `reach` wide, so that all within `reach` of a point are in the 27 cells around
     /// it. `period` must be at least three times `reach`.
     pub(super) fn new(points: &[DVec3], reach: f64, period: Option<DVec2>) -> Self {
@@ -122,9 +122,9 @@ impl Grid {
     }
 }
 
-/// Finds the neighbours of points in a [`Grid`].
+/// Finds the neighbours of points in a [`PointGrid`].
 pub(super) struct Walk<'a> {
-    grid: &'a Grid,
+    grid: &'a PointGrid,
     /// The cell last asked for, and the entries around it.
     cell: Option<u32>,
     runs: Vec<Range<u32>>,
@@ -173,7 +173,7 @@ mod tests {
             .map(|_| DVec3::new(f64::from(stream.next()) * 4.0, f64::from(stream.next()) * 5.0, stream.next().into()))
             .collect();
         for period in [Some(period), None] {
-            let grid = Grid::new(&points, 1.0, period);
+            let grid = PointGrid::new(&points, 1.0, period);
             let mut walk = grid.walk();
             for (i, p) in points.iter().enumerate() {
                 let mut found = vec![0; points.len()];

@@ -391,7 +391,7 @@ enum Surface {
 }
 
 /// A place before it is laid on the surface: share of the width, plus diameters across, up from the first row, out.
-struct Place {
+struct SheetPoint {
     share: f64,
     across: f64,
     up: f64,
@@ -413,7 +413,7 @@ impl Surface {
         }
     }
 
-    fn place(&self, p: &Place) -> DVec3 {
+    fn place(&self, p: &SheetPoint) -> DVec3 {
         match self {
             Self::Plane { width, .. } => DVec3::new(p.share * width + p.across, p.up, p.out),
             Self::Round { revolution, .. } => {
@@ -609,7 +609,7 @@ impl Layout {
 impl StitchForm {
     /// The curve at `t`: 0 and 2 pi between stitches, pi at the head. `relaxed` is its place in a plain stitch, as
     /// [`Cell::stitch`] gives it, if that is known.
-    fn at(&self, t: f64, relaxed: Option<DVec3>, surface: &Surface, stitches: usize) -> Place {
+    fn at(&self, t: f64, relaxed: Option<DVec3>, surface: &Surface, stitches: usize) -> SheetPoint {
         // Shape of the densest plain stitch of this form whose strands keep apart, found by a search: how far a loop
         // reaches up and down, leans out and dives, for a stitch 4.13 wide and rows 2.28 apart.
         const REACH: f64 = 1.915 / 2.28;
@@ -637,10 +637,10 @@ impl StitchForm {
         };
         let share = self.share + mix(mixed(&self.foot), self.head);
         if let Some(p) = relaxed {
-            return Place { share, across: width * p.x, up: middle + height * p.y, out: p.z + out };
+            return SheetPoint { share, across: width * p.x, up: middle + height * p.y, out: p.z + out };
         }
         let rib = RIB_OUT * mixed(&self.foot_sign);
-        Place {
+        SheetPoint {
             share,
             across: width * (t / TAU - 0.5) + LEAN * width.min(4.13) * sin2,
             up: middle - REACH * height * foot_reach * cos,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::{Grid, Walk, nearest};
+use super::contact::{PointGrid, Walk, nearest};
 use crate::geometry::{chain::Chain, curve::Curve};
 
 /// How far yarns run into each other.
@@ -59,7 +59,7 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
     if reach <= 0.0 || !reach.is_finite() {
         return Some(Overlap { length: 0.0, share: 0.0, deepest: 0.0, nearest: f64::INFINITY });
     }
-    let grid = Grid::new(&middles, reach, None);
+    let grid = PointGrid::new(&middles, reach, None);
     let nearest_of = |walk: &mut Walk<'_>, i: usize| {
         let a = &pieces[i];
         let mut best = f64::INFINITY;

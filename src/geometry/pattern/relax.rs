@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::contact::{Grid, nearest};
+use super::contact::{PointGrid, nearest};
 
 /// How a rope goes on after its last point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +118,7 @@ impl Relaxation {
         }));
         let longest = halves.iter().copied().fold(0.1, f64::max).min(0.5);
         let touch = 1.0 + MARGIN;
-        let grid = Grid::new(&middles, touch + 2.0 * longest, self.period);
+        let grid = PointGrid::new(&middles, touch + 2.0 * longest, self.period);
         let of_rope = |r: usize| -> Vec<Contacts> {
             let mut found: Vec<Contacts> = Vec::new();
             let mut walk = grid.walk();

@@ -1,7 +1,7 @@
 //! Whole messages, from text to what the user sees.
 
 use super::*;
-use crate::scene::diagnostic::{Sources, unknown_name};
+use crate::input::diagnostic::{Sources, unknown_name};
 
 /// Reads a scene of a small made-up renderer and gives the messages.
 fn check_with(text: &str, options: &[&str]) -> String {

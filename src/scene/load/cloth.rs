@@ -9,9 +9,9 @@ use std::{
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
-    super::{Fabric, Mode, Movement, Thread, Yarn, transform_curves},
+    super::{CurveKind, Fabric, FabricMotion, Mode, Yarn, transform_curves},
     Context, Range, Reader, UNITS,
-    color::{self, ColorPlan, Grid},
+    color::{self, ColorPlan, FabricCoordinates},
     pattern::{self, KnitPlan, WeavePlan},
     placement, radians, sequence,
     yarns::Library,
@@ -22,8 +22,8 @@ use crate::{
         curve_file::{self, ReadOptions},
         pattern::straight,
     },
+    input::diagnostic::{Span, unknown_name},
     math::sampler::Stream,
-    scene::diagnostic::{Span, unknown_name},
 };
 
 /// Radius, millimetres, of a fibre whose file and fabric give none: that of fine wool and of cotton.
@@ -86,12 +86,12 @@ enum Up {
 }
 
 /// What the curves of a fabric are, by name.
-enum ThreadName {
+enum KindName {
     Yarn(String),
     Fiber(String),
 }
 
-impl ThreadName {
+impl KindName {
     fn into_name(self) -> String {
         match self {
             Self::Yarn(name) | Self::Fiber(name) => name,
@@ -102,7 +102,7 @@ impl ThreadName {
 /// A fabric whose text is sound and whose curves are not read yet.
 pub(super) struct FabricPlan {
     name: Option<String>,
-    thread: ThreadName,
+    kind: KindName,
     radius: Option<f64>,
     phases: Option<Vec<f64>>,
     seed: u32,
@@ -160,8 +160,8 @@ pub(super) fn plan(
         }
     };
     table.finish();
-    let thread = fiber.map(ThreadName::Fiber).or(yarn.map(ThreadName::Yarn))?;
-    Some(FabricPlan { name, thread, radius, phases, seed, color, transform, source: source? })
+    let kind = fiber.map(KindName::Fiber).or(yarn.map(KindName::Yarn))?;
+    Some(FabricPlan { name, kind, radius, phases, seed, color, transform, source: source? })
 }
 
 fn file_source(
@@ -261,10 +261,10 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: O
 /// Curves of one kind of yarn, before they are moved to their place.
 struct Made {
     origin: String,
-    thread: Thread,
+    kind: CurveKind,
     curves: Vec<(Curve, Vec<f64>)>,
     /// Where their points are in the cloth, if that is known.
-    grid: Option<Grid>,
+    coordinates: Option<FabricCoordinates>,
 }
 
 impl FabricPlan {
@@ -277,10 +277,10 @@ impl FabricPlan {
         detail: &Detail,
         warnings: &mut Vec<String>,
     ) -> Option<Vec<Fabric>> {
-        let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(Thread::Yarn);
-        let (thread, own_radius) = match &self.thread {
-            ThreadName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
-            ThreadName::Fiber(name) => (Thread::Fiber(library.fibers.keys().position(|n| n == name)?), FIBER_RADIUS),
+        let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(CurveKind::Yarn);
+        let (kind, own_radius) = match &self.kind {
+            KindName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
+            KindName::Fiber(name) => (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), FIBER_RADIUS),
         };
         let radius = self.radius.unwrap_or(own_radius);
         let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
@@ -290,33 +290,38 @@ impl FabricPlan {
             };
             curves.into_iter().map(with).collect()
         };
-        let mut movement = Movement::default();
+        let mut motion = FabricMotion::default();
         let made = match self.source {
             Source::Knit(plan) => {
-                let (curves, grid) = plan.curves(2.0 * radius, context)?;
-                vec![Made { origin: plan.origin(), thread, curves: with_radius(curves, radius), grid: Some(grid) }]
+                let (curves, coordinates) = plan.curves(2.0 * radius, context)?;
+                vec![Made {
+                    origin: plan.origin(),
+                    kind,
+                    curves: with_radius(curves, radius),
+                    coordinates: Some(coordinates),
+                }]
             }
             Source::Weave(plan) => {
-                let [(warps, mut grid), (wefts, weft_grid)] = plan.curves(context)?;
-                let weft = plan.weft_yarn.as_deref().map_or(Some(thread), place_of)?;
+                let [(warps, mut coordinates), (wefts, weft_coordinates)] = plan.curves(context)?;
+                let weft = plan.weft_yarn.as_deref().map_or(Some(kind), place_of)?;
                 let weft_radius = plan.weave.weft_radius;
                 let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, weft_radius));
-                if weft == thread {
+                if weft == kind {
                     warps.extend(wefts);
-                    grid.join(weft_grid);
-                    vec![Made { origin: plan.origin(), thread, curves: warps, grid: Some(grid) }]
+                    coordinates.join(weft_coordinates);
+                    vec![Made { origin: plan.origin(), kind, curves: warps, coordinates: Some(coordinates) }]
                 } else {
                     let (warp_origin, weft_origin) =
                         (format!("{}, warp", plan.origin()), format!("{}, weft", plan.origin()));
                     vec![
-                        Made { origin: warp_origin, thread, curves: warps, grid: Some(grid) },
-                        Made { origin: weft_origin, thread: weft, curves: wefts, grid: Some(weft_grid) },
+                        Made { origin: warp_origin, kind, curves: warps, coordinates: Some(coordinates) },
+                        Made { origin: weft_origin, kind: weft, curves: wefts, coordinates: Some(weft_coordinates) },
                     ]
                 }
             }
             Source::Straight { count, length, spacing } => {
                 let curves = with_radius(straight(count, length, spacing), radius);
-                vec![Made { origin: format!("{count} straight"), thread, curves, grid: None }]
+                vec![Made { origin: format!("{count} straight"), kind, curves, coordinates: None }]
             }
             Source::File(file) => {
                 let mut read = |path: &Path| {
@@ -338,13 +343,13 @@ impl FabricPlan {
                     Some(curves)
                 };
                 let (path, curves, of_file) = sequence::read(&file, detail, context, &mut read)?;
-                movement = of_file;
-                vec![Made { origin: path.display().to_string(), thread, curves, grid: None }]
+                motion = of_file;
+                vec![Made { origin: path.display().to_string(), kind, curves, coordinates: None }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
-        let name = self.name.unwrap_or_else(|| self.thread.into_name());
-        let fabric = |Made { origin, thread, curves, grid }: Made| {
+        let name = self.name.unwrap_or_else(|| self.kind.into_name());
+        let fabric = |Made { origin, kind, curves, coordinates }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -354,11 +359,11 @@ impl FabricPlan {
             let mut fabric = Fabric {
                 name: name.clone(),
                 origin,
-                thread,
+                kind,
                 curves,
-                movement: std::mem::take(&mut movement),
+                motion: std::mem::take(&mut motion),
                 variants: Vec::new(),
-                picks: Vec::new(),
+                material_indices: Vec::new(),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
@@ -366,7 +371,12 @@ impl FabricPlan {
                 longest_segment: detail.longest_segment,
             };
             fabric.transform(&self.transform);
-            self.color.apply(&mut fabric, |f| grid.unwrap_or_else(|| Grid::along(COLUMNS, f)), context, library)?;
+            self.color.apply(
+                &mut fabric,
+                |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
+                context,
+                library,
+            )?;
             Some(fabric)
         };
         made.into_iter().map(fabric).collect()

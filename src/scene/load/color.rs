@@ -12,7 +12,7 @@ use std::{
 use glam::Vec3;
 
 use super::{
-    super::{Fabric, Thread, Yarn},
+    super::{CurveKind, Fabric, Yarn},
     Context, Range, Reader, radians,
     yarns::Library,
 };
@@ -22,11 +22,11 @@ use crate::{
         pattern::{PatternStrand, StrandKind},
     },
     image::{self, png::srgb_to_linear, texture::Texture},
+    input::diagnostic::{Span, unknown_name},
     math::{
         sampler::{Stream, hash2},
         warp::normal,
     },
-    scene::diagnostic::{Span, unknown_name},
 };
 
 /// Levels of each channel of a tint, even in its square root; what lies between is dithered from point to point.
@@ -35,7 +35,7 @@ const LEVELS: f32 = 31.0;
 const SHADES: u32 = 256;
 
 /// Where each control point of a fabric lies in its own grid.
-pub(super) struct Grid {
+pub(super) struct FabricCoordinates {
     /// Wale and course, warp and weft, or the place along a yarn and the yarn's number; none where the latter holds for
     /// every curve.
     points: Vec<Vec<[f32; 2]>>,
@@ -45,7 +45,7 @@ pub(super) struct Grid {
     extent: [f32; 2],
 }
 
-impl Grid {
+impl FabricCoordinates {
     /// That of curves of which nothing is known: `columns` along each, and one row each.
     pub(super) fn along(columns: f32, fabric: &Fabric) -> Self {
         Self { points: Vec::new(), kinds: Vec::new(), extent: [columns, fabric.curves.len() as f32] }
@@ -336,7 +336,7 @@ impl ColorPlan {
     pub(super) fn apply(
         &self,
         fabric: &mut Fabric,
-        grid: impl FnOnce(&Fabric) -> Grid,
+        grid: impl FnOnce(&Fabric) -> FabricCoordinates,
         context: &Context<'_>,
         library: &Library,
     ) -> Option<()> {
@@ -349,7 +349,7 @@ impl ColorPlan {
         if plain && self.tint.is_none() && shades.is_none() {
             return Some(());
         }
-        let Thread::Yarn(base) = fabric.thread else {
+        let CurveKind::Yarn(base) = fabric.kind else {
             context.error(self.header, "colours of single fibres are those of their [fiber] table", None);
             return None;
         };
@@ -408,7 +408,7 @@ impl ColorPlan {
             },
         };
         let mut variants = Variants::default();
-        let mut picks = Vec::with_capacity(fabric.curves.len());
+        let mut material_indices = Vec::with_capacity(fabric.curves.len());
         for (index, (curve, radii)) in fabric.curves.iter().enumerate() {
             let shade = shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
             let shine = shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade));
@@ -437,9 +437,9 @@ impl ColorPlan {
                         (Key { yarn, shade: None, levels }, Vec3::from(color))
                     }
                 };
-                row.push(variants.pick(key, || all[key.yarn].dyed(color.to_array().map(f64::from))));
+                row.push(variants.material_index(key, || all[key.yarn].dyed(color.to_array().map(f64::from))));
             }
-            picks.push(row);
+            material_indices.push(row);
         }
         if variants.made.len() > usize::from(u16::MAX) {
             let hint = "fewer yarns, or a picture of fewer colours";
@@ -447,7 +447,7 @@ impl ColorPlan {
             return None;
         }
         fabric.variants = variants.made;
-        fabric.picks = picks;
+        fabric.material_indices = material_indices;
         Some(())
     }
 }
@@ -467,7 +467,7 @@ struct Variants {
 }
 
 impl Variants {
-    fn pick(&mut self, key: Key, make: impl FnOnce() -> Yarn) -> u16 {
+    fn material_index(&mut self, key: Key, make: impl FnOnce() -> Yarn) -> u16 {
         *self.places.entry(key).or_insert_with(|| {
             self.made.push(make());
             // Too many are told as an error before anyone looks.
@@ -505,7 +505,7 @@ impl Variation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::diagnostic::{SourceId, Sources};
+    use crate::input::diagnostic::{SourceId, Sources};
 
     fn span() -> Span {
         let id: SourceId = Sources::new().add_file("s.toml", "");

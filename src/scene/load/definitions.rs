@@ -2,16 +2,15 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{
-    super::{
-        Yarn,
+use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns};
+use crate::{
+    input::{
         diagnostic::{Diagnostics, Sources, unknown_name},
         document::Document,
         reader::Reader,
     },
-    Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns,
+    scattering::fiber::FiberMaterial,
 };
-use crate::scattering::fiber::FiberMaterial;
 
 /// The library that travels inside the program.
 const BUILT_IN: &str = include_str!("../../../scenes/yarns.toml");

@@ -11,9 +11,9 @@ use super::{
 use crate::{
     geometry::{mesh::Mesh, obj},
     image::texture::Texture,
+    input::diagnostic::{Span, unknown_name},
     math::Rgb,
     scattering::surface::SurfaceMaterial,
-    scene::diagnostic::{Span, unknown_name},
 };
 
 /// A material as it is written.

@@ -23,14 +23,16 @@ use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 pub use definitions::{Definitions, load_definitions};
 
-use super::{
-    Fabric, Ground, Light, Mode, Object, Scene, Thread, bounds,
-    diagnostic::{Diagnostic, Diagnostics, Sources, Span},
-    document::{Document, MAX_FILE_BYTES, Value},
-    identity,
-    reader::{Range, Reader},
+use super::{CurveKind, Fabric, Ground, Mode, Object, Scene, bounds, identity};
+use crate::{
+    geometry::fiber::packing,
+    input::{
+        diagnostic::{Diagnostic, Diagnostics, Sources, Span},
+        document::{Document, MAX_FILE_BYTES, Value},
+        reader::{Range, Reader},
+    },
+    light::Light,
 };
-use crate::geometry::fiber::packing;
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -326,9 +328,9 @@ fn keep_used(scene: &mut Scene) {
         })
     };
     for fabric in &mut scene.fabrics {
-        fabric.thread = match fabric.thread {
-            Thread::Yarn(yarn) => Thread::Yarn(place_in(&mut yarns, yarn)),
-            Thread::Fiber(fiber) => Thread::Fiber(place_in(&mut fibers, fiber)),
+        fabric.kind = match fabric.kind {
+            CurveKind::Yarn(yarn) => CurveKind::Yarn(place_in(&mut yarns, yarn)),
+            CurveKind::Fiber(fiber) => CurveKind::Fiber(place_in(&mut fibers, fiber)),
         };
     }
     scene.yarns = yarns.into_iter().map(|y| scene.yarns[y].clone()).collect();
@@ -356,8 +358,8 @@ fn warn_about_density(scene: &mut Scene) {
 
 /// Fly-aways are made where yarns are when the shutter opens, and stay there.
 fn warn_about_standing_hairs(scene: &mut Scene) {
-    let hairy = |thread| matches!(thread, Thread::Yarn(yarn) if scene.yarns[yarn].flyaways.is_some());
-    let still = scene.fabrics.iter().filter(|f| !f.movement.later.is_empty() && hairy(f.thread));
+    let hairy = |thread| matches!(thread, CurveKind::Yarn(yarn) if scene.yarns[yarn].flyaways.is_some());
+    let still = scene.fabrics.iter().filter(|f| !f.motion.later.is_empty() && hairy(f.kind));
     let warnings = still.map(|f| format!("the fly-aways of `{}` stand still while the shutter is open", f.name));
     scene.warnings.extend(warnings.collect::<Vec<_>>());
 }

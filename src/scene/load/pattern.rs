@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Context, Range, Reader, cloth::Yarns, color::Grid};
+use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
 use crate::{
     geometry::{
         curve::Curve,
@@ -14,7 +14,7 @@ use crate::{
             weave::{self, Weave},
         },
     },
-    scene::diagnostic::{Span, unknown_name},
+    input::diagnostic::{Span, unknown_name},
 };
 
 /// A knit that is checked but for what only knitting tells.
@@ -32,9 +32,9 @@ impl KnitPlan {
     }
 
     /// The courses with their places; what is wrong with the chart is told.
-    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<(Vec<Curve>, Grid)> {
+    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<(Vec<Curve>, FabricCoordinates)> {
         match self.knit.strands(diameter) {
-            Ok(strands) => Some(Grid::of(strands, [self.knit.stitches, self.knit.rows])),
+            Ok(strands) => Some(FabricCoordinates::of(strands, [self.knit.stitches, self.knit.rows])),
             Err(error) => {
                 let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
                 context.error(*span, error.problem, Some(error.hint));
@@ -158,12 +158,12 @@ impl WeavePlan {
     }
 
     /// Warps and wefts with their places.
-    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[(Vec<Curve>, Grid); 2]> {
+    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[(Vec<Curve>, FabricCoordinates); 2]> {
         match self.weave.strands() {
             Ok(strands) => {
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-                Some([warps, wefts].map(|side| Grid::of(side, [self.weave.warps, self.weave.wefts])))
+                Some([warps, wefts].map(|side| FabricCoordinates::of(side, [self.weave.warps, self.weave.wefts])))
             }
             Err(tight) => {
                 let (key, least) =

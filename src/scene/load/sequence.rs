@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::{
     super::{
-        Movement,
+        FabricMotion,
         animation::{first_number, numbered},
     },
     Context,
@@ -27,7 +27,7 @@ pub(super) fn read(
     detail: &Detail,
     context: &Context<'_>,
     read: &mut impl FnMut(&Path) -> Option<Curves>,
-) -> Option<(PathBuf, Curves, Movement)> {
+) -> Option<(PathBuf, Curves, FabricMotion)> {
     let own = numbered(&file.path, detail.frame).filter(|_| !file.path.exists());
     let rest_of = |curves: &Curves, rest: Curves| same_shape(curves, &rest).map(|()| points_of(rest));
     let tell = |problem: String, other: &Path| {
@@ -36,12 +36,12 @@ pub(super) fn read(
     };
     let Some(own) = own else {
         let curves = read(&file.path)?;
-        let mut movement = Movement::default();
+        let mut motion = FabricMotion::default();
         if let Some(path) = &file.rest {
             let rest = read(path)?;
-            movement.rest = Some(rest_of(&curves, rest).map_err(|problem| tell(problem, path)).ok()?);
+            motion.rest = Some(rest_of(&curves, rest).map_err(|problem| tell(problem, path)).ok()?);
         }
-        return Some((file.path.clone(), curves, movement));
+        return Some((file.path.clone(), curves, motion));
     };
 
     // Between two files yarns move evenly from one to the other.
@@ -98,7 +98,7 @@ pub(super) fn read(
             Some(rest_of(&curves, rest).map_err(|problem| tell(problem, &path)).ok()?)
         }
     };
-    Some((own, curves, Movement { later, rest }))
+    Some((own, curves, FabricMotion { later, rest }))
 }
 
 /// Times at which to know the curves, evenly spaced from the opening of the shutter to its closing, in frames.

@@ -1,10 +1,7 @@
 //! `[render]` and `[output]`.
 
-use super::{
-    super::{diagnostic::shortened, *},
-    Range, Reader,
-};
-use crate::image::png::ToneMap;
+use super::{super::*, Range, Reader};
+use crate::{image::png::ToneMap, input::diagnostic::shortened};
 
 const SIZE: std::ops::RangeInclusive<u64> = 1..=65_536;
 

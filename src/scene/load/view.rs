@@ -8,8 +8,6 @@ use super::{
     super::{
         Fabric, Object,
         camera::{Camera, Lens, Projection},
-        document::Value,
-        light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     },
     Context, Range, Reader,
     mesh::{MaterialPlan, Materials, material_of},
@@ -18,8 +16,9 @@ use super::{
 };
 use crate::{
     image,
+    input::{diagnostic::Span, document::Value},
+    light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     math::{Rgb, frame::orthonormal_basis},
-    scene::diagnostic::Span,
 };
 
 /// A camera before the cloth is known.

@@ -11,8 +11,8 @@ use crate::{
         },
         yarn::{MAX_PLIES, PlyParameters, touching_plies},
     },
+    input::diagnostic::{Sources, unknown_name},
     scattering::fiber::FiberMaterial,
-    scene::diagnostic::{Sources, unknown_name},
 };
 
 /// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake.

@@ -1,0 +1,9 @@
+//! Text files from the user, and every message about them.
+//!
+//! [`document`] turns TOML text and `--set` options into one tree that knows where everything was written; [`reader`]
+//! reads it key by key and collects what is wrong; [`diagnostic`] shows that to the user. Scenes and suites are read
+//! with them; this module knows the keys of neither.
+
+pub mod diagnostic;
+pub mod document;
+pub mod reader;
