@@ -120,7 +120,13 @@ fn loop_in_space(points: usize, wave: f64) -> Curve {
         let t = TAU * i as f64 / points as f64;
         DVec3::new(20.0 * t.cos(), 14.0 * t.sin(), wave * (2.0 * t).sin() + 0.5 * wave * (3.0 * t).cos())
     };
-    Curve { basis: Basis::CatmullRom, closed: true, points: (0..points).map(at).collect(), radii: None }
+    Curve {
+        basis: Basis::CatmullRom,
+        closed: true,
+        points: (0..points).map(at).collect(),
+        radii: None,
+        flattening: None,
+    }
 }
 
 #[test]

@@ -69,7 +69,13 @@ impl Chain {
         let knots: Vec<DVec4> = knots.iter().map(|&(segment, u)| self.at(segment, u).at).collect();
         let distinct = if closed { &knots[..knots.len() - 1] } else { &knots[..] };
         if basis != Basis::BSpline {
-            let curve = Curve { basis, closed, points: distinct.iter().map(|p| p.truncate()).collect(), radii: None };
+            let curve = Curve {
+                basis,
+                closed,
+                points: distinct.iter().map(|p| p.truncate()).collect(),
+                radii: None,
+                flattening: None,
+            };
             return Self::new(&curve, &distinct.iter().map(|p| p.w).collect::<Vec<f64>>());
         }
         let mut points = if closed {
@@ -91,7 +97,7 @@ impl Chain {
         let points = self.points.iter().map(|p| p.truncate());
         let added = if closed { [1, 2] } else { [usize::from(self.basis != Basis::BSpline); 2] };
         let points = points.take(self.points.len() - added[1]).skip(added[0]).collect();
-        Curve { basis: self.basis, closed, points, radii: None }
+        Curve { basis: self.basis, closed, points, radii: None, flattening: None }
     }
 
     /// Arc length at `steps` points of each segment, from the chain's start.
@@ -248,7 +254,10 @@ mod tests {
     fn wave(n: usize, closed: bool, basis: Basis) -> (Curve, Vec<f64>) {
         let at = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
         let points = (0..n).map(|i| DVec3::new(3.0 * at(i).cos(), 2.0 * at(i).sin(), (2.0 * at(i)).sin())).collect();
-        (Curve { basis, closed, points, radii: None }, (0..n).map(|i| 0.2 + 0.1 * at(i).cos()).collect())
+        (
+            Curve { basis, closed, points, radii: None, flattening: None },
+            (0..n).map(|i| 0.2 + 0.1 * at(i).cos()).collect(),
+        )
     }
 
     #[test]
@@ -290,7 +299,7 @@ mod tests {
     #[test]
     fn a_straight_chain_is_as_long_as_it_is() {
         let points = [0.0, 1.0, 1.5, 4.0].map(|x| DVec3::new(0.6 * x, 0.8 * x, 0.0)).to_vec();
-        let curve = Curve { basis: Basis::Linear, closed: false, points, radii: None };
+        let curve = Curve { basis: Basis::Linear, closed: false, points, radii: None, flattening: None };
         let lengths = Chain::new(&curve, &[0.1; 4]).lengths(LENGTH_STEPS);
         assert_eq!(lengths.len(), 3 * LENGTH_STEPS + 1);
         for (segment, end) in [(1, 1.0), (2, 1.5), (3, 4.0)] {

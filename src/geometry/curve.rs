@@ -24,6 +24,10 @@ pub struct Curve {
     pub points: Vec<DVec3>,
     /// One radius for each point, where the file has them.
     pub radii: Option<Vec<f64>>,
+    /// How far the section is pressed flat, where it is: one vector for each point, along the section's short axis (across
+    /// the curve; either of its two directions), as long as the ratio of the short axis to the long one, in (0, 1]. The
+    /// radius is then half of the long axis: a round tube of that radius bounds the yarn.
+    pub flattening: Option<Vec<DVec3>>,
 }
 
 impl Curve {

@@ -41,6 +41,56 @@ pub struct YarnFrame {
     pub normal: Vec3A,
     /// Angle of the plies about the tangent, from `normal`, radians.
     pub phase: f32,
+    /// Along the short axis of the section in the frame of `normal` and `tangent x normal`, as long as the ratio of the
+    /// short axis to the long one: [`ROUND`], or any other vector of length 1, where the yarn is not pressed flat.
+    pub flattening: Vec2,
+    /// By how much that axis turns in the frame along the yarn, radians per yarn radius.
+    pub flattening_turn: f32,
+}
+
+/// [`YarnFrame::flattening`] of a round yarn.
+pub const ROUND: Vec2 = Vec2::X;
+/// A section whose axes differ by less is round.
+const NEARLY_ROUND: f32 = 0.9999;
+
+impl YarnFrame {
+    /// The point of the world at `at` of the round section that this one was pressed from, in yarn radii along `normal`
+    /// and `tangent x normal`.
+    pub fn point(&self, at: Vec2) -> Vec3A {
+        let at = Pressed::new(self.flattening).map_or(at, |pressed| pressed.real(at));
+        let across = self.tangent.cross(self.normal);
+        self.centre + self.radius * (at.x * self.normal + at.y * across)
+    }
+}
+
+/// How a section is pressed flat: an affine map that takes circles to ellipses, and with them the plies inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pressed {
+    /// Unit vector along the short axis.
+    axis: Vec2,
+    /// Long over short axis, above 1.
+    stretch: f32,
+}
+
+impl Pressed {
+    /// From [`YarnFrame::flattening`]; `None` where the section is round.
+    #[inline]
+    pub fn new(flattening: Vec2) -> Option<Self> {
+        let ratio = flattening.length();
+        (ratio < NEARLY_ROUND).then(|| Self { axis: flattening / ratio, stretch: 1.0 / ratio })
+    }
+
+    /// A point or a vector of the pressed section in the round one.
+    #[inline]
+    pub fn round(&self, p: Vec2) -> Vec2 {
+        p + (self.stretch - 1.0) * p.dot(self.axis) * self.axis
+    }
+
+    /// A point or a vector of the round section in the pressed one.
+    #[inline]
+    pub fn real(&self, p: Vec2) -> Vec2 {
+        p + (1.0 / self.stretch - 1.0) * p.dot(self.axis) * self.axis
+    }
 }
 
 /// A place seen by one ray.
@@ -72,6 +122,10 @@ pub struct Section {
     pub tilted: bool,
     /// (cos, sin) of the plies' phase in this frame.
     pub phase: Vec2,
+    /// How the section is pressed flat, if it is. Plies are placed in the round section that it was pressed from.
+    pub pressed: Option<Pressed>,
+    /// By how much the axis of pressing turns along the yarn, radians per yarn radius.
+    pub pressed_turn: f32,
 }
 
 /// One ply on the way of a ray.
@@ -79,9 +133,9 @@ pub struct Section {
 pub struct PlyCrossing {
     /// Index of the ply in the yarn's shape.
     pub ply: usize,
-    /// Centre of the ply where the ray passes it.
+    /// Centre of the ply where the ray passes it, in the round section.
     pub centre: Vec2,
-    /// Unit vector from the yarn's axis to the ply there.
+    /// Unit vector from the yarn's axis to the ply there, in the round section.
     pub axis: Vec2,
     /// Signed distance of the ray from the ply's axis, in the circle of the ply's radius.
     pub offset: f32,
@@ -96,14 +150,15 @@ pub struct PlyCrossing {
 impl PlyCrossing {
     /// Outward normal of the ply where the ray enters, in the section.
     pub fn normal(&self, section: &Section) -> Vec3A {
-        let n = Vec2::new(self.enter - self.centre.x, section.h - self.centre.y).normalize_or(Vec2::X);
+        // The normal of the pressed circle: of the map, the transpose of the inverse, which here is the way back.
+        let n = section.round(section.round(Vec2::new(self.enter, section.h)) - self.centre).normalize_or(Vec2::X);
         Vec3A::new(n.x, n.y, 0.0)
     }
 
     /// Unit tangent of the fibres where the ray enters.
     pub fn tangent_at_entry(&self, shape: &YarnShape, section: &Section) -> Vec3A {
         let at = Vec2::new(self.enter, section.h);
-        let straight = fiber_tangent(&shape.plies[self.ply], shape.ply_rate, self.centre, self.axis, at);
+        let straight = section.fiber_tangent(shape, self.ply, self.centre, self.axis, at);
         (straight + section.bent(section.travel(at.x))).normalize()
     }
 }
@@ -122,8 +177,10 @@ pub enum PlyParts {
     CoreOf(usize),
 }
 
-/// A ply where a ray passes it.
+/// A ply where a ray passes it, in the round section.
 struct Passage {
+    /// x of the ray there.
+    x: f32,
     /// Unit vector from the yarn's axis to the ply.
     axis: Vec2,
     /// Centre of the ply.
@@ -169,6 +226,8 @@ impl Section {
         };
         let (s, c) = sin_cos(place.phase);
         let normal = Vec2::new(place.normal.dot(x), place.normal.dot(y));
+        let pressed = Pressed::new(place.flattening)
+            .map(|pressed| Pressed { axis: rotate(normal, pressed.axis.y, pressed.axis.x), ..pressed });
         Self {
             x,
             y,
@@ -183,6 +242,8 @@ impl Section {
             bend,
             tilted,
             phase: rotate(normal, s, c),
+            pressed,
+            pressed_turn: place.flattening_turn,
         }
     }
 
@@ -196,6 +257,38 @@ impl Section {
     #[inline]
     pub fn to_local(&self, v: Vec3A) -> Vec3A {
         Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// A point or a vector of this section in the round one that it was pressed from.
+    #[inline]
+    pub fn round(&self, p: Vec2) -> Vec2 {
+        self.pressed.map_or(p, |pressed| pressed.round(p))
+    }
+
+    /// A point or a vector of that round section in this one.
+    #[inline]
+    pub fn real(&self, p: Vec2) -> Vec2 {
+        self.pressed.map_or(p, |pressed| pressed.real(p))
+    }
+
+    /// By how much fibres are closer to each other than in the round section: its area over this one's.
+    #[inline]
+    pub fn squeeze(&self) -> f32 {
+        self.pressed.map_or(1.0, |pressed| pressed.stretch)
+    }
+
+    /// The tangent (of z = 1) of a fibre at `at` of this section, on a yarn that is not bent, in a ply with centre `centre`
+    /// and the unit vector `axis` to it, both in the round section.
+    #[inline]
+    pub fn fiber_tangent(&self, shape: &YarnShape, ply: usize, centre: Vec2, axis: Vec2, at: Vec2) -> Vec3A {
+        let Some(pressed) = self.pressed else {
+            return fiber_tangent(&shape.plies[ply], shape.ply_rate, centre, axis, at);
+        };
+        let round = pressed.round(at);
+        let t = fiber_tangent(&shape.plies[ply], shape.ply_rate, centre, axis, round);
+        // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
+        let turned = self.pressed_turn * (at.perp() - pressed.real(round.perp()));
+        (pressed.real(t.truncate()) + turned).extend(1.0).into()
     }
 
     /// The world position of the point on the camera's ray at depth `x`, rebuilt from the yarn's centre. A steep ray is
@@ -232,10 +325,10 @@ impl Section {
         rotate(here, turn.0, turn.1)
     }
 
-    /// Centre of a ply on the bent yarn, seen in this frame.
+    /// Centre of a ply on the bent yarn, in the round section.
     #[inline]
     pub fn ply_centre(&self, ply: &PlyShape, axis: Vec2, travel: f32) -> Vec2 {
-        ply.distance * axis + (0.5 * travel * travel) * self.bend
+        ply.distance * axis + self.round((0.5 * travel * travel) * self.bend)
     }
 
     /// How much of a step along the yarn's axis a point away from it makes: less outside of a bend.
@@ -252,32 +345,35 @@ impl Section {
     fn follow(&self, shape: &YarnShape, ply: &PlyShape) -> Passage {
         let mut axis = self.ply_axis(ply, (0.0, 1.0));
         let mut centre = ply.distance * axis;
+        let mut x = self.real(centre).x;
         if self.slope == 0.0 {
-            return Passage { axis, centre, drift: Vec2::ZERO };
+            return Passage { x, axis, centre, drift: Vec2::ZERO };
         }
         let untwisted = shape.ply_rate == 0.0;
         let mut travel = 0.0;
         let mut straightness = 1.0;
         for _ in 0..if self.slope.abs() < 1.0 && shape.ply_rate.abs() < FAST_TURN { 2 } else { 3 } {
-            straightness = self.straightness(Vec2::new(centre.x, self.h));
-            travel = (-(self.enter - centre.x) * self.slope / straightness).clamp(-MAX_TRAVEL, MAX_TRAVEL);
+            straightness = self.straightness(Vec2::new(x, self.h));
+            travel = (-(self.enter - x) * self.slope / straightness).clamp(-MAX_TRAVEL, MAX_TRAVEL);
             if !untwisted {
                 axis = self.ply_axis(ply, Self::turn(shape, travel));
             }
             centre = self.ply_centre(ply, axis, travel);
+            x = self.real(centre).x;
         }
         if travel.abs() == MAX_TRAVEL {
-            return Passage { axis, centre, drift: Vec2::ZERO };
+            return Passage { x, axis, centre, drift: Vec2::ZERO };
         }
-        let drift = self.slope / straightness * (shape.ply_rate * ply.distance * axis.perp() + travel * self.bend);
-        Passage { axis, centre, drift }
+        let turning = shape.ply_rate * ply.distance * axis.perp();
+        let drift = self.slope / straightness * (turning + self.round(travel * self.bend));
+        Passage { x, axis, centre, drift }
     }
 
     /// The ray's line past the ply's moving centre, in the circle that the ply's section becomes.
     #[inline]
     fn line_in_ply(&self, ply: &PlyShape, at: &Passage) -> LineInPly {
-        let along = Vec2::X - at.drift;
-        let start = Vec2::new(0.0, self.h - at.centre.y);
+        let along = self.round(Vec2::X) - at.drift;
+        let start = self.round(Vec2::new(at.x, self.h)) - at.centre;
         let (along, start) = if ply.stretch.x == 1.0 {
             (along, start)
         } else {
@@ -305,8 +401,8 @@ impl Section {
                 continue;
             }
             let half = (ply.core_radius * ply.core_radius - offset * offset).max(0.0).sqrt() / length;
-            let (enter, exit) = (at.centre.x + foot + half, at.centre.x + foot - half);
-            let fibers = ply.fibers_on_chord(offset) / length * self.tilt_factor(shape, ply, &at, enter, exit);
+            let (enter, exit) = (at.x + foot + half, at.x + foot - half);
+            let fibers = ply.fibers_on_chord(offset) / length * self.tilt_factor(shape, index, &at, enter, exit);
             let crossing = PlyCrossing { ply: index, centre: at.centre, axis: at.axis, offset, enter, exit, fibers };
             let place = out.iter().position(|c| c.enter < enter).unwrap_or(out.len());
             out.insert(place, crossing);
@@ -315,10 +411,11 @@ impl Section {
 
     /// The stretches of plies that lie ahead of a point inside the yarn, in a direction `w` of this frame.
     ///
-    /// `start` is a point of the section that is `travel` farther along the yarn than the frame's origin. `visit` is
-    /// called with a ply's index, the distances (in the section) at which the way enters and leaves it, and its signed
-    /// distance from the ply's axis. As for rays, each ply is placed where the way passes nearest to it, and moves on
-    /// from there.
+    /// `start` is a point of this (not the round) section that is `travel` farther along the yarn than the frame's
+    /// origin. `visit` is called with a ply's index, the distances (in the section) at which the way enters and leaves
+    /// it, and its signed distance from the ply's axis, in the circle of the ply's radius. Of a pressed section fibres
+    /// are closer to each other than of the round one by [`Self::squeeze`]. As for rays, each ply is placed where the way
+    /// passes nearest to it, and moves on from there.
     #[inline]
     pub fn chords_ahead(
         &self,
@@ -334,10 +431,11 @@ impl Section {
         // As far along the yarn as is needed to cross it once and a bit.
         let slope = if self.tilted { w.z / cos } else { 0.0 };
         let turn_here = Self::turn(shape, travel);
+        let (round_start, round_ahead) = (self.round(start), self.round(ahead));
         for (index, ply) in shape.plies.iter().enumerate() {
             let mut axis = self.ply_axis(ply, turn_here);
             let mut centre = self.ply_centre(ply, axis, travel);
-            let nearest = (centre - start).dot(ahead).max(0.0);
+            let nearest = ((centre - round_start).dot(round_ahead) / round_ahead.length_squared()).max(0.0);
             let slope = slope / self.straightness(start + nearest * ahead);
             let further = (nearest * slope).clamp(-MAX_LIGHT_TRAVEL, MAX_LIGHT_TRAVEL);
             if further != 0.0 {
@@ -353,11 +451,12 @@ impl Section {
             };
             // The centre moves on while the way goes past it.
             let drift = if further.abs() < MAX_LIGHT_TRAVEL {
-                slope * (shape.ply_rate * ply.distance * axis.perp() + (travel + further) * self.bend)
+                let turning = shape.ply_rate * ply.distance * axis.perp();
+                slope * (turning + self.round((travel + further) * self.bend))
             } else {
                 Vec2::ZERO
             };
-            let (from, way) = (start - centre + nearest * drift, ahead - drift);
+            let (from, way) = (round_start - centre + nearest * drift, round_ahead - drift);
             let (from, way) = if ply.stretch.x == 1.0 {
                 (from, way)
             } else {
@@ -377,19 +476,19 @@ impl Section {
         }
     }
 
-    /// How many more fibres a chord meets because they are tilted: the chord's mean of
+    /// How many more fibres a chord meets because they are squeezed and tilted: the chord's mean of
     /// sqrt(1 - (w.T)^2) / (cos theta_w cos alpha). (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place
     /// for all: fibres near the ply's axis are not tilted.)
     #[inline]
-    fn tilt_factor(&self, shape: &YarnShape, ply: &PlyShape, at: &Passage, enter: f32, exit: f32) -> f32 {
-        if ply.fiber_rate == 0.0 && shape.ply_rate == 0.0 {
-            return 1.0;
+    fn tilt_factor(&self, shape: &YarnShape, ply: usize, at: &Passage, enter: f32, exit: f32) -> f32 {
+        if shape.plies[ply].fiber_rate == 0.0 && shape.ply_rate == 0.0 {
+            return self.squeeze();
         }
         // With t = (tx, ty, 1) a fibre's tangent and w = (cos, 0, sin), the factor is sqrt(|t|^2 - (w.t)^2) / cos,
         // by four-point Gauss-Legendre quadrature; t is linear along the chord.
         let end = |x: f32| {
-            let centre = at.centre + (x - at.centre.x) * at.drift;
-            fiber_tangent(ply, shape.ply_rate, centre, at.axis, Vec2::new(x, self.h))
+            let centre = at.centre + (x - at.x) * at.drift;
+            self.fiber_tangent(shape, ply, centre, at.axis, Vec2::new(x, self.h))
         };
         let (a, b) = (end(enter), end(exit));
         let nodes = f32x4::new(GAUSS_LEGENDRE_4.map(|(node, _)| node as f32));
@@ -399,7 +498,7 @@ impl Section {
         let along = tx * f32x4::splat(self.cos) + f32x4::splat(self.sin);
         let square = f32x4::ONE + tx * tx + ty * ty - along * along;
         let root = square.fast_max(f32x4::splat(1e-9)).sqrt() * weights;
-        root.reduce_add() / self.cos
+        self.squeeze() * root.reduce_add() / self.cos
     }
 }
 
@@ -416,6 +515,8 @@ mod tests {
             radius: 1.0,
             normal: Vec3A::X,
             phase: 0.3,
+            flattening: ROUND,
+            flattening_turn: 0.0,
         }
     }
 
@@ -474,6 +575,60 @@ mod tests {
             assert_eq!(section.meets_ply(&shape), meets, "filter and shading agree");
         }
         assert!(seen > 600);
+    }
+
+    #[test]
+    fn pressed_plies_are_the_pressed_image_of_round_ones() {
+        // Points of the ray are in a ply if their image in the round section is.
+        let shape = touching_yarn(3, 60, 0.4, 0.35, -0.4);
+        let mut crossings = Crossings::new();
+        let mut seen = 0;
+        for i in 0..400 {
+            let (theta, phi) = (-0.5 + 0.0024 * i as f32, 0.05 * i as f32);
+            let h = -0.99 + 1.98 * ((i * 37 % 400) as f32) / 399.0;
+            let ratio = 0.4 + 0.0015 * i as f32;
+            let place = YarnFrame { flattening: ratio * Vec2::from_angle(0.7 * i as f32), ..place() };
+            let (origin, direction) = ray(theta, phi, h);
+            let section = Section::new(&place, origin, direction, true);
+            section.crossings(&shape, &mut crossings);
+            let steps = 8000;
+            let mut inside = [0usize; 3];
+            for s in 0..steps {
+                let x = section.enter * (1.0 - 2.0 * (s as f32 + 0.5) / steps as f32);
+                let point = section.round(Vec2::new(x, section.h));
+                for (k, ply) in shape.plies.iter().enumerate() {
+                    let centre = ply.distance * section.ply_axis(ply, Section::turn(&shape, section.travel(x)));
+                    inside[k] += usize::from((point - centre).length() < ply.core_radius);
+                }
+            }
+            for (k, count) in inside.iter().enumerate() {
+                let walked = *count as f32 / steps as f32 * 2.0 * section.enter;
+                let chord = crossings.iter().find(|c| c.ply == k).map_or(0.0, |c| c.enter - c.exit);
+                assert!((walked - chord).abs() < 0.06, "ray {i} ply {k}: walked {walked}, crossing {chord}");
+                seen += usize::from(chord > 0.0);
+            }
+            assert_eq!(section.meets_ply(&shape), !crossings.is_empty(), "filter and shading agree");
+        }
+        assert!(seen > 300);
+    }
+
+    #[test]
+    fn pressing_keeps_the_fibers_that_rays_along_its_axes_meet() {
+        // Across the short axis a ray meets what it met before; across the long one all fibres in less height.
+        let shape = touching_yarn(1, 60, 0.4, 0.0, 0.0);
+        let mut crossings = Crossings::new();
+        let mut count = |flattening: Vec2, h: f32| {
+            let section =
+                Section::new(&YarnFrame { flattening, ..place() }, ray(0.0, 0.0, h).0, ray(0.0, 0.0, h).1, true);
+            section.crossings(&shape, &mut crossings);
+            crossings.iter().map(|c| c.fibers).sum::<f32>()
+        };
+        for h in [0.0, 0.2, -0.4] {
+            let round = count(ROUND, h);
+            assert!((count(Vec2::new(0.5, 0.0), h) / round - 1.0).abs() < 1e-5);
+            assert!((count(Vec2::new(0.0, 0.5), 0.5 * h) / round - 2.0).abs() < 1e-5);
+        }
+        assert_eq!(count(Vec2::new(0.0, 0.5), 0.6), 0.0, "a ray that meets the round tube only passes");
     }
 
     #[test]

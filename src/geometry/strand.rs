@@ -6,13 +6,13 @@
 
 use std::{f64::consts::TAU, sync::Arc};
 
-use glam::{DVec3, Vec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec2, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
     chain::{Chain, Fit, LENGTH_STEPS, nearest_indices, resample},
     curve::{Basis, Curve},
-    section::YarnFrame,
+    section::{Pressed, ROUND, YarnFrame},
     spline::{SplinePoint, evaluate_f32},
     tube::curve_of,
 };
@@ -78,7 +78,9 @@ pub struct Strands {
     frames: Vec<PointFrame>,
     /// The same points and frames at later times; empty where yarns stand still.
     later: Vec<Pose>,
-    /// What was nearest_indices for each segment; empty where nothing was.
+    /// As [`YarnFrame::flattening`], for each point; empty where all yarns are round.
+    flattening: Vec<Vec2>,
+    /// What was nearest for each segment: see [`Self::material_index`].
     material_indices: Vec<u16>,
     /// The first segment of each yarn, and the number of all segments at the end.
     first_segments: Vec<u32>,
@@ -106,6 +108,8 @@ pub struct StrandMotion<'a> {
 struct Strand {
     /// Points and frames at each time.
     poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
+    /// For each point, or empty.
+    flattening: Vec<Vec2>,
     material_indices: Vec<u16>,
     tight: Option<(usize, f64)>,
     length: f64,
@@ -154,6 +158,7 @@ impl Strands {
             segments: Arc::new([]),
             frames: Vec::new(),
             later: Vec::new(),
+            flattening: Vec::new(),
             material_indices: Vec::with_capacity(made.iter().map(|s| s.material_indices.len()).sum()),
             first_segments: Vec::with_capacity(made.len() + 1),
             tight_bends: Vec::new(),
@@ -161,12 +166,18 @@ impl Strands {
         };
         let count: usize = made.iter().map(|s| s.poses[0].0.len()).sum();
         let mut segments = Vec::with_capacity(count.saturating_sub(3 * made.len()));
+        let flattened = made.iter().any(|s| !s.flattening.is_empty());
         let mut poses: Vec<(Vec<Vec4>, Vec<PointFrame>)> =
             (0..=motion.later.len()).map(|_| (Vec::with_capacity(count), Vec::with_capacity(count))).collect();
         for (yarn, strand) in made.into_iter().enumerate() {
             strands.first_segments.push(segments.len() as u32);
             let first = poses[0].0.len() as u32;
-            segments.extend(first..first + strand.poses[0].0.len().saturating_sub(3) as u32);
+            let points = strand.poses[0].0.len();
+            segments.extend(first..first + points.saturating_sub(3) as u32);
+            if flattened {
+                strands.flattening.extend(strand.flattening);
+                strands.flattening.resize(first as usize + points, ROUND);
+            }
             for (all, (points, frames)) in poses.iter_mut().zip(strand.poses) {
                 all.0.extend(points);
                 all.1.extend(frames);
@@ -176,6 +187,9 @@ impl Strands {
             strands.tight_bends.extend(strand.tight.map(|(segment, tightness)| TightBend { yarn, segment, tightness }));
         }
         strands.first_segments.push(segments.len() as u32);
+        if strands.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
+            strands.flattening = Vec::new();
+        }
         let mut poses = poses.into_iter().map(|(points, frames)| Pose { points: points.into(), frames });
         if let Some(first) = poses.next() {
             (strands.points, strands.frames) = (first.points, first.frames);
@@ -220,17 +234,29 @@ impl Strands {
         &self.tight_bends
     }
 
+    /// Whether any yarn is pressed flat somewhere.
+    pub fn flattened(&self) -> bool {
+        !self.flattening.is_empty()
+    }
+
+    /// Mean ratio of the short to the long axis of the yarns' sections: 1 where all are round.
+    pub fn mean_flattening(&self) -> f64 {
+        let sum: f64 = self.flattening.iter().map(|f| f64::from(f.length())).sum();
+        if self.flattening.is_empty() { 1.0 } else { sum / self.flattening.len() as f64 }
+    }
+
     /// Bytes of points, segments and frames.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points)
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
+            + size_of_val(&*self.flattening)
             + self.later.iter().map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames)).sum::<usize>()
             + size_of_val(&*self.material_indices)
             + size_of_val(&*self.first_segments)) as u64
     }
 
-    /// What was nearest_indices for a segment, if anything was for any.
+    /// The material index of a segment, if any has one.
     #[inline]
     pub fn material_index(&self, segment: u32) -> Option<u16> {
         self.material_indices.get(segment as usize).copied()
@@ -281,37 +307,12 @@ impl Strands {
         segments.map(|s| f64::from(self.points[self.segments[s as usize] as usize + 1].w)).sum::<f64>() / n
     }
 
-    /// Lets the plies' phase follow directions given at every knot of every yarn (one more than its segments), instead of
-    /// turning at an even rate.
-    pub fn align(&mut self, axes: &[Vec<Vec3A>]) {
-        for (yarn, axes) in axes.iter().enumerate() {
-            let segments = self.segments_of(yarn);
-            let Some(first) = segments.clone().next() else { continue };
-            let first = self.segments[first as usize] as usize;
-            let angles: Vec<f32> = (0..=segments.len())
-                .map(|knot| {
-                    let (segment, u) = if knot < segments.len() { (knot, 0.0) } else { (knot - 1, 1.0) };
-                    let place = self.frame(segments.start + segment as u32, u);
-                    let axis = axes[knot];
-                    axis.dot(place.tangent.cross(place.normal)).atan2(axis.dot(place.normal))
-                })
-                .collect();
-            for (knot, &angle) in angles.iter().enumerate() {
-                let next = angles.get(knot + 1).copied().unwrap_or(angle);
-                let growth = next - angle;
-                let frame = &mut self.frames[first + 1 + knot];
-                frame.phase = angle;
-                frame.growth = growth - TAU as f32 * (growth / TAU as f32).round();
-            }
-        }
-    }
-
     /// Everything a ray needs to know at `u` (0 to 1) of a segment.
     #[inline]
     pub fn frame(&self, segment: u32, u: f32) -> YarnFrame {
         let first = self.segments[segment as usize] as usize;
         let p: &[Vec4; 4] = self.points[first..first + 4].try_into().expect("a segment has four points");
-        self.frame_of(p, &self.frames[first + 1], &self.frames[first + 2], u)
+        self.frame_of(first, p, &self.frames[first + 1], &self.frames[first + 2], u)
     }
 
     /// As [`Self::place`], at a time from 0, when the shutter opens, to 1, when it closes.
@@ -333,17 +334,27 @@ impl Strands {
         // As Embree moves them.
         let p = std::array::from_fn(|i| points[first + i].lerp(next_points[first + i], s));
         let frame = |i: usize| frames[first + i].towards(&next_frames[first + i], s);
-        self.frame_of(&p, &frame(1), &frame(2), u)
+        self.frame_of(first, &p, &frame(1), &frame(2), u)
     }
 
     #[inline]
-    fn frame_of(&self, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> YarnFrame {
+    fn frame_of(&self, first: usize, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> YarnFrame {
         let (at, d1, d2) = evaluate_f32(self.basis, p, u);
         let speed_squared = d1.length_squared().max(1e-30);
         let tangent = d1 / speed_squared.sqrt();
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
         let normal = Vec3A::from(a.normal + u * (b.normal - a.normal));
         let normal = normal - normal.dot(tangent) * tangent;
+        let (flattening, flattening_turn) = if self.flattening.is_empty() {
+            (ROUND, 0.0)
+        } else {
+            let (from, to) = (self.flattening[first + 1], self.flattening[first + 2]);
+            let length = |v: Vec2| v.length();
+            // The ratio by itself: between two axes a straight line is shorter than both.
+            let ratio = length(from) + u * (length(to) - length(from));
+            let turn = from.perp_dot(to) / (length(from) * length(to)).max(1e-12);
+            (ratio * from.lerp(to, u).normalize_or(ROUND), turn / speed_squared.sqrt() * at.w)
+        };
         YarnFrame {
             centre: Vec3A::from_vec4(at),
             tangent,
@@ -351,9 +362,14 @@ impl Strands {
             radius: at.w,
             normal: normal / normal.length().max(1e-10),
             phase: a.phase + u * a.growth,
+            flattening,
+            flattening_turn,
         }
     }
 }
+
+/// The flattest section there is: short over long axis.
+pub const FLATTEST: f64 = 0.05;
 
 /// Steps per resampled segment along which frames are carried.
 const FRAME_STEPS: usize = 16;
@@ -412,19 +428,61 @@ impl Strand {
             winding.frames(at_rest, missing, phase)
         };
         let tight = wound[0].tight;
+        let flattening = match &curve.flattening {
+            Some(vectors) => flattening_along(curve, vectors, knots.as_deref(), &wound[0]),
+            None => Vec::new(),
+        };
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
         let poses = poses.iter().zip(&wound).map(|(chain, winding)| (points(chain), frames(winding))).collect();
-        Self { poses, material_indices, tight, length: total }
+        Self { poses, flattening, material_indices, tight, length: total }
     }
+}
+
+/// What presses a curve flat, in the frame of each point of the chain made from it: it moves with that frame.
+fn flattening_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]>, wound: &Winding) -> Vec<Vec2> {
+    assert_eq!(vectors.len(), curve.points.len(), "a curve is pressed flat at each of its points or at none");
+    // An axis has no sign: each points to the side of the one before. Its direction and its ratio make a chain of their
+    // own, which has its knots where the curve has them.
+    let mut axis = DVec3::ZERO;
+    let axes: Vec<DVec3> = vectors
+        .iter()
+        .map(|v| {
+            let v = v.try_normalize().unwrap_or(axis);
+            axis = if v.dot(axis) < 0.0 { -v } else { v };
+            axis
+        })
+        .collect();
+    let ratios: Vec<f64> = vectors.iter().map(|v| v.length()).collect();
+    let chain = Chain::at_time(curve, &ratios, &axes);
+    let ends = || (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]);
+    let at: Vec<(usize, f64)> = knots.map_or_else(|| ends().collect(), <[_]>::to_vec);
+    let mut before = DVec2::ZERO;
+    let made = at.iter().zip(&wound.knots).map(|(&(segment, u), knot)| {
+        let place = chain.at(segment, u);
+        let axis = place.at.truncate();
+        let across = DVec2::new(axis.dot(knot.normal), axis.dot(knot.tangent.cross(knot.normal)));
+        let across = across.try_normalize().unwrap_or(DVec2::X) * place.at.w.clamp(FLATTEST, 1.0);
+        before = if across.dot(before) < 0.0 { -across } else { across };
+        before.as_vec2()
+    });
+    let made: Vec<Vec2> = made.collect();
+    std::iter::once(made[0]).chain(made.iter().copied()).chain([made[made.len() - 1]]).collect()
 }
 
 /// A normal carried along a chain, and how far plies have turned about it.
 struct Winding {
-    /// At each knot, and the angle of the plies' turns up to there.
-    knots: Vec<(DVec3, f64)>,
+    knots: Vec<Knot>,
     /// By how much a closed chain turns the normal against itself.
     angle: f64,
     tight: Option<(usize, f64)>,
+}
+
+/// A knot of a chain.
+struct Knot {
+    tangent: DVec3,
+    normal: DVec3,
+    /// The angle of the plies' turns up to here.
+    turned: f64,
 }
 
 impl Winding {
@@ -441,7 +499,7 @@ impl Winding {
         let mut knots = Vec::with_capacity(segments + 1);
         let mut turned = 0.0;
         let mut tight: Option<(usize, f64)> = None;
-        knots.push((normal, turned));
+        knots.push(Knot { tangent, normal, turned });
         for segment in 0..segments {
             for step in 1..=FRAME_STEPS {
                 let next = chain.at(segment, step as f64 / FRAME_STEPS as f64);
@@ -460,27 +518,27 @@ impl Winding {
                 }
                 (here, tangent) = (next, next_tangent);
             }
-            knots.push((normal, turned));
+            knots.push(Knot { tangent, normal, turned });
         }
         Self { knots, angle: tangent.dot(start.cross(normal)).atan2(start.dot(normal)), tight }
     }
 
     /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
     fn residual(&self, at_rest: &Self) -> f64 {
-        self.angle + at_rest.knots[at_rest.knots.len() - 1].1
+        self.angle + at_rest.knots[at_rest.knots.len() - 1].turned
     }
 
     /// What is known at each control point.
     fn frames(&self, at_rest: &Self, missing: f64, phase: f64) -> Vec<PointFrame> {
         let segments = self.knots.len() - 1;
-        let turned = |i: usize| at_rest.knots[i].1 - missing * i as f64 / segments as f64;
+        let turned = |i: usize| at_rest.knots[i].turned - missing * i as f64 / segments as f64;
         // Knot i is where segment i starts: the second of its four points.
         let frame = |i: usize| {
             let angle = turned(i.min(segments));
             let growth = turned((i + 1).min(segments)) - angle;
             let wrapped = phase + angle;
             let wrapped = wrapped - TAU * (wrapped / TAU).round();
-            let normal = self.knots[i.min(segments)].0;
+            let normal = self.knots[i.min(segments)].normal;
             PointFrame { normal: normal.as_vec3(), phase: wrapped as f32, growth: growth as f32 }
         };
         let mut frames = Vec::with_capacity(segments + 3);
@@ -522,7 +580,7 @@ mod tests {
                 DVec3::new(10.0 * t.cos(), 10.0 * t.sin(), 2.0 * (3.0 * t).sin())
             })
             .collect();
-        Curve { basis: Basis::CatmullRom, closed, points, radii: None }
+        Curve { basis: Basis::CatmullRom, closed, points, radii: None, flattening: None }
     }
 
     fn strands(curve: Curve, radius: f64, options: &StrandOptions) -> Strands {
@@ -605,6 +663,46 @@ mod tests {
     }
 
     #[test]
+    fn a_flattened_section_keeps_its_axes_wherever_points_are_put() {
+        for (basis, closed) in [(Basis::CatmullRom, true), (Basis::CatmullRom, false), (Basis::BSpline, true)] {
+            // The short axis across the plane in which the curve mostly lies, turned by up to half a radian, with signs that
+            // say nothing.
+            let curve = knit_like(200, closed);
+            let short = |p: &DVec3| {
+                let angle = p.y.atan2(p.x);
+                let outward = DVec3::new(p.x, p.y, 0.0).normalize();
+                let tilt = 0.5 * (2.0 * angle).sin();
+                (DVec3::Z * tilt.cos() + outward * tilt.sin(), 0.6 + 0.2 * angle.cos())
+            };
+            let vectors = curve.points.iter().enumerate().map(|(i, p)| {
+                let (axis, ratio) = short(p);
+                axis * if i % 3 == 0 { -ratio } else { ratio }
+            });
+            let flattening = Some(vectors.collect());
+            let round = strands(curve.clone(), 0.5, &options(basis));
+            let pose = vec![curve.points.iter().map(|p| *p + DVec3::X).collect()];
+            let radii = vec![0.5; curve.points.len()];
+            let movement = StrandMotion { later: &[pose], rest: None };
+            let s = Strands::moving(&[(Curve { flattening, ..curve }, radii)], movement, &options(basis));
+            assert!(s.flattened() && !round.flattened() && round.mean_flattening() == 1.0);
+            assert_eq!(s.segments().len(), round.segments().len());
+            for i in 0..s.segments().len() as u32 {
+                for (u, time) in [(0.0, 0.0), (0.3, 0.5), (0.5, 1.0), (1.0, 0.0)] {
+                    let place = s.frame_at(i, u, time);
+                    let centre = place.centre - Vec3A::X * time;
+                    let (axis, ratio) = short(&centre.as_dvec3());
+                    let axis = axis - axis.dot(place.tangent.as_dvec3()) * place.tangent.as_dvec3();
+                    let found = (place.flattening.length(), place.point(place.flattening.normalize()) - place.centre);
+                    assert!((f64::from(found.0) - ratio).abs() < 0.01, "{basis:?} {i} {u}: {} {ratio}", found.0);
+                    let cos = found.1.normalize().as_dvec3().dot(axis.normalize()).abs();
+                    assert!(cos > 0.998, "{basis:?} closed {closed} {i} {u}: {cos}");
+                    assert!((f64::from(found.1.length()) / 0.5 - ratio).abs() < 0.01, "pressed along its axis");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn what_moves_is_between_its_poses_and_takes_its_plies_along() {
         for (basis, closed) in [(Basis::CatmullRom, true), (Basis::CatmullRom, false), (Basis::BSpline, true)] {
             let curve = knit_like(200, closed);
@@ -661,6 +759,7 @@ mod tests {
             closed: false,
             points: (0..50).map(|i| DVec3::new(f64::from(i) * 0.4, 0.0, 0.0)).collect(),
             radii: None,
+            flattening: None,
         };
         let s = strands(curve, 0.5, &options(Basis::CatmullRom));
         let total: f32 = (0..s.segments().len()).map(|i| s.frames[i + 1].growth).sum();
@@ -678,7 +777,7 @@ mod tests {
                 DVec3::new(x, 6.0 * (-x * x / 2.0).exp(), 0.0)
             })
             .collect();
-        let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None };
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
         let s = strands(curve, 0.5, &options(Basis::CatmullRom));
         assert_eq!(s.tight_bends().len(), 1);
         let bend = s.tight_bends()[0];
@@ -698,7 +797,7 @@ mod tests {
             (vec![p(0.0), p(1.0), p(0.0)], true, Basis::BSpline),
         ] {
             for target in [Basis::CatmullRom, Basis::BSpline] {
-                let curve = Curve { basis, closed, points: points.clone(), radii: None };
+                let curve = Curve { basis, closed, points: points.clone(), radii: None, flattening: None };
                 let s = strands(curve, 0.3, &options(target));
                 for i in 0..s.segments().len() as u32 {
                     let place = s.frame(i, 0.5);

@@ -153,6 +153,7 @@ pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
         closed: false,
         points: kept.iter().map(|p| p.truncate().as_dvec3()).collect(),
         radii: Some(kept.iter().map(|p| f64::from(p.w)).collect()),
+        flattening: None,
     }
 }
 
@@ -200,6 +201,7 @@ mod tests {
             closed: false,
             points: (0..4).map(|i| DVec3::new(x, f64::from(i), 0.0)).collect(),
             radii: None,
+            flattening: None,
         };
         let tubes = Tubes::new(&[(line(0.0), vec![0.1; 4]), (line(1.0), vec![0.2; 4])]);
         assert_eq!((tubes.count(), tubes.segments().len()), (2, 6));

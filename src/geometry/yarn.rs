@@ -66,6 +66,9 @@ pub struct PlyShape {
     pub fibers: f32,
     /// Turns of the fibre pattern around the ply's axis, radians per yarn radius along the yarn.
     pub fiber_rate: f32,
+    /// By how much its fibres are closer to each other than `radius` says, in the mean along a yarn that is pressed flat:
+    /// area of the round section over that of the pressed one.
+    pub squeeze: f32,
 }
 
 impl PlyShape {
@@ -144,6 +147,7 @@ impl YarnShape {
                     core_radius: (p.radius - fiber_radius) as f32,
                     fibers: p.fibers as f32,
                     fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
+                    squeeze: 1.0,
                 }
             })
             .collect();
@@ -160,6 +164,16 @@ impl YarnShape {
             ply_rate: ply_rate as f32,
             tilted,
         }
+    }
+}
+
+impl YarnShape {
+    /// The same yarn pressed flat to a mean ratio of the short to the long axis of its section.
+    pub fn pressed(mut self, ratio: f64) -> Self {
+        for ply in &mut self.plies {
+            ply.squeeze = (1.0 / ratio) as f32;
+        }
+        self
     }
 }
 

@@ -82,6 +82,12 @@ impl Plan {
             "all plies of a yarn are of the same fibre",
         );
         add("ply_filter", shapes.iter().any(|s| !s.filled), "plies leave gaps", "plies fill the yarn");
+        add(
+            "flattening",
+            scene.fabrics.iter().flat_map(|f| &f.curves).any(|(curve, _)| curve.flattening.is_some()),
+            "a yarn is pressed flat",
+            "all yarns are round",
+        );
         add("elliptical_plies", shapes.iter().any(|s| s.elliptical), "a ply is elliptical", "all plies are round");
         add(
             "ply_twist",

@@ -35,7 +35,7 @@ use super::{
 use crate::{
     geometry::{
         section::{Crossings, PlyCrossing, PlyParts, Section},
-        yarn::{YarnShape, fiber_tangent},
+        yarn::YarnShape,
     },
     math::{Rgb, frame::sin_cos, sampler::Stream, special::wrapped_normal, warp::normal},
 };
@@ -341,7 +341,8 @@ impl<'a> Vertex<'a> {
             let axis = self.section.ply_axis(ply, Section::turn(&self.yarn.shape, travel));
             (axis, self.section.ply_centre(ply, axis, travel))
         };
-        let tangent = fiber_tangent(ply, self.yarn.shape.ply_rate, centre, axis, point) + self.section.bent(travel);
+        let straight = self.section.fiber_tangent(&self.yarn.shape, crossing.ply, centre, axis, point);
+        let tangent = straight + self.section.bent(travel);
         let length = tangent.length();
         let tangent = tangent / length;
         let sin = tangent.dot(self.camera).clamp(-1.0, 1.0);
@@ -481,7 +482,7 @@ impl<'a> Vertex<'a> {
             }
         });
         let along = w.dot(node.tangent);
-        let tilt = (1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos;
+        let tilt = (1.0 - along * along).max(1e-9).sqrt() * node.tangent_stretch / cos * self.section.squeeze();
         others *= tilt;
         (own * tilt + others, others)
     }
@@ -777,7 +778,7 @@ impl Forward {
         let start = Vec2::new(self.middle, section.h);
         let travel = section.travel(self.middle);
         section.chords_ahead(&yarn.shape, start, travel, -camera, PlyParts::Whole, |ply, from, to, _| {
-            plain += yarn.plies[ply].sigma * (to - from);
+            plain += section.squeeze() * yarn.plies[ply].sigma * (to - from);
         });
         let far_half = FarHalf {
             scale: if plain > 0.0 { (0.5 * self.fibers / plain).clamp(0.3, 2.0) } else { 1.0 },
@@ -807,7 +808,7 @@ impl Forward {
         let travel = section.travel(self.middle);
         section.chords_ahead(&yarn.shape, start, travel, w, PlyParts::Whole, |ply, from, to, _| {
             let optics = &yarn.plies[ply];
-            let fibers = far_half.scale * optics.sigma * (to - from);
+            let fibers = far_half.scale * section.squeeze() * optics.sigma * (to - from);
             depth += optics.rho * fibers;
             unscattered += optics.rho_unscattered * fibers;
         });

@@ -41,9 +41,9 @@ impl LobeFrame {
     /// About a ply where a ray passes it, on the bent yarn.
     #[inline]
     pub(crate) fn of_ply(shape: &YarnShape, section: &Section, crossing: &PlyCrossing, camera: Vec3A) -> Self {
-        let (w, c) = (shape.ply_rate, crossing.centre);
-        let bent = section.bent(section.travel(c.x));
-        Self::new((Vec3A::new(-w * c.y, w * c.x, 1.0) + bent).normalize(), camera)
+        let centre = section.real(crossing.centre);
+        let axis = section.fiber_tangent(shape, crossing.ply, crossing.centre, crossing.axis, centre);
+        Self::new((axis + section.bent(section.travel(centre.x))).normalize(), camera)
     }
 
     /// A vector of the world in this frame.

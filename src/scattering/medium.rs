@@ -62,7 +62,7 @@ pub fn extinction_rate(loss: f64, density: f64) -> f64 {
 /// A ply's fibres as light sees them. Lengths in yarn radii; albedos per channel.
 #[derive(Clone, Debug)]
 pub struct PlyOptics {
-    /// Expected fibres per length of a chord through the core.
+    /// Expected fibres per length of a chord through the core, where the section is not pressed flat.
     pub sigma: f32,
     /// Extinction per expected fibre of light that may pass fibres as TT.
     pub rho: Rgb,
@@ -103,8 +103,11 @@ impl PlyOptics {
     pub fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
         let (n, radius) = (f64::from(ply.fibers), f64::from(ply.radius));
         let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
-        let density = (n * fiber * fiber / (radius * radius)).min(0.85);
+        let squeeze = f64::from(ply.squeeze);
+        let density = (n * fiber * fiber / (radius * radius) * squeeze).min(0.85);
         let sigma = 2.0 * fiber * n / (PI * core * core);
+        // An ellipse is about as thick for light as the circle of its area.
+        let round_core = core * squeeze.sqrt();
         let f = material.chain_share();
         let per_channel = |value: &dyn Fn(usize) -> f64| Rgb::from([value(0), value(1), value(2)]);
 
@@ -117,7 +120,7 @@ impl PlyOptics {
         // Light that leaves the chain, over what the chain loses; 0 where nothing is lost.
         let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
         let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
-        let radius_optical = |c: usize| sigma * rho(c) * core;
+        let radius_optical = |c: usize| sigma * rho(c) * round_core;
         let escape = |c: usize| {
             let t = radius_optical(c);
             let e = escape_probability_of_disc(t);

@@ -39,6 +39,8 @@ pub(super) fn section(theta: f32, h: f32, phase: f32) -> Section {
         bend: Vec2::ZERO,
         tilted: true,
         phase: Vec2::new(phase.cos(), phase.sin()),
+        pressed: None,
+        pressed_turn: 0.0,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, fmt, iter::Sum};
 
-use super::{CurveGeometry, FiberGeometry, YarnGeometry, scatterer, yarn_scatterer};
+use super::{CurveGeometry, FiberGeometry, YarnGeometry, yarn_of_shape, yarn_scatterer};
 use crate::{
     ffi::embree::EmbreeError,
     geometry::{
@@ -22,6 +22,8 @@ const BVH_BYTES: [f64; 2] = [44.0, 119.0];
 const POINT_BYTES: u64 = 16;
 /// As `POINT_BYTES`.
 const FRAME_BYTES: u64 = 20;
+/// Of what presses a point's section flat, in yarns that are.
+const FLATTENING_BYTES: u64 = 8;
 /// As `POINT_BYTES`.
 const SEGMENT_BYTES: u64 = 4;
 /// Bytes of the material index of each segment, in a fabric with variants.
@@ -179,10 +181,17 @@ impl<'a> Preparation<'a> {
                         Mode::Yarn => {
                             let (points, segments) = (strands.points().len(), strands.segments().len());
                             estimate.add(points as u64, segments as u64, true, compact);
+                            if strands.flattened() {
+                                estimate.geometry_bytes += points as u64 * FLATTENING_BYTES;
+                            }
                         }
                         Mode::Ply => {
                             let (points, segments) = plies.ply_counts();
                             estimate.add(points, segments, true, compact);
+                            // What is round across the yarn is not across a ply that turns about it.
+                            if strands.flattened() || shape.elliptical || shape.ply_rate != 0.0 {
+                                estimate.geometry_bytes += points * FLATTENING_BYTES;
+                            }
                         }
                         Mode::Fiber => {
                             let (points, segments) = plies.fiber_counts();
@@ -264,7 +273,8 @@ impl<'a> Preparation<'a> {
                         }));
                     }
                     if mode == Mode::Yarn {
-                        let scatterer = |of: &Yarn| scatterer(of, model);
+                        let flattening = strands.mean_flattening();
+                        let scatterer = |of: &Yarn| yarn_of_shape(of, of.shape().pressed(flattening), model);
                         let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
                         all.push(CurveGeometry::Yarns(YarnGeometry {
                             fabric: index,
@@ -301,23 +311,8 @@ fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
 
 /// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
 fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usize) -> (Strands, YarnShape) {
-    let (mut curves, mut axes) = (Vec::new(), Vec::new());
-    for (curve, radii, along) in plies.ply_curves(slot) {
-        curves.push((curve, radii));
-        axes.push(along);
-    }
-    let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));
-    // A ply at angle alpha is longer than its yarn by 1 / cos(alpha), and its rotation-minimising frame turns with the
-    // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
-    let cos = 1.0 / (wp * ply.distance).hypot(1.0);
-    let wide = ply.long_axis();
-    let axis_rate = wp * cos * cos * wide;
-    let fiber_rate = (wf - wp) * cos * wide + axis_rate;
-    let alone = ply.alone();
-    let fiber_twist = (fiber_rate * alone.radius).atan();
-    let mut shape = YarnShape::new(&[PlyParameters { fiber_twist, ..alone }], 0.0, of.tilted);
-    let mut strands = Strands::new(
-        &curves,
+    let strands = Strands::new(
+        &plies.ply_curves(slot),
         &StrandOptions {
             basis: Basis::BSpline,
             tolerance: 0.0,
@@ -327,9 +322,21 @@ fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usi
             phases: vec![0.0],
         },
     );
-    if shape.elliptical {
-        shape.ply_rate = axis_rate as f32;
-        strands.align(&axes);
-    }
+    let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));
+    // A ply at angle alpha is longer than its yarn by 1 / cos(alpha), and its rotation-minimising frame turns with the
+    // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
+    let cos = 1.0 / (wp * ply.distance).hypot(1.0);
+    let wide = plies.mean_width(&strands);
+    let fiber_twist = (((wf - wp) * cos + wp * cos * cos) * wide).atan();
+    let alone = PlyParameters {
+        radius: 1.0,
+        aspect: 1.0,
+        distance: 0.0,
+        angle: 0.0,
+        fibers: ply.fibers,
+        fiber_radius: ply.fiber_radius / wide,
+        fiber_twist,
+    };
+    let shape = YarnShape::new(&[alone], 0.0, of.tilted).pressed(strands.mean_flattening());
     (strands, shape)
 }

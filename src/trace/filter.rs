@@ -55,7 +55,7 @@ impl HitFilter for GapFilter<'_> {
         }
         let CurveGeometry::Yarns(yarns) = geometry else { return true };
         let shape = yarns.yarn_at(hit.segment).shape();
-        if shape.filled {
+        if shape.filled && !yarns.strands.flattened() {
             return true;
         }
         let section = section_at(yarns, self.ray, hit);

@@ -375,8 +375,12 @@ pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
 
 /// A yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
+    yarn_of_shape(yarn, yarn.shape(), model)
+}
+
+fn yarn_of_shape(yarn: &Yarn, shape: YarnShape, model: Model) -> YarnScatterer {
     let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
-    yarn_scatterer(yarn.shape(), &materials, model)
+    yarn_scatterer(shape, &materials, model)
 }
 
 fn yarn_scatterer(shape: YarnShape, materials: &[&FiberMaterial], model: Model) -> YarnScatterer {

@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use super::{Outcome, View};
 use crate::{
-    geometry::section::{Crossings, Section, YarnFrame},
+    geometry::section::{Crossings, ROUND, Section, YarnFrame},
     math::{Rgb, sampler::Sampler},
     scattering::{
         LobeValues,
@@ -61,6 +61,8 @@ pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> 
         radius: 1.0,
         normal: Vec3A::X,
         phase: phase as f32,
+        flattening: ROUND,
+        flattening_turn: 0.0,
     };
     let towards = Vec3A::new(theta.cos() as f32, 0.0, theta.sin() as f32);
     Section::new(&place, Vec3A::new(0.0, h, 0.0), -towards, tilted)

@@ -56,7 +56,13 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
     let shape = yarn.shape();
     let points = 2 * (HALF_LENGTH / 2.0) as usize;
     let at = |i: usize| DVec3::new(0.0, 0.0, HALF_LENGTH * (2.0 * i as f64 / points as f64 - 1.0));
-    let curve = Curve { basis: Basis::CatmullRom, closed: false, points: (0..=points).map(at).collect(), radii: None };
+    let curve = Curve {
+        basis: Basis::CatmullRom,
+        closed: false,
+        points: (0..=points).map(at).collect(),
+        radii: None,
+        flattening: None,
+    };
     let radii = vec![1.0; curve.points.len()];
     let options = StrandOptions {
         basis: Basis::CatmullRom,

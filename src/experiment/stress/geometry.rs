@@ -94,7 +94,7 @@ fn world(scene: &Scene) -> World {
 }
 
 fn open(points: Vec<DVec3>) -> Curve {
-    Curve { basis: Basis::CatmullRom, closed: false, points, radii: None }
+    Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None }
 }
 
 fn closed(points: Vec<DVec3>) -> Curve {

@@ -282,8 +282,13 @@ mod tests {
         let set = parsed(&bytes);
         let points: Vec<DVec3> =
             TRIANGLE.iter().map(|p| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))).collect();
-        let curve =
-            |closed, points: &[DVec3]| Curve { basis: Basis::CatmullRom, closed, points: points.to_vec(), radii: None };
+        let curve = |closed, points: &[DVec3]| Curve {
+            basis: Basis::CatmullRom,
+            closed,
+            points: points.to_vec(),
+            radii: None,
+            flattening: None,
+        };
         assert_eq!(
             set,
             CurveSet {

@@ -195,6 +195,7 @@ mod tests {
             closed,
             points: (0..n).map(|i| DVec3::new(f64::from(i), f64::from(i * i) * 0.25, f64::from(n))).collect(),
             radii: Some((0..n).map(|i| 0.5 + 0.125 * f64::from(i)).collect()),
+            flattening: None,
         };
         CurveSet { curves: vec![line(3, false), line(5, true), line(2, false)], ..CurveSet::default() }
     }

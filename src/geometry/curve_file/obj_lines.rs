@@ -119,6 +119,7 @@ mod tests {
             closed,
             points: (0..n).map(|i| DVec3::new(f64::from(i), 0.1 * f64::from(i * i), f64::from(n))).collect(),
             radii: None,
+            flattening: None,
         };
         let set = CurveSet { curves: vec![curve(2, false), curve(4, true), curve(3, false)], ..CurveSet::default() };
         let mut bytes = Vec::new();

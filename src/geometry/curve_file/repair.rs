@@ -92,7 +92,7 @@ impl Repair {
             self.duplicates += (trimmed - points.len()) as u64;
             self.duplicate_curves.add(index);
         }
-        self.set.curves.push(Curve { basis, closed, points, radii });
+        self.set.curves.push(Curve { basis, closed, points, radii, flattening: None });
     }
 
     /// Adds a line for the user that is not about a single curve.

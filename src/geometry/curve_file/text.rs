@@ -154,6 +154,7 @@ mod tests {
             closed: false,
             points: points.iter().map(|&point| point.into()).collect(),
             radii: None,
+            flattening: None,
         };
         assert_eq!(
             set,
@@ -230,7 +231,8 @@ mod tests {
     fn what_is_written_is_read_back_exactly() {
         let points =
             vec![DVec3::new(0.1, 1e300, -1e-300), DVec3::new(f64::from(0.1_f32), f64::MIN, 5e-324), DVec3::X, DVec3::Y];
-        let curve = |closed, radii| Curve { basis: Basis::CatmullRom, closed, points: points.clone(), radii };
+        let curve =
+            |closed, radii| Curve { basis: Basis::CatmullRom, closed, points: points.clone(), radii, flattening: None };
         let radii = Some(vec![0.1, 0.2, 0.0, 1.0 / 3.0]);
         for radii in [None, radii] {
             let set = CurveSet { curves: vec![curve(true, radii.clone()), curve(false, radii)], ..CurveSet::default() };
@@ -243,7 +245,13 @@ mod tests {
 
     #[test]
     fn mixed_radii_are_not_written() {
-        let curve = |radii| Curve { basis: Basis::Linear, closed: false, points: vec![DVec3::X, DVec3::Y], radii };
+        let curve = |radii| Curve {
+            basis: Basis::Linear,
+            closed: false,
+            points: vec![DVec3::X, DVec3::Y],
+            radii,
+            flattening: None,
+        };
         for (curves, expected) in [
             (vec![curve(None), curve(Some(vec![1.0, 1.0]))], "a text file has radii for all curves or for none"),
             (vec![curve(Some(vec![1.0]))], "a curve needs one radius for each point"),

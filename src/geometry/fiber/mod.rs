@@ -14,7 +14,7 @@ pub mod packing;
 
 use std::f64::consts::TAU;
 
-use glam::{DVec2, Vec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -128,11 +128,10 @@ impl<'a> Guide<'a> {
     }
 }
 
-/// The point at `at` (yarn radii) of the section at a place.
+/// The point at `at` (yarn radii) of the round section at a place.
 #[inline]
 fn point(place: &YarnFrame, at: DVec2) -> Vec3 {
-    let across = place.tangent.cross(place.normal);
-    (place.centre + place.radius * (at.x as f32 * place.normal + at.y as f32 * across)).into()
+    place.point(at.as_vec2()).into()
 }
 
 /// The plies of a yarn, wound around its strands.
@@ -252,34 +251,62 @@ impl<'a> Plies<'a> {
         material_indices
     }
 
-    /// One curve for each yarn along the middle of a ply, as wide as the ply, and at each of its points the direction
-    /// from the yarn's axis.
-    pub fn ply_curves(&self, ply: usize) -> Vec<(Curve, Vec<f64>, Vec<Vec3A>)> {
-        let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
-        let wide = parameters.long_axis() as f32;
+    /// Mean radius of strands made along plies, in radii of the yarns that these belong to.
+    pub fn mean_width(&self, plies: &Strands) -> f64 {
+        let all = |of: &Strands| (0..of.yarns()).map(|yarn| of.mean_radius_of(yarn)).sum::<f64>();
+        all(plies) / all(self.strands).max(1e-300)
+    }
+
+    /// One curve for each yarn along the middle of a ply, as wide as the ply. Its section is what an ellipse, pressed flat
+    /// with the yarn and cut across the ply instead of across the yarn, becomes.
+    pub fn ply_curves(&self, ply: usize) -> Vec<(Curve, Vec<f64>)> {
+        let shape = &self.shape.plies[ply];
+        let semi_axes = shape.radius / shape.stretch;
         (0..self.strands.yarns())
             .into_par_iter()
             .map(|yarn| {
                 let guide = Guide::new(self.strands, yarn);
                 let places: Vec<YarnFrame> = guide.steps(self.steps[yarn]).map(|s| guide.frame_at(s)).collect();
-                let (mut knots, mut axes) = (Vec::new(), Vec::new());
-                for place in &places {
-                    let axis = self.axis(place, shape);
-                    knots.push(point(place, f64::from(shape.distance) * axis));
-                    let across = place.tangent.cross(place.normal);
-                    axes.push(axis.x as f32 * place.normal + axis.y as f32 * across);
-                }
-                let points = spline_through(&knots, |step| places[step].radius * wide);
+                let knots: Vec<Vec3> =
+                    places.iter().map(|p| point(p, f64::from(shape.distance) * self.axis(p, shape))).collect();
+                let points = spline_through(&knots, |_| 0.0);
+                let sections: Vec<(DVec3, f64)> = (0..points.len())
+                    .map(|i| {
+                        // The knot that the point stands for.
+                        let place = &places[i.saturating_sub(1).min(knots.len() - 1)];
+                        let axis = self.axis(place, shape).as_vec2();
+                        let middle = place.point(shape.distance * axis);
+                        let half = |to: Vec2| (place.point(shape.distance * axis + to) - middle).as_dvec3();
+                        // The ply goes on along the bent yarn and turns about it.
+                        let bent = f64::from(place.radius - place.radius * place.curvature.dot(middle - place.centre));
+                        let turned = half(self.shape.ply_rate * shape.distance * axis.perp());
+                        let along = bent * place.tangent.as_dvec3() + turned;
+                        let halves = [half(semi_axes.x * axis), half(semi_axes.y * axis.perp())];
+                        cut_across(halves, along.normalize_or(place.tangent.as_dvec3()))
+                    })
+                    .collect();
                 let curve = Curve {
                     basis: Basis::BSpline,
                     closed: false,
                     points: points.iter().map(|p| p.truncate().as_dvec3()).collect(),
                     radii: None,
+                    flattening: Some(sections.iter().map(|s| s.0).collect()),
                 };
-                (curve, points.iter().map(|p| f64::from(p.w)).collect(), axes)
+                (curve, sections.iter().map(|s| s.1).collect())
             })
             .collect()
     }
+}
+
+/// Two conjugate half axes of an ellipse, looked at along the unit vector `tangent`: the ellipse's short axis, as long as
+/// its ratio to the long one, and the length of half of the long one.
+fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
+    let [a, b] = halves.map(|h| h - h.dot(tangent) * tangent);
+    // The angle t at which a cos t + b sin t is longest or shortest.
+    let t = 0.5 * (2.0 * a.dot(b)).atan2(a.length_squared() - b.length_squared());
+    let (long, short) = (a * t.cos() + b * t.sin(), b * t.cos() - a * t.sin());
+    let ratio = (short.length() / long.length().max(1e-300)).min(1.0);
+    (short.normalize_or(a.cross(tangent).normalize_or(DVec3::X)) * ratio, long.length())
 }
 
 impl Distribution {

@@ -32,7 +32,7 @@ fn arch(shape: &YarnShape) -> Strands {
             DVec3::new(6.0 * t.cos(), 6.0 * t.sin(), 0.4 * t)
         })
         .collect();
-    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None };
+    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
     let options = StrandOptions {
         basis: Basis::BSpline,
         tolerance: 0.002,
@@ -193,6 +193,45 @@ fn flyaways_are_as_many_and_reach_as_far_as_asked() {
 }
 
 #[test]
+fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
+    let shape = touching_yarn(3, 33, 0.3, 0.25, -0.3);
+    let parameters = plies(3, 33, 0.3, -0.3);
+    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
+    let flattening = Some(vec![DVec3::Y * 0.5; points.len()]);
+    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
+    let options = StrandOptions {
+        basis: Basis::CatmullRom,
+        tolerance: 0.01,
+        longest_segment: 2.0,
+        ply_rate: f64::from(shape.ply_rate),
+        symmetry: 1.0,
+        phases: vec![0.0],
+    };
+    let strands = Strands::new(&[(curve, vec![1.0; 30])], &options);
+    let made = Plies::new(&strands, &parameters, &shape, 1);
+    let (mut wide, mut high) = (0.0f32, 0.0f32);
+    for ply in 0..3 {
+        let tubes = made.fibers(ply, Placement::Regular).0;
+        for segment in 0..tubes.segments().len() as u32 {
+            let centre = tubes.place(segment, 0.5).centre;
+            assert!(centre.x.hypot(2.0 * centre.y) < 1.0, "within the ellipse");
+            (wide, high) = (wide.max(centre.x.abs()), high.max(centre.y.abs()));
+        }
+        // The ply as a tube of its own: its section is the ellipse that the fibres' circle became.
+        let (curve, radii) = &made.ply_curves(ply)[0];
+        let flattening = curve.flattening.as_ref().expect("a pressed ply is not round");
+        let r = f64::from(shape.plies[ply].radius);
+        for (vector, long) in flattening.iter().zip(radii) {
+            assert!(*long <= r * 1.001 && *long > 0.5 * r && vector.length() <= 1.0);
+            // Its area, cut at an angle.
+            let area = long * long * vector.length() / (0.5 * r * r);
+            assert!(area < 1.001 && area > 0.9, "{area}");
+        }
+    }
+    assert!(wide > 0.9 && high > 0.45, "{wide} {high}");
+}
+
+#[test]
 fn the_same_seed_makes_the_same_fibers() {
     let shape = touching_yarn(2, 20, 0.3, 0.2, -0.3);
     let parameters = plies(2, 20, 0.3, -0.3);
@@ -211,10 +250,12 @@ fn ply_curves_run_through_the_middle_of_their_plies() {
     let made = Plies::new(&strands, &parameters, &shape, 1);
     let curves = made.ply_curves(2);
     assert_eq!(curves.len(), 1);
-    let (curve, radii, axes) = &curves[0];
-    assert!((radii[3] - 0.5 * parameters[2].radius).abs() < 1e-6);
+    let (curve, radii) = &curves[0];
+    // A round ply cut across itself: as wide as it is towards the yarn's axis, narrower the other way.
+    assert!((radii[3] - 0.5 * parameters[2].radius).abs() < 1e-4);
+    let ratio = curve.flattening.as_ref().expect("a twisted ply is cut at an angle")[3].length();
+    assert!((ratio / 0.25f64.cos() - 1.0).abs() < 0.01, "{ratio}");
     let tubes = Tubes::new(&[(curve.clone(), radii.clone())]);
-    assert_eq!(axes.len(), tubes.segments().len() + 1);
     for segment in 0..tubes.segments().len() as u32 {
         let (place, p) = locate(&strands, tubes.place(segment, 0.5).centre);
         let want = f64::from(shape.plies[2].distance) * made.axis(&place, &shape.plies[2]);

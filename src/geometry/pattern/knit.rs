@@ -150,6 +150,7 @@ impl Knit {
                     closed: course.closed,
                     points: course.points.into_iter().map(|p| p * diameter).collect(),
                     radii: None,
+                    flattening: None,
                 },
                 kind: StrandKind::Course,
                 index: row as u32,

@@ -72,7 +72,7 @@ pub fn straight(count: u32, length: f64, spacing: f64) -> Vec<Curve> {
         .map(|i| {
             let y = (f64::from(i) - 0.5 * f64::from(count - 1)) * spacing;
             let points = [-0.5, -1.0 / 6.0, 1.0 / 6.0, 0.5].map(|x| DVec3::new(x * length, y, 0.0)).to_vec();
-            Curve { basis: Basis::CatmullRom, closed: false, points, radii: None }
+            Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None }
         })
         .collect()
 }
@@ -86,7 +86,13 @@ mod tests {
         let points: Vec<DVec3> = (0..12).map(|i| DVec3::new(f64::from(i), f64::from(i * i % 5), 0.0)).collect();
         for closed in [false, true] {
             let strand = PatternStrand {
-                curve: Curve { basis: Basis::CatmullRom, closed, points: points.clone(), radii: None },
+                curve: Curve {
+                    basis: Basis::CatmullRom,
+                    closed,
+                    points: points.clone(),
+                    radii: None,
+                    flattening: None,
+                },
                 kind: StrandKind::Course,
                 index: 0,
                 coordinates: (0..12).map(|i| [i as f32, 0.5]).collect(),

@@ -156,6 +156,7 @@ mod tests {
             closed: false,
             points: (0..41).map(|i| axis * (f64::from(i) - 20.0) + DVec3::Z * z).collect(),
             radii: None,
+            flattening: None,
         };
         let found = measured(&[line(DVec3::X, 0.0), line(DVec3::Y, 1.0)], 1.0);
         assert!((found.nearest - 0.5).abs() < 1e-6);
@@ -174,6 +175,7 @@ mod tests {
                 .map(|a| DVec3::new(radius * a.cos(), radius * a.sin(), 0.01 * a))
                 .collect(),
             radii: None,
+            flattening: None,
         };
         assert_eq!(measured(&[ring(1.2, 0.5)], 1.0).share, 0.0);
         assert!(measured(&[ring(3.0, 2.0)], 1.0).share > 0.9);

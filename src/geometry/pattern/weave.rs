@@ -99,7 +99,7 @@ impl Weave {
         let run = |signs: &[f64], spacing: f64, offset: f64| path(signs, spacing, reach, offset, self.points);
         let mut out = Vec::with_capacity((self.warps + self.wefts) as usize);
         let strand = |kind, index: u32, points: Vec<DVec3>, coordinates| PatternStrand {
-            curve: Curve { basis: Basis::CatmullRom, closed: false, points, radii: None },
+            curve: Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None },
             kind,
             index,
             coordinates,
