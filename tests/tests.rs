@@ -21,6 +21,8 @@ mod converge;
 mod frames;
 // What bad input is answered with: whole messages, exit status 2, no output.
 mod errors;
+// Scenes that are built in code, without text.
+mod builder;
 // Pictures against explicit fibres, where the truths lie beside the project.
 mod fabric_truth;
 // White cloth under a white sky is as bright as the sky.

@@ -1,17 +1,24 @@
 //! What the user asked for: a checked [`Scene`].
 //!
-//! [`load`] knows the renderer's keys, their ranges and units, and reads the files that a scene names. A [`Scene`] is a
-//! plain value in millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or Embree.
+//! A [`SceneBuilder`] takes yarns, curves, lights and a camera as values and makes a [`Scene`] of them. [`load`] does so
+//! from scene files: it knows their keys, ranges and units, and reads the files that a scene names. A [`Scene`] is a
+//! plain value in millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or
+//! Embree.
 
 pub mod animation;
+pub mod builder;
 pub mod camera;
+pub mod defaults;
 pub mod identity;
 pub mod load;
+pub mod motion;
+pub mod view;
 
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2};
 
+pub use builder::{SceneBuilder, SceneError};
 pub use camera::Camera;
 
 use crate::{

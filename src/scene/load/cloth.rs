@@ -1,7 +1,6 @@
 //! `[[fabric]]`: curves from a file or a generator, and the yarn they are of.
 
 use std::{
-    collections::HashSet,
     f64::consts::TAU,
     path::{Path, PathBuf},
 };
@@ -9,7 +8,7 @@ use std::{
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
-    super::{CurveKind, Fabric, FabricMotion, Mode, Yarn, transform_curves},
+    super::{CurveKind, Fabric, FabricMotion, Mode, Yarn, defaults, transform_curves},
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan, FabricCoordinates},
     pattern::{self, KnitPlan, WeavePlan},
@@ -25,9 +24,6 @@ use crate::{
     input::diagnostic::{Span, unknown_name},
     math::sampler::Stream,
 };
-
-/// Radius, millimetres, of a fibre whose file and fabric give none: that of fine wool and of cotton.
-const FIBER_RADIUS: f64 = 0.01;
 
 /// Columns that a yarn counts where nothing is known of its cloth.
 const COLUMNS: f32 = 256.0;
@@ -50,9 +46,13 @@ impl Detail {
     pub(super) fn read(table: Option<&Reader<'_>>) -> Self {
         let bases = [("auto", None), ("catmull-rom", Some(Basis::CatmullRom)), ("b-spline", Some(Basis::BSpline))];
         let basis = table.and_then(|t| t.one_of_or("curve_basis", None, &bases));
-        let tolerance = table.map_or(0.005, |t| t.f64_or("curve_tolerance", 0.005, Range::between(0.0, 1.0)));
-        let longest_segment = table.map_or(3.0, |t| t.f64_or("longest_segment", 3.0, Range::above(0.0)));
-        let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(1, |f| f as u32);
+        let tolerance = table.map_or(defaults::CURVE_TOLERANCE, |t| {
+            t.f64_or("curve_tolerance", defaults::CURVE_TOLERANCE, Range::between(0.0, 1.0))
+        });
+        let longest_segment = table.map_or(defaults::LONGEST_SEGMENT, |t| {
+            t.f64_or("longest_segment", defaults::LONGEST_SEGMENT, Range::above(0.0))
+        });
+        let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(defaults::FRAME, |f| f as u32);
         let can_move = table.is_none_or(|t| t.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name());
         Self { basis, tolerance, longest_segment, frame, can_move, shutter: None }
     }
@@ -144,7 +144,7 @@ pub(super) fn plan(
     let source = match table.table("source") {
         Some(source_table) => {
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
-            let fallback = if fiber.is_some() { FIBER_RADIUS } else { 0.5 };
+            let fallback = if fiber.is_some() { defaults::FIBER_RADIUS } else { 0.5 };
             let known = Yarns { library, own, radius, fallback };
             source(source_table, context, &known, curves)
         }
@@ -280,7 +280,9 @@ impl FabricPlan {
         let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(CurveKind::Yarn);
         let (kind, own_radius) = match &self.kind {
             KindName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
-            KindName::Fiber(name) => (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), FIBER_RADIUS),
+            KindName::Fiber(name) => {
+                (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), defaults::FIBER_RADIUS)
+            }
         };
         let radius = self.radius.unwrap_or(own_radius);
         let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
@@ -399,18 +401,5 @@ impl CurveFile {
             *p *= scale;
         }
         Some((set, scale))
-    }
-}
-
-/// Numbers the fabrics whose name another one before them has.
-pub(super) fn tell_names_apart(fabrics: &mut [Fabric]) {
-    let mut taken: HashSet<String> = HashSet::new();
-    for fabric in fabrics {
-        let given = fabric.name.clone();
-        let mut number = 1;
-        while !taken.insert(fabric.name.clone()) {
-            number += 1;
-            fabric.name = format!("{given}_{number}");
-        }
     }
 }

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
-    super::{AlbedoTexture, Material, Object},
+    super::{AlbedoTexture, Material, Object, defaults},
     Context, Range, Reader, UNITS, placement,
 };
 use crate::{
@@ -41,12 +41,12 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
         let span = table.span("texture").unwrap_or(table.header());
         (context.resolve(path, span), span, repeat)
     });
-    let plain = if texture.is_some() { 1.0 } else { 0.5 };
+    let plain = if texture.is_some() { 1.0 } else { defaults::ALBEDO };
     let albedo = table.rgb_or("albedo", [plain; 3], Range::UNIT);
     let coat = (kind == 1).then(|| {
         // A perfectly smooth coat would be a mirror, in which no light of no size is ever found.
-        let roughness = table.f64_or("roughness", 0.3, Range::between(0.03, 1.0));
-        (roughness, table.f64_or("ior", 1.5, Range::between(1.01, 4.0)))
+        let roughness = table.f64_or("roughness", defaults::ROUGHNESS, Range::between(0.03, 1.0));
+        (roughness, table.f64_or("ior", defaults::IOR, Range::between(1.01, 4.0)))
     });
     table.finish();
     Some(MaterialPlan { albedo, coat, texture })
@@ -56,7 +56,7 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
 pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<MaterialPlan> {
     let albedo = table.rgb("albedo", Range::UNIT);
     let Some(name) = table.string("material") else {
-        return Some(MaterialPlan { albedo: albedo.unwrap_or([0.5; 3]), coat: None, texture: None });
+        return Some(MaterialPlan { albedo: albedo.unwrap_or([defaults::ALBEDO; 3]), coat: None, texture: None });
     };
     if albedo.is_some() {
         table.error_at("albedo", "give `material` or `albedo`, not both", None);
@@ -157,14 +157,14 @@ fn shape(table: &Reader<'_>, context: &Context<'_>) -> Option<Source> {
     let kinds = ["sphere", "cylinder", "box", "plane", "revolution"].map(|name| (name, name));
     let kind = table.one_of("shape", &kinds)?;
     let length = |key: &str| table.required_f64(key, Range::POSITIVE).map(|l| l * context.unit);
-    let segments = |otherwise| table.u64_or("segments", otherwise, 3..=4096) as u32;
+    let segments = || table.u64_or("segments", defaults::MESH_SEGMENTS.into(), 3..=4096) as u32;
     let mesh = match kind {
         "sphere" => {
-            let (radius, segments) = (length("radius"), segments(128));
+            let (radius, segments) = (length("radius"), segments());
             Mesh::sphere(radius?, segments)
         }
         "cylinder" => {
-            let (radius, height, segments) = (length("radius"), length("height"), segments(128));
+            let (radius, height, segments) = (length("radius"), length("height"), segments());
             Mesh::cylinder(radius?, height?, segments)
         }
         "box" => {
@@ -179,7 +179,7 @@ fn shape(table: &Reader<'_>, context: &Context<'_>) -> Option<Source> {
             Mesh::plane(DVec2::from(size?) * context.unit)
         }
         _ => {
-            let (profile, segments) = (profile(table, context), segments(128));
+            let (profile, segments) = (profile(table, context), segments());
             Mesh::revolution(&profile?, segments)
         }
     };

@@ -23,15 +23,16 @@ use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 pub use definitions::{Definitions, load_definitions};
 
-use super::{CurveKind, Fabric, Ground, Mode, Object, Scene, bounds, identity};
-use crate::{
-    geometry::fiber::packing,
-    input::{
-        diagnostic::{Diagnostic, Diagnostics, Sources, Span},
-        document::{Document, MAX_FILE_BYTES, Value},
-        reader::{Range, Reader},
-    },
-    light::Light,
+use super::{
+    RenderSettings, Scene,
+    builder::{OutputSettings, SceneBuilder},
+    defaults,
+    view::CameraSetup,
+};
+use crate::input::{
+    diagnostic::{Diagnostic, Diagnostics, Sources, Span},
+    document::{Document, MAX_FILE_BYTES, Value},
+    reader::{Range, Reader},
 };
 
 /// What the command line adds to a scene file.
@@ -199,181 +200,96 @@ fn build(
     root.u64("schema", 1..=1);
     let unit = root.one_of_or("unit", 1.0, &UNITS);
     let context = Context { sources, diagnostics, unit };
-
-    let render_table = root.table("render");
-    let settings = settings::render(render_table.as_ref());
-    let output = settings::output(root.table("output"));
-    let tilted = render_table
-        .as_ref()
-        .is_none_or(|r| r.one_of_or("ply_intersection", true, &[("tilted", true), ("perpendicular", false)]));
-    let mut detail = cloth::Detail::read(render_table.as_ref());
-    if let Some(table) = render_table {
-        table.finish();
-    }
-    let library = yarns::read(&root, &context, tilted);
-    let fabric_tables = root.tables("fabric");
-    if fabric_tables.is_empty() && options.curves.is_some() {
-        root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
-    }
-    let plans: Vec<Option<cloth::FabricPlan>> = fabric_tables
-        .into_iter()
-        .enumerate()
-        .map(|(i, table)| {
-            let curves = if i == 0 { options.curves.as_deref() } else { None };
-            cloth::plan(table, &context, &library, curves)
-        })
-        .collect();
-    let materials = mesh::materials(&root, &context);
-    let mesh_plans = mesh::meshes(&root, &context, &materials);
-    let camera_plan = view::camera(&root, &context, options.frame);
-    let light_plans = view::lights(&root, &context);
-    let ground_plan = view::ground(&root, &context, &materials);
+    let plans = Plans::read(&root, options, &context);
     root.finish();
     if diagnostics.has_errors() {
         return None;
     }
-    detail.shutter = camera_plan.as_ref().and_then(view::CameraPlan::shutter);
-
     // The text is sound: now the files.
-    let mut warnings = Vec::new();
-    let mut fabrics: Vec<Fabric> = plans
-        .into_iter()
-        .flatten()
-        .enumerate()
-        .filter_map(|(i, plan)| plan.make(i, &context, &library, &detail, &mut warnings))
-        .flatten()
-        .collect();
-    let mut made = Vec::new();
-    let mut objects: Vec<Object> =
-        mesh_plans.into_iter().flatten().filter_map(|plan| plan.make(&context, &mut made)).collect();
-    let mut lights: Vec<Light> = light_plans.into_iter().flatten().filter_map(|l| l.make(&context)).collect();
+    let builder = plans.make(name, &context)?;
     if diagnostics.has_errors() {
         return None;
     }
-    cloth::tell_names_apart(&mut fabrics);
-
-    // Single precision is kept for what is near: the middle of the cloth becomes the origin.
-    let around =
-        |objects: &[Object]| objects.iter().filter_map(|o| o.mesh.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let middle = bounds(&fabrics).or(around(&objects)).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
-    for fabric in &mut fabrics {
-        fabric.transform(&DAffine3::from_translation(-middle));
-    }
-    for object in &mut objects {
-        object.mesh.transform(&DAffine3::from_translation(-middle));
-    }
-    for light in &mut lights {
-        light.translate(-middle);
-    }
-    let render = settings?;
-    let aspect = f64::from(render.width) / f64::from(render.height);
-    let frame = f64::from(render.frame.unwrap_or(1));
-    let (camera, camera_path) = camera_plan?.make(&fabrics, &objects, middle, aspect, frame);
-    let ground = ground_plan.and_then(|plan| {
-        let height = plan.height.map(|h| h * unit - middle.y);
-        let lowest = [bounds(&fabrics), around(&objects)].into_iter().flatten().map(|(low, _)| low.y);
-        let lowest = lowest.reduce(f64::min).unwrap_or(0.0);
-        if let Some(span) = plan.material.texture_span() {
-            context.error(span, "the ground has no texture coordinates: give this material to a plane", None);
-        }
-        let material = plan.material.make(&context, &mut made)?;
-        Some(Ground { height: height.unwrap_or(lowest) as f32, material })
-    });
-    if diagnostics.has_errors() {
-        return None;
-    }
-    let mut scene = Scene {
-        path: name.to_owned(),
-        render,
-        display: output.display,
-        layers: output.layers,
-        storage: output.storage,
-        denoise: output.denoise,
-        camera,
-        camera_path,
-        yarns: library.yarns.into_values().collect(),
-        fibers: library.fibers.into_iter().collect(),
-        fabrics,
-        objects,
-        materials: made.into_iter().map(|(_, material)| material).collect(),
-        lights,
-        ground,
-        middle,
-        identity: Vec::new(),
-        fingerprint: String::new(),
-        warnings,
-    };
-    keep_used(&mut scene);
-    for lobe in scene.render.without.clone() {
-        let of_yarns = scene.yarns.iter_mut().flat_map(|y| &mut y.fibers);
-        for (_, fiber) in of_yarns.chain(&mut scene.fibers) {
-            lobe.remove_from(fiber);
+    match builder.build() {
+        Ok(scene) => Some(scene),
+        Err(error) => {
+            diagnostics.push(Diagnostic::error(error.to_string()));
+            None
         }
     }
-    warn_about_precision(&mut scene);
-    warn_about_density(&mut scene);
-    warn_about_standing_hairs(&mut scene);
-    scene.identity = identity::identity(&scene);
-    scene.fingerprint = identity::fingerprint(&scene.identity);
-    Some(scene)
 }
 
-/// Drops kinds of yarn and fibre that no fabric uses: libraries hold many.
-fn keep_used(scene: &mut Scene) {
-    let (mut yarns, mut fibers) = (Vec::new(), Vec::new());
-    let place_in = |kept: &mut Vec<usize>, index: usize| {
-        kept.iter().position(|&k| k == index).unwrap_or_else(|| {
-            kept.push(index);
-            kept.len() - 1
-        })
-    };
-    for fabric in &mut scene.fabrics {
-        fabric.kind = match fabric.kind {
-            CurveKind::Yarn(yarn) => CurveKind::Yarn(place_in(&mut yarns, yarn)),
-            CurveKind::Fiber(fiber) => CurveKind::Fiber(place_in(&mut fibers, fiber)),
+/// Everything that a scene's text says, before the files it names are read. `None` where something is wrong.
+struct Plans {
+    render: Option<RenderSettings>,
+    output: OutputSettings,
+    detail: cloth::Detail,
+    library: yarns::Library,
+    fabrics: Vec<Option<cloth::FabricPlan>>,
+    meshes: Vec<Option<mesh::MeshPlan>>,
+    camera: Option<CameraSetup>,
+    lights: Vec<Option<view::LightPlan>>,
+    ground: Option<view::GroundPlan>,
+}
+
+impl Plans {
+    fn read(root: &Reader<'_>, options: &LoadOptions, context: &Context<'_>) -> Self {
+        let table = root.table("render");
+        let render = settings::render(table.as_ref());
+        let output = settings::output(root.table("output"));
+        let intersections = [("tilted", true), ("perpendicular", false)];
+        let tilted = table
+            .as_ref()
+            .map_or(defaults::TILTED, |r| r.one_of_or("ply_intersection", defaults::TILTED, &intersections));
+        let mut detail = cloth::Detail::read(table.as_ref());
+        if let Some(table) = table {
+            table.finish();
+        }
+        let library = yarns::read(root, context, tilted);
+        let tables = root.tables("fabric");
+        if tables.is_empty() && options.curves.is_some() {
+            root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
+        }
+        let fabric = |(i, table)| {
+            let curves = if i == 0 { options.curves.as_deref() } else { None };
+            cloth::plan(table, context, &library, curves)
         };
+        let fabrics = tables.into_iter().enumerate().map(fabric).collect();
+        let materials = mesh::materials(root, context);
+        let meshes = mesh::meshes(root, context, &materials);
+        let camera = view::camera(root, context, options.frame);
+        detail.shutter = camera.as_ref().and_then(|camera| camera.motion.shutter);
+        let lights = view::lights(root, context);
+        let ground = view::ground(root, context, &materials);
+        Self { render, output, detail, library, fabrics, meshes, camera, lights, ground }
     }
-    scene.yarns = yarns.into_iter().map(|y| scene.yarns[y].clone()).collect();
-    scene.fibers = fibers.into_iter().map(|f| scene.fibers[f].clone()).collect();
-}
 
-/// Explicit fibres that do not fit their ply overlap.
-fn warn_about_density(scene: &mut Scene) {
-    if scene.render.mode != Mode::Fiber {
-        return;
-    }
-    for yarn in &scene.yarns {
-        let fullest = yarn.plies.iter().map(|p| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2));
-        let fullest = fullest.fold(0.0, f64::max);
-        if fullest > packing::DENSEST {
-            scene.warnings.push(format!(
-                "yarn `{}`: fibres would fill {:.0} % of a ply; above {:.0} % they overlap",
-                yarn.name,
-                100.0 * fullest,
-                100.0 * packing::DENSEST
-            ));
-        }
-    }
-}
-
-/// Fly-aways are made where yarns are when the shutter opens, and stay there.
-fn warn_about_standing_hairs(scene: &mut Scene) {
-    let hairy = |thread| matches!(thread, CurveKind::Yarn(yarn) if scene.yarns[yarn].flyaways.is_some());
-    let still = scene.fabrics.iter().filter(|f| !f.motion.later.is_empty() && hairy(f.kind));
-    let warnings = still.map(|f| format!("the fly-aways of `{}` stand still while the shutter is open", f.name));
-    scene.warnings.extend(warnings.collect::<Vec<_>>());
-}
-
-/// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.
-fn warn_about_precision(scene: &mut Scene) {
-    let Some((low, high)) = scene.bounds() else { return };
-    let thinnest = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(_, r)| r).copied().fold(f64::MAX, f64::min);
-    let ratio = 0.5 * (high - low).length() / thinnest;
-    if ratio > 1e5 {
-        scene.warnings.push(format!(
-            "the scene is {ratio:.1e} times as wide as its thinnest yarn: positions of hits are uncertain by more than \
-             0.2 % of that yarn's radius"
-        ));
+    /// Reads the files; what is wrong with them is told.
+    fn make(self, name: &str, context: &Context<'_>) -> Option<SceneBuilder> {
+        let mut warnings = Vec::new();
+        let fabrics = self.fabrics.into_iter().flatten().enumerate();
+        let fabrics = fabrics
+            .filter_map(|(i, plan)| plan.make(i, context, &self.library, &self.detail, &mut warnings))
+            .flatten()
+            .collect();
+        let mut made = Vec::new();
+        let objects = self.meshes.into_iter().flatten().filter_map(|plan| plan.make(context, &mut made)).collect();
+        let lights = self.lights.into_iter().flatten().filter_map(|light| light.make(context)).collect();
+        let ground = self.ground.and_then(|plan| plan.make(context, &mut made));
+        Some(SceneBuilder {
+            name: name.to_owned(),
+            render: self.render?,
+            output: self.output,
+            camera: self.camera?,
+            yarns: self.library.yarns.into_values().collect(),
+            fibers: self.library.fibers.into_iter().collect(),
+            fabrics,
+            objects,
+            materials: made.into_iter().map(|(_, material)| material).collect(),
+            lights,
+            ground,
+            warnings,
+        })
     }
 }
 

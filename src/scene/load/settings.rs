@@ -1,35 +1,19 @@
 //! `[render]` and `[output]`.
 
-use super::{super::*, Range, Reader};
+use super::{
+    super::{builder::OutputSettings, *},
+    Range, Reader,
+};
 use crate::{image::png::ToneMap, input::diagnostic::shortened};
 
 const SIZE: std::ops::RangeInclusive<u64> = 1..=65_536;
 
 /// The settings of `[render]`; `None` if one is wrong.
 pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
-    let defaults = RenderSettings {
-        mode: Mode::Yarn,
-        model: Model::Aggregated,
-        without: Vec::new(),
-        width: 768,
-        height: 576,
-        crop: [0, 0, 768, 576],
-        filter: PixelFilter::Gaussian(0.5),
-        spp: 64,
-        time: None,
-        noise: None,
-        adaptive: false,
-        max_bounces: 64,
-        threads: None,
-        seed: 0,
-        frame: None,
-        compact_bvh: true,
-        max_memory: None,
-        force: Vec::new(),
-    };
-    let Some(table) = table else { return Some(defaults) };
-    let width = table.u64_or("width", 768, SIZE) as u32;
-    let height = table.u64_or("height", 576, SIZE) as u32;
+    let otherwise = RenderSettings::default();
+    let Some(table) = table else { return Some(otherwise) };
+    let width = table.u64_or("width", otherwise.width.into(), SIZE) as u32;
+    let height = table.u64_or("height", otherwise.height.into(), SIZE) as u32;
     let crop = table.numbers("crop", Range::at_least(0.0));
     let crop = match crop.as_deref() {
         None => [0, 0, width, height],
@@ -54,42 +38,31 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
     let kind = table.one_of_or("filter", 2, &[("box", 0), ("tent", 1), ("gaussian", 2)]);
     let filter_width = table.f64("filter_width", Range::above(0.0).and_at_most(16.0)).map(|w| w as f32);
     let filter = match kind {
-        0 => PixelFilter::Box(filter_width.unwrap_or(0.5)),
-        1 => PixelFilter::Tent(filter_width.unwrap_or(1.0)),
-        _ => PixelFilter::Gaussian(filter_width.unwrap_or(0.5)),
+        0 => PixelFilter::Box(filter_width.unwrap_or(defaults::BOX_WIDTH)),
+        1 => PixelFilter::Tent(filter_width.unwrap_or(defaults::TENT_WIDTH)),
+        _ => PixelFilter::Gaussian(filter_width.unwrap_or(defaults::GAUSSIAN_WIDTH)),
     };
-    let mode = table.one_of_or("mode", defaults.mode, &Mode::NAMES);
-    // Explicit fibres scatter dozens of times where a yarn scatters once.
-    let bounces = if mode == Mode::Fiber { 512 } else { 64 };
+    let mode = table.one_of_or("mode", otherwise.mode, &Mode::NAMES);
     Some(RenderSettings {
         mode,
-        model: table.one_of_or("model", defaults.model, &Model::NAMES),
+        model: table.one_of_or("model", otherwise.model, &Model::NAMES),
         without: without(table),
         width,
         height,
         crop,
         filter,
-        spp: table.u64_or("spp", 64, 1..=u64::from(u32::MAX)) as u32,
+        spp: table.u64_or("spp", otherwise.spp.into(), 1..=u64::from(u32::MAX)) as u32,
         time: table.f64("time", Range::above(0.0)),
         noise: table.f64("noise", Range::above(0.0)),
-        max_bounces: table.u64_or("max_bounces", bounces, 0..=1_000_000) as u32,
-        adaptive: table.bool_or("adaptive", false),
+        max_bounces: table.u64_or("max_bounces", defaults::max_bounces(mode).into(), 0..=1_000_000) as u32,
+        adaptive: table.bool_or("adaptive", otherwise.adaptive),
         threads: table.u64("threads", 1..=4096).map(|t| t as usize),
-        seed: table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32,
+        seed: table.u64_or("seed", otherwise.seed.into(), 0..=u64::from(u32::MAX)) as u32,
         frame: table.u64("frame", 0..=u64::from(u32::MAX)).map(|f| f as u32),
-        compact_bvh: table.one_of_or("bvh", true, &[("compact", true), ("fast", false)]),
+        compact_bvh: table.one_of_or("bvh", otherwise.compact_bvh, &[("compact", true), ("fast", false)]),
         max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
         force: table.strings("force").into_iter().map(|(name, _)| name.to_owned()).collect(),
     })
-}
-
-/// What `[output]` says.
-#[derive(Default)]
-pub(super) struct Output {
-    pub(super) display: Display,
-    pub(super) layers: Layers,
-    pub(super) storage: Storage,
-    pub(super) denoise: bool,
 }
 
 /// `without = ["D"]`: lobes of single fibres to leave out.
@@ -110,18 +83,23 @@ fn without(table: &Reader<'_>) -> Vec<FiberLobe> {
 }
 
 /// The settings of `[output]`.
-pub(super) fn output(table: Option<Reader<'_>>) -> Output {
-    let Some(table) = table else { return Output::default() };
+pub(super) fn output(table: Option<Reader<'_>>) -> OutputSettings {
+    let Some(table) = table else { return OutputSettings::default() };
+    let otherwise = OutputSettings::default();
     let display = Display {
-        tone_map: table.one_of_or("tone_map", ToneMap::Srgb, &ToneMap::NAMES),
-        exposure: table.f64_or("exposure", 0.0, Range::between(-100.0, 100.0)) as f32,
-        alpha: table.bool_or("alpha", false),
+        tone_map: table.one_of_or("tone_map", otherwise.display.tone_map, &ToneMap::NAMES),
+        exposure: table.f64_or("exposure", otherwise.display.exposure.into(), Range::between(-100.0, 100.0)) as f32,
+        alpha: table.bool_or("alpha", otherwise.display.alpha),
     };
     let storage = Storage {
-        compression: table.one_of_or("compression", Compression::default(), &Compression::NAMES),
-        half_lobes: table.one_of_or("lobe_precision", false, &[("float", false), ("half", true)]),
+        compression: table.one_of_or("compression", otherwise.storage.compression, &Compression::NAMES),
+        half_lobes: table.one_of_or(
+            "lobe_precision",
+            otherwise.storage.half_lobes,
+            &[("float", false), ("half", true)],
+        ),
     };
-    let mut layers = Layers::DEFAULT;
+    let mut layers = otherwise.layers;
     if table.has("layers") {
         layers = Layers::NONE;
         for (name, _) in table.strings("layers") {
@@ -136,7 +114,7 @@ pub(super) fn output(table: Option<Reader<'_>>) -> Output {
             }
         }
     }
-    let denoise = table.bool_or("denoise", false);
+    let denoise = table.bool_or("denoise", otherwise.denoise);
     table.finish();
-    Output { display, layers, storage, denoise }
+    OutputSettings { display, layers, storage, denoise }
 }

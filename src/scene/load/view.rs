@@ -6,13 +6,16 @@ use glam::{DVec2, DVec3, Mat3A, Vec3A};
 
 use super::{
     super::{
-        Fabric, Object,
-        camera::{Camera, Lens, Projection},
+        Material,
+        builder::GroundSetup,
+        camera::Projection,
+        defaults,
+        motion::Aim,
+        view::{CameraSetup, Focus, LensSetup},
     },
     Context, Range, Reader,
     mesh::{MaterialPlan, Materials, material_of},
-    motion::{self, Aim, Motion},
-    radians,
+    motion, radians,
 };
 use crate::{
     image,
@@ -21,58 +24,9 @@ use crate::{
     math::{Rgb, frame::orthonormal_basis},
 };
 
-/// A camera before the cloth is known.
-pub(super) struct CameraPlan {
-    camera: Camera,
-    /// Margin, if the camera is to frame the cloth.
-    frame: Option<f64>,
-    lens: Option<LensPlan>,
-    /// What it looks at, if it is told.
-    aim: Option<Aim>,
-    up: DVec3,
-    motion: Motion,
-}
-
-/// A lens before it is known where the cloth is.
-struct LensPlan {
-    /// Radius of the opening, millimetres.
-    radius: f64,
-    focus: Focus,
-}
-
-/// What is sharp; in the scene's own place.
-enum Focus {
-    /// The middle of the cloth.
-    Cloth,
-    /// What is so far away along the view, millimetres.
-    Distance(f64),
-    /// The plane through a point.
-    Point(DVec3),
-}
-
-const DEFAULT_FOV: f64 = 30.0;
-const DEFAULT_MARGIN: f64 = 0.04;
-/// Height of a full-frame sensor, millimetres.
-const DEFAULT_SENSOR: f64 = 24.0;
-
-fn default_camera(direction: DVec3, up: DVec3, projection: Projection) -> Option<Camera> {
-    Camera::looking_at(direction, DVec3::ZERO, up, projection)
-}
-
 /// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth.
-pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraPlan> {
-    let framing = |direction: DVec3| {
-        let projection = Projection::Perspective(radians(DEFAULT_FOV));
-        Some(CameraPlan {
-            camera: default_camera(direction, DVec3::Y, projection)?,
-            frame: Some(DEFAULT_MARGIN),
-            lens: None,
-            aim: None,
-            up: DVec3::Y,
-            motion: Motion::default(),
-        })
-    };
-    let Some(node) = root.node("camera") else { return framing(DVec3::Z) };
+pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraSetup> {
+    let Some(node) = root.node("camera") else { return Some(CameraSetup::default()) };
     if let Value::String(word) = &node.value {
         if word != "frame" {
             context.error(
@@ -81,31 +35,33 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
                 Some("camera = \"frame\", or a [camera] table".to_owned()),
             );
         }
-        return framing(DVec3::Z);
+        return Some(CameraSetup::default());
     }
     let table = root.table("camera")?;
     let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2)];
     let kind = table.one_of_or("type", 0, &kinds);
-    let up = DVec3::from(table.vec3_or("up", [0.0, 1.0, 0.0], Range::FINITE));
+    let up = DVec3::from(table.vec3_or("up", defaults::UP, Range::FINITE));
     let fov = |table: &Reader<'_>| {
-        Projection::Perspective(radians(table.f64_or("fov", DEFAULT_FOV, Range::above(0.0).and_below(180.0))))
+        Projection::Perspective(radians(table.f64_or(
+            "fov",
+            defaults::FIELD_OF_VIEW,
+            Range::above(0.0).and_below(180.0),
+        )))
     };
     let plan = if kind == 0 {
-        let direction = DVec3::from(table.vec3_or("direction", [0.0, 0.0, 1.0], Range::FINITE));
-        let margin = table.f64_or("margin", DEFAULT_MARGIN, Range::between(-5.0, 0.45));
+        let direction = DVec3::from(table.vec3_or("direction", defaults::VIEW_FROM, Range::FINITE));
+        let margin = table.f64_or("margin", defaults::MARGIN, Range::between(-5.0, 0.45));
         let flat = table.one_of_or("projection", false, &[("perspective", false), ("orthographic", true)]);
         let projection = if flat { Projection::Orthographic(1.0) } else { fov(&table) };
-        let motion = Motion::read(&table, context, None, projection);
-        match default_camera(direction, up, projection) {
-            Some(camera) => {
-                let lens = lens(&table, context, projection, Focus::Cloth);
-                Some(CameraPlan { camera, frame: Some(margin), lens, aim: None, up, motion })
-            }
-            None => {
-                table.error("`direction` and `up` of the camera must not be parallel or zero", None);
-                None
-            }
+        let motion = motion::read(&table, context, None, projection);
+        let setup = CameraSetup::framing(direction, up, projection);
+        if setup.is_none() {
+            table.error("`direction` and `up` of the camera must not be parallel or zero", None);
         }
+        setup.map(|setup| {
+            let lens = lens(&table, context, projection, Focus::Cloth);
+            CameraSetup { margin: Some(margin), lens, motion, ..setup }
+        })
     } else {
         let position = table.required_vec3("position", Range::FINITE);
         let target = table.vec3_or("target", [0.0; 3], Range::FINITE);
@@ -115,16 +71,17 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
             Projection::Orthographic(table.required_f64("size", Range::POSITIVE).unwrap_or(1.0) * context.unit)
         };
         let aim = position.map(|p| Aim { position: context.position(p), target: context.position(target), up });
-        let motion = Motion::read(&table, context, aim.as_ref().filter(|_| !frame), projection);
+        let motion = motion::read(&table, context, aim.as_ref().filter(|_| !frame), projection);
         aim.and_then(|aim| {
-            let made = Camera::looking_at(aim.position, aim.target, up, projection);
-            if made.is_none() {
+            let setup = CameraSetup::aimed(aim, projection);
+            if setup.is_none() {
                 table.error_at("position", "`position` and `target` must differ, and not along `up`", None);
             }
             let focus = if frame { Focus::Cloth } else { Focus::Point(aim.target) };
             let lens = lens(&table, context, projection, focus);
-            let margin = frame.then_some(DEFAULT_MARGIN);
-            made.map(|camera| CameraPlan { camera, frame: margin, lens, aim: (!frame).then_some(aim), up, motion })
+            let setup = CameraSetup { lens, motion, ..setup? };
+            // `--frame` keeps the directions only.
+            Some(if frame { CameraSetup { margin: Some(defaults::MARGIN), aim: None, ..setup } } else { setup })
         })
     };
     table.finish();
@@ -132,11 +89,11 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
 }
 
 /// The lens, if the camera has `aperture` or `f_number`; `otherwise` is sharp if the camera does not say.
-fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, otherwise: Focus) -> Option<LensPlan> {
+fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, otherwise: Focus) -> Option<LensSetup> {
     let aperture = table.f64("aperture", Range::at_least(0.0)).map(|a| a * context.unit);
     let f_number = table.f64("f_number", Range::above(0.0));
     // A size in the world of cameras, whatever the scene's unit.
-    let sensor = table.f64_or("sensor_height", DEFAULT_SENSOR, Range::POSITIVE);
+    let sensor = table.f64_or("sensor_height", defaults::SENSOR_HEIGHT, Range::POSITIVE);
     let distance = table.f64("focus_distance", Range::POSITIVE).map(|d| d * context.unit);
     let point = table.vec3("focus", Range::FINITE).map(|p| context.position(p));
     if aperture.is_some() && f_number.is_some() {
@@ -161,66 +118,7 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
         }
     };
     let focus = distance.map(Focus::Distance).or(point.map(Focus::Point)).unwrap_or(otherwise);
-    (diameter > 0.0).then_some(LensPlan { radius: 0.5 * diameter, focus })
-}
-
-impl CameraPlan {
-    /// When the shutter opens and closes, in frames from the frame's own time.
-    pub(super) fn shutter(&self) -> Option<[f64; 2]> {
-        self.motion.shutter
-    }
-
-    /// The camera at a frame for cloth that lies about `middle`, and its path while the shutter is open, if it moves.
-    /// Without any cloth it frames `objects`.
-    pub(super) fn make(
-        self,
-        fabrics: &[Fabric],
-        objects: &[Object],
-        middle: DVec3,
-        aspect: f64,
-        frame: f64,
-    ) -> (Camera, Vec<Camera>) {
-        let frame_all = |margin, points: &mut dyn Iterator<Item = (&DVec3, f64)>| -> Camera {
-            let points: Vec<(DVec3, f64)> = points.map(|(p, r)| (*p, r)).collect();
-            let points = points.iter().map(|(p, r)| (p, *r));
-            if !self.motion.turns() {
-                return self.camera.framing(points, aspect, margin);
-            }
-            // From every side, so that the camera keeps its distance.
-            let outline = motion::revolved(points, self.up);
-            self.camera.framing(outline.iter().map(|p| (p, 0.0)), aspect, margin)
-        };
-        let still = match self.frame {
-            None => Camera { position: self.camera.position - middle, ..self.camera },
-            Some(margin) if fabrics.is_empty() => {
-                frame_all(margin, &mut objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0)))
-            }
-            Some(margin) => {
-                let curves = fabrics.iter().flat_map(|f| &f.curves);
-                frame_all(margin, &mut curves.flat_map(|(c, radii)| c.points.iter().zip(radii.iter().copied())))
-            }
-        };
-        let (mut camera, mut path) = self.motion.poses(&still, self.aim.as_ref(), middle, self.up, frame);
-        if let Some(lens) = &self.lens {
-            for camera in std::iter::once(&mut camera).chain(&mut path) {
-                camera.lens = Some(lens.of(camera, middle));
-            }
-        }
-        (camera, path)
-    }
-}
-
-impl LensPlan {
-    fn of(&self, camera: &Camera, middle: DVec3) -> Lens {
-        let along_view = |point: DVec3| (camera.position - point).dot(camera.back);
-        let focus = match self.focus {
-            Focus::Cloth => along_view(DVec3::ZERO),
-            Focus::Distance(distance) => distance,
-            Focus::Point(point) => along_view(point - middle),
-        };
-        // What lies behind the camera can not be sharp.
-        Lens { radius: self.radius, focus: focus.max(1e-6) }
-    }
+    (diameter > 0.0).then_some(LensSetup { radius: 0.5 * diameter, focus })
 }
 
 /// A light whose image is not read yet.
@@ -240,10 +138,11 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
         [("environment", 0), ("distant", 1), ("point", 2), ("spot", 3), ("rectangle", 4), ("disk", 5), ("sphere", 6)];
     let kind = table.required_one_of("type", &kinds);
     // Radiant intensity is per square of the scene's unit.
-    let intensity = || table.rgb_or("intensity", [1.0; 3], bright).map(|i| i * context.unit * context.unit);
+    let intensity =
+        || table.rgb_or("intensity", [defaults::RADIANCE; 3], bright).map(|i| i * context.unit * context.unit);
     let plan = match kind {
         Some(0) => {
-            let radiance = Rgb::from(table.rgb_or("radiance", [1.0; 3], bright));
+            let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], bright));
             let environment = Environment { radiance, image: None, visible: table.bool_or("visible", true) };
             let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE)) as f32;
             match table.string("image") {
@@ -258,7 +157,7 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
         Some(1) => {
             let towards = table.required_vec3("towards", Range::FINITE);
             let angle = radians(table.f64_or("angular_radius", 0.0, Range::between(0.0, 90.0)));
-            let irradiance = Rgb::from(table.rgb_or("irradiance", [std::f64::consts::PI; 3], bright));
+            let irradiance = Rgb::from(table.rgb_or("irradiance", [defaults::IRRADIANCE; 3], bright));
             towards.and_then(|t| {
                 let unit = DVec3::from(t).try_normalize();
                 if unit.is_none() {
@@ -283,8 +182,8 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
         Some(3) => {
             let aim = aim(&table, context);
             let intensity = Rgb::from(intensity());
-            let angle = table.f64_or("angle", 30.0, Range::above(0.0).and_at_most(180.0));
-            let edge = table.f64_or("edge", 0.2 * angle, Range::at_least(0.0));
+            let angle = table.f64_or("angle", defaults::SPOT_ANGLE, Range::above(0.0).and_at_most(180.0));
+            let edge = table.f64_or("edge", defaults::SPOT_EDGE * angle, Range::at_least(0.0));
             if edge > angle {
                 table.error_at("edge", format!("`edge` must be at most `angle`, {angle}"), None);
             }
@@ -295,7 +194,7 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
             })
         }
         Some(kind @ 4..=6) => {
-            let radiance = Rgb::from(table.rgb_or("radiance", [1.0; 3], bright));
+            let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], bright));
             let visible = table.bool_or("visible", true);
             let two_sided = kind != 6 && table.bool_or("two_sided", false);
             let shape = match kind {
@@ -336,7 +235,7 @@ fn aim(table: &Reader<'_>, context: &Context<'_>) -> Option<(Vec3A, Vec3A)> {
 /// A rectangle about `position` that faces `target`, its height along `up` as far as that is possible.
 fn rectangle(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
     let aim = aim(table, context);
-    let up = Vec3A::from(table.vec3_or("up", [0.0, 1.0, 0.0], Range::FINITE).map(|v| v as f32));
+    let up = Vec3A::from(table.vec3_or("up", defaults::UP, Range::FINITE).map(|v| v as f32));
     if !table.has("size") {
         table.error("missing key `size` in the light: width and height", Some("size = [40, 20]"));
     }
@@ -375,8 +274,23 @@ impl LightPlan {
 /// A floor before the cloth is known.
 pub(super) struct GroundPlan {
     /// In scene units; `None` for right below the cloth.
-    pub(super) height: Option<f64>,
-    pub(super) material: MaterialPlan,
+    height: Option<f64>,
+    material: MaterialPlan,
+}
+
+impl GroundPlan {
+    /// Reads what its material names.
+    pub(super) fn make(
+        self,
+        context: &Context<'_>,
+        materials: &mut Vec<(MaterialPlan, Material)>,
+    ) -> Option<GroundSetup> {
+        if let Some(span) = self.material.texture_span() {
+            context.error(span, "the ground has no texture coordinates: give this material to a plane", None);
+        }
+        let material = self.material.make(context, materials)?;
+        Some(GroundSetup { height: self.height.map(|h| h * context.unit), material })
+    }
 }
 
 /// Reads `[ground]`.

@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
-use super::{super::Yarn, Context, Range, Reader, TWIST, radians};
+use super::{
+    super::{Yarn, defaults},
+    Context, Range, Reader, TWIST, radians,
+};
 use crate::{
     geometry::{
         fiber::{
@@ -47,9 +50,9 @@ fn fiber(table: Reader<'_>) -> Option<FiberMaterial> {
     // Half a turn and more is as wide as anything can be; zero would be a mirror no light finds.
     let width = Range::above(0.0).and_at_most(360.0);
     let [r, tt, d] = ["r", "tt", "d"].map(|key| table.rgb_or(key, [0.0; 3], Range::UNIT));
-    let beta_r = table.f64_or("beta_r", 10.0, width);
-    let beta_tt = table.f64_or("beta_tt", 10.0, width);
-    let beta_n = table.f64_or("beta_n", 20.0, width);
+    let beta_r = table.f64_or("beta_r", defaults::BETA_R, width);
+    let beta_tt = table.f64_or("beta_tt", defaults::BETA_TT, width);
+    let beta_n = table.f64_or("beta_n", defaults::BETA_N, width);
     for c in 0..3 {
         let sum = r[c] + tt[c] + d[c];
         if sum > 1.0 + 1e-9 {
@@ -97,7 +100,11 @@ impl PlyKeys {
         let own = fiber_radius.is_some() || density.is_some();
         Self {
             radius: table.f64("ply_radius", Range::POSITIVE).or(behind.and_then(|b| b.radius)),
-            aspect: table.f64_or("ply_aspect", behind.map_or(1.0, |b| b.aspect), Range::above(0.0).and_at_most(1.0)),
+            aspect: table.f64_or(
+                "ply_aspect",
+                behind.map_or(defaults::PLY_ASPECT, |b| b.aspect),
+                Range::above(0.0).and_at_most(1.0),
+            ),
             fiber: table.string("fiber").map(str::to_owned).or_else(|| behind.and_then(|b| b.fiber.clone())),
             fibers: table.u64("fibers", 0..=1_000_000).or(behind.and_then(|b| b.fibers)),
             fiber_radius: fiber_radius.or(if own { None } else { behind.and_then(|b| b.fiber_radius) }),

@@ -1,0 +1,394 @@
+//! A scene described by values: what programs make without text, and what scene files are read into.
+
+use std::{collections::HashSet, f64::consts::TAU, fmt};
+
+use glam::{DAffine3, DVec3};
+
+use super::{
+    CurveKind, Fabric, FabricMotion, Ground, Layers, Material, Mode, Object, RenderSettings, Scene, Storage, Yarn,
+    bounds, defaults, identity, view::CameraSetup,
+};
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        fiber::{Placement, packing},
+        yarn::{PlyParameters, touching_plies},
+    },
+    image::png::Display,
+    light::Light,
+    math::sampler::Stream,
+    scattering::fiber::FiberMaterial,
+};
+
+/// What a scene is made of, in its own place: millimetres, radians, +y up.
+///
+/// Everything has a default but the cloth ([`defaults`]). [`Self::build`] checks what belongs together, moves the middle
+/// of the cloth to the origin, places camera and ground, and drops yarns that no fabric uses.
+#[derive(Clone, Debug, Default)]
+pub struct SceneBuilder {
+    /// What messages call the scene: its file, if it has one.
+    pub name: String,
+    /// Settings of the render.
+    pub render: RenderSettings,
+    /// Which pictures are made, and how they are stored.
+    pub output: OutputSettings,
+    /// The camera.
+    pub camera: CameraSetup,
+    /// Kinds of yarn that fabrics may use.
+    pub yarns: Vec<Yarn>,
+    /// Fibres that fabrics may use by themselves: name and material.
+    pub fibers: Vec<(String, FiberMaterial)>,
+    /// The cloth.
+    pub fabrics: Vec<Fabric>,
+    /// Meshes beside it.
+    pub objects: Vec<Object>,
+    /// Materials of ground and meshes.
+    pub materials: Vec<Material>,
+    /// The lights.
+    pub lights: Vec<Light>,
+    /// The floor, if there is one.
+    pub ground: Option<GroundSetup>,
+    /// What the user should know already.
+    pub warnings: Vec<String>,
+}
+
+/// Which pictures are made of a film, and how they are stored.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OutputSettings {
+    /// How pictures for a screen are made.
+    pub display: Display,
+    /// Layers of an EXR.
+    pub layers: Layers,
+    /// How an EXR is stored.
+    pub storage: Storage,
+    /// Whether a denoised picture is made as well.
+    pub denoise: bool,
+}
+
+/// A floor before it is known where the cloth lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundSetup {
+    /// Its y, millimetres; `None` for right below all cloth and meshes.
+    pub height: Option<f64>,
+    /// Index into the materials.
+    pub material: usize,
+}
+
+/// Why described parts do not make a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneError(String);
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for SceneError {}
+
+impl SceneBuilder {
+    /// A scene without anything in it.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), ..Self::default() }
+    }
+
+    /// Sets the size of the picture, pixels, and renders all of it.
+    pub fn size(&mut self, width: u32, height: u32) {
+        (self.render.width, self.render.height) = (width, height);
+        self.render.crop = [0, 0, width, height];
+    }
+
+    /// Adds a kind of yarn and gives what fabrics of it are made of.
+    pub fn add_yarn(&mut self, yarn: Yarn) -> CurveKind {
+        self.yarns.push(yarn);
+        CurveKind::Yarn(self.yarns.len() - 1)
+    }
+
+    /// Adds a material and gives its index, for meshes and the ground.
+    pub fn add_material(&mut self, material: Material) -> usize {
+        self.materials.push(material);
+        self.materials.len() - 1
+    }
+
+    /// Makes the scene.
+    ///
+    /// # Errors
+    /// If an index points at nothing, curves lack points or radii, a number is not finite, or the picture has no pixels.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        self.check()?;
+        let Self { name, render, output, camera, yarns, fibers, mut fabrics, mut objects, materials, .. } = self;
+        let (mut lights, ground, warnings) = (self.lights, self.ground, self.warnings);
+        tell_names_apart(&mut fabrics);
+
+        // Single precision is kept for what is near: the middle of the cloth becomes the origin.
+        let middle = bounds(&fabrics).or(bounds_of_objects(&objects));
+        let middle = middle.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+        for fabric in &mut fabrics {
+            fabric.transform(&DAffine3::from_translation(-middle));
+        }
+        for object in &mut objects {
+            object.mesh.transform(&DAffine3::from_translation(-middle));
+        }
+        for light in &mut lights {
+            light.translate(-middle);
+        }
+        let aspect = f64::from(render.width) / f64::from(render.height);
+        let frame = f64::from(render.frame.unwrap_or(defaults::FRAME));
+        let (camera, camera_path) = camera.place(&fabrics, &objects, middle, aspect, frame);
+        let ground = ground.map(|ground| {
+            let lowest = [bounds(&fabrics), bounds_of_objects(&objects)].into_iter().flatten().map(|(low, _)| low.y);
+            let lowest = lowest.reduce(f64::min).unwrap_or(0.0);
+            let height = ground.height.map_or(lowest, |h| h - middle.y);
+            Ground { height: height as f32, material: ground.material }
+        });
+        let OutputSettings { display, layers, storage, denoise } = output;
+        let mut scene = Scene {
+            path: name,
+            render,
+            display,
+            layers,
+            storage,
+            denoise,
+            camera,
+            camera_path,
+            yarns,
+            fibers,
+            fabrics,
+            objects,
+            materials,
+            lights,
+            ground,
+            middle,
+            identity: Vec::new(),
+            fingerprint: String::new(),
+            warnings,
+        };
+        keep_used(&mut scene);
+        remove_lobes(&mut scene);
+        warn_about_precision(&mut scene);
+        warn_about_density(&mut scene);
+        warn_about_standing_hairs(&mut scene);
+        scene.identity = identity::identity(&scene);
+        scene.fingerprint = identity::fingerprint(&scene.identity);
+        Ok(scene)
+    }
+
+    /// What must hold of values that no reader has checked.
+    fn check(&self) -> Result<(), SceneError> {
+        let fail = |what: String| Err(SceneError(what));
+        let RenderSettings { width, height, crop: [x0, y0, x1, y1], spp, .. } = self.render;
+        if x0 >= x1 || y0 >= y1 || x1 > width || y1 > height || spp == 0 {
+            return fail(format!(
+                "expected at least one pixel and one sample: the crop is {:?} of {width} x {height} at {spp} spp",
+                self.render.crop
+            ));
+        }
+        for yarn in &self.yarns {
+            if yarn.plies.is_empty() || yarn.plies.len() != yarn.fibers.len() {
+                return fail(format!("yarn `{}`: expected plies, and as many fibres", yarn.name));
+            }
+        }
+        for fabric in &self.fabrics {
+            let known = match fabric.kind {
+                CurveKind::Yarn(yarn) => yarn < self.yarns.len(),
+                CurveKind::Fiber(fiber) => fiber < self.fibers.len(),
+            };
+            if !known {
+                return fail(format!("fabric `{}`: the scene has no {:?}", fabric.name, fabric.kind));
+            }
+            for (curve, radii) in &fabric.curves {
+                let finite = curve.points.iter().all(|p| p.is_finite()) && radii.iter().all(|r| r.is_finite());
+                if curve.points.len() < 2 || radii.len() != curve.points.len() || !finite {
+                    return fail(format!(
+                        "fabric `{}`: expected curves of two finite points or more and as many radii, found {} and {}",
+                        fabric.name,
+                        curve.points.len(),
+                        radii.len()
+                    ));
+                }
+            }
+        }
+        let of_objects = self.objects.iter().map(|o| o.material);
+        if let Some(none) = of_objects.chain(self.ground.map(|g| g.material)).find(|&m| m >= self.materials.len()) {
+            return fail(format!("the scene has no material {none}, only {}", self.materials.len()));
+        }
+        Ok(())
+    }
+}
+
+/// A fibre that returns no light, of the default widths.
+impl Default for FiberMaterial {
+    fn default() -> Self {
+        let [beta_r, beta_tt, beta_n] = [defaults::BETA_R, defaults::BETA_TT, defaults::BETA_N].map(f64::to_radians);
+        Self { r: [0.0; 3], tt: [0.0; 3], d: [0.0; 3], beta_r, beta_tt, beta_n }
+    }
+}
+
+impl Fabric {
+    /// Yarns or fibres of even radius (millimetres) along curves, without motion and of one colour. Plies start at
+    /// phases that are random in `seed`.
+    pub fn new(name: impl Into<String>, kind: CurveKind, curves: Vec<Curve>, radius: f64, seed: u32) -> Self {
+        let mut stream = Stream::new(seed);
+        Self {
+            name: name.into(),
+            origin: "a program".to_owned(),
+            kind,
+            motion: FabricMotion::default(),
+            variants: Vec::new(),
+            material_indices: Vec::new(),
+            phases: curves.iter().map(|_| TAU * f64::from(stream.next())).collect(),
+            seed,
+            basis: match curves.first().map(|curve| curve.basis) {
+                Some(Basis::BSpline) => Basis::BSpline,
+                _ => Basis::CatmullRom,
+            },
+            tolerance: defaults::CURVE_TOLERANCE,
+            longest_segment: defaults::LONGEST_SEGMENT,
+            curves: curves
+                .into_iter()
+                .map(|curve| {
+                    let radii = vec![radius; curve.points.len()];
+                    (curve, radii)
+                })
+                .collect(),
+        }
+    }
+}
+
+impl Yarn {
+    /// A yarn of `plies` equal round plies that touch each other, each of `fibers` fibres which fill the share `density`
+    /// of it. `radius` in millimetres; twists, in radians, are those of the plies about the yarn and of the outermost
+    /// fibres about the ply.
+    ///
+    /// # Errors
+    /// If there are no plies or fibres, or a number is beyond its range.
+    #[allow(clippy::too_many_arguments, reason = "what describes a yarn of equal plies, each by its name")]
+    pub fn of_equal_plies(
+        name: impl Into<String>,
+        radius: f64,
+        plies: u32,
+        fibers: u32,
+        density: f64,
+        twists: [f64; 2],
+        fiber: (String, FiberMaterial),
+    ) -> Result<Self, SceneError> {
+        let name = name.into();
+        let fail = |what: &str| Err(SceneError(format!("yarn `{name}`: {what}")));
+        if !(1..=crate::geometry::yarn::MAX_PLIES as u32).contains(&plies) {
+            return fail("expected 1 to 64 plies");
+        }
+        if fibers == 0 || !(density > 0.0 && density.is_finite()) || !(radius > 0.0 && radius.is_finite()) {
+            return fail("expected fibres, and a radius and a density above 0");
+        }
+        let (ply_radius, distance) = touching_plies(plies);
+        let fiber_radius = ply_radius * (density / f64::from(fibers)).sqrt();
+        if fiber_radius >= ply_radius {
+            return fail("its fibres do not fit its plies: a lower density, or more fibres");
+        }
+        let ply = |k: u32| PlyParameters {
+            radius: ply_radius,
+            aspect: defaults::PLY_ASPECT,
+            distance,
+            angle: TAU * f64::from(k) / f64::from(plies),
+            fibers,
+            fiber_radius,
+            fiber_twist: twists[1],
+        };
+        Ok(Self {
+            plies: (0..plies).map(ply).collect(),
+            ply_twist: twists[0],
+            fibers: vec![fiber; plies as usize],
+            placement: Placement::Regular,
+            flyaways: None,
+            tilted: defaults::TILTED,
+            name,
+            radius,
+        })
+    }
+}
+
+fn bounds_of_objects(objects: &[Object]) -> Option<(DVec3, DVec3)> {
+    objects.iter().filter_map(|o| o.mesh.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Numbers the fabrics whose name another one before them has.
+fn tell_names_apart(fabrics: &mut [Fabric]) {
+    let mut taken: HashSet<String> = HashSet::new();
+    for fabric in fabrics {
+        let given = fabric.name.clone();
+        let mut number = 1;
+        while !taken.insert(fabric.name.clone()) {
+            number += 1;
+            fabric.name = format!("{given}_{number}");
+        }
+    }
+}
+
+/// Leaves out the lobes of single fibres that the settings name.
+fn remove_lobes(scene: &mut Scene) {
+    for lobe in &scene.render.without {
+        let of_yarns = scene.yarns.iter_mut().flat_map(|y| &mut y.fibers);
+        for (_, fiber) in of_yarns.chain(&mut scene.fibers) {
+            lobe.remove_from(fiber);
+        }
+    }
+}
+
+/// Drops kinds of yarn and fibre that no fabric uses: libraries hold many.
+fn keep_used(scene: &mut Scene) {
+    let (mut yarns, mut fibers) = (Vec::new(), Vec::new());
+    let place_in = |kept: &mut Vec<usize>, index: usize| {
+        kept.iter().position(|&k| k == index).unwrap_or_else(|| {
+            kept.push(index);
+            kept.len() - 1
+        })
+    };
+    for fabric in &mut scene.fabrics {
+        fabric.kind = match fabric.kind {
+            CurveKind::Yarn(yarn) => CurveKind::Yarn(place_in(&mut yarns, yarn)),
+            CurveKind::Fiber(fiber) => CurveKind::Fiber(place_in(&mut fibers, fiber)),
+        };
+    }
+    scene.yarns = yarns.into_iter().map(|y| scene.yarns[y].clone()).collect();
+    scene.fibers = fibers.into_iter().map(|f| scene.fibers[f].clone()).collect();
+}
+
+/// Explicit fibres that do not fit their ply overlap.
+fn warn_about_density(scene: &mut Scene) {
+    if scene.render.mode != Mode::Fiber {
+        return;
+    }
+    for yarn in &scene.yarns {
+        let fullest = yarn.plies.iter().map(|p| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2));
+        let fullest = fullest.fold(0.0, f64::max);
+        if fullest > packing::DENSEST {
+            scene.warnings.push(format!(
+                "yarn `{}`: fibres would fill {:.0} % of a ply; above {:.0} % they overlap",
+                yarn.name,
+                100.0 * fullest,
+                100.0 * packing::DENSEST
+            ));
+        }
+    }
+}
+
+/// Fly-aways are made where yarns are when the shutter opens, and stay there.
+fn warn_about_standing_hairs(scene: &mut Scene) {
+    let hairy = |thread| matches!(thread, CurveKind::Yarn(yarn) if scene.yarns[yarn].flyaways.is_some());
+    let still = scene.fabrics.iter().filter(|f| !f.motion.later.is_empty() && hairy(f.kind));
+    let warnings = still.map(|f| format!("the fly-aways of `{}` stand still while the shutter is open", f.name));
+    scene.warnings.extend(warnings.collect::<Vec<_>>());
+}
+
+/// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.
+fn warn_about_precision(scene: &mut Scene) {
+    let Some((low, high)) = scene.bounds() else { return };
+    let thinnest = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(_, r)| r).copied().fold(f64::MAX, f64::min);
+    let ratio = 0.5 * (high - low).length() / thinnest;
+    if ratio > 1e5 {
+        scene.warnings.push(format!(
+            "the scene is {ratio:.1e} times as wide as its thinnest yarn: positions of hits are uncertain by more than \
+             0.2 % of that yarn's radius"
+        ));
+    }
+}

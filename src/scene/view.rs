@@ -1,0 +1,124 @@
+//! A camera as it is asked for, before it is known where the cloth lies.
+
+use glam::DVec3;
+
+use super::{
+    Fabric, Object,
+    camera::{Camera, Lens, Projection},
+    defaults,
+    motion::{self, Aim, CameraMotion},
+};
+
+/// A camera in the scene's own place, and how it finds the cloth. By default it frames the cloth from +z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraSetup {
+    /// Its directions and projection, and where it stands if it does not frame the cloth.
+    pub camera: Camera,
+    /// The share of the picture left free on each side, if the camera moves to where it sees all of the cloth.
+    pub margin: Option<f64>,
+    /// The lens; `None` for a pinhole.
+    pub lens: Option<LensSetup>,
+    /// What it looks at, if it is told: keys of `motion` move these places.
+    pub aim: Option<Aim>,
+    /// Which way is up: the axis of a turntable.
+    pub up: DVec3,
+    /// How it moves.
+    pub motion: CameraMotion,
+}
+
+/// A lens before it is known where the cloth is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensSetup {
+    /// Radius of the opening, millimetres.
+    pub radius: f64,
+    /// What is sharp.
+    pub focus: Focus,
+}
+
+/// What is sharp, in the scene's own place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Focus {
+    /// The middle of the cloth.
+    Cloth,
+    /// What is so far away along the view, millimetres.
+    Distance(f64),
+    /// The plane through a point, millimetres.
+    Point(DVec3),
+}
+
+impl Default for CameraSetup {
+    fn default() -> Self {
+        let projection = Projection::Perspective(defaults::FIELD_OF_VIEW.to_radians());
+        Self::framing(DVec3::from(defaults::VIEW_FROM), DVec3::from(defaults::UP), projection)
+            .expect("the default view is not along the default up")
+    }
+}
+
+impl CameraSetup {
+    /// One that sees all of the cloth from a direction; `None` if that is zero or along `up`. The height of an
+    /// orthographic view does not matter.
+    pub fn framing(direction: DVec3, up: DVec3, projection: Projection) -> Option<Self> {
+        let camera = Camera::looking_at(direction, DVec3::ZERO, up, projection)?;
+        let margin = Some(defaults::MARGIN);
+        Some(Self { camera, margin, lens: None, aim: None, up, motion: CameraMotion::default() })
+    }
+
+    /// One that stands and looks where it is told; `None` if these places fall together or the view is along `up`.
+    pub fn aimed(aim: Aim, projection: Projection) -> Option<Self> {
+        let camera = Camera::looking_at(aim.position, aim.target, aim.up, projection)?;
+        let motion = CameraMotion::default();
+        Some(Self { camera, margin: None, lens: None, aim: Some(aim), up: aim.up, motion })
+    }
+
+    /// The camera at a frame for cloth that lies about `middle`, and its path while the shutter is open, if it moves.
+    /// Without any cloth it frames `objects`.
+    pub(super) fn place(
+        &self,
+        fabrics: &[Fabric],
+        objects: &[Object],
+        middle: DVec3,
+        aspect: f64,
+        frame: f64,
+    ) -> (Camera, Vec<Camera>) {
+        let frame_all = |margin, points: &mut dyn Iterator<Item = (&DVec3, f64)>| -> Camera {
+            let points: Vec<(DVec3, f64)> = points.map(|(p, r)| (*p, r)).collect();
+            let points = points.iter().map(|(p, r)| (p, *r));
+            if !self.motion.turns() {
+                return self.camera.framing(points, aspect, margin);
+            }
+            // From every side, so that the camera keeps its distance.
+            let outline = motion::revolved(points, self.up);
+            self.camera.framing(outline.iter().map(|p| (p, 0.0)), aspect, margin)
+        };
+        let still = match self.margin {
+            None => Camera { position: self.camera.position - middle, ..self.camera },
+            Some(margin) if fabrics.is_empty() => {
+                frame_all(margin, &mut objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0)))
+            }
+            Some(margin) => {
+                let curves = fabrics.iter().flat_map(|f| &f.curves);
+                frame_all(margin, &mut curves.flat_map(|(c, radii)| c.points.iter().zip(radii.iter().copied())))
+            }
+        };
+        let (mut camera, mut path) = self.motion.poses(&still, self.aim.as_ref(), middle, self.up, frame);
+        if let Some(lens) = &self.lens {
+            for camera in std::iter::once(&mut camera).chain(&mut path) {
+                camera.lens = Some(lens.of(camera, middle));
+            }
+        }
+        (camera, path)
+    }
+}
+
+impl LensSetup {
+    fn of(&self, camera: &Camera, middle: DVec3) -> Lens {
+        let along_view = |point: DVec3| (camera.position - point).dot(camera.back);
+        let focus = match self.focus {
+            Focus::Cloth => along_view(DVec3::ZERO),
+            Focus::Distance(distance) => distance,
+            Focus::Point(point) => along_view(point - middle),
+        };
+        // What lies behind the camera can not be sharp.
+        Lens { radius: self.radius, focus: focus.max(1e-6) }
+    }
+}

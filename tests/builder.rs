@@ -1,0 +1,91 @@
+//! Scenes that are built in code: the same as from text, and errors in place of panics.
+
+use glam::DVec3;
+use yarnray::{
+    geometry::pattern::straight,
+    light::{AreaLight, Environment, Light, Shape},
+    math::Rgb,
+    scattering::fiber::FiberMaterial,
+    scene::{
+        CurveKind, Fabric, SceneBuilder, Yarn,
+        builder::GroundSetup,
+        load::{LoadOptions, parse},
+    },
+};
+
+const TEXT: &str = r#"
+[fiber.wool]
+r = 0.05
+tt = [0.6, 0.1, 0.1]
+d = [0.2, 0.05, 0.05]
+[yarn.wool]
+radius = 0.25
+plies = 2
+fibers = 80
+density = 0.3
+fiber = "wool"
+ply_twist = 25
+fiber_twist = -15
+[[fabric]]
+name = "yarns"
+yarn = "wool"
+seed = 7
+source = { type = "straight", count = 3, length = 4, spacing = 0.6 }
+[[light]]
+type = "environment"
+[[light]]
+type = "sphere"
+position = [3, 5, 4]
+radius = 1
+radiance = 20
+visible = false
+"#;
+
+fn in_code() -> SceneBuilder {
+    let wool = FiberMaterial { r: [0.05; 3], tt: [0.6, 0.1, 0.1], d: [0.2, 0.05, 0.05], ..FiberMaterial::default() };
+    let twists = [25f64.to_radians(), -15f64.to_radians()];
+    let mut scene = SceneBuilder::new("a test");
+    let yarn = Yarn::of_equal_plies("wool", 0.25, 2, 80, 0.3, twists, ("wool".to_owned(), wool)).unwrap();
+    let kind = scene.add_yarn(yarn);
+    scene.fabrics.push(Fabric::new("yarns", kind, straight(3, 4.0, 0.6), 0.25, 7));
+    scene.lights.push(Light::Environment(Environment { radiance: Rgb::ONE, image: None, visible: true }));
+    let shape = Shape::Sphere { centre: DVec3::new(3.0, 5.0, 4.0).as_vec3a(), radius: 1.0 };
+    scene.lights.push(Light::Area(AreaLight { shape, radiance: Rgb::splat(20.0), two_sided: false, visible: false }));
+    scene
+}
+
+#[test]
+fn a_scene_in_code_is_that_of_the_text() {
+    let from_text = parse("a test", TEXT, &LoadOptions::default()).unwrap();
+    let built = in_code().build().unwrap();
+    assert_eq!(built.identity, from_text.identity);
+    assert_eq!(built.fingerprint, from_text.fingerprint);
+    assert_eq!((built.render.spp, built.camera), (from_text.render.spp, from_text.camera));
+}
+
+#[test]
+fn what_makes_no_scene_is_told() {
+    let error = |change: &dyn Fn(&mut SceneBuilder)| {
+        let mut scene = in_code();
+        change(&mut scene);
+        scene.build().unwrap_err().to_string()
+    };
+    assert!(error(&|s| s.fabrics[0].kind = CurveKind::Yarn(3)).contains("the scene has no Yarn(3)"));
+    assert!(error(&|s| s.fabrics[0].curves[1].1.truncate(2)).contains("as many radii, found 4 and 2"));
+    assert!(error(&|s| s.fabrics[0].curves[0].0.points[2].x = f64::NAN).contains("finite points"));
+    assert!(error(&|s| s.ground = Some(GroundSetup { height: None, material: 0 })).contains("no material 0"));
+    assert!(error(&|s| s.size(0, 48)).contains("at least one pixel"));
+    assert!(error(&|s| s.yarns[0].fibers.clear()).contains("yarn `wool`"));
+}
+
+#[test]
+fn yarns_have_plies_and_room_for_their_fibers() {
+    let yarn = |plies, fibers, density| {
+        let fiber = ("f".to_owned(), FiberMaterial::default());
+        Yarn::of_equal_plies("y", 1.0, plies, fibers, density, [0.0; 2], fiber).map_err(|e| e.to_string())
+    };
+    assert_eq!(yarn(3, 40, 0.4).unwrap().plies.len(), 3);
+    for (plies, fibers, density) in [(0, 40, 0.4), (65, 40, 0.4), (1, 0, 0.4), (1, 40, f64::NAN), (1, 4, 4.0)] {
+        assert!(yarn(plies, fibers, density).is_err(), "{plies} {fibers} {density}");
+    }
+}
