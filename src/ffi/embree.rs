@@ -220,46 +220,41 @@ impl SceneBuilder {
             CurveBasis::CatmullRom => sys::RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE,
             CurveBasis::BSpline => sys::RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE,
         };
-        let id = self.buffers.len() as u32;
-        let device = self.scene.device.handle;
-        // SAFETY: the buffers are kept in `self.buffers` until the scene is released, have the stated formats
-        // and lengths, and each Vec4 is 16-byte aligned and fully readable.
-        unsafe {
-            let geometry = sys::rtcNewGeometry(device, kind);
-            if points.len() > 1 {
-                sys::rtcSetGeometryTimeStepCount(geometry, points.len() as u32);
-            }
-            for (step, points) in points.iter().enumerate() {
+        let count = points.len() as u32;
+        let length = segments.len();
+        let first_of_each = segments.as_ptr();
+        let steps: Vec<(*const Vec4, usize)> = points.iter().map(|p| (p.as_ptr(), p.len())).collect();
+        self.attach(kind, "adding curves", Box::new((points, segments)), |geometry| {
+            // SAFETY: `attach` keeps the buffers until the scene is released; they have the stated formats and lengths,
+            // and each Vec4 is 16-byte aligned and fully readable.
+            unsafe {
+                if count > 1 {
+                    sys::rtcSetGeometryTimeStepCount(geometry, count);
+                }
+                for (step, (data, length)) in steps.into_iter().enumerate() {
+                    sys::rtcSetSharedGeometryBuffer(
+                        geometry,
+                        sys::RTC_BUFFER_TYPE_VERTEX,
+                        step as u32,
+                        sys::RTC_FORMAT_FLOAT4,
+                        data.cast(),
+                        0,
+                        size_of::<Vec4>(),
+                        length,
+                    );
+                }
                 sys::rtcSetSharedGeometryBuffer(
                     geometry,
-                    sys::RTC_BUFFER_TYPE_VERTEX,
-                    step as u32,
-                    sys::RTC_FORMAT_FLOAT4,
-                    points.as_ptr().cast(),
+                    sys::RTC_BUFFER_TYPE_INDEX,
                     0,
-                    size_of::<Vec4>(),
-                    points.len(),
+                    sys::RTC_FORMAT_UINT,
+                    first_of_each.cast(),
+                    0,
+                    size_of::<u32>(),
+                    length,
                 );
             }
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTC_BUFFER_TYPE_INDEX,
-                0,
-                sys::RTC_FORMAT_UINT,
-                segments.as_ptr().cast(),
-                0,
-                size_of::<u32>(),
-                segments.len(),
-            );
-            sys::rtcCommitGeometry(geometry);
-            sys::rtcAttachGeometryByID(self.scene.raw, geometry, id);
-            sys::rtcReleaseGeometry(geometry);
-        }
-        if let Some(error) = last_error(device, "adding curves") {
-            return Err(error);
-        }
-        self.buffers.push(Box::new((points, segments)));
-        Ok(id)
+        })
     }
 
     /// Adds triangles, each of three indices of points, and returns their geometry id as [`Self::add_round_curves`]
@@ -272,40 +267,68 @@ impl SceneBuilder {
             triangles.iter().flatten().all(|&i| (i as usize) < points.len()),
             "a triangle names a point that is not there"
         );
+        let (corners, corner_count) = (points.as_ptr(), points.len());
+        let (indices, index_count) = (triangles.as_ptr(), triangles.len());
+        let kept = Box::new((points, triangles));
+        self.attach(sys::RTC_GEOMETRY_TYPE_TRIANGLE, "adding triangles", kept, |geometry| {
+            // SAFETY: as for curves; a Vec3A is three floats in 16 bytes, all of which may be read.
+            unsafe {
+                sys::rtcSetSharedGeometryBuffer(
+                    geometry,
+                    sys::RTC_BUFFER_TYPE_VERTEX,
+                    0,
+                    sys::RTC_FORMAT_FLOAT3,
+                    corners.cast(),
+                    0,
+                    size_of::<Vec3A>(),
+                    corner_count,
+                );
+                sys::rtcSetSharedGeometryBuffer(
+                    geometry,
+                    sys::RTC_BUFFER_TYPE_INDEX,
+                    0,
+                    sys::RTC_FORMAT_UINT3,
+                    indices.cast(),
+                    0,
+                    size_of::<[u32; 3]>(),
+                    index_count,
+                );
+            }
+        })
+    }
+
+    /// Makes a geometry that reads `buffers`, lets `set` describe it, and attaches it.
+    ///
+    /// The buffers are the scene's before Embree hears of them: whatever fails, it never holds memory that is freed. A
+    /// geometry that Embree refuses is not attached; its id stays empty and the scene can be used without it.
+    fn attach(
+        &mut self,
+        kind: sys::RTCGeometryType,
+        during: &'static str,
+        buffers: Buffers,
+        set: impl FnOnce(sys::RTCGeometry),
+    ) -> Result<u32, EmbreeError> {
         let id = self.buffers.len() as u32;
+        self.buffers.push(buffers);
         let device = self.scene.device.handle;
-        // SAFETY: as for curves; a Vec3A is three floats in 16 bytes, all of which may be read.
-        unsafe {
-            let geometry = sys::rtcNewGeometry(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE);
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTC_BUFFER_TYPE_VERTEX,
-                0,
-                sys::RTC_FORMAT_FLOAT3,
-                points.as_ptr().cast(),
-                0,
-                size_of::<Vec3A>(),
-                points.len(),
-            );
-            sys::rtcSetSharedGeometryBuffer(
-                geometry,
-                sys::RTC_BUFFER_TYPE_INDEX,
-                0,
-                sys::RTC_FORMAT_UINT3,
-                triangles.as_ptr().cast(),
-                0,
-                size_of::<[u32; 3]>(),
-                triangles.len(),
-            );
-            sys::rtcCommitGeometry(geometry);
-            sys::rtcAttachGeometryByID(self.scene.raw, geometry, id);
-            sys::rtcReleaseGeometry(geometry);
-        }
-        if let Some(error) = last_error(device, "adding triangles") {
-            return Err(error);
-        }
-        self.buffers.push(Box::new((points, triangles)));
-        Ok(id)
+        let failed = || last_error(device, during).map_or(Ok(()), Err);
+        // SAFETY: the device is valid; without an error the geometry is.
+        let geometry = unsafe { sys::rtcNewGeometry(device, kind) };
+        failed()?;
+        set(geometry);
+        let described = failed().and_then(|()| {
+            // SAFETY: the geometry is valid and its buffers live as long as the scene.
+            unsafe { sys::rtcCommitGeometry(geometry) };
+            failed()
+        });
+        let attached = described.and_then(|()| {
+            // SAFETY: as above; no other geometry has this id.
+            unsafe { sys::rtcAttachGeometryByID(self.scene.raw, geometry, id) };
+            failed()
+        });
+        // SAFETY: made above; the scene holds a reference of its own if it was attached.
+        unsafe { sys::rtcReleaseGeometry(geometry) };
+        attached.map(|()| id)
     }
 
     /// Builds the BVH. Afterwards the scene can be traced and no longer changed.
@@ -530,6 +553,24 @@ mod tests {
 
     fn endless(origin: Vec3A, direction: Vec3A) -> RawRay {
         RawRay { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0 }
+    }
+
+    /// Embree takes at most 129 times: what it refuses must be neither freed under it nor in the way of what follows.
+    #[test]
+    fn a_refused_geometry_keeps_its_buffers_and_harms_nothing() {
+        let device = Device::new(1).unwrap();
+        let points: Arc<[Vec4]> = (0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect();
+        let segments: Arc<[u32]> = (0..5).collect();
+        let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
+        let too_many = vec![Arc::clone(&points); 200];
+        let error = builder.add_round_curves(CurveBasis::CatmullRom, too_many, Arc::clone(&segments)).unwrap_err();
+        assert_eq!(error.during, "adding curves");
+        assert_eq!(Arc::strong_count(&points), 201, "the buffers are kept");
+        assert_eq!(builder.add_round_curves(CurveBasis::CatmullRom, vec![points], segments), Ok(1));
+        let scene = builder.commit().unwrap();
+        let mut filter = Counting { guard: 0, calls: 0, accept: true };
+        let hit = scene.intersect(&endless(Vec3A::new(3.2, 1.0, 0.0), Vec3A::NEG_Y), &mut filter).unwrap();
+        assert_eq!(hit.geometry, 1);
     }
 
     /// Counts hits behind a guard value, where a context that Embree thinks larger would be overwritten.
