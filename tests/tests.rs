@@ -3,6 +3,8 @@
 //! Data that lies beside the project is looked for under `YARNRAY_SHARED`, or `../shared`; what needs it says that it
 //! was skipped where it is absent.
 
+#![allow(clippy::print_stderr, reason = "tests say what they skip")]
+
 // Table 3's procedure from end to end, resumed, and with mistakes in suites.
 mod bench;
 // What the command line promises: help, info, statistics, outputs, stops, signals, metadata.
@@ -49,6 +51,8 @@ mod make;
 mod scenes;
 // Stiff and extreme cases, as the program reports them.
 mod stress;
+// Outputs that fail, clash or have nowhere to go.
+mod outputs;
 // A real Slurm of one machine: shards, a requeued one among them, make the frame of one machine.
 mod slurm;
 // Temporary directories, runs of the program, pictures: what the others share.

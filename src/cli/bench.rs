@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, signals::interrupt_flag, thread_pool, write_text};
+use super::{Failure, files::Files, log, signals::interrupt_flag, terminal::print, thread_pool, write_text};
 use crate::{
     experiment::{
         LOBES, converge,
@@ -12,7 +12,6 @@ use crate::{
         suite::{ConvergePlan, Suite},
         table3::{self, BenchError, Processes},
     },
-    image::output,
     report::{
         page::Picture,
         table3::{
@@ -65,21 +64,20 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     let stem = args.suite.file_stem().map_or("suite".into(), |stem| stem.to_string_lossy().into_owned());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
-    for name in ["table.md", "table.csv", "table.json", "report.html", "rows/x", "cache/x"] {
-        output::check_target(&out.join(name))?;
-    }
+    let names = ["table.md", "table.csv", "table.json", "report.html", "rows/x", "cache/x"];
+    Files::default().reads("SUITE", [&args.suite]).writes("-o", &names.map(|name| out.join(name))).check(args.quiet)?;
     let threads = args.threads.map(|threads| threads as usize);
     let interrupt = interrupt_flag();
     let say = |text: &str| {
         if !args.quiet {
-            eprintln!("{text}");
+            log::say(text);
         }
     };
     let mut processes = Processes { threads, scratch: &out, interrupt: &interrupt };
     let saved = |table: &Table| {
         write(&out, table, &[]).map_err(|failure| match failure {
             Failure::Input(message) | Failure::Check(message) => BenchError::Suite(message),
-            Failure::Interrupted => BenchError::Interrupted,
+            Failure::Interrupted | Failure::Closed => BenchError::Interrupted,
         })
     };
     let table = table3::run(&suite, &mut processes, &out, threads, say, saved)?;
@@ -93,9 +91,9 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     write(&out, &table, &plots)?;
     if !args.quiet {
-        eprintln!("wrote {}", out.join("report.html").display());
+        log::say(&format!("wrote {}", out.join("report.html").display()));
     }
-    print!("{}", table.to_markdown());
+    print(&table.to_markdown())?;
     let failed: Vec<String> = table
         .missing
         .iter()

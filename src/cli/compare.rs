@@ -4,7 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, write_text};
+use super::{
+    Failure,
+    files::{Attempts, Files},
+    terminal::print,
+    write_text,
+};
 use crate::{
     image::{
         self, Image,
@@ -75,8 +80,13 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
                 path.display()
             )));
         }
-        image::output::check_target(path)?;
     }
+    Files::default()
+        .reads("TEST", [&args.test])
+        .reads("REFERENCE", [&args.reference])
+        .reads("--mask", args.mask.iter().filter(|m| *m != Path::new("alpha")))
+        .writes("-o", &args.out)
+        .check(true)?;
     let names = [&args.test, &args.reference].map(|path| path.display().to_string());
     let [test, reference] = [image::read(&args.test)?, image::read(&args.reference)?];
     let mut pair = Pair::new(&test, &reference)
@@ -96,22 +106,25 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         ))
     })?;
     let names = names.each_ref().map(String::as_str);
+    let mut attempts = Attempts::default();
     for path in &args.out {
         if has_extension(path, "png") {
             let (values, most) = error_map(&pair, &args.map);
-            map::write(path, &values, pair.width, most)?;
+            attempts.note(map::write(path, &values, pair.width, most));
         } else {
             let picture = |colors: &[[f32; 3]]| Picture { width: pair.width, colors: colors.to_vec() };
             let flip = flip::ldr(&pair.test, &pair.reference, pair.width);
             let pictures = [&picture(&pair.test), &picture(&pair.reference)];
-            write_text(path, &to_html(&comparison, names, pictures, &Picture::of_map(&flip, pair.width, map::magma)))?;
+            let page = to_html(&comparison, names, pictures, &Picture::of_map(&flip, pair.width, map::magma));
+            attempts.note(write_text(path, &page));
         }
     }
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&to_json(&comparison)).expect("numbers and text become JSON"));
+        print(&(serde_json::to_string_pretty(&to_json(&comparison)).expect("numbers and text become JSON") + "\n"))?;
     } else {
-        print!("{}", to_text(&comparison, names));
+        print(&to_text(&comparison, names))?;
     }
+    attempts.finish()?;
     let worse: Vec<String> = args
         .threshold
         .iter()

@@ -4,13 +4,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, signals::interrupt_flag, thread_pool, write_text};
-use crate::{
-    experiment::{
-        converge::{self, Options},
-        method::Method,
-    },
-    image::output,
+use super::{
+    Failure, SceneArgs,
+    files::{Attempts, Files},
+    log,
+    signals::interrupt_flag,
+    terminal::print,
+    thread_pool, write_text,
+};
+use crate::experiment::{
+    converge::{self, Options},
+    method::Method,
 };
 
 const EXAMPLES: &str = "Examples:
@@ -76,9 +80,7 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         options.load(&args.scene).map_err(|error| error.to_string())
     };
     let plain = args.options.load(&args.scene)?;
-    for file in &files {
-        output::check_target(file)?;
-    }
+    Files::default().reads("SCENE", [&args.scene]).writes("-o", &files).check(args.quiet)?;
     let methods = if args.methods.is_empty() {
         let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };
         reference.into_iter().filter(|method| *method != yarn).chain([yarn]).collect()
@@ -99,14 +101,15 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     let interrupt = interrupt_flag();
     let say = |text: &str| {
         if !args.quiet {
-            eprintln!("{text}");
+            log::say(text);
         }
     };
     let result = pool.install(|| converge::run(load, &options, &cache, &interrupt, say))?;
+    let mut attempts = Attempts::default();
     let json = serde_json::to_string_pretty(&result.to_json()).expect("numbers and text become JSON") + "\n";
     for (file, text) in files.iter().zip([result.to_csv(), json, result.to_svg()]) {
-        write_text(file, &text)?;
+        attempts.note(write_text(file, &text));
     }
-    print!("{}", result.to_text());
-    Ok(())
+    print(&result.to_text())?;
+    attempts.finish()
 }

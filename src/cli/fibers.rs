@@ -4,7 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, make::write_curves};
+use super::{
+    Failure, SceneArgs,
+    files::{Attempts, Files},
+    log,
+    make::write_curves,
+    terminal::print,
+};
 use crate::{
     geometry::curve::CurveSet,
     geometry::curve_file,
@@ -31,7 +37,7 @@ pub(super) struct FibersArgs {
     #[arg(long)]
     estimate: bool,
     /// Say nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
     #[command(flatten)]
     options: SceneArgs,
@@ -45,13 +51,13 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     }
     if args.estimate {
         let total: Estimate = trace::estimates(&scene).into_iter().sum();
-        println!(
-            "{} control points, {} segments; {} of curves and {} of BVH when rendered",
+        print(&format!(
+            "{} control points, {} segments; {} of curves and {} of BVH when rendered\n",
             total.points,
             total.segments,
             super::bytes_in_words(total.geometry_bytes),
             super::bytes_in_words(total.bvh_bytes)
-        );
+        ))?;
     }
     for path in &args.out {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -63,17 +69,22 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     if args.out.is_empty() {
         return Ok(());
     }
+    Files::default()
+        .reads("SCENE", [&args.scene])
+        .reads("--curves", &args.options.curves)
+        .writes("-o", &args.out)
+        .check(args.quiet)?;
     let curves = trace::curves(&scene)?;
     let set = CurveSet { curves, unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
+    let mut attempts = Attempts::default();
     for path in &args.out {
-        write_curves(path, &set)?;
+        if attempts.note(write_curves(path, &set)) && !args.quiet {
+            log::say(&format!("wrote {}", path.display()));
+        }
     }
     if !args.quiet {
-        for path in &args.out {
-            eprintln!("wrote {}", path.display());
-        }
         let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        eprintln!("{} curves, {points} control points", set.curves.len());
+        log::say(&format!("{} curves, {points} control points", set.curves.len()));
     }
-    Ok(())
+    attempts.finish()
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words};
+use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, terminal::print};
 use crate::{
     geometry::{
         curve::{Basis, Curve, CurveSet},
@@ -53,11 +53,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         curves_report(&args.file, &set, args.radius)
     };
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&report).expect("numbers and text become JSON"));
+        print(&(serde_json::to_string_pretty(&report).expect("numbers and text become JSON") + "\n"))
     } else {
-        print!("{text}");
+        print(&text)
     }
-    Ok(())
 }
 
 /// What a checkpoint or part of a render holds.

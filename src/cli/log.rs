@@ -1,7 +1,7 @@
 //! What the program says while it works: `tracing` events as plain lines, or as lines of JSON for machines.
 //!
 //! A plain line is an event's message alone; its fields are for machines, which get all of it. Everything goes to
-//! standard error, past the progress bar where there is one.
+//! standard error, past the progress bar where there is one; what cannot be written there is dropped.
 
 use std::{
     fmt,
@@ -20,6 +20,8 @@ use tracing_subscriber::{
     fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter, format::Writer},
     registry::LookupSpan,
 };
+
+use super::terminal;
 
 /// Options of commands that take their time.
 #[derive(Args, Debug, Clone, Default)]
@@ -64,7 +66,16 @@ pub(super) fn error(message: &str) {
     if STARTED.load(Ordering::Relaxed) {
         tracing::error!("{message}");
     } else {
-        eprintln!("{message}");
+        terminal::say(message);
+    }
+}
+
+/// Says a line that is neither result nor error.
+pub(super) fn say(message: &str) {
+    if STARTED.load(Ordering::Relaxed) {
+        tracing::info!("{message}");
+    } else {
+        terminal::say(message);
     }
 }
 
@@ -117,12 +128,12 @@ impl Write for PastTheBar {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let bar = BAR.lock().unwrap_or_else(PoisonError::into_inner);
         match &*bar {
-            Some(bar) => bar.suspend(|| io::stderr().write_all(bytes))?,
-            None => io::stderr().write_all(bytes)?,
+            Some(bar) => bar.suspend(|| terminal::say_bytes(bytes)),
+            None => terminal::say_bytes(bytes),
         }
         Ok(bytes.len())
     }
     fn flush(&mut self) -> io::Result<()> {
-        io::stderr().flush()
+        Ok(())
     }
 }

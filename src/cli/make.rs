@@ -8,6 +8,8 @@ use glam::DVec2;
 use super::{
     Failure,
     fibers::{self, FibersArgs},
+    files::{Attempts, Files},
+    log,
 };
 use crate::{
     geometry::{
@@ -61,7 +63,7 @@ struct Output {
     #[arg(long, default_value_t = 0.5, value_name = "R", value_parser = positive)]
     radius: f64,
     /// Say nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
@@ -246,21 +248,22 @@ fn write(strands: Vec<PatternStrand>, output: &Output, weft_radius: f64) -> Resu
             return Err(Failure::Input(problem));
         }
     }
+    Files::default().writes("-o", &output.out).check(output.quiet)?;
+    let mut attempts = Attempts::default();
     for path in &output.out {
-        write_curves(path, &set)?;
+        if attempts.note(write_curves(path, &set)) && !output.quiet {
+            log::say(&format!("wrote {}", path.display()));
+        }
     }
     if !output.quiet {
         let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
         let lengths = overlap(set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?))));
-        for path in &output.out {
-            eprintln!("wrote {}", path.display());
-        }
-        eprintln!("{} yarns, {points} control points", set.curves.len());
+        log::say(&format!("{} yarns, {points} control points", set.curves.len()));
         if let Some(found) = lengths {
-            eprintln!("{}", super::overlap_in_words(&found));
+            log::say(&super::overlap_in_words(&found));
         }
     }
-    Ok(())
+    attempts.finish()
 }
 
 /// Writes curves to a file that appears whole or not at all.

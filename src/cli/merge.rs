@@ -4,7 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, log::LogArgs, render::is_film_path};
+use super::{
+    Failure,
+    files::{Attempts, Files},
+    log::LogArgs,
+    render::is_film_path,
+};
 use crate::{
     image::output,
     render::{film_file, merge::merge, picture},
@@ -35,6 +40,7 @@ pub(super) struct MergeArgs {
 
 pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     args.log.start();
+    Files::default().reads("PART", &args.parts).writes("-o", &args.out).check(false)?;
     for path in &args.out {
         if is_film_path(path) {
             output::check_file(path)?;
@@ -51,13 +57,16 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     let (about, job) = merge(&args.parts, args.partial).map_err(|error| Failure::Input(format!("error: {error}")))?;
     let command = std::env::args().collect::<Vec<_>>().join(" ");
     let attributes = report::merged_attributes(&about.metadata, &job, args.parts.len(), &command);
+    let mut attempts = Attempts::default();
     for path in &args.out {
-        if is_film_path(path) {
-            film_file::write(path, &about, &job)?;
+        let result = if is_film_path(path) {
+            film_file::write(path, &about, &job)
         } else {
-            picture::write(path, &about.frame, &job.film, None, &attributes)?;
+            picture::write(path, &about.frame, &job.film, None, &attributes)
+        };
+        if attempts.note(result) {
+            tracing::info!(path = %path.display(), "wrote {}", path.display());
         }
-        tracing::info!(path = %path.display(), "wrote {}", path.display());
     }
     let (least, mean, most) = job.film.samples();
     let spp =
@@ -73,5 +82,5 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     if least == 0 {
         tracing::warn!("some pixels have no sample: they are black");
     }
-    Ok(())
+    attempts.finish()
 }

@@ -1,12 +1,13 @@
 //! The command line: one file per command, from arguments to a call and to what is printed.
 //!
 //! Exit status: 0 done; 1 a check failed; 2 bad usage or input, with one clear message; 130 interrupted by the user,
-//! 143 by the system.
+//! 143 by the system, 129 by a terminal that closed.
 
 mod bench;
 mod compare;
 mod converge;
 mod fibers;
+mod files;
 mod info;
 mod log;
 mod make;
@@ -15,6 +16,7 @@ mod render;
 mod scatter;
 mod signals;
 mod stress;
+mod terminal;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -78,9 +80,11 @@ enum Failure {
     Input(String),
     /// The work was done and a check failed: exit status 1.
     Check(String),
-    /// Interrupted; what there was is saved: exit status 130 or 143.
+    /// Interrupted; what there was is saved: exit status 129, 130 or 143.
     Interrupted,
 }
+    /// Whoever read the output has gone: nothing is left to do, and nothing to say.
+    Closed,
 
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
@@ -154,13 +158,13 @@ pub fn run() -> ExitCode {
         Command::Stress(args) => stress::run(&args),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
         Err(Failure::Input(message)) => {
             log::error(&message);
             ExitCode::from(2)
         }
         Err(Failure::Check(message)) => {
-            eprintln!("{message}");
+            terminal::say(&message);
             ExitCode::from(1)
         }
         Err(Failure::Interrupted) => ExitCode::from(signals::exit_status()),
@@ -203,7 +207,7 @@ struct SceneArgs {
     /// Threads; all cores if not given.
     #[arg(long, short = 'j', value_name = "N")]
     threads: Option<u32>,
-    /// Refuse scenes whose curves and BVH would take more than so many gigabytes.
+    /// Refuse renders whose curves, BVH, film and textures would take more than so many gigabytes. Default: the machine's
     #[arg(long, value_name = "GIGABYTES")]
     max_memory: Option<f64>,
     /// Start of all random numbers.

@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::{
     Failure, SceneArgs, bytes_in_words,
+    files::{Attempts, Files},
     log::{self, LogArgs},
     signals::interrupt_flag,
     thread_pool, write_text,
@@ -117,6 +118,21 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let mut scene = args.options.load(&args.scene)?;
     let outputs = Outputs::new(args);
     // A film may become any picture.
+    let denoised: Vec<PathBuf> = outputs
+        .pictures
+        .iter()
+        .filter(|_| args.denoise || scene.denoise)
+        .filter_map(|p| picture::denoised_path(p))
+        .collect();
+    Files::default()
+        .reads("SCENE", [&args.scene])
+        .reads("--curves", &args.options.curves)
+        .writes("-o", &outputs.pictures)
+        .writes("-o", &outputs.films)
+        .writes("--denoise", &denoised)
+        .writes("--stats", &args.stats)
+        .writes("--checkpoint", &args.checkpoint)
+        .check(false)?;
     let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
     for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
@@ -125,9 +141,6 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         image::output::check_file(path)?;
     }
     check_shard(args, &scene, &outputs)?;
-    if let Some(stats) = &args.stats {
-        image::output::check_target(stats)?;
-    }
     scene.denoise |= args.denoise;
     if !layered {
         scene.layers = Layers::NONE;
@@ -158,7 +171,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let before = job.elapsed;
         let interrupt = interrupt_flag();
         let bar = bar(args);
-        let mut saver = Saver { args, about: &about, films: &outputs.films, failed: None };
+        let mut saver = Saver { args, about: &about, films: &outputs.films, failed: Vec::new(), written: Vec::new() };
         let mut last_line = None;
         let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
         let rendered = render::run(
@@ -197,29 +210,31 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let attributes = record(phases).attributes(&command);
         // What was rendered is kept even if the denoiser fails.
         let clean = denoised.as_ref().ok().and_then(Option::as_ref);
-        let mut written = Vec::new();
+        // What one file's disk refuses, another's may take.
+        let (mut attempts, mut written) = (Attempts::default(), Vec::new());
         let frame = Frame::new(&scene);
         for path in &outputs.pictures {
-            picture::write(path, &frame, &rendered.film, clean, &attributes)?;
-            written.push(path.clone());
-            if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path)) {
-                picture::write_denoised(&path, &frame, &rendered.film, clean)?;
+            if attempts.note(picture::write(path, &frame, &rendered.film, clean, &attributes)) {
+                written.push(path.clone());
+            }
+            if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path))
+                && attempts.note(picture::write_denoised(&path, &frame, &rendered.film, clean))
+            {
                 written.push(path);
             }
         }
-        denoised?;
+        attempts.note(denoised.map(drop));
         phases.write = writing.elapsed();
         log::phase("write", phases.write);
         phases.total = started.elapsed();
         if let Some(path) = &args.stats {
             let text = serde_json::to_string_pretty(&record(phases).to_json()).expect("numbers and text become JSON");
-            write_text(path, &(text + "\n"))?;
+            attempts.note(write_text(path, &(text + "\n")));
         }
-        written.extend(outputs.films.iter().cloned());
+        written.extend(saver.written);
         summary(&world, &rendered, &phases, &written);
-        if let Some(error) = saver.failed {
-            return Err(error.into());
-        }
+        saver.failed.into_iter().for_each(|error| _ = attempts.note(Err::<(), _>(error)));
+        attempts.finish()?;
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })
 }
@@ -339,8 +354,10 @@ struct Saver<'a> {
     args: &'a RenderArgs,
     about: &'a About,
     films: &'a [PathBuf],
-    /// Why the last one could not be saved.
-    failed: Option<ImageError>,
+    /// Why the last ones could not be saved.
+    failed: Vec<ImageError>,
+    /// The films that were, besides the checkpoint.
+    written: Vec<PathBuf>,
 }
 
 impl Saver<'_> {
@@ -349,7 +366,7 @@ impl Saver<'_> {
     }
 
     fn save(&mut self, job: &Job, last: bool) {
-        self.failed = None;
+        self.failed.clear();
         let films = if last { self.films } else { &[] };
         for path in self.args.checkpoint.iter().chain(films) {
             let began = Instant::now();
@@ -358,13 +375,16 @@ impl Saver<'_> {
                     let seconds = began.elapsed().as_secs_f64();
                     let path = path.display();
                     tracing::debug!(checkpoint = %path, spp = job.done, seconds, "saved {path} in {seconds:.3} s");
+                    if films.contains(path) {
+                        self.written.push(path.clone());
+                    }
                 }
                 Err(error) => {
                     // Hours of work are not thrown away for a disk that is full now.
                     if !last {
                         tracing::warn!("the render goes on without a checkpoint: {error}");
                     }
-                    self.failed = Some(error);
+                    self.failed.push(error);
                 }
             }
         }

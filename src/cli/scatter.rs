@@ -5,7 +5,13 @@ use std::{fmt::Write as _, path::PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, names, write_text};
+use super::{
+    Failure,
+    files::{Attempts, Files},
+    log, names,
+    terminal::print,
+    write_text,
+};
 use crate::{
     experiment::{
         LOBES,
@@ -15,7 +21,6 @@ use crate::{
             ply_alone,
         },
     },
-    image::output,
     input::document::Value as Setting,
     scene::{
         Model, Yarn,
@@ -280,8 +285,8 @@ pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
         if extension == "png" && args.sweep.is_some() {
             return Err(input(format!("{}: a sweep is written as .json, .csv or .svg", path.display())));
         }
-        output::check_target(path)?;
     }
+    Files::default().writes("-o", &args.out).check(true)?;
     if args.samples == 0 {
         return Err(input("--samples 0: expected at least 1"));
     }
@@ -304,32 +309,34 @@ fn run_one(args: &ScatterArgs) -> Result<(), Failure> {
     let found = args.measure(&job)?;
     let mut report = report_json(args, &job, &found);
     let shown: Vec<(&str, &Measurement)> = found.all.iter().map(|(n, m)| (n.as_str(), m)).collect();
+    let (mut attempts, mut written) = (Attempts::default(), Vec::new());
     for path in &args.out {
-        if extension_is(path, "png") {
-            picture::write_map(path, &shown.iter().map(|(_, m)| *m).collect::<Vec<_>>())?;
+        let is_written = if extension_is(path, "png") {
+            attempts.note(picture::write_map(path, &shown.iter().map(|(_, m)| *m).collect::<Vec<_>>()))
         } else if extension_is(path, "csv") {
-            write_text(path, &picture::distribution_csv(&shown))?;
+            attempts.note(write_text(path, &picture::distribution_csv(&shown)))
         } else if extension_is(path, "svg") {
             let title = format!("{}, theta {}: share per radian of azimuth", found.title, args.theta);
-            write_text(path, &picture::polar_svg(&title, &shown))?;
+            attempts.note(write_text(path, &picture::polar_svg(&title, &shown)))
         } else {
             let mut whole = report.clone();
             for (name, m) in &shown {
                 whole["distribution"][*name] = m.distribution_json();
             }
-            write_text(path, &pretty(&whole))?;
+            attempts.note(write_text(path, &pretty(&whole)))
+        };
+        if is_written {
+            written.push(path);
         }
     }
     if args.json {
-        report["wrote"] = json!(args.out.iter().map(|p| p.display().to_string()).collect::<Vec<_>>());
-        print!("{}", pretty(&report));
+        report["wrote"] = json!(written.iter().map(|p| p.display().to_string()).collect::<Vec<_>>());
+        print(&pretty(&report))?;
     } else {
-        print!("{}", report_text(args, &found));
-        for path in &args.out {
-            println!("wrote {}", path.display());
-        }
+        let wrote = written.iter().map(|path| format!("wrote {}\n", path.display()));
+        print(&(report_text(args, &found) + &wrote.collect::<String>()))?;
     }
-    Ok(())
+    attempts.finish()
 }
 
 fn report_json(args: &ScatterArgs, job: &Job, found: &Found) -> Value {
@@ -445,6 +452,7 @@ fn run_sweep(args: &ScatterArgs, sweep: &Sweep) -> Result<(), Failure> {
             .collect();
         pretty(&json!({"specimen": title, "key": sweep.key, "rows": rows}))
     };
+    let (mut attempts, mut written) = (Attempts::default(), Vec::new());
     for path in &args.out {
         let text = if extension_is(path, "csv") {
             csv.clone()
@@ -453,15 +461,15 @@ fn run_sweep(args: &ScatterArgs, sweep: &Sweep) -> Result<(), Failure> {
         } else {
             as_json()
         };
-        write_text(path, &text)?;
-    }
-    if args.json {
-        print!("{}", as_json());
-    } else {
-        print!("{csv}");
-        for path in &args.out {
-            eprintln!("wrote {}", path.display());
+        if attempts.note(write_text(path, &text)) {
+            written.push(path);
         }
     }
-    Ok(())
+    if args.json {
+        print(&as_json())?;
+    } else {
+        print(&csv)?;
+        written.iter().for_each(|path| log::say(&format!("wrote {}", path.display())));
+    }
+    attempts.finish()
 }

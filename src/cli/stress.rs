@@ -4,11 +4,8 @@ use std::{path::PathBuf, time::Instant};
 
 use clap::Args;
 
-use super::{Failure, write_text};
-use crate::{
-    experiment::stress::{self, Bound, Outcome, Scale, figure},
-    image::output,
-};
+use super::{Failure, files::Files, terminal::print, write_text};
+use crate::experiment::stress::{self, Bound, Outcome, Scale, figure};
 
 const EXAMPLES: &str = "Examples:
   yarnray stress                             every case, in minutes
@@ -42,10 +39,8 @@ pub(super) struct StressArgs {
 pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     let all = stress::cases();
     if args.list {
-        for case in &all {
-            println!("{:12}{:26}{}", case.group.name(), case.name, case.about);
-        }
-        return Ok(());
+        let lines = all.iter().map(|case| format!("{:12}{:26}{}\n", case.group.name(), case.name, case.about));
+        return print(&lines.collect::<String>());
     }
     for name in &args.case {
         if !all.iter().any(|c| c.name == name) {
@@ -56,8 +51,8 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
         if !path.extension().is_some_and(|e| e == "md" || e == "json") {
             return Err(Failure::Input(format!("error: {}: expected the extension .md or .json", path.display())));
         }
-        output::check_target(path)?;
     }
+    Files::default().writes("-o", &args.out).check(args.quiet)?;
     let scale = if args.quick { Scale::Quick } else { Scale::Full };
     let started = Instant::now();
     let mut outcomes = Vec::new();
@@ -67,7 +62,7 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     for case in all.iter().filter(|c| args.case.is_empty() || args.case.iter().any(|n| n == c.name)) {
         let outcome = stress::run(case, scale);
         if !args.quiet && !args.json {
-            print!("{}", in_words(&outcome));
+            print(&in_words(&outcome))?;
         }
         outcomes.push(outcome);
     }
@@ -83,9 +78,9 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     let failed = outcomes.iter().filter(|o| !o.passed()).count();
     let sum = format!("{} cases in {:.1} s, {failed} failed", outcomes.len(), elapsed.as_secs_f64());
     if args.json {
-        print!("{text}");
+        print(&text)?;
     } else {
-        println!("{sum}");
+        print(&format!("{sum}\n"))?;
     }
     if failed > 0 { Err(Failure::Check(format!("error: {failed} cases of {} failed", outcomes.len()))) } else { Ok(()) }
 }
