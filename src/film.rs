@@ -1,10 +1,12 @@
 //! What pixels have collected: sums owned by tiles, so that threads share nothing.
 //!
 //! All sums are exact ([`crate::math::exact`]): films of different samples of a picture, from threads, resumed runs or
-//! other machines, add up to the film of all of them, to the bit. A pixel takes 108 bytes (count, colour, squares,
-//! alpha), with depth, normal, albedo and the parts of light 484: twice what sums of floats would take.
+//! other machines, add up to the film of all of them, to the bit. A pixel takes 84 bytes (count, colour, squares,
+//! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from.
 
 mod matte;
+
+use std::{collections::TryReserveError, fmt};
 
 use glam::Vec3A;
 
@@ -18,6 +20,29 @@ pub use matte::Matte;
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
+
+/// There is no memory for a film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfMemory {
+    /// What the film would take.
+    pub bytes: u64,
+}
+
+impl fmt::Display for OutOfMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no memory for a film of {:.2} GB", self.bytes as f64 / 1e9)
+    }
+}
+
+impl std::error::Error for OutOfMemory {}
+
+/// So many empty elements, if there is memory for them.
+fn zeros<T: Clone + Default>(count: usize) -> Result<Vec<T>, TryReserveError> {
+    let mut all = Vec::new();
+    all.try_reserve_exact(count)?;
+    all.resize(count, T::default());
+    Ok(all)
+}
 
 /// The pixels of one tile, row by row.
 #[derive(Clone, Debug)]
@@ -42,6 +67,9 @@ pub struct Tile {
     sums: Sums,
     matte: Matte,
 }
+
+/// Bytes of a tile besides its pixels: itself, what the allocator keeps for each of its sums, its place in the order.
+const TILE_BYTES: u64 = (size_of::<Tile>() + 8 * 16 + size_of::<u32>()) as u64;
 
 /// Sums over the samples of each pixel. Layers that are not asked for are empty.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,18 +100,18 @@ macro_rules! for_all_sums {
 }
 
 impl Sums {
-    fn new(n: usize, layers: Layers) -> Self {
+    fn new(n: usize, layers: Layers) -> Result<Self, TryReserveError> {
         let sized = |wanted: bool| if wanted { n } else { 0 };
-        Self {
-            count: vec![0; n],
-            color: vec![Default::default(); n],
-            square: vec![Default::default(); n],
-            alpha: vec![Default::default(); n],
-            depth: vec![Default::default(); sized(layers.depth)],
-            normal: vec![Default::default(); sized(layers.normal)],
-            albedo: vec![Default::default(); sized(layers.albedo)],
-            parts: vec![Default::default(); sized(layers.lobes)],
-        }
+        Ok(Self {
+            count: zeros(n)?,
+            color: zeros(n)?,
+            square: zeros(n)?,
+            alpha: zeros(n)?,
+            depth: zeros(sized(layers.depth))?,
+            normal: zeros(sized(layers.normal))?,
+            albedo: zeros(sized(layers.albedo))?,
+            parts: zeros(sized(layers.lobes))?,
+        })
     }
 
     /// Adds pixel `j` of other sums to pixel `i`.
@@ -106,10 +134,10 @@ impl Sums {
 }
 
 impl Tile {
-    fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers, scale: f32) -> Self {
+    fn new(x: u32, y: u32, width: u32, height: u32, layers: Layers, scale: f32) -> Result<Self, TryReserveError> {
         let n = (width * height) as usize;
         let matte = Matte::new(if layers.cryptomatte { n } else { 0 });
-        Self {
+        Ok(Self {
             x,
             y,
             width,
@@ -118,9 +146,9 @@ impl Tile {
             share: [1.0; 2],
             rays: [0; 2],
             scale,
-            sums: Sums::new(n, layers),
+            sums: Sums::new(n, layers)?,
             matte,
-        }
+        })
     }
 
     /// Adds a sample to a pixel, given from the tile's corner. A sample that is not finite, or brighter than
@@ -240,9 +268,17 @@ impl Tile {
 
     /// Least bytes of a pixel in [`Self::save`]; Cryptomatte adds 16 for each ply that covers it.
     pub fn bytes_per_pixel(layers: Layers) -> usize {
-        let mut bytes = if layers.cryptomatte { size_of::<u32>() } else { 0 };
-        for_all_sums!(&Sums::new(1, layers), add_bytes, &mut bytes);
-        bytes
+        let sized = |wanted: bool, bytes: usize| if wanted { bytes } else { 0 };
+        let narrow = <[NarrowSum; 3]>::BYTES;
+        u32::BYTES
+            + <[Sum; 3]>::BYTES
+            + <[SquareSum; 3]>::BYTES
+            + NarrowSum::BYTES
+            + sized(layers.depth, Sum::BYTES)
+            + sized(layers.normal, narrow)
+            + sized(layers.albedo, narrow)
+            + sized(layers.lobes, LightParts::COUNT * narrow)
+            + sized(layers.cryptomatte, size_of::<u32>())
     }
 
     /// Appends all sums to a file's bytes.
@@ -348,19 +384,37 @@ impl Film {
     /// An empty film for the pixels x0, y0, x1, y1 (the latter exclusive).
     ///
     /// `light_scale` is that of the scene ([`crate::scene::Scene::light_scale`]): the unit in which light is summed up.
-    pub fn new(crop: [u32; 4], layers: Layers, light_scale: f32) -> Self {
+    ///
+    /// # Errors
+    /// If there is no memory for it.
+    pub fn new(crop: [u32; 4], layers: Layers, light_scale: f32) -> Result<Self, OutOfMemory> {
+        Self::allocate(crop, layers, light_scale).map_err(|_| OutOfMemory { bytes: Self::bytes(crop, layers) })
+    }
+
+    fn allocate(crop: [u32; 4], layers: Layers, light_scale: f32) -> Result<Self, TryReserveError> {
         let [x0, y0, x1, y1] = crop;
         let (width, height) = (x1 - x0, y1 - y0);
         let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
-        let tiles = (0..rows * columns)
-            .map(|i| {
-                let (x, y) = (x0 + i % columns * TILE, y0 + i / columns * TILE);
-                Tile::new(x, y, TILE.min(x1 - x), TILE.min(y1 - y), layers, light_scale)
-            })
-            .collect();
-        let mut order: Vec<u32> = (0..rows * columns).collect();
-        order.sort_by_key(|i| morton(i % columns, i / columns));
-        Self { origin: [x0, y0], width, height, tiles, columns, order }
+        let count = rows * columns;
+        let mut tiles = Vec::new();
+        tiles.try_reserve_exact(count as usize)?;
+        for i in 0..count {
+            let (x, y) = (x0 + i % columns * TILE, y0 + i / columns * TILE);
+            tiles.push(Tile::new(x, y, TILE.min(x1 - x), TILE.min(y1 - y), layers, light_scale)?);
+        }
+        let mut order: Vec<u32> = zeros(count as usize)?;
+        order.iter_mut().zip(0..).for_each(|(place, i)| *place = i);
+        order.sort_unstable_by_key(|i| morton(i % columns, i / columns));
+        Ok(Self { origin: [x0, y0], width, height, tiles, columns, order })
+    }
+
+    /// Bytes of memory that a film takes; with Cryptomatte if four plies cover each pixel.
+    pub fn bytes(crop: [u32; 4], layers: Layers) -> u64 {
+        let [width, height] = [crop[2] - crop[0], crop[3] - crop[1]].map(u64::from);
+        let matte =
+            if layers.cryptomatte { size_of::<Vec<(ClothId, u32)>>() + 4 * size_of::<(ClothId, u32)>() } else { 0 };
+        let tiles = width.div_ceil(TILE.into()) * height.div_ceil(TILE.into());
+        width * height * (Tile::bytes_per_pixel(layers) + matte) as u64 + tiles * TILE_BYTES
     }
 
     /// The tiles in the order in which to render them.
@@ -489,7 +543,7 @@ mod tests {
 
     #[test]
     fn pixels_are_found_again_and_average() {
-        let mut film = Film::new([5, 7, 45, 40], Layers::ALL, 1.0);
+        let mut film = Film::new([5, 7, 45, 40], Layers::ALL, 1.0).unwrap();
         for tile in film.tiles_in_order() {
             for y in 0..tile.height {
                 for x in 0..tile.width {
@@ -525,7 +579,7 @@ mod tests {
             let runs = 40;
             for run in 0..runs {
                 let mut random = Stream::new(run);
-                let mut film = Film::new([0, 0, 48, 32], Layers::NONE, 1.0);
+                let mut film = Film::new([0, 0, 48, 32], Layers::NONE, 1.0).unwrap();
                 for tile in film.tiles_mut() {
                     for i in 0..tile.width * tile.height * 16 {
                         let (x, y) = (i % tile.width, i / tile.width % tile.height);
@@ -549,10 +603,11 @@ mod tests {
 
     #[test]
     fn tiles_come_back_from_their_bytes() {
-        let layers = Layers { cryptomatte: true, ..Layers::DEFAULT };
-        assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 108);
-        assert_eq!(Tile::bytes_per_pixel(layers), 488);
-        let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0);
+        let layers = Layers::ALL;
+        assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 84);
+        assert_eq!(Tile::bytes_per_pixel(Layers::DEFAULT), 144);
+        assert_eq!(Tile::bytes_per_pixel(layers), 460);
+        let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
         let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
         for x in 0..3 {
             let radiance = Rgb::splat(0.3 + x as f32);
@@ -560,8 +615,8 @@ mod tests {
         }
         let mut bytes = Vec::new();
         tile.save(&mut bytes);
-        assert_eq!(bytes.len(), 6 * 488 + 3 * 16);
-        let mut again = Tile::new(0, 0, 3, 2, layers, 1.0);
+        assert_eq!(bytes.len(), 6 * 460 + 3 * 16);
+        let mut again = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
         assert_eq!(again.load(&bytes), Some(()));
         assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));
         for cut in [0, 5, bytes.len() - 1] {
@@ -571,9 +626,31 @@ mod tests {
         assert_eq!(again.load(&bytes), None);
     }
 
+    /// What `info` says beforehand, and what a picture of a cinema's size may take.
+    #[test]
+    fn a_film_is_as_small_as_it_says() {
+        let crop = [0, 0, 3840, 2160];
+        let per_pixel = Film::bytes(crop, Layers::DEFAULT) as f64 / (3840.0 * 2160.0);
+        assert!((144.0..150.0).contains(&per_pixel), "{per_pixel} bytes a pixel");
+        for layers in [Layers::NONE, Layers::DEFAULT, Layers { lobes: true, ..Layers::DEFAULT }] {
+            let sums = Sums::new(5, layers).unwrap();
+            let mut bytes = 0;
+            for_all_sums!(&sums, add_bytes, &mut bytes);
+            assert_eq!(bytes, 5 * Tile::bytes_per_pixel(layers));
+            // In memory they are as tight as in the file.
+            assert_eq!(size_of_val(&*sums.color) + size_of_val(&*sums.square), 5 * 72);
+        }
+    }
+
+    #[test]
+    fn no_memory_is_an_error() {
+        let too_large = Film::new([0, 0, u32::MAX, 65_536], Layers::ALL, 1.0).unwrap_err();
+        assert!(too_large.to_string().starts_with("no memory for a film of "), "{too_large}");
+    }
+
     #[test]
     fn every_tile_is_rendered_once() {
-        let mut film = Film::new([0, 0, 100, 33], Layers::NONE, 1.0);
+        let mut film = Film::new([0, 0, 100, 33], Layers::NONE, 1.0).unwrap();
         let mut seen: Vec<(u32, u32)> = film.tiles_in_order().iter().map(|t| (t.x, t.y)).collect();
         seen.sort_unstable();
         seen.dedup();

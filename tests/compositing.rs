@@ -26,7 +26,8 @@ const PARTS: [&str; 13] = [
 /// The swatch above a floor, with the sky above the horizon.
 fn on_a_floor() -> String {
     let view = "direction = [0.25, 0.12, 1.0]\nmargin = 0.25";
-    SWATCH.replace("direction = [0.25, -0.35, 1.0]", view) + "[ground]\nalbedo = [0.5, 0.4, 0.3]\n"
+    SWATCH.replace("direction = [0.25, -0.35, 1.0]", view)
+        + "[ground]\nalbedo = [0.5, 0.4, 0.3]\n[output]\nlayers = [\"lobes\", \"albedo\"]\n"
 }
 
 /// The largest difference between the picture and the sum of its parts, over the pixel's value and a hundredth.

@@ -4,8 +4,10 @@ use std::{
     fs::File,
     path::Path,
     process::{Command, Stdio},
+    time::{Duration, Instant},
 };
 
+use serde_json::Value;
 use yarnray::image;
 
 use crate::support::{SWATCH, directory, listing, program, write, yarnray};
@@ -172,4 +174,52 @@ fn a_terminal_that_closes_saves_unless_it_is_ignored() {
     assert_eq!(ends_by(d.path(), "nohup", 300), Some(0));
     let picture = image::read(&d.path().join("s.exr")).unwrap();
     assert!(picture.channel("samples.count").unwrap().iter().all(|&n| n == 300.0));
+}
+
+#[test]
+fn memory_is_told_and_too_much_is_refused_at_once() {
+    let d = swatch();
+    let d = d.path();
+    let info = |args: &str| -> Value {
+        let run = yarnray(d, &words(&format!("info s.toml --json {args}"))).good();
+        serde_json::from_str(&run.stdout).unwrap()
+    };
+    let memory = &info("--width 3840 --height 2160")["memory"];
+    let film = memory["film_bytes"].as_u64().unwrap();
+    assert!((144..150).contains(&(film / (3840 * 2160))), "{memory}");
+    let denoised = &info("--width 100 --height 50 --set output.denoise=true")["memory"];
+    assert_eq!(denoised["denoiser_bytes"], 100 * 50 * 48);
+    let text = yarnray(d, &words("info s.toml --width 1920 --height 1080")).good().stdout;
+    assert!(text.contains(" of BVH, 30") && text.contains(" MB of film\n"), "{text}");
+    // The widest picture there is, with a film of 600 GB.
+    let started = Instant::now();
+    let run = yarnray(d, &words("render s.toml --width 65536 --height 65536 --max-memory 20 -o o.exr"));
+    assert_eq!(run.status, Some(2));
+    assert!(run.stderr.starts_with("error: 65536 x 65536 pixels need 6"), "{}", run.stderr);
+    assert!(run.stderr.contains(" GB of film; all may take 20.00 GB\n  hint: --crop renders a part"), "{}", run.stderr);
+    assert!(started.elapsed() < Duration::from_secs(10), "{:?}", started.elapsed());
+    assert_eq!(listing(d), ["s.toml"]);
+    let text = yarnray(d, &words("info s.toml --width 65536 --height 65536 --max-memory 20")).good().stdout;
+    assert!(text.contains("more than the 20.00 GB that it may take"), "{text}");
+    // Curves, BVH and film together.
+    let film = info("")["memory"]["film_bytes"].as_u64().unwrap();
+    let run = yarnray(d, &words(&format!("render s.toml --max-memory {} -o o.exr", (film + 1000) as f64 / 1e9)));
+    assert_eq!(run.status, Some(2));
+    assert!(run.stderr.contains("GB of film and textures)"), "{}", run.stderr);
+}
+
+/// A gigabyte of address space, and a film of five: no abort.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_allocation_that_fails_is_an_error() {
+    let d = swatch();
+    let script = format!(
+        "ulimit -v 1000000; exec '{}' render s.toml -q -j 1 --width 8000 --height 8000 --max-memory 1000 -o o.png",
+        env!("CARGO_BIN_EXE_yarnray")
+    );
+    let output = Command::new("bash").args(["-c", &script]).current_dir(d.path()).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.starts_with("error: no memory for a film of 5."), "{text}");
+    assert_eq!(listing(d.path()), ["s.toml"]);
 }

@@ -13,7 +13,7 @@ use crate::{
         curve_file::{self, ReadOptions},
         pattern::overlap::{Overlap, TOLERATED, overlap},
     },
-    plan::Plan,
+    plan::{Memory, Plan},
     render::film_file,
     scene::{CurveKind, Fabric, Scene},
     trace::{self, Estimate},
@@ -162,6 +162,11 @@ fn scene_report(scene: &Scene) -> (Value, String) {
     let estimates = trace::estimates(scene);
     let total: Estimate = estimates.iter().copied().sum();
     let plan = Plan::new(scene);
+    let memory = Memory::new(scene);
+    let beside = |bytes: u64, what: &str| match bytes {
+        0 => String::new(),
+        _ => format!(", {} of {what}", bytes_in_words(bytes)),
+    };
     let render = &scene.render;
     let (low, high) = scene.bounds().map_or((DVec3::ZERO, DVec3::ZERO), |(a, b)| (a + scene.middle, b + scene.middle));
     let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
@@ -194,7 +199,10 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         "image": {"width": render.width, "height": render.height, "spp": render.spp},
         "fabrics": fabrics, "overlap": overlap_json(found),
         "bounds_mm": [list(low), list(high)],
-        "memory": {"geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes},
+        "memory": {
+            "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
+            "texture_bytes": memory.textures, "denoiser_bytes": memory.denoiser, "limit_bytes": memory.limit,
+        },
         "pixels": pixels,
         "used": reasons(true), "left_out": reasons(false),
         "warnings": scene.warnings,
@@ -227,10 +235,19 @@ fn scene_report(scene: &Scene) -> (Value, String) {
     }
     text += &overlap_line(found);
     text += &format!(
-        "  memory    about {} of curves, {} of BVH\n",
+        "  memory    about {} of curves, {} of BVH, {} of film{}{}\n",
         bytes_in_words(total.geometry_bytes),
-        bytes_in_words(total.bvh_bytes)
+        bytes_in_words(total.bvh_bytes),
+        bytes_in_words(memory.film),
+        beside(memory.textures, "textures"),
+        beside(memory.denoiser, "the denoiser"),
     );
+    if let Some(limit) = memory.limit.filter(|limit| total.bytes() + memory.bytes() > *limit) {
+        text += &format!(
+            "            more than the {} that it may take: `render` would refuse it\n",
+            bytes_in_words(limit)
+        );
+    }
     for used in [true, false] {
         text += if used { "  used\n" } else { "  left out\n" };
         for f in plan.features.iter().filter(|f| f.used == used) {

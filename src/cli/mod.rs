@@ -28,6 +28,7 @@ use crate::{
     image::output,
     input::document::Value,
     plan,
+    render::OutOfMemory,
     scene::{
         Mode, Model, Scene,
         load::{LoadError, LoadOptions, load},
@@ -82,9 +83,9 @@ enum Failure {
     Check(String),
     /// Interrupted; what there was is saved: exit status 129, 130 or 143.
     Interrupted,
-}
     /// Whoever read the output has gone: nothing is left to do, and nothing to say.
     Closed,
+}
 
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
@@ -103,10 +104,25 @@ impl From<BuildError> for Failure {
         let hint = match &error {
             BuildError::Embree(_) => "",
             BuildError::Memory { .. } => {
-                "\n  hint: --max-memory GIGABYTES allows more; fewer yarns, or --mode yarn, take less"
+                "\n  hint: --max-memory GIGABYTES allows more; fewer yarns or pixels, or --mode yarn, take less"
             }
         };
         Self::Input(format!("error: {error}{hint}"))
+    }
+}
+
+impl From<plan::TooLarge> for Failure {
+    fn from(error: plan::TooLarge) -> Self {
+        Self::Input(format!(
+            "error: {error}\n  hint: --crop renders a part, and `yarnray merge` puts parts together; output.layers = [] takes less; \
+             --max-memory GIGABYTES allows more"
+        ))
+    }
+}
+
+impl From<OutOfMemory> for Failure {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Input(format!("error: {error}\n  hint: --crop renders a part, and `yarnray merge` puts parts together"))
     }
 }
 

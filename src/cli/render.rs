@@ -20,6 +20,7 @@ use super::{
 use crate::{
     ffi::oidn::Denoiser,
     image::{self, ImageError, output::Format, png::ToneMap},
+    plan::Memory,
     render::{
         self, Checkpoints, Control, Job, Progress, Rendered, Shard, Stop,
         denoise::Denoised,
@@ -117,7 +118,6 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let mut scene = args.options.load(&args.scene)?;
     let outputs = Outputs::new(args);
-    // A film may become any picture.
     let denoised: Vec<PathBuf> = outputs
         .pictures
         .iter()
@@ -133,6 +133,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         .writes("--stats", &args.stats)
         .writes("--checkpoint", &args.checkpoint)
         .check(false)?;
+    // A film may become any picture.
     let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
     for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
@@ -153,12 +154,14 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     if let Some(exposure) = args.exposure {
         scene.display.exposure = exposure;
     }
+    let memory = Memory::new(&scene);
+    memory.check()?;
     let (pool, threads) = thread_pool(scene.render.threads)?;
     let old = old_checkpoint(args)?;
     let load = started.elapsed();
     log::phase("load", load);
     pool.install(|| {
-        let (world, made) = World::new(&scene, threads)?;
+        let (world, made) = World::within(&scene, threads, memory.limit, memory.bytes())?;
         warn(args, &scene, &world);
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);
@@ -166,7 +169,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, &world), args.shard);
         let job = match old {
             Some(old) => resumed(old, &about, args)?,
-            None => Job::new(&scene, args.shard),
+            None => Job::new(&scene, args.shard)?,
         };
         let before = job.elapsed;
         let interrupt = interrupt_flag();
@@ -372,12 +375,12 @@ impl Saver<'_> {
             let began = Instant::now();
             match film_file::write(path, self.about, job) {
                 Ok(()) => {
-                    let seconds = began.elapsed().as_secs_f64();
-                    let path = path.display();
-                    tracing::debug!(checkpoint = %path, spp = job.done, seconds, "saved {path} in {seconds:.3} s");
                     if films.contains(path) {
                         self.written.push(path.clone());
                     }
+                    let seconds = began.elapsed().as_secs_f64();
+                    let path = path.display();
+                    tracing::debug!(checkpoint = %path, spp = job.done, seconds, "saved {path} in {seconds:.3} s");
                 }
                 Err(error) => {
                     // Hours of work are not thrown away for a disk that is full now.

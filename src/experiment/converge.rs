@@ -16,7 +16,7 @@ use super::{
     method::Method,
 };
 use crate::{
-    film::Film,
+    film::{Film, OutOfMemory},
     image::{Channel, Image, ImageError},
     math::stats::Estimate,
     render,
@@ -102,7 +102,7 @@ pub fn run(
             let mut scene = scene.clone();
             scene.render.spp = options.converged_spp;
             scene.render.seed = seed(&scene, half);
-            let rendered = render::render(&scene, &world, interrupt, |_| {});
+            let rendered = render::render(&scene, &world, interrupt, |_| {}).map_err(no_memory)?;
             if interrupt.load(Ordering::Relaxed) {
                 return Err(ConvergeError::Interrupted);
             }
@@ -139,6 +139,10 @@ pub fn run(
         target: options.target,
         curves,
     })
+}
+
+fn no_memory(error: OutOfMemory) -> ConvergeError {
+    ConvergeError::Failed(format!("error: {error}"))
 }
 
 /// Seeds of halves and of measured renders, all different.
@@ -185,6 +189,7 @@ fn curve(
             });
             looking += started.elapsed();
         });
+        let rendered = rendered.map_err(no_memory)?;
         if rendered.stop == render::Stop::Interrupted {
             return Err(ConvergeError::Interrupted);
         }

@@ -56,6 +56,12 @@ impl Texture {
         match self.never {}
     }
 
+    /// Bytes of all its levels, three half floats a pixel: what the texture cache may come to hold of it.
+    pub fn bytes(&self) -> u64 {
+        let [width, height] = self.size().map(|n| n as u64);
+        width * height * 6 * 4 / 3
+    }
+
     /// The colour at (u, v), filtered over a square of this width.
     #[inline]
     pub fn sample(&self, u: f32, v: f32, width: f32) -> [f32; 3] {
@@ -68,6 +74,9 @@ impl Texture {
         }
     }
 }
+
+/// Most bytes of all textures together that are kept in memory, as `ffi/oiio.cpp` sets it.
+pub const CACHE_BYTES: u64 = 1024 << 20;
 
 /// Bytes that textures take in memory now.
 pub fn bytes() -> u64 {

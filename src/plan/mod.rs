@@ -3,8 +3,10 @@
 //! What is left out is not computed, allocated or loaded; [`force`] brings it back, to measure what that saves.
 
 mod force;
+mod memory;
 
 pub use force::{FORCEABLE, force};
+pub use memory::{Memory, TooLarge};
 
 use crate::{
     film::Tile,

@@ -48,7 +48,7 @@ fn used(scene: &Scene, name: &str) -> bool {
 /// Colour of each pixel, and the variance of its mean.
 fn picture(scene: &Scene) -> Vec<([f32; 3], [f32; 3])> {
     let (world, _) = World::new(scene, 1).unwrap();
-    let film = render::render(scene, &world, &AtomicBool::new(false), |_| {}).film;
+    let film = render::render(scene, &world, &AtomicBool::new(false), |_| {}).unwrap().film;
     (0..24)
         .flat_map(|y| (0..32).map(move |x| (x, y)))
         .map(|(x, y)| film.pixel(x, y))

@@ -111,8 +111,10 @@ mod tests {
     #[test]
     fn samples_go_where_the_noise_is_and_add_up() {
         let mut random = Stream::new(1);
-        let (mut adaptive, mut even) =
-            (Film::new([0, 0, 64, 40], Layers::NONE, 1.0), Film::new([0, 0, 64, 40], Layers::NONE, 1.0));
+        let (mut adaptive, mut even) = (
+            Film::new([0, 0, 64, 40], Layers::NONE, 1.0).unwrap(),
+            Film::new([0, 0, 64, 40], Layers::NONE, 1.0).unwrap(),
+        );
         fill(&mut adaptive, Target::Even(PILOT), &mut random);
         plan(&mut adaptive);
         for level in [32, 64, 128] {
@@ -131,7 +133,7 @@ mod tests {
 
     #[test]
     fn an_even_picture_stays_even() {
-        let mut film = Film::new([0, 0, 48, 48], Layers::NONE, 1.0);
+        let mut film = Film::new([0, 0, 48, 48], Layers::NONE, 1.0).unwrap();
         let mut random = Stream::new(2);
         for tile in film.tiles_mut() {
             for i in 0..tile.width * tile.height * PILOT {
@@ -143,7 +145,7 @@ mod tests {
         plan(&mut film);
         assert!(film.tiles().iter().all(|t| t.share.iter().all(|s| (s - 1.0).abs() < 0.1)));
         // Without any noise there is nothing to go by.
-        let mut film = Film::new([0, 0, 20, 16], Layers::NONE, 1.0);
+        let mut film = Film::new([0, 0, 20, 16], Layers::NONE, 1.0).unwrap();
         plan(&mut film);
         assert!(film.tiles().iter().all(|t| t.share == [1.0; 2]));
         assert_eq!(Target::of_plan(&film, 40).of(&film.tiles()[1]), [40, 40]);
@@ -156,7 +158,7 @@ mod tests {
         let (mut sum, mut square, runs) = (0.0, 0.0, 300);
         for run in 0..runs {
             let mut random = Stream::new(1000 + run);
-            let mut film = Film::new([0, 0, 34, 2], Layers::NONE, 1.0);
+            let mut film = Film::new([0, 0, 34, 2], Layers::NONE, 1.0).unwrap();
             for target in [None, Some(24)] {
                 let target = target.map_or(Target::Even(PILOT), |level| Target::of_plan(&film, level));
                 for tile in film.tiles_mut() {

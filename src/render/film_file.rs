@@ -34,7 +34,7 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"YARNFILM";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Longest header that is read: identities hold a few lines for each light, yarn and fabric.
 const HEADER_LIMIT: u32 = 64 << 20;
 /// Bytes of a tile besides its sums and its length: next samples, shares, rays, checksum.
@@ -145,7 +145,8 @@ fn write_to(out: &mut impl Write, about: &About, job: &Job) -> io::Result<()> {
 pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
     let (header, mut file) = open(path)?;
     let size = file.get_ref().metadata().map_err(|e| unreadable(path, &e.to_string()))?.len();
-    let mut film = Film::new(header.crop, header.about.collected, header.light_scale);
+    let film = Film::new(header.crop, header.about.collected, header.light_scale);
+    let mut film = film.map_err(|error| unreadable(path, &error.to_string()))?;
     let mut at = header.length;
     let mut bytes = Vec::new();
     for (i, tile) in film.tiles_mut().iter_mut().enumerate() {

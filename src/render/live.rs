@@ -192,7 +192,7 @@ mod tests {
     use crate::{integrator::Sample, math::Rgb, scene::Layers};
 
     fn film(value: f32) -> Film {
-        let mut film = Film::new([3, 5, 803, 605], Layers::NONE, 1.0);
+        let mut film = Film::new([3, 5, 803, 605], Layers::NONE, 1.0).unwrap();
         for tile in film.tiles_in_order() {
             for y in 0..tile.height {
                 for x in 0..tile.width {

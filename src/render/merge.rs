@@ -9,7 +9,11 @@ use super::{
     Job,
     film_file::{self, About, Header},
 };
-use crate::{film::Film, image::ImageError, scene::identity};
+use crate::{
+    film::{Film, OutOfMemory},
+    image::ImageError,
+    scene::identity,
+};
 
 /// Why parts do not make a picture.
 #[derive(Debug)]
@@ -18,6 +22,14 @@ pub enum MergeError {
     File(ImageError),
     /// The files do not fit together; what is wrong, in words.
     Parts(String),
+    /// The whole film does not fit into memory.
+    Memory(OutOfMemory),
+}
+
+impl From<OutOfMemory> for MergeError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Memory(error)
+    }
 }
 
 impl fmt::Display for MergeError {
@@ -25,6 +37,7 @@ impl fmt::Display for MergeError {
         match self {
             Self::File(error) => error.fmt(f),
             Self::Parts(problem) => f.write_str(problem),
+            Self::Memory(error) => error.fmt(f),
         }
     }
 }
@@ -72,7 +85,7 @@ pub fn merge(paths: &[PathBuf], partial: bool) -> Result<(About, Job), MergeErro
     let (mut about, mut job) = film_file::read(first)?;
     let alone = paths.len() == 1;
     if job.film.crop() != crop || !alone {
-        let mut film = Film::new(crop, about.collected, job.film.light_scale());
+        let mut film = Film::new(crop, about.collected, job.film.light_scale())?;
         film.add(&job.film);
         job.film = film;
     }

@@ -23,6 +23,8 @@ use rayon::prelude::*;
 
 pub use stop::Stop;
 
+pub use crate::film::OutOfMemory;
+
 use self::{
     adaptive::{PILOT, Target},
     stop::{WARM_UP, wave_end},
@@ -78,12 +80,16 @@ pub struct Job {
 
 impl Job {
     /// A scene's render, or a part of it, from the beginning.
-    pub fn new(scene: &Scene, shard: Option<Shard>) -> Self {
+    ///
+    /// # Errors
+    /// If there is no memory for its film.
+    pub fn new(scene: &Scene, shard: Option<Shard>) -> Result<Self, OutOfMemory> {
         let spp = scene.render.spp;
         let samples = shard.map_or(0..spp, |s| s.samples(spp));
-        let mut film = Film::new(scene.render.crop, scene.collected(), scene.light_scale());
+        let mut film = Film::new(scene.render.crop, scene.collected(), scene.light_scale())?;
         film.tiles_mut().iter_mut().for_each(|t| t.next = [samples.start; 2]);
-        Self { film, samples, done: 0, planned: false, counters: Counters::default(), elapsed: Duration::ZERO }
+        let counters = Counters::default();
+        Ok(Self { film, samples, done: 0, planned: false, counters, elapsed: Duration::ZERO })
     }
 
     /// How far tiles go so that all pixels have `level` samples in the mean.
@@ -153,13 +159,17 @@ pub struct Rendered {
 
 /// Renders in the calling thread's rayon pool. `interrupt` ends the render after the tiles in work; `progress` is
 /// called after every wave.
+///
+/// # Errors
+/// If there is no memory for a film.
 pub fn render(
     scene: &Scene,
     world: &World,
     interrupt: &AtomicBool,
     mut progress: impl FnMut(Progress<'_>),
-) -> Rendered {
-    run(scene, world, Job::new(scene, None), Control { interrupt, progress: &mut progress, checkpoints: None })
+) -> Result<Rendered, OutOfMemory> {
+    let job = Job::new(scene, None)?;
+    Ok(run(scene, world, job, Control { interrupt, progress: &mut progress, checkpoints: None }))
 }
 
 /// Goes on with a job until the first of the scene's limits, in the calling thread's rayon pool.

@@ -207,10 +207,11 @@ impl Layers {
         ("cryptomatte", |l| &mut l.cryptomatte),
     ];
     /// All of them.
-    pub const ALL: Self = Self { cryptomatte: true, ..Self::DEFAULT };
-    /// Those of a scene that names none: all but Cryptomatte, whose channels are many.
+    pub const ALL: Self = Self { lobes: true, cryptomatte: true, ..Self::DEFAULT };
+    /// Those of a scene that names none: all but the light by where it came from, whose sums would take two thirds of
+    /// the film, and Cryptomatte, whose channels are many.
     pub const DEFAULT: Self = Self {
-        lobes: true,
+        lobes: false,
         depth: true,
         normal: true,
         albedo: true,

@@ -38,7 +38,9 @@ pub enum BuildError {
     Memory {
         /// What it would take.
         needed: Estimate,
-        /// What it may take, bytes.
+        /// What the render takes besides, such as its film; bytes.
+        beside: u64,
+        /// What all may take, bytes.
         limit: u64,
     },
 }
@@ -53,15 +55,17 @@ impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Embree(error) => error.fmt(f),
-            Self::Memory { needed, limit } => {
+            Self::Memory { needed, beside, limit } => {
                 let gigabytes = |bytes: u64| bytes as f64 / 1e9;
                 write!(
                     f,
-                    "the scene needs about {:.2} GB ({:.2} GB of curves, {:.2} GB of BVH, {} segments), but may take {:.2} GB",
-                    gigabytes(needed.bytes()),
+                    "the scene needs about {:.2} GB ({:.2} GB of curves, {:.2} GB of BVH, {} segments, {:.2} GB of film and \
+                     textures), but may take {:.2} GB",
+                    gigabytes(needed.bytes() + beside),
                     gigabytes(needed.geometry_bytes),
                     gigabytes(needed.bvh_bytes),
                     needed.segments,
+                    gigabytes(*beside),
                     gigabytes(*limit)
                 )
             }
@@ -152,12 +156,12 @@ impl<'a> Preparation<'a> {
         Self { scene, fabrics }
     }
 
-    /// As [`Self::new`], refused if all would take more memory than the scene may.
-    pub(super) fn checked(scene: &'a Scene) -> Result<Self, BuildError> {
+    /// As [`Self::new`], refused if all would take more memory than `limit` with what is taken `beside`, bytes.
+    pub(super) fn checked(scene: &'a Scene, limit: Option<u64>, beside: u64) -> Result<Self, BuildError> {
         let preparation = Self::new(scene);
         let needed: Estimate = preparation.estimates().sum();
-        match scene.render.max_memory {
-            Some(limit) if needed.bytes() > limit => Err(BuildError::Memory { needed, limit }),
+        match limit {
+            Some(limit) if needed.bytes() + beside > limit => Err(BuildError::Memory { needed, beside, limit }),
             _ => Ok(preparation),
         }
     }

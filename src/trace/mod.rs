@@ -134,8 +134,21 @@ impl World {
     /// # Errors
     /// What Embree says, mostly that memory is short; or that the scene would take more than it may.
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
+        Self::within(scene, threads, scene.render.max_memory, 0)
+    }
+
+    /// As [`Self::new`], within a `limit` of bytes of which some are taken `beside`: by a film, by textures.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn within(
+        scene: &Scene,
+        threads: usize,
+        limit: Option<u64>,
+        beside: u64,
+    ) -> Result<(Self, BuildTimes), BuildError> {
         let started = Instant::now();
-        let preparation = Preparation::checked(scene)?;
+        let preparation = Preparation::checked(scene, limit, beside)?;
         let curves = preparation.geometries();
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
@@ -359,7 +372,7 @@ pub fn estimates(scene: &Scene) -> Vec<Estimate> {
 /// # Errors
 /// If they would take more memory than the scene may.
 pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
-    let geometries = Preparation::checked(scene)?.geometries();
+    let geometries = Preparation::checked(scene, scene.render.max_memory, 0)?.geometries();
     let mut curves: Vec<Curve> = geometries
         .iter()
         .flat_map(|geometry| match geometry {

@@ -98,7 +98,7 @@ impl Pieces {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         let rendered = pool.install(|| {
             let (world, _) = World::new(&scene, threads).expect("Embree builds the cases' scenes");
-            render(&scene, &world, &AtomicBool::new(false), |_| {})
+            render(&scene, &world, &AtomicBool::new(false), |_| {}).expect("the cases' films are small")
         });
         let (width, height) = (scene.render.width, scene.render.height);
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
