@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = scene.build()?;
 
     let (world, _) = World::new(&scene, 1)?;
-    let film = render::render(&scene, &world, &AtomicBool::new(false), |_| {}).film;
+    let film = render::render(&scene, &world, &AtomicBool::new(false), |_| {})?.film;
 
     // Linear Rec.709 radiance, row by row from the top; alpha is the share of each pixel that yarns cover.
     let pixels: Vec<[f32; 4]> = (0..film.height)

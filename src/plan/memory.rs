@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use crate::{
-    film::Film,
-    scene::{Light, Scene},
-};
+use crate::{film::Film, light::Light, scene::Scene};
 
 /// Bytes of a pixel that the denoiser is given and gives back: colour, albedo, normal, the result.
 const DENOISER_BYTES: u64 = 4 * size_of::<[f32; 3]>() as u64;
