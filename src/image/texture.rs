@@ -9,6 +9,8 @@ use super::ImageError;
 pub struct Texture {
     #[cfg(feature = "oiio")]
     file: crate::ffi::oiio::TextureFile,
+    /// Of the file's bytes.
+    hash: u128,
     /// Holds the copy that OpenImageIO reads, until this is dropped.
     #[cfg(feature = "oiio")]
     _folder: tempfile::TempDir,
@@ -25,7 +27,9 @@ impl Texture {
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         use crate::ffi::oiio::{OiioError, TextureFile};
         // What is no file at all is told in the words of every other picture.
-        std::fs::File::open(path).map_err(|e| ImageError::unreadable(path, &e))?;
+        let bytes = std::fs::read(path).map_err(|e| ImageError::unreadable(path, &e))?;
+        let hash = twox_hash::XxHash3_128::oneshot(&bytes);
+        drop(bytes);
         let failed = |reason: String| ImageError::Read { path: path.into(), reason };
         let folder = tempfile::Builder::new()
             .prefix("yarnray-texture-")
@@ -35,7 +39,7 @@ impl Texture {
             OiioError::Missing(_) => ImageError::Unsupported { path: path.into(), reason: error.to_string() },
             _ => failed(error.to_string()),
         })?;
-        Ok(Self { file, _folder: folder })
+        Ok(Self { file, hash, _folder: folder })
     }
 
     /// Without the feature: an error that says how to get it.
@@ -52,6 +56,14 @@ impl Texture {
     pub fn size(&self) -> [usize; 2] {
         #[cfg(feature = "oiio")]
         return self.file.size();
+        #[cfg(not(feature = "oiio"))]
+        match self.never {}
+    }
+
+    /// A hash of the file that it was opened from.
+    pub fn hash(&self) -> u128 {
+        #[cfg(feature = "oiio")]
+        return self.hash;
         #[cfg(not(feature = "oiio"))]
         match self.never {}
     }

@@ -1,11 +1,9 @@
 //! What a render needs and what it leaves out, told from the checked scene before anything is built.
 //!
-//! What is left out is not computed, allocated or loaded; [`force`] brings it back, to measure what that saves.
+//! What is left out is not computed, allocated or loaded; [`crate::scene::force`] brings it back, to measure what that saves.
 
-mod force;
 mod memory;
 
-pub use force::{FORCEABLE, force};
 pub use memory::{Memory, TooLarge};
 
 use crate::{

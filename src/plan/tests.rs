@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use super::*;
 use crate::{
     render,
+    scene::force::{FORCEABLE, force},
     scene::load::{LoadOptions, parse},
     trace::World,
 };

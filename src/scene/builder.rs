@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::{
     CurveKind, Fabric, FabricMotion, Ground, Layers, Material, Mode, Object, RenderSettings, Scene, Storage, Yarn,
-    bounds, defaults, identity, view::CameraSetup,
+    bounds, defaults, force, identity, view::CameraSetup,
 };
 use crate::{
     geometry::{
@@ -113,7 +113,8 @@ impl SceneBuilder {
     /// Makes the scene.
     ///
     /// # Errors
-    /// If an index points at nothing, curves lack points or radii, a number is not finite, or the picture has no pixels.
+    /// If an index points at nothing, curves lack points or radii, a number is not finite, the picture has no pixels, or a
+    /// feature cannot be forced.
     pub fn build(self) -> Result<Scene, SceneError> {
         self.check()?;
         let Self { name, render, output, camera, yarns, fibers, mut fabrics, mut objects, materials, .. } = self;
@@ -165,9 +166,13 @@ impl SceneBuilder {
         };
         keep_used(&mut scene);
         remove_lobes(&mut scene);
+        for name in scene.render.force.clone() {
+            force::force(&mut scene, &name).map_err(SceneError)?;
+        }
         warn_about_precision(&mut scene);
         warn_about_density(&mut scene);
         warn_about_standing_hairs(&mut scene);
+        // Last: whatever changes the picture has its place in it.
         scene.identity = identity::identity(&scene);
         scene.fingerprint = identity::fingerprint(&scene.identity);
         Ok(scene)

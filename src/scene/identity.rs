@@ -5,93 +5,266 @@
 
 use std::fmt::{Debug, Write as _};
 
-use super::{CurveKind, Fabric, Object, Scene};
-use crate::light::{Environment, Light};
+use twox_hash::XxHash3_128;
+
+use super::{AlbedoTexture, Camera, CurveKind, Fabric, FabricMotion, Material, Object, RenderSettings, Scene, Yarn};
+use crate::{
+    geometry::{curve::Curve, mesh::Mesh},
+    light::{Environment, Light},
+};
 
 /// Values longer than this are told by their hash.
 const LONGEST_VALUE: usize = 120;
 
 /// Keys and values, in a fixed order: not of samples, time, threads or outputs. Keys are those of scene files where
 /// they have one.
+///
+/// Every structure is taken apart field by field: a new field does not compile before it has its place here.
 pub fn identity(scene: &Scene) -> Vec<(String, String)> {
-    let mut out = Vec::new();
-    let mut add = |key: String, value: &dyn Debug| {
+    let Scene {
+        path: _,
+        render,
+        // How the picture is shown and stored, and which layers are beside it.
+        display: _,
+        layers: _,
+        storage: _,
+        denoise: _,
+        camera,
+        camera_path,
+        yarns,
+        fibers,
+        fabrics,
+        objects,
+        materials,
+        lights,
+        ground,
+        middle,
+        identity: _,
+        fingerprint: _,
+        warnings: _,
+    } = scene;
+    let mut keys = Keys::default();
+    of_settings(render, &mut keys);
+    let Camera { position, right, up, back, projection, lens } = camera;
+    keys.add("camera.shutter", camera_path);
+    keys.add("camera.position", position);
+    keys.add("camera.direction", &[right, up, back]);
+    keys.add("camera.projection", projection);
+    keys.add("camera.lens", lens);
+    for yarn in yarns {
+        of_yarn(yarn, &mut keys);
+    }
+    for (name, material) in fibers {
+        keys.add(&format!("fiber.{name}"), material);
+    }
+    for (i, fabric) in fabrics.iter().enumerate() {
+        of_fabric(fabric, scene, &format!("fabric.{i}"), &mut keys);
+    }
+    for (i, light) in lights.iter().enumerate() {
+        of_light(light, &format!("light.{i}"), &mut keys);
+    }
+    for (i, Material { surface, texture }) in materials.iter().enumerate() {
+        let texture =
+            texture.as_ref().map(|AlbedoTexture { texture, repeat }| (texture.size(), texture.hash(), repeat));
+        keys.add(&format!("material.{i}"), &(surface, texture));
+    }
+    for (i, Object { origin: _, mesh, material }) in objects.iter().enumerate() {
+        let Mesh { points, normals, uvs, triangles } = mesh;
+        let mut hash = Hash::default();
+        points.iter().chain(normals).for_each(|p| hash.numbers(&p.to_array()));
+        uvs.iter().for_each(|uv| hash.numbers(&uv.to_array()));
+        triangles.iter().flatten().for_each(|i| hash.bytes(&i.to_le_bytes()));
+        let lengths = [points.len(), normals.len(), uvs.len(), triangles.len()];
+        keys.add(&format!("mesh.{i}"), &(material, lengths, hash.word()));
+    }
+    keys.add("ground", ground);
+    keys.add("middle", middle);
+    keys.0
+}
+
+/// Keys with their values, long ones by their hash.
+#[derive(Default)]
+struct Keys(Vec<(String, String)>);
+
+impl Keys {
+    fn add(&mut self, key: &str, value: &dyn Debug) {
         let text = format!("{value:?}");
-        out.push((key, if text.len() > LONGEST_VALUE { hashed(text.as_bytes()) } else { text }));
-    };
-    let r = &scene.render;
-    let mut setting = |name: &str, value: &dyn Debug| add(format!("render.{name}"), value);
-    setting("mode", &r.mode.name());
-    setting("model", &r.model.name());
-    setting("width", &r.width);
-    setting("height", &r.height);
-    setting("crop", &r.crop);
-    setting("filter", &r.filter);
-    setting("max_bounces", &r.max_bounces);
-    setting("seed", &r.seed);
-    setting("frame", &r.frame);
-    setting("adaptive", &r.adaptive);
-    let camera = &scene.camera;
-    add("camera.shutter".to_owned(), &scene.camera_path);
-    add("camera.position".to_owned(), &camera.position);
-    add("camera.direction".to_owned(), &[camera.right, camera.up, camera.back]);
-    add("camera".to_owned(), camera);
-    for yarn in &scene.yarns {
-        let mut of_yarn = |name: &str, value: &dyn Debug| add(format!("yarn.{}.{name}", yarn.name), value);
-        of_yarn("radius", &yarn.radius);
-        of_yarn("ply", &yarn.plies);
-        of_yarn("ply_twist", &yarn.ply_twist);
-        of_yarn("fiber", &yarn.fibers.iter().map(|(name, _)| name).collect::<Vec<_>>());
-        let mut fibers: Vec<_> = yarn.fibers.iter().collect();
-        fibers.dedup_by_key(|(name, _)| name.clone());
-        add(format!("yarn.{}", yarn.name), yarn);
-        for (name, material) in fibers {
-            add(format!("fiber.{name}"), material);
-        }
+        let shown = plain(&text);
+        self.0.push((key.to_owned(), if shown.len() > LONGEST_VALUE { hashed(text.as_bytes()) } else { shown }));
     }
-    for (name, material) in &scene.fibers {
-        add(format!("fiber.{name}"), material);
-    }
-    for (i, fabric) in scene.fabrics.iter().enumerate() {
-        let mut of_fabric = |name: &str, value: &dyn Debug| add(format!("fabric.{i}.{name}"), value);
-        match fabric.kind {
-            CurveKind::Yarn(i) => of_fabric("yarn", &scene.yarns[i].name),
-            CurveKind::Fiber(i) => of_fabric("fiber", &scene.fibers[i].0),
-        }
-        of_fabric("phase", &fabric.phases);
-        of_fabric("seed", &fabric.seed);
-        if !fabric.variants.is_empty() {
-            of_fabric("colors", &(&fabric.variants, &fabric.material_indices));
-        }
-        of_fabric("curves", &curves(fabric));
-        of_fabric("shutter", &fabric.motion);
-        of_fabric("curve_basis", &fabric.basis);
-        of_fabric("curve_tolerance", &(fabric.tolerance, fabric.longest_segment));
-    }
-    for (i, light) in scene.lights.iter().enumerate() {
-        match light {
-            Light::Environment(Environment { radiance, image: Some(map), visible }) => {
-                let pixels: Vec<u8> = map.pixels().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
-                add(format!("light.{i}"), &(radiance, visible, map.rotation(), hashed(&pixels)));
+}
+
+/// What Rust prints for its programmers, for readers: `Some(3)` is 3, `None` none, `Vec3A(0.0, 1.0, 0.0)` an array,
+/// `Gaussian(0.5)` gaussian (0.5), text without quotes. Nothing that tells two values apart is lost.
+fn plain(debug: &str) -> String {
+    let mut out = String::with_capacity(debug.len());
+    // What closes each open bracket.
+    let mut closing: Vec<&str> = Vec::new();
+    let mut rest = debug;
+    while let Some(c) = rest.chars().next() {
+        let word = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        let is_name = c.is_alphabetic() && word > 0;
+        if is_name {
+            let (name, after) = rest.split_at(word);
+            let is_vector = ["Vec", "DVec", "Rgb", "Mat3A", "f32x4"].iter().any(|v| name.starts_with(v));
+            rest = after;
+            match (name, after.starts_with('(')) {
+                ("Some", true) => {
+                    closing.push("");
+                    rest = &after[1..];
+                }
+                (_, true) if is_vector => {
+                    out.push('[');
+                    closing.push("]");
+                    rest = &after[1..];
+                }
+                (_, true) => {
+                    out += &format!("{} (", name.to_lowercase());
+                    closing.push(")");
+                    rest = &after[1..];
+                }
+                _ => out += &name.to_lowercase(),
             }
-            _ => add(format!("light.{i}"), light),
+            continue;
+        }
+        rest = &rest[c.len_utf8()..];
+        match c {
+            '(' | '[' | '{' => {
+                out.push(c);
+                closing.push(match c {
+                    '(' => ")",
+                    '[' => "]",
+                    _ => "}",
+                });
+            }
+            ')' | ']' | '}' => out += closing.pop().unwrap_or_default(),
+            '"' => {
+                // A name stays as it is written.
+                let end = rest.find('"').unwrap_or(rest.len());
+                out += &rest[..end];
+                rest = rest.get(end + 1..).unwrap_or_default();
+            }
+            _ => out.push(c),
         }
     }
-    for (i, material) in scene.materials.iter().enumerate() {
-        // A texture by some of its colours: whoever changes a picture changes its mean, or one of many places.
-        let texture = material.texture.as_ref().map(|t| {
-            let colors =
-                (0..4096).map(|i| t.texture.sample((i % 64) as f32 / 64.0, (i / 64) as f32 / 64.0, 1.0 / 64.0));
-            let bytes: Vec<u8> = colors.flatten().flat_map(f32::to_le_bytes).collect();
-            (t.repeat, t.texture.size(), hashed(&bytes))
-        });
-        add(format!("material.{i}"), &(&material.surface, texture));
-    }
-    for (i, object) in scene.objects.iter().enumerate() {
-        add(format!("mesh.{i}"), &(object.material, triangles(object)));
-    }
-    add("ground".to_owned(), &scene.ground);
     out
+}
+
+fn of_settings(render: &RenderSettings, keys: &mut Keys) {
+    let RenderSettings {
+        mode,
+        model,
+        without,
+        width,
+        height,
+        crop,
+        filter,
+        // When to stop: samples are the same however many are taken.
+        spp: _,
+        time: _,
+        noise: _,
+        adaptive,
+        max_bounces,
+        threads: _,
+        seed,
+        frame,
+        compact_bvh,
+        max_memory: _,
+        force,
+    } = render;
+    let mut setting = |name: &str, value: &dyn Debug| keys.add(&format!("render.{name}"), value);
+    setting("mode", &mode.name());
+    setting("model", &model.name());
+    setting("without", without);
+    setting("width", width);
+    setting("height", height);
+    setting("crop", crop);
+    setting("filter", filter);
+    setting("adaptive", adaptive);
+    setting("max_bounces", max_bounces);
+    setting("seed", seed);
+    setting("frame", frame);
+    setting("bvh", &if *compact_bvh { "compact" } else { "fast" });
+    setting("force", force);
+}
+
+fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
+    let Yarn { name, radius, plies, ply_twist, fibers, placement, flyaways, tilted } = yarn;
+    let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("yarn.{name}.{key}"), value);
+    key("radius", radius);
+    key("ply", plies);
+    key("ply_twist", ply_twist);
+    key("fiber", &fibers.iter().map(|(name, _)| name).collect::<Vec<_>>());
+    key("packing", placement);
+    key("flyaways", flyaways);
+    key("ply_intersection", &if *tilted { "tilted" } else { "perpendicular" });
+    let mut different: Vec<_> = fibers.iter().collect();
+    different.dedup_by_key(|(name, _)| name);
+    for (name, material) in different {
+        keys.add(&format!("fiber.{name}"), material);
+    }
+}
+
+fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
+    let Fabric {
+        // Names are for messages and mattes: what covers a pixel is counted by number.
+        name: _,
+        origin: _,
+        kind,
+        curves,
+        motion,
+        variants,
+        material_indices,
+        phases,
+        seed,
+        basis,
+        tolerance,
+        longest_segment,
+    } = fabric;
+    let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("{path}.{key}"), value);
+    match *kind {
+        CurveKind::Yarn(i) => key("yarn", &scene.yarns[i].name),
+        CurveKind::Fiber(i) => key("fiber", &scene.fibers[i].0),
+    }
+    key("phase", phases);
+    key("seed", seed);
+    if !variants.is_empty() {
+        key("colors", &(variants, material_indices));
+    }
+    let mut hash = Hash::default();
+    for (Curve { basis, closed, points, radii: _, flattening }, radii) in curves {
+        let pressed = flattening.as_ref().map(Vec::len);
+        hash.bytes(format!("{basis:?} {closed} {} {} {pressed:?}", points.len(), radii.len()).as_bytes());
+        flattening.iter().flatten().for_each(|v| hash.numbers(&v.to_array()));
+        points.iter().for_each(|p| hash.numbers(&p.to_array()));
+        hash.numbers(radii);
+    }
+    key("curves", &hash.word());
+    let FabricMotion { later, rest } = motion;
+    if !later.is_empty() || rest.is_some() {
+        let mut hash = Hash::default();
+        for points in later.iter().flatten().chain(rest.iter().flatten()) {
+            hash.bytes(&points.len().to_le_bytes());
+            points.iter().for_each(|p| hash.numbers(&p.to_array()));
+        }
+        key("shutter", &(later.len(), rest.is_some(), hash.word()));
+    }
+    key("curve_basis", basis);
+    key("curve_tolerance", &(tolerance, longest_segment));
+}
+
+fn of_light(light: &Light, path: &str, keys: &mut Keys) {
+    match light {
+        Light::Environment(Environment { radiance, image: Some(map), visible }) => {
+            let mut hash = Hash::default();
+            map.pixels().as_flattened().iter().for_each(|v| hash.bytes(&v.to_le_bytes()));
+            keys.add(path, &(radiance, visible, map.rotation(), map.pixels().len(), hash.word()));
+        }
+        // Written out by what they derive: all of their fields.
+        Light::Environment(_) | Light::Distant { .. } | Light::Point { .. } | Light::Spot { .. } | Light::Area(_) => {
+            keys.add(path, light)
+        }
+    }
 }
 
 /// One word for an identity.
@@ -124,37 +297,49 @@ pub fn differences(there: &[(String, String)], here: &[(String, String)]) -> Vec
         .collect()
 }
 
-/// A hash of curves and their radii.
-fn curves(fabric: &Fabric) -> String {
-    let mut bytes = Vec::new();
-    for (curve, radii) in &fabric.curves {
-        bytes.extend(format!("{:?} {} {}", curve.basis, curve.closed, radii.len()).into_bytes());
-        for (p, r) in curve.points.iter().zip(radii) {
-            bytes.extend([p.x, p.y, p.z, *r].map(f64::to_le_bytes).as_flattened());
-        }
+/// XXH3 of 128 bits, fed piece by piece.
+#[derive(Default)]
+struct Hash(XxHash3_128);
+
+impl Hash {
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.0.write(bytes);
     }
-    hashed(&bytes)
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        numbers.iter().for_each(|v| self.0.write(&v.to_le_bytes()));
+    }
+
+    fn word(&self) -> String {
+        format!("{:032x}", self.0.finish_128())
+    }
 }
 
-/// A hash of a mesh.
-fn triangles(object: &Object) -> String {
-    let mesh = &object.mesh;
-    let mut bytes = format!("{} {}", mesh.normals.len(), mesh.uvs.len()).into_bytes();
-    let vectors = mesh.points.iter().chain(&mesh.normals).flat_map(|p| p.to_array());
-    bytes.extend(vectors.chain(mesh.uvs.iter().flat_map(|uv| uv.to_array())).flat_map(f64::to_le_bytes));
-    bytes.extend(mesh.triangles.as_flattened().iter().flat_map(|i| i.to_le_bytes()));
-    hashed(&bytes)
-}
-
-/// FNV-1a.
 fn hashed(bytes: &[u8]) -> String {
-    let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-    format!("{:016x}", bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix))
+    format!("{:032x}", XxHash3_128::oneshot(bytes))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_are_plain_words() {
+        for (debug, words) in [
+            ("Some(3)", "3"),
+            ("None", "none"),
+            ("Gaussian(0.5)", "gaussian (0.5)"),
+            ("\"Wool\"", "Wool"),
+            ("[Some(Vec3A(0.0, 1.0, -2.5)), None]", "[[0.0, 1.0, -2.5], none]"),
+            (
+                "Distant { towards: Vec3A(0.0, 1.0, 0.0), one_minus_cos: 1e-5 }",
+                "distant { towards: [0.0, 1.0, 0.0], one_minus_cos: 1e-5 }",
+            ),
+            ("Perspective(0.43), [1, 2]", "perspective (0.43), [1, 2]"),
+        ] {
+            assert_eq!(plain(debug), words);
+        }
+    }
 
     #[test]
     fn differences_have_names() {

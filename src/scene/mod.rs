@@ -9,6 +9,7 @@ pub mod animation;
 pub mod builder;
 pub mod camera;
 pub mod defaults;
+pub mod force;
 pub mod identity;
 pub mod load;
 pub mod motion;

@@ -1,7 +1,7 @@
 //! `[render]` and `[output]`.
 
 use super::{
-    super::{builder::OutputSettings, *},
+    super::{builder::OutputSettings, force::FORCEABLE, *},
     Range, Reader,
 };
 use crate::{image::png::ToneMap, input::diagnostic::shortened};
@@ -61,7 +61,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         frame: table.u64("frame", 0..=u64::from(u32::MAX)).map(|f| f as u32),
         compact_bvh: table.one_of_or("bvh", otherwise.compact_bvh, &[("compact", true), ("fast", false)]),
         max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
-        force: table.strings("force").into_iter().map(|(name, _)| name.to_owned()).collect(),
+        force: force(table),
     })
 }
 
@@ -80,6 +80,16 @@ fn without(table: &Reader<'_>) -> Vec<FiberLobe> {
         }
     }
     lobes
+}
+
+/// `force = ["distant_light"]`: features to bring in.
+fn force(table: &Reader<'_>) -> Vec<String> {
+    let names: Vec<String> = table.strings("force").into_iter().map(|(name, _)| name.to_owned()).collect();
+    for name in names.iter().filter(|name| !FORCEABLE.contains(&name.as_str())) {
+        let hint = format!("these can: {}", FORCEABLE.join(", "));
+        table.error_at("force", format!("`{}` cannot be forced", shortened(name)), Some(&hint));
+    }
+    names
 }
 
 /// The settings of `[output]`.

@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 use glam::{DVec3, Mat3A, Vec3A};
 
+use super::{Material, Object, Scene, camera::Lens};
 use crate::{
     geometry::{fiber::flyaway::Flyaways, mesh::Mesh},
     light::{AreaLight, EnvironmentMap, Light, Shape},
     math::Rgb,
     scattering::surface::SurfaceMaterial,
-    scene::{Material, Object, Scene, camera::Lens},
 };
 
 /// Light that shines on nothing anybody could see, but that shadow rays look for.
 const FAINT: f32 = 1e-30;
 
-/// Names of features that can be forced, as in [`super::Plan`].
+/// Names of features that can be forced, as the plan of a render has them.
 pub const FORCEABLE: [&str; 18] = [
     "ply_filter",
     "elliptical_plies",
