@@ -2,9 +2,10 @@
 //!
 //! A [`Reader`] never stops at an error: it reports, answers with nothing (or the default), and goes on,
 //! so that a user sees everything that is wrong at once. After the last question [`Reader::finish`]
-//! reports every key nobody asked for.
+//! reports every key nobody asked for. Whoever reads a table asks for all of its keys before judging their values together:
+//! what returns early leaves valid keys to be called unknown.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -156,6 +157,8 @@ pub struct Reader<'a> {
     title: Title,
     diagnostics: &'a Diagnostics,
     asked: RefCell<Vec<String>>,
+    /// Whether the key that says what the table is of has a wrong value: then nobody knows its other keys.
+    of_unknown_kind: Cell<bool>,
 }
 
 impl<'a> Reader<'a> {
@@ -166,7 +169,7 @@ impl<'a> Reader<'a> {
     }
 
     fn with_title(table: &'a Table, title: Title, diagnostics: &'a Diagnostics) -> Reader<'a> {
-        Reader { table, title, diagnostics, asked: RefCell::new(Vec::new()) }
+        Reader { table, title, diagnostics, asked: RefCell::new(Vec::new()), of_unknown_kind: Cell::new(false) }
     }
 
     // Places and messages.
@@ -224,8 +227,11 @@ impl<'a> Reader<'a> {
         });
     }
 
-    /// Reports every key that is there but was never asked for.
+    /// Reports every key that is there but was never asked for, unless the table is of an unknown kind ([`Self::kind`]).
     pub fn finish(self) {
+        if self.of_unknown_kind.get() {
+            return;
+        }
         let asked = self.asked.borrow();
         for entry in self.table.entries().filter(|entry| !entry.is_read()) {
             let message = format!("unknown key `{}`{}", shortened(&entry.key), self.title.inside());
@@ -510,6 +516,26 @@ impl<'a> Reader<'a> {
     /// One of the names, or the default.
     pub fn one_of_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> T {
         self.one_of(key, choices).unwrap_or(default)
+    }
+
+    /// One of the names, for a key that decides which other keys a table has. Where its value is wrong, or the key is
+    /// missing, [`Self::finish`] calls no key unknown: one mistake is told once.
+    pub fn kind<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+        let kind = self.required_one_of(key, choices);
+        if kind.is_none() {
+            self.of_unknown_kind();
+        }
+        kind
+    }
+
+    /// Says that nobody knows which keys the table has: [`Self::finish`] calls none unknown.
+    pub fn of_unknown_kind(&self) {
+        self.of_unknown_kind.set(true);
+    }
+
+    /// As [`Self::kind`], with a default for a table that does not say.
+    pub fn kind_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> Option<T> {
+        if self.has(key) { self.kind(key, choices) } else { Some(default) }
     }
 
     /// One of the names; the key must be there.

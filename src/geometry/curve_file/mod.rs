@@ -211,6 +211,11 @@ pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Curv
     Ok(set)
 }
 
+/// Whether a file is named as those that [`read`] reads.
+pub fn can_read(path: &Path) -> bool {
+    recognise(&[], path).is_some()
+}
+
 /// The format that a file's name asks for, if it can be written.
 fn written_as(path: &Path) -> Option<Format> {
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {

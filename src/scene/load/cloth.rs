@@ -21,7 +21,7 @@ use crate::{
         curve_file::{self, ReadOptions},
         pattern::straight,
     },
-    input::diagnostic::{Span, unknown_name},
+    input::diagnostic::Span,
     math::sampler::Stream,
 };
 
@@ -124,8 +124,8 @@ pub(super) fn plan(
         if let Some(name) = name
             && !names.contains(name)
         {
-            let (message, hint) = unknown_name(key, name, names.iter().map(String::as_str));
-            table.error_at(key, message, Some(&hint));
+            let span = table.span(key).unwrap_or(table.header());
+            context.unknown(span, key, name, names.iter().map(String::as_str));
         }
     }
     if yarn.is_some() && fiber.is_some() {
@@ -217,7 +217,7 @@ impl Yarns<'_> {
 
 fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: Option<&Path>) -> Option<Source> {
     let kinds = [("file", 0), ("knit", 1), ("weave", 2), ("straight", 3), ("stockinette", 4)];
-    let kind = table.required_one_of("type", &kinds);
+    let kind = table.kind("type", &kinds);
     let header = table.header();
     let made = match kind {
         Some(0) => {
@@ -395,6 +395,13 @@ impl CurveFile {
                 return None;
             }
         };
+        if set.curves.is_empty() {
+            let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+            let hint =
+                is_obj.then(|| "curves of an OBJ file are its lines (`l`); its triangles go into a [[mesh]]".into());
+            context.error(self.span, format!("{}: it holds no curve that can be drawn", path.display()), hint);
+            return None;
+        }
         warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
         let scale = self.unit.or(set.unit_mm).unwrap_or(context.unit);
         for p in set.curves.iter_mut().flat_map(|c| &mut c.points) {

@@ -22,7 +22,7 @@ use crate::{
         pattern::{PatternStrand, StrandKind},
     },
     image::{self, png::srgb_to_linear, texture::Texture},
-    input::diagnostic::{Span, unknown_name},
+    input::diagnostic::Span,
     math::{
         sampler::{Stream, hash2},
         warp::normal,
@@ -156,8 +156,7 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
     }
     let known = |name: &str, span: Span| {
         if !library.yarn_names.iter().any(|n| n == name) {
-            let (message, hint) = unknown_name("yarn", name, library.yarn_names.iter().map(String::as_str));
-            context.error(span, message, Some(hint));
+            context.unknown(span, "yarn", name, library.yarn_names.iter().map(String::as_str));
         }
     };
     let names = |key: &str| -> Vec<String> {

@@ -80,7 +80,7 @@ pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<De
         }
         let root = Reader::new(&document, &diagnostics);
         let unit = root.one_of_or("unit", 1.0, &UNITS);
-        let context = Context { sources: &sources, diagnostics: &diagnostics, unit };
+        let context = Context::new(&sources, &diagnostics, unit, true);
         let library = yarns::read(&root, &context, true);
         Some(Definitions { fibers: library.fibers, yarns: library.yarns })
     });

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     geometry::{mesh::Mesh, obj},
     image::texture::Texture,
-    input::diagnostic::{Span, unknown_name},
+    input::diagnostic::Span,
     math::Rgb,
     scattering::surface::SurfaceMaterial,
 };
@@ -35,7 +35,7 @@ pub(super) fn materials(root: &Reader<'_>, context: &Context<'_>) -> Materials {
 }
 
 fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
-    let kind = table.one_of_or("type", 0, &[("diffuse", 0), ("coated", 1)]);
+    let kind = table.kind_or("type", 0, &[("diffuse", 0), ("coated", 1)]);
     let repeat = table.vec2("repeat", Range::POSITIVE).unwrap_or([1.0; 2]);
     let texture = table.string("texture").map(|path| {
         let span = table.span("texture").unwrap_or(table.header());
@@ -43,7 +43,7 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
     });
     let plain = if texture.is_some() { 1.0 } else { defaults::ALBEDO };
     let albedo = table.rgb_or("albedo", [plain; 3], Range::UNIT);
-    let coat = (kind == 1).then(|| {
+    let coat = (kind == Some(1)).then(|| {
         // A perfectly smooth coat would be a mirror, in which no light of no size is ever found.
         let roughness = table.f64_or("roughness", defaults::ROUGHNESS, Range::between(0.03, 1.0));
         (roughness, table.f64_or("ior", defaults::IOR, Range::between(1.01, 4.0)))
@@ -53,7 +53,7 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
 }
 
 /// The material that a table names under `material`, or a diffuse one of its `albedo`.
-pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<MaterialPlan> {
+pub(super) fn material_of(table: &Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<MaterialPlan> {
     let albedo = table.rgb("albedo", Range::UNIT);
     let Some(name) = table.string("material") else {
         return Some(MaterialPlan { albedo: albedo.unwrap_or([defaults::ALBEDO; 3]), coat: None, texture: None });
@@ -64,8 +64,8 @@ pub(super) fn material_of(table: &Reader<'_>, materials: &Materials) -> Option<M
     match materials.get(name) {
         Some(material) => material.clone(),
         None => {
-            let (message, hint) = unknown_name("material", name, materials.keys().map(String::as_str));
-            table.error_at("material", message, Some(&hint));
+            let span = table.span("material").unwrap_or(table.header());
+            context.unknown(span, "material", name, materials.keys().map(String::as_str));
             None
         }
     }
@@ -125,11 +125,12 @@ pub(super) fn meshes(root: &Reader<'_>, context: &Context<'_>, materials: &Mater
 
 fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<MeshPlan> {
     let transform = placement(&table, context);
-    let material = material_of(&table, materials);
+    let material = material_of(&table, context, materials);
     let mut smooth = false;
     let source = match (table.string("path"), table.has("shape")) {
         (Some(_), true) => {
             table.error_at("shape", "give `path` or `shape`, not both", None);
+            table.of_unknown_kind();
             None
         }
         (Some(path), false) => {
@@ -146,6 +147,7 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Opti
                     "path = \"body.obj\", or shape = \"sphere\", \"cylinder\", \"box\", \"plane\" or \"revolution\"";
                 table.error("missing key `path` or `shape` in the mesh", Some(hint));
             }
+            table.of_unknown_kind();
             None
         }
     };
@@ -155,7 +157,7 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Opti
 
 fn shape(table: &Reader<'_>, context: &Context<'_>) -> Option<Source> {
     let kinds = ["sphere", "cylinder", "box", "plane", "revolution"].map(|name| (name, name));
-    let kind = table.one_of("shape", &kinds)?;
+    let kind = table.kind("shape", &kinds)?;
     let length = |key: &str| table.required_f64(key, Range::POSITIVE).map(|l| l * context.unit);
     let segments = || table.u64_or("segments", defaults::MESH_SEGMENTS.into(), 3..=4096) as u32;
     let mesh = match kind {

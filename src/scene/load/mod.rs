@@ -15,6 +15,7 @@ mod view;
 mod yarns;
 
 use std::{
+    cell::RefCell,
     fmt,
     path::{Path, PathBuf},
 };
@@ -25,12 +26,14 @@ pub use definitions::{Definitions, load_definitions};
 
 use super::{
     RenderSettings, Scene,
+    animation::numbered,
     builder::{OutputSettings, SceneBuilder},
     defaults,
     view::CameraSetup,
 };
+use crate::geometry::curve_file;
 use crate::input::{
-    diagnostic::{Diagnostic, Diagnostics, Sources, Span},
+    diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},
     reader::{Range, Reader},
 };
@@ -69,6 +72,16 @@ struct Context<'a> {
     diagnostics: &'a Diagnostics,
     /// Millimetres per unit of the scene.
     unit: f64,
+    /// Whether all libraries were read: else they may have what is not found.
+    libraries_are_read: bool,
+    /// Files that the text names, and where.
+    named: RefCell<Vec<(PathBuf, Span)>>,
+}
+
+impl<'a> Context<'a> {
+    fn new(sources: &'a Sources, diagnostics: &'a Diagnostics, unit: f64, libraries_are_read: bool) -> Self {
+        Self { sources, diagnostics, unit, libraries_are_read, named: RefCell::default() }
+    }
 }
 
 impl Context<'_> {
@@ -76,7 +89,29 @@ impl Context<'_> {
     fn resolve(&self, path: &str, span: Span) -> PathBuf {
         let source = span.source();
         let base = if self.sources.is_option(source) { None } else { Path::new(self.sources.name(source)).parent() };
-        base.map_or_else(|| PathBuf::from(path), |base| base.join(path))
+        let path = base.map_or_else(|| PathBuf::from(path), |base| base.join(path));
+        self.named.borrow_mut().push((path.clone(), span));
+        path
+    }
+
+    /// Tells which of the named files are not there. Where the text has mistakes, no file is read; this at least is found
+    /// out with them.
+    fn tell_missing_files(&self) {
+        for (path, span) in self.named.borrow().iter() {
+            // One of a sequence is found when its number is known.
+            if !path.exists() && numbered(path, 0).is_none() {
+                self.error(*span, format!("{}: no such file", path.display()), None);
+            }
+        }
+    }
+
+    /// Tells of a name of this kind (`yarn`, `fiber`, `material`) that nothing has; nothing is told where a library is
+    /// missing that may have it.
+    fn unknown<'n>(&self, span: Span, kind: &str, name: &str, names: impl Iterator<Item = &'n str> + Clone) {
+        if self.libraries_are_read {
+            let (message, hint) = unknown_name(kind, name, names);
+            self.error(span, message, Some(hint));
+        }
     }
 
     fn error(&self, span: Span, message: impl Into<String>, hint: Option<String>) {
@@ -99,6 +134,12 @@ impl Context<'_> {
 /// Everything that is wrong with it, as text for the user.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let name = path.display().to_string();
+    if curve_file::can_read(path) && path.is_file() {
+        return Err(LoadError(format!(
+            "{name}: error: a curve file is no scene\n  hint: `yarnray render SCENE.toml --curves {name}` renders it in a scene, \
+             such as scenes/glove.toml; `yarnray info {name}` tells what it holds\n"
+        )));
+    }
     let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
     parse(&name, &text, options)
 }
@@ -154,38 +195,39 @@ fn load_text(
     diagnostics: &Diagnostics,
 ) -> Option<Scene> {
     let mut document = Document::parse(name, text, sources, diagnostics)?;
-    merge_libraries(&mut document, sources, diagnostics);
+    let libraries_are_read = merge_libraries(&mut document, sources, diagnostics);
     for (key, value, label) in &options.settings {
         document.set(key, value.clone(), label, sources, diagnostics);
     }
     for assignment in &options.assignments {
         document.apply_option(assignment, sources, diagnostics);
     }
-    if diagnostics.has_errors() {
-        return None;
-    }
-    build(name, &document, options, sources, diagnostics)
+    build(name, &document, options, sources, diagnostics, libraries_are_read)
 }
 
-/// Adds the tables of the files under `library`; what the scene itself says wins.
-fn merge_libraries(document: &mut Document, sources: &mut Sources, diagnostics: &Diagnostics) {
+/// Adds the tables of the files under `library`; what the scene itself says wins. Whether all of them could be read.
+fn merge_libraries(document: &mut Document, sources: &mut Sources, diagnostics: &Diagnostics) -> bool {
+    let mut whole = true;
     let paths: Vec<(String, Span)> =
         Reader::new(document, diagnostics).strings("library").into_iter().map(|(p, s)| (p.to_owned(), s)).collect();
     for (path, span) in paths {
-        let full = Context { sources, diagnostics, unit: 1.0 }.resolve(&path, span);
+        let full = Context::new(sources, diagnostics, 1.0, true).resolve(&path, span);
         match read_text(&full) {
-            Ok(text) => {
-                if let Some(library) = Document::parse(&full.display().to_string(), &text, sources, diagnostics) {
-                    document.merge(library, sources);
-                }
+            Ok(text) => match Document::parse(&full.display().to_string(), &text, sources, diagnostics) {
+                Some(library) => document.merge(library, sources),
+                None => whole = false,
+            },
+            Err(problem) => {
+                whole = false;
+                diagnostics.push(
+                    Diagnostic::error(format!("cannot read the library {}: {problem}", full.display()))
+                        .at(span)
+                        .hint("paths are relative to the file that names them"),
+                );
             }
-            Err(problem) => diagnostics.push(
-                Diagnostic::error(format!("cannot read the library {}: {problem}", full.display()))
-                    .at(span)
-                    .hint("paths are relative to the file that names them"),
-            ),
         }
     }
+    whole
 }
 
 fn build(
@@ -194,15 +236,17 @@ fn build(
     options: &LoadOptions,
     sources: &Sources,
     diagnostics: &Diagnostics,
+    libraries_are_read: bool,
 ) -> Option<Scene> {
     let root = Reader::new(document, diagnostics);
     root.strings("library");
     root.u64("schema", 1..=1);
     let unit = root.one_of_or("unit", 1.0, &UNITS);
-    let context = Context { sources, diagnostics, unit };
+    let context = Context::new(sources, diagnostics, unit, libraries_are_read);
     let plans = Plans::read(&root, options, &context);
     root.finish();
     if diagnostics.has_errors() {
+        context.tell_missing_files();
         return None;
     }
     // The text is sound: now the files.

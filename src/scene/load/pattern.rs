@@ -14,7 +14,10 @@ use crate::{
             weave::{self, Weave},
         },
     },
-    input::diagnostic::{Span, unknown_name},
+    input::{
+        diagnostic::{Span, unknown_name},
+        document::Value,
+    },
 };
 
 /// A knit that is checked but for what only knitting tells.
@@ -47,6 +50,12 @@ impl KnitPlan {
 /// Reads the keys of a knit.
 pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
     let chart_rows = table.strings("chart");
+    if table.has("chart") && chart_rows.is_empty() {
+        // A value of another type is told already.
+        if table.node("chart").is_some_and(|node| matches!(&node.value, Value::Array(rows) if rows.is_empty())) {
+            table.error_at("chart", "a chart without rows", Some("chart = [\"12: k2 p2\", \"3: k\"]"));
+        }
+    }
     let pattern = table.string("pattern");
     if pattern.is_some() && !chart_rows.is_empty() {
         table.error_at(
@@ -86,7 +95,7 @@ pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>)
     }
     let lines = chart_rows.iter().map(|(_, span)| *span).collect();
     let rows = if lines_are_all(&form, &chart_rows) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
-    counted(table, chart?, form?, name, rows, lines)
+    counted(table, chart, form, name, rows, lines)
 }
 
 /// Shaped pieces are knitted once, from the first row of the chart to the last.
@@ -96,20 +105,25 @@ fn lines_are_all(form: &Option<Form>, chart_rows: &[(&str, Span)]) -> bool {
 
 /// `type = "stockinette"`: a flat knit of that pattern.
 pub(super) fn stockinette(table: &Reader<'_>) -> Option<KnitPlan> {
-    counted(table, Chart::named("stockinette")?, Form::Flat, "stockinette", 20, Vec::new())
+    counted(table, Chart::named("stockinette"), Some(Form::Flat), "stockinette", 20, Vec::new())
 }
 
-fn counted(table: &Reader<'_>, chart: Chart, form: Form, name: &str, rows: u32, lines: Vec<Span>) -> Option<KnitPlan> {
-    let knit = Knit {
-        chart,
-        stitches: table.u64_or("stitches", 20, 1..=1_000_000) as u32,
-        rows: table.u64_or("rows", rows.into(), 1..=1_000_000) as u32,
-        form,
-        stitch_width: table.f64("stitch_width", Range::between(1.0, 20.0)),
-        row_height: table.f64("row_height", Range::between(0.5, 20.0)),
-        yarn_per_stitch: table.f64_or("yarn_per_stitch", knit::YARN_PER_STITCH, Range::between(6.0, 60.0)),
-        points: table.u64_or("points", knit::POINTS.into(), 12..=200) as u32,
-    };
+fn counted(
+    table: &Reader<'_>,
+    chart: Option<Chart>,
+    form: Option<Form>,
+    name: &str,
+    rows: u32,
+    lines: Vec<Span>,
+) -> Option<KnitPlan> {
+    let stitches = table.u64_or("stitches", 20, 1..=1_000_000) as u32;
+    let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
+    let stitch_width = table.f64("stitch_width", Range::between(1.0, 20.0));
+    let row_height = table.f64("row_height", Range::between(0.5, 20.0));
+    let yarn_per_stitch = table.f64_or("yarn_per_stitch", knit::YARN_PER_STITCH, Range::between(6.0, 60.0));
+    let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
+    let (chart, form) = (chart?, form?);
+    let knit = Knit { chart, stitches, rows, form, stitch_width, row_height, yarn_per_stitch, points };
     if knit.control_points() > MAX_POINTS {
         table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
     }
@@ -183,22 +197,20 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
     let names = &yarns.library.yarn_names;
     if let Some(name) = weft_yarn.filter(|name| !names.iter().any(|n| n == name)) {
-        let (message, hint) = unknown_name("yarn", name, names.iter().map(String::as_str));
-        table.error_at("weft_yarn", message, Some(&hint));
+        let span = table.span("weft_yarn").unwrap_or(table.header());
+        context.unknown(span, "yarn", name, names.iter().map(String::as_str));
     }
     let own = yarns.radius();
     let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
-    let weave = Weave {
-        draft: draft?,
-        warps: table.u64_or("warps", 20, 1..=1_000_000) as u32,
-        wefts: table.u64_or("wefts", 20, 1..=1_000_000) as u32,
-        warp_radius: own,
-        weft_radius,
-        warp_spacing: table.f64("warp_spacing", Range::POSITIVE).map(|s| s * context.unit),
-        weft_spacing: table.f64("weft_spacing", Range::POSITIVE).map(|s| s * context.unit),
-        crimp: table.f64_or("crimp", 0.5, Range::UNIT),
-        points: table.u64_or("points", weave::POINTS.into(), 4..=200) as u32,
-    };
+    let warps = table.u64_or("warps", 20, 1..=1_000_000) as u32;
+    let wefts = table.u64_or("wefts", 20, 1..=1_000_000) as u32;
+    let warp_spacing = table.f64("warp_spacing", Range::POSITIVE).map(|s| s * context.unit);
+    let weft_spacing = table.f64("weft_spacing", Range::POSITIVE).map(|s| s * context.unit);
+    let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
+    let points = table.u64_or("points", weave::POINTS.into(), 4..=200) as u32;
+    let warp_radius = own;
+    let draft = draft?;
+    let weave = Weave { draft, warps, wefts, warp_radius, weft_radius, warp_spacing, weft_spacing, crimp, points };
     if weave.control_points() > MAX_POINTS {
         table.error_at("warps", "more than 2^26 control points", Some("fewer warps, wefts or points"));
         return None;
@@ -210,7 +222,13 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
 fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
     let rows = table.strings("draft");
     let read: Result<(String, Draft), DraftError> = match rows.as_slice() {
-        [] if table.has("draft") => return (String::new(), None),
+        [] if table.has("draft") => {
+            // A value of another type is told already.
+            if table.node("draft").is_some_and(|node| matches!(&node.value, Value::Array(rows) if rows.is_empty())) {
+                table.error_at("draft", "a draft without rows", Some("draft = [\"#..\", \".#.\", \"..#\"]"));
+            }
+            return (String::new(), None);
+        }
         [] => Draft::named("plain").map(|d| ("plain weave".to_owned(), d)),
         [(name, _)] if !name.contains(['#', '.']) => Draft::named(name).map(|d| (format!("{name} weave"), d)),
         rows => Draft::matrix(&rows.iter().map(|(text, _)| *text).collect::<Vec<_>>()).map(|d| ("weave".to_owned(), d)),

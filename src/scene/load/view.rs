@@ -39,7 +39,10 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
     }
     let table = root.table("camera")?;
     let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2)];
-    let kind = table.one_of_or("type", 0, &kinds);
+    let Some(kind) = table.kind_or("type", 0, &kinds) else {
+        table.finish();
+        return None;
+    };
     let up = DVec3::from(table.vec3_or("up", defaults::UP, Range::FINITE));
     let fov = |table: &Reader<'_>| {
         Projection::Perspective(radians(table.f64_or(
@@ -58,10 +61,8 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
         if setup.is_none() {
             table.error("`direction` and `up` of the camera must not be parallel or zero", None);
         }
-        setup.map(|setup| {
-            let lens = lens(&table, context, projection, Focus::Cloth);
-            CameraSetup { margin: Some(margin), lens, motion, ..setup }
-        })
+        let lens = lens(&table, context, projection, Focus::Cloth);
+        setup.map(|setup| CameraSetup { margin: Some(margin), lens, motion, ..setup })
     } else {
         let position = table.required_vec3("position", Range::FINITE);
         let target = table.vec3_or("target", [0.0; 3], Range::FINITE);
@@ -72,6 +73,10 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> O
         };
         let aim = position.map(|p| Aim { position: context.position(p), target: context.position(target), up });
         let motion = motion::read(&table, context, aim.as_ref().filter(|_| !frame), projection);
+        if aim.is_none() {
+            // What its lens is sharp on is not known either.
+            table.of_unknown_kind();
+        }
         aim.and_then(|aim| {
             let setup = CameraSetup::aimed(aim, projection);
             if setup.is_none() {
@@ -136,7 +141,7 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
     let bright = Range::at_least(0.0);
     let kinds =
         [("environment", 0), ("distant", 1), ("point", 2), ("spot", 3), ("rectangle", 4), ("disk", 5), ("sphere", 6)];
-    let kind = table.required_one_of("type", &kinds);
+    let kind = table.kind("type", &kinds);
     // Radiant intensity is per square of the scene's unit.
     let intensity =
         || table.rgb_or("intensity", [defaults::RADIANCE; 3], bright).map(|i| i * context.unit * context.unit);
@@ -312,7 +317,7 @@ pub(super) fn ground(root: &Reader<'_>, context: &Context<'_>, materials: &Mater
         },
     };
     let height = if auto { None } else { table.f64("height", Range::FINITE) };
-    let material = material_of(&table, materials);
+    let material = material_of(&table, context, materials);
     table.finish();
     Some(GroundPlan { height, material: material? })
 }

@@ -14,7 +14,7 @@ use crate::{
         },
         yarn::{MAX_PLIES, PlyParameters, touching_plies},
     },
-    input::diagnostic::{Sources, unknown_name},
+    input::diagnostic::Sources,
     scattering::fiber::FiberMaterial,
 };
 
@@ -203,6 +203,8 @@ fn yarn(
         (_, m) if m > 0 => m as u64,
         (n, _) => n.unwrap_or(1),
     };
+    let placement = table.table("packing").map_or(Placement::Regular, packing);
+    let flyaways = table.table("flyaways").map(|t| flyaways(t, radius.unwrap_or(1.0)));
     let Some(radius) = radius else {
         if !table.has("radius") {
             table.error(
@@ -213,8 +215,6 @@ fn yarn(
         table.finish();
         return None;
     };
-    let placement = table.table("packing").map_or(Placement::Regular, packing);
-    let flyaways = table.table("flyaways").map(|t| flyaways(t, radius));
     let (touching, _) = touching_plies(count as u32);
 
     let mut plies = Vec::new();
@@ -272,8 +272,8 @@ fn yarn(
             return;
         };
         let Some(material) = fibers.get(fiber.as_str()) else {
-            let (message, hint) = unknown_name("fiber", fiber, fibers.keys().map(String::as_str));
-            place.error_at("fiber", message, Some(&hint));
+            let span = place.span("fiber").unwrap_or(place.header());
+            context.unknown(span, "fiber", fiber, fibers.keys().map(String::as_str));
             return;
         };
         plies.push(PlyParameters {
