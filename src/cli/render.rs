@@ -63,7 +63,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_parser = ["srgb", "filmic"])]
     tone_map: Option<String>,
     /// Exposure of the picture for a screen, in stops.
-    #[arg(long, value_name = "STOPS", allow_hyphen_values = true)]
+    #[arg(long, value_name = "STOPS", value_parser = stops)]
     exposure: Option<f32>,
     /// Write statistics as JSON.
     #[arg(long, value_name = "FILE.json")]
@@ -242,6 +242,14 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     })
 }
 
+/// Reads a number of stops.
+fn stops(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|s| (-100.0..=100.0).contains(s))
+        .ok_or_else(|| "expected a number of stops from -100 to 100".to_owned())
+}
+
 /// Numbers of frames, from the first to the last.
 #[derive(Clone, Debug)]
 struct Frames(RangeInclusive<u32>);
@@ -415,21 +423,23 @@ fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
     for warning in &scene.warnings {
         tracing::warn!("{warning}");
     }
-    let verbose = args.log.verbose > 0;
-    const SHOWN: usize = 3;
-    let total = world.tight_bends().count();
-    for (weave, bend) in world.tight_bends().take(if verbose { usize::MAX } else { SHOWN }) {
+    for (i, fabric) in scene.fabrics.iter().enumerate() {
+        let bends = || world.tight_bends().filter(|(of, _)| *of == i).map(|(_, bend)| bend);
+        let Some(worst) = bends().max_by(|a, b| a.fold.total_cmp(&b.fold)) else { continue };
         tracing::warn!(
-            "{}: yarn {} bends too tightly at segment {}: its radius is {:.2} times its radius of curvature, \
-             and the tube folds into itself",
-            scene.fabrics[weave].origin,
-            bend.yarn,
-            bend.segment,
-            bend.tightness
+            "{}: {} of {} yarns bend so tightly that they fold into themselves and their plies break; the worst is yarn {} \
+             at segment {}, whose inner side runs backwards by {:.1} of its radius{}",
+            fabric.origin,
+            bends().count(),
+            fabric.curves.len(),
+            worst.yarn,
+            worst.segment,
+            worst.fold,
+            if args.log.verbose > 0 { "" } else { " (-v shows all)" }
         );
-    }
-    if total > SHOWN && !verbose {
-        tracing::warn!("... and {} more yarns with such bends (-v shows all)", total - SHOWN);
+        for bend in bends() {
+            tracing::debug!("yarn {} folds at segment {} by {:.2} of its radius", bend.yarn, bend.segment, bend.fold);
+        }
     }
     if scene.lights.is_empty() {
         tracing::warn!("the scene has no light: the picture will be black");

@@ -34,15 +34,20 @@ pub struct StrandOptions {
     pub phases: Vec<f64>,
 }
 
-/// A place where the radius exceeds the radius of curvature, so that the tube folds into itself.
+/// How far the inner side of a bend may run backwards, in yarn radii, before plies are seen to break: about the radius of one
+/// ply of three.
+const SEEN_FOLD: f64 = 0.5;
+
+/// A bend whose radius of curvature is so much smaller than the yarn's radius that the tube folds into itself, and plies
+/// are seen to break.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TightBend {
     /// Which yarn.
     pub yarn: usize,
     /// Which segment of it, as resampled.
     pub segment: usize,
-    /// Radius times curvature there; above 1.
-    pub tightness: f64,
+    /// By how much the inner side of the bend runs backwards, in yarn radii; above a half, and finite for any curve.
+    pub fold: f64,
 }
 
 /// What is known at a control point beyond its position and radius.
@@ -184,7 +189,7 @@ impl Strands {
             }
             strands.material_indices.extend(strand.material_indices);
             strands.length += strand.length;
-            strands.tight_bends.extend(strand.tight.map(|(segment, tightness)| TightBend { yarn, segment, tightness }));
+            strands.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
         }
         strands.first_segments.push(segments.len() as u32);
         if strands.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
@@ -498,7 +503,7 @@ impl Winding {
         let start = normal;
         let mut knots = Vec::with_capacity(segments + 1);
         let mut turned = 0.0;
-        let mut tight: Option<(usize, f64)> = None;
+        let (mut fold, mut tight): (f64, Option<(usize, f64)>) = (0.0, None);
         knots.push(Knot { tangent, normal, turned });
         for segment in 0..segments {
             for step in 1..=FRAME_STEPS {
@@ -508,13 +513,11 @@ impl Winding {
                 let distance = next.at.truncate().distance(here.at.truncate());
                 let radius = (0.5 * (here.at.w + next.at.w)).max(1e-300);
                 turned += options.ply_rate * distance / radius;
-                let speed = next.d1.truncate().length();
-                if speed > 0.0 {
-                    let curvature = next.d1.truncate().cross(next.d2.truncate()).length() / (speed * speed * speed);
-                    let tightness = curvature * next.at.w;
-                    if tightness > 1.0 && tight.is_none_or(|(_, worst)| tightness > worst) {
-                        tight = Some((segment, tightness));
-                    }
+                // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
+                // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
+                fold = (fold + tangent.angle_between(next_tangent) - distance / radius).max(0.0);
+                if fold > SEEN_FOLD && tight.is_none_or(|(_, worst)| fold > worst) {
+                    tight = Some((segment, fold));
                 }
                 (here, tangent) = (next, next_tangent);
             }
@@ -782,7 +785,23 @@ mod tests {
         assert_eq!(s.tight_bends().len(), 1);
         let bend = s.tight_bends()[0];
         let place = s.frame(bend.segment as u32, 0.5);
-        assert!(place.centre.x.abs() < 1.5 && bend.tightness > 1.0, "{bend:?} at {}", place.centre);
+        assert!(place.centre.x.abs() < 1.5 && bend.fold > 0.5 && bend.fold < 3.0, "{bend:?} at {}", place.centre);
+    }
+
+    /// Curvature of real files is without bounds: a point given twice, a step there and back.
+    #[test]
+    fn a_bend_without_radius_has_a_fold_of_a_number() {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let there_and_back = vec![p(0.0, 0.0), p(5.0, 0.0), p(10.0, 0.0), p(5.0, 1e-9), p(0.0, 0.0)];
+        let twice = vec![p(0.0, 0.0), p(5.0, 0.0), p(5.0, 0.0), p(5.0, 5.0), p(5.0, 10.0)];
+        let arc = (0..20).map(|i| f64::from(i) * 0.1).map(|a| p(3.0 * a.cos(), 3.0 * a.sin())).collect();
+        for (points, folded) in [(there_and_back, true), (twice, false), (arc, false)] {
+            let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
+            let s = strands(curve, 0.5, &options(Basis::CatmullRom));
+            assert_eq!(!s.tight_bends().is_empty(), folded, "{:?}", s.tight_bends());
+            // A turn back is half a turn.
+            assert!(s.tight_bends().iter().all(|b| b.fold > 0.5 && b.fold < 3.2), "{:?}", s.tight_bends());
+        }
     }
 
     #[test]
