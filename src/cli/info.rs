@@ -61,7 +61,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
 
 /// What a checkpoint or part of a render holds.
 fn film_report(path: &Path) -> Result<(Value, String), Failure> {
-    let header = film_file::read_header(path)?;
+    let header = film_file::check(path)?;
     let (about, [from, to], [least, most]) = (&header.about, header.samples, header.next);
     let [x0, y0, x1, y1] = header.crop;
     let seconds = header.elapsed.as_secs_f64();

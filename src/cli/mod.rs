@@ -20,7 +20,7 @@ mod terminal;
 
 use std::{path::PathBuf, process::ExitCode};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::{
     experiment::{converge::ConvergeError, table3::BenchError},
@@ -159,9 +159,41 @@ fn thread_pool(threads: Option<usize>) -> Result<(rayon::ThreadPool, usize), Fai
     }
 }
 
+/// Names of values that are numbers, as `--help` shows them.
+const NUMBERS: [&str; 16] = [
+    "N",
+    "L",
+    "R",
+    "X",
+    "D",
+    "K",
+    "DEG",
+    "H",
+    "R,Y",
+    "THETA,PHI",
+    "SECONDS",
+    "GIGABYTES",
+    "STOPS",
+    "RELMSE",
+    "A..B",
+    "X0,Y0,X1,Y1",
+];
+
+/// Lets every option that takes a number take `-1` as well: its own message tells what is expected, where clap would look
+/// for an option of this name.
+fn take_negative_numbers(command: clap::Command) -> clap::Command {
+    let is_number = |arg: &clap::Arg| {
+        let names = arg.get_value_names().unwrap_or_default();
+        names.iter().any(|name| NUMBERS.contains(&name.as_str()))
+    };
+    let command = command.mut_args(|arg| if is_number(&arg) { arg.allow_hyphen_values(true) } else { arg });
+    command.mut_subcommands(take_negative_numbers)
+}
+
 /// Runs the program with the process's arguments.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = take_negative_numbers(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
         Command::Merge(args) => merge::run(&args),
@@ -291,11 +323,7 @@ impl SceneArgs {
             let [x0, y0, x1, y1] = crop;
             options.assignments.push(format!("render.crop=[{x0},{y0},{x1},{y1}]"));
         }
-        let mut scene = load(path, &options)?;
-        for name in scene.render.force.clone() {
-            plan::force(&mut scene, &name).map_err(|e| LoadError(format!("{}: error: {e}", path.display())))?;
-        }
-        Ok(scene)
+        load(path, &options)
     }
 }
 
@@ -332,10 +360,9 @@ fn bytes_in_words(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
 
     #[test]
     fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        take_negative_numbers(Cli::command()).debug_assert();
     }
 }

@@ -143,13 +143,52 @@ fn write_to(out: &mut impl Write, about: &About, job: &Job) -> io::Result<()> {
 /// # Errors
 /// [`ImageError::Read`]: no film file, one of another version, cut short, or damaged.
 pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
-    let (header, mut file) = open(path)?;
-    let size = file.get_ref().metadata().map_err(|e| unreadable(path, &e.to_string()))?.len();
+    let (header, file) = open(path)?;
     let film = Film::new(header.crop, header.about.collected, header.light_scale);
     let mut film = film.map_err(|error| unreadable(path, &error.to_string()))?;
+    let mut tiles = film.tiles_mut().iter_mut();
+    read_tiles(path, &header, file, |bytes| {
+        let Some(tile) = tiles.next() else { return false };
+        let word = |k: usize| [bytes[k], bytes[k + 1], bytes[k + 2], bytes[k + 3]];
+        tile.next = [4, 8].map(|k| u32::from_le_bytes(word(k)));
+        tile.share = [12, 16].map(|k| f32::from_le_bytes(word(k)));
+        let long = |k: usize| u64::from(u32::from_le_bytes(word(k + 4))) << 32 | u64::from(u32::from_le_bytes(word(k)));
+        tile.rays = [20, 28].map(long);
+        tile.load(&bytes[TILE_EXTRA..]).is_some()
+    })?;
+    let job = Job {
+        film,
+        samples: header.samples[0]..header.samples[1],
+        done: header.done,
+        planned: header.planned,
+        counters: header.counters,
+        elapsed: header.elapsed,
+    };
+    Ok((header.about, job))
+}
+
+/// Reads the first part of a film file, and goes through the rest without keeping it: whether all of it is sound.
+///
+/// # Errors
+/// As [`read`].
+pub fn check(path: &Path) -> Result<Header, ImageError> {
+    let (header, file) = open(path)?;
+    read_tiles(path, &header, file, |_| true)?;
+    Ok(header)
+}
+
+/// Gives the bytes of every tile to `take`, which says whether they are its sums.
+fn read_tiles(
+    path: &Path,
+    header: &Header,
+    mut file: BufReader<File>,
+    mut take: impl FnMut(&[u8]) -> bool,
+) -> Result<(), ImageError> {
+    let size = file.get_ref().metadata().map_err(|e| unreadable(path, &e.to_string()))?.len();
+    let [width, height] = [header.crop[2] - header.crop[0], header.crop[3] - header.crop[1]];
     let mut at = header.length;
     let mut bytes = Vec::new();
-    for (i, tile) in film.tiles_mut().iter_mut().enumerate() {
+    for i in 0..width.div_ceil(TILE) * height.div_ceil(TILE) {
         let damaged = |what: &str| unreadable(path, &format!("tile {i} at byte {at} is damaged: {what}"));
         let mut length = [0; 4];
         file.read_exact(&mut length).map_err(|e| unreadable_or_short(path, &e, at))?;
@@ -164,26 +203,15 @@ pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
         if crc32fast::hash(sums) != u32::from_le_bytes(*checksum) {
             return Err(damaged("its checksum is wrong"));
         }
-        let word = |k: usize| [sums[k], sums[k + 1], sums[k + 2], sums[k + 3]];
-        tile.next = [4, 8].map(|k| u32::from_le_bytes(word(k)));
-        tile.share = [12, 16].map(|k| f32::from_le_bytes(word(k)));
-        let long = |k: usize| u64::from(u32::from_le_bytes(word(k + 4))) << 32 | u64::from(u32::from_le_bytes(word(k)));
-        tile.rays = [20, 28].map(long);
-        tile.load(&sums[TILE_EXTRA..]).ok_or_else(|| damaged("it holds something else than its sums"))?;
+        if sums.len() < TILE_EXTRA || !take(sums) {
+            return Err(damaged("it holds something else than its sums"));
+        }
         at += 4 + rest;
     }
     if at != size {
         return Err(unreadable(path, &format!("{} bytes follow after the last tile, at byte {at}", size - at)));
     }
-    let job = Job {
-        film,
-        samples: header.samples[0]..header.samples[1],
-        done: header.done,
-        planned: header.planned,
-        counters: header.counters,
-        elapsed: header.elapsed,
-    };
-    Ok((header.about, job))
+    Ok(())
 }
 
 /// Reads the first part of a film file, and checks that the rest can be there.

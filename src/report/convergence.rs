@@ -135,6 +135,8 @@ impl Convergence {
         let fit = |f: Option<PowerLaw>| {
             f.map(|f| json!({"slope": f.slope, "slope_error": f.slope_error, "at_one_second": f.at(1.0)}))
         };
+        // Without a reference nobody has measured a model's error.
+        let against_reference = self.reference.is_some();
         let curves: Vec<Value> = self
             .curves
             .iter()
@@ -152,9 +154,9 @@ impl Convergence {
                     .collect();
                 json!({
                     "method": c.method, "setup_seconds": c.setup_seconds, "converged_spp": c.converged_spp,
-                    "noise_fit": fit(c.noise_fit()), "error_fit": fit(c.error_fit()),
+                    "noise_fit": fit(c.noise_fit()), "error_fit": fit(c.error_fit().filter(|_| against_reference)),
                     "time_of_noise": reached_json(c.time_of_noise(self.target)),
-                    "time_of_error": reached_json(c.time_of_error(self.target)),
+                    "time_of_error": if against_reference { reached_json(c.time_of_error(self.target)) } else { Value::Null },
                     "points": points,
                 })
             })
@@ -194,14 +196,16 @@ impl Convergence {
         let mut out = String::new();
         for c in &self.curves {
             let slope = c.noise_fit().map_or("?".to_owned(), |f| format!("{:.3} +- {:.3}", f.slope, f.slope_error));
-            let _ = writeln!(
+            let noise = reached_text(c.time_of_noise(self.target));
+            let _ = write!(
                 out,
-                "{:20} noise falls with slope {slope}; relMSE {} by noise after {}, with model error {}",
-                c.method,
-                self.target,
-                reached_text(c.time_of_noise(self.target)),
-                reached_text(c.time_of_error(self.target)),
+                "{:20} noise falls with slope {slope}; relMSE {} by noise after {noise}",
+                c.method, self.target
             );
+            if self.reference.is_some() {
+                let _ = write!(out, ", with model error {}", reached_text(c.time_of_error(self.target)));
+            }
+            out.push('\n');
         }
         out
     }
@@ -251,6 +255,11 @@ mod tests {
         assert_eq!(json["curves"][1]["points"].as_array().unwrap().len(), 6);
         let svg = result.to_svg();
         assert!(svg.contains("yarn:aggregated: noise and model error") && svg.contains("slope -1.00"));
-        assert!(result.to_text().contains("extrapolated"));
+        assert!(result.to_text().contains("extrapolated") && result.to_text().contains("with model error"));
+        let alone = Convergence { reference: None, curves: vec![curve("fiber", 0.1, None)], ..result };
+        assert!(!alone.to_text().contains("model error"), "{}", alone.to_text());
+        let json = alone.to_json();
+        assert!(json["curves"][0]["time_of_error"].is_null() && json["curves"][0]["error_fit"].is_null());
+        assert!(json["curves"][0]["time_of_noise"]["seconds"].is_number());
     }
 }
