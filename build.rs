@@ -80,7 +80,6 @@ mod oiio {
             .expect("OUT_DIR is writable");
     }
 
-    #[allow(clippy::print_stderr, reason = "a build script has no other voice")]
     fn fail(message: &str) -> ! {
         eprintln!("{message}");
         // Shown even where cargo does not print what a build script wrote.

@@ -3,8 +3,6 @@
 //! Data that lies beside the project is looked for under `YARNRAY_SHARED`, or `../shared`; what needs it says that it
 //! was skipped where it is absent.
 
-#![allow(clippy::print_stderr, reason = "tests say what they skip")]
-
 // Table 3's procedure from end to end, resumed, and with mistakes in suites.
 mod bench;
 // What the command line promises: help, info, statistics, outputs, stops, signals, metadata.
