@@ -5,18 +5,21 @@
 //! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from.
 
 mod matte;
+mod parts;
+mod sample;
 
 use std::{collections::TryReserveError, fmt};
 
 use glam::Vec3A;
 
 use crate::{
-    integrator::{ClothId, LightParts, Sample},
     math::exact::{Exact, NarrowSum, SquareSum, Sum},
     scene::Layers,
 };
 
 pub use matte::Matte;
+pub use parts::LightParts;
+pub use sample::{ClothId, Sample};
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -47,13 +50,13 @@ fn zeros<T: Clone + Default>(count: usize) -> Result<Vec<T>, TryReserveError> {
 /// The pixels of one tile, row by row.
 #[derive(Clone, Debug)]
 pub struct Tile {
-    /// Upper left pixel, in the whole picture.
+    /// Column of the upper left pixel, in the whole picture.
     pub x: u32,
-    /// As `x`.
+    /// Row of the upper left pixel, in the whole picture.
     pub y: u32,
-    /// Size; smaller than [`TILE`] at the right and lower edge.
+    /// Columns of pixels; fewer than [`TILE`] at the right edge.
     pub width: u32,
-    /// As `width`.
+    /// Rows of pixels; fewer than [`TILE`] at the lower edge.
     pub height: u32,
     /// The sample that comes next for the even and the odd pixels, by (x + y) mod 2: the same but for adaptive
     /// sampling.
@@ -338,9 +341,9 @@ struct NoiseSums {
 pub struct Noise {
     /// The estimate.
     pub estimate: f64,
-    /// Ends of its interval of 95 %.
+    /// Lower end of its interval of 95 %.
     pub low: f64,
-    /// As `low`.
+    /// Upper end of its interval of 95 %.
     pub high: f64,
 }
 
@@ -370,9 +373,9 @@ pub struct Pixel {
 pub struct Film {
     /// Upper left corner of what is rendered, in the whole picture.
     pub origin: [u32; 2],
-    /// Size of what is rendered.
+    /// Width of what is rendered, pixels.
     pub width: u32,
-    /// As `width`.
+    /// Height of what is rendered, pixels.
     pub height: u32,
     tiles: Vec<Tile>,
     columns: u32,
@@ -456,7 +459,7 @@ impl Film {
         &self.tiles
     }
 
-    /// As [`Self::tiles`], to be changed.
+    /// The tiles, row by row, to add samples to.
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }

@@ -25,8 +25,8 @@
 //! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files. [`light`]: light sources.
-//! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`integrator`]: light along a path.
-//! * [`film`]: what pixels have collected. [`render`]: the driver, films in files, and pictures from films.
+//! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`film`]: what a sample is, and what pixels collect.
+//! * [`integrator`]: light along a path. [`render`]: the driver, films in files, and pictures from films.
 //! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was, and what many were.
 //! * [`experiment`]: what parts and pictures say, held against what is true. [`cli`]: the program.
 //!

@@ -87,6 +87,23 @@ pub struct ConvergePlan {
     pub converged_spp: u32,
 }
 
+impl ConvergePlan {
+    /// The plan for the cases there are. A quick suite may have left one out, and a row may be missing; the name of a case
+    /// that no suite has is a mistake.
+    fn of_cases(mut self, cases: &[Case], missing: &[(String, String)], root: &Reader<'_>, quick: bool) -> Self {
+        self.cases.retain(|name| {
+            let known = cases.iter().any(|case| case.name == *name);
+            if !known && !quick && !missing.iter().any(|(row, _)| name.starts_with(row.as_str())) {
+                let (message, hint) =
+                    unknown_name("row and lighting", name, cases.iter().map(|case| case.name.as_str()));
+                root.error_at("converge", message, Some(&hint));
+            }
+            known
+        });
+        self
+    }
+}
+
 impl Case {
     /// The options with which the case's scene is loaded for a method; `more` stands over all others.
     pub fn options(&self, suite: &Suite, method: Method, more: &[String]) -> LoadOptions {
@@ -143,105 +160,21 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
     let title = root.string_or("title", "Explicit fibres and aggregated yarns at equal quality").to_owned();
     let reference = method(&root, "reference", "fiber");
     let tested = method(&root, "tested", "yarn:aggregated");
-    let mut quality = Quality::read(&root);
-    let others = root.tables("other").into_iter().map(|table| {
-        let name = table.required_string("name").unwrap_or_default().to_owned();
-        let method =
-            if table.has("method") { method(&table, "method", "") } else { table.required_string("method").and(None) };
-        let set = strings(&table, "set");
-        table.finish();
-        method.map(|method| OtherWay { name, method, set })
-    });
-    let mut others: Vec<OtherWay> = others.flatten().collect();
-    let lights: Vec<(String, Vec<String>)> = root
-        .named_tables("lighting")
-        .into_iter()
-        .map(|(name, table)| {
-            let set = strings(&table, "set");
-            table.finish();
-            (name.to_owned(), set)
-        })
-        .collect();
-    let known_light = |table: &Reader<'_>, key: &str| -> Vec<String> {
-        let names: Vec<String> = strings(table, key);
-        for name in &names {
-            if !lights.iter().any(|(known, _)| known == name) {
-                let (message, hint) = unknown_name("lighting", name, lights.iter().map(|(known, _)| known.as_str()));
-                table.error_at(key, message, Some(&hint));
-            }
-        }
-        names
-    };
-    let mut rows: Vec<Row> = root.tables("row").into_iter().map(|table| row(table, folder, known_light)).collect();
-    if rows.is_empty() {
-        root.error("a suite needs at least one [[row]]", Some("[[row]] with `name` and `scene`"));
-    }
-    for (i, row) in rows.iter().enumerate() {
-        if rows[..i].iter().any(|other| other.name == row.name) {
-            root.error(format!("two rows are called \"{}\"", row.name), None);
-        }
-    }
-    let mut converge = root.table("converge").map(converge_plan);
+    let quality = Quality::read(&root);
+    let others = root.tables("other").into_iter().filter_map(other_way).collect();
+    let lights = Lightings::read(&root);
+    let rows = rows(&root, folder, &lights);
+    let converge = root.table("converge").map(converge_plan);
+    let mut parts = Parts { quality, others, rows, converge };
     if let Some(table) = root.table("quick") {
-        let shorter = quality.over(&table);
-        let kept = if table.has("rows") { Some(strings(&table, "rows")) } else { None };
-        let lights = if table.has("lights") { Some(known_light(&table, "lights")) } else { None };
-        let with_others = table.bool_or("others", true);
-        let with_converge = table.bool_or("converge", true);
-        for name in kept.iter().flatten() {
-            if !rows.iter().any(|row| row.name == *name) {
-                let (message, hint) = unknown_name("row", name, rows.iter().map(|row| row.name.as_str()));
-                table.error_at("rows", message, Some(&hint));
-            }
-        }
-        table.finish();
+        let shorter = Quick::read(table, &parts, &lights);
         if quick {
-            quality = shorter;
-            rows.retain(|row| kept.as_ref().is_none_or(|kept| kept.contains(&row.name)));
-            for row in &mut rows {
-                row.lights.retain(|light| lights.as_ref().is_none_or(|lights| lights.contains(light)));
-            }
-            if !with_others {
-                others.clear();
-            }
-            if !with_converge {
-                converge = None;
-            }
+            shorter.shorten(&mut parts);
         }
     }
-    let mut cases = Vec::new();
-    let mut missing = Vec::new();
-    for row in rows {
-        if let Some(reason) = row.missing {
-            missing.push((row.name, reason));
-            continue;
-        }
-        let case = |name: String, light: &[String]| Case {
-            name,
-            scene: row.scene.clone(),
-            curves: row.curves.clone(),
-            set: row.set.iter().chain(light).cloned().collect(),
-            paper: row.paper,
-        };
-        if lights.is_empty() {
-            cases.push(case(row.name.clone(), &[]));
-        }
-        for (light, set) in lights.iter().filter(|(light, _)| row.lights.contains(light)) {
-            cases.push(case(format!("{}, {light}", row.name), set));
-        }
-    }
-    if let Some(plan) = &mut converge {
-        // A quick suite may have left a case out; a case that no suite has is a mistake.
-        plan.cases.retain(|name| {
-            let known = cases.iter().any(|case| case.name == *name);
-            if !known && !quick && !missing.iter().any(|(row, _)| name.starts_with(row.as_str())) {
-                let (message, hint) =
-                    unknown_name("row and lighting", name, cases.iter().map(|case| case.name.as_str()));
-                root.error_at("converge", message, Some(&hint));
-            }
-            known
-        });
-    }
+    let Parts { quality, others, rows, converge } = parts;
+    let (cases, missing) = lights.cases(rows);
+    let converge = converge.map(|plan| plan.of_cases(&cases, &missing, &root, quick));
     root.finish();
     Some(Suite {
         path: name.to_owned(),
@@ -259,6 +192,132 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
         missing,
         converge,
     })
+}
+
+/// One `[[other]]`; `None` if its method is wrong.
+fn other_way(table: Reader<'_>) -> Option<OtherWay> {
+    let name = table.required_string("name").unwrap_or_default().to_owned();
+    let method =
+        if table.has("method") { method(&table, "method", "") } else { table.required_string("method").and(None) };
+    let set = strings(&table, "set");
+    table.finish();
+    method.map(|method| OtherWay { name, method, set })
+}
+
+/// Every `[[row]]`, with its mistakes told.
+fn rows(root: &Reader<'_>, folder: &Path, lights: &Lightings) -> Vec<Row> {
+    let rows: Vec<Row> = root.tables("row").into_iter().map(|table| row(table, folder, lights)).collect();
+    if rows.is_empty() {
+        root.error("a suite needs at least one [[row]]", Some("[[row]] with `name` and `scene`"));
+    }
+    for (i, row) in rows.iter().enumerate() {
+        if rows[..i].iter().any(|other| other.name == row.name) {
+            root.error(format!("two rows are called \"{}\"", row.name), None);
+        }
+    }
+    rows
+}
+
+/// The tables `[lighting.NAME]`: what each sets over a row's scene.
+struct Lightings(Vec<(String, Vec<String>)>);
+
+impl Lightings {
+    fn read(root: &Reader<'_>) -> Self {
+        let lighting = |(name, table): (&str, Reader<'_>)| {
+            let set = strings(&table, "set");
+            table.finish();
+            (name.to_owned(), set)
+        };
+        Self(root.named_tables("lighting").into_iter().map(lighting).collect())
+    }
+
+    /// The names under a key; one that is not known is told.
+    fn names(&self, table: &Reader<'_>, key: &str) -> Vec<String> {
+        let names: Vec<String> = strings(table, key);
+        for name in &names {
+            if !self.0.iter().any(|(known, _)| known == name) {
+                let (message, hint) = unknown_name("lighting", name, self.0.iter().map(|(known, _)| known.as_str()));
+                table.error_at(key, message, Some(&hint));
+            }
+        }
+        names
+    }
+
+    /// Each row under each of its lightings; then the rows that are missing, with the reason.
+    fn cases(&self, rows: Vec<Row>) -> (Vec<Case>, Vec<(String, String)>) {
+        let (mut cases, mut missing) = (Vec::new(), Vec::new());
+        for row in rows {
+            if let Some(reason) = row.missing {
+                missing.push((row.name, reason));
+                continue;
+            }
+            let case = |name: String, light: &[String]| Case {
+                name,
+                scene: row.scene.clone(),
+                curves: row.curves.clone(),
+                set: row.set.iter().chain(light).cloned().collect(),
+                paper: row.paper,
+            };
+            if self.0.is_empty() {
+                cases.push(case(row.name.clone(), &[]));
+            }
+            for (light, set) in self.0.iter().filter(|(light, _)| row.lights.contains(light)) {
+                cases.push(case(format!("{}, {light}", row.name), set));
+            }
+        }
+        (cases, missing)
+    }
+}
+
+/// What `[quick]` may change of a suite.
+struct Parts {
+    quality: Quality,
+    others: Vec<OtherWay>,
+    rows: Vec<Row>,
+    converge: Option<ConvergePlan>,
+}
+
+/// The table `[quick]`: a shorter suite. Rows and lightings are kept all if none are named.
+struct Quick {
+    quality: Quality,
+    rows: Option<Vec<String>>,
+    lights: Option<Vec<String>>,
+    others: bool,
+    converge: bool,
+}
+
+impl Quick {
+    fn read(table: Reader<'_>, whole: &Parts, lights: &Lightings) -> Self {
+        let quick = Self {
+            quality: whole.quality.over(&table),
+            rows: if table.has("rows") { Some(strings(&table, "rows")) } else { None },
+            lights: if table.has("lights") { Some(lights.names(&table, "lights")) } else { None },
+            others: table.bool_or("others", true),
+            converge: table.bool_or("converge", true),
+        };
+        for name in quick.rows.iter().flatten() {
+            if !whole.rows.iter().any(|row| row.name == *name) {
+                let (message, hint) = unknown_name("row", name, whole.rows.iter().map(|row| row.name.as_str()));
+                table.error_at("rows", message, Some(&hint));
+            }
+        }
+        table.finish();
+        quick
+    }
+
+    fn shorten(self, parts: &mut Parts) {
+        parts.quality = self.quality;
+        parts.rows.retain(|row| self.rows.as_ref().is_none_or(|kept| kept.contains(&row.name)));
+        for row in &mut parts.rows {
+            row.lights.retain(|light| self.lights.as_ref().is_none_or(|kept| kept.contains(light)));
+        }
+        if !self.others {
+            parts.others.clear();
+        }
+        if !self.converge {
+            parts.converge = None;
+        }
+    }
 }
 
 /// What decides how long a suite takes.
@@ -308,13 +367,13 @@ fn strings(table: &Reader<'_>, key: &str) -> Vec<String> {
     table.strings(key).into_iter().map(|(text, _)| text.to_owned()).collect()
 }
 
-fn row(table: Reader<'_>, folder: &Path, known_light: impl Fn(&Reader<'_>, &str) -> Vec<String>) -> Row {
+fn row(table: Reader<'_>, folder: &Path, lights: &Lightings) -> Row {
     let name = table.required_string("name").unwrap_or_default().to_owned();
     let scene = folder.join(table.required_string("scene").unwrap_or_default());
     let curves = table.string("curves").map(|path| folder.join(path));
     let fallback = table.string("fallback").map(|path| folder.join(path));
     let set = strings(&table, "set");
-    let lights = known_light(&table, "lights");
+    let lights = lights.names(&table, "lights");
     let pair = |table: &Reader<'_>, key: &str| table.vec2(key, Range::POSITIVE);
     let paper = table.table("paper").and_then(|paper| {
         let figures = [pair(&paper, "seconds"), pair(&paper, "megabytes"), pair(&paper, "bounces")];

@@ -1,6 +1,6 @@
 //! Which cloth covers each pixel: counts of samples, from which Cryptomatte layers are made.
 
-use crate::integrator::ClothId;
+use super::ClothId;
 
 /// For each pixel of a tile, how many samples met which ply.
 ///

@@ -96,11 +96,11 @@ impl Pressed {
 /// A place seen by one ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Section {
-    /// The frame's axes in the world.
+    /// The frame's x axis in the world: across the yarn, towards the camera.
     pub x: Vec3A,
-    /// As `x`.
+    /// The frame's y axis in the world: across the yarn and the ray.
     pub y: Vec3A,
-    /// As `x`; the yarn's tangent.
+    /// The frame's z axis in the world: the yarn's tangent.
     pub z: Vec3A,
     /// Origin of the frame in the world.
     pub centre: Vec3A,

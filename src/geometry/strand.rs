@@ -134,12 +134,12 @@ impl Strands {
         Self::with_material_indices(curves, &[], motion, options)
     }
 
-    /// As [`Self::moving`], with material indices for each curve, so many evenly from each given point to the next (a closed
-    /// curve goes on to its first point, an open one ends with its last), of which each segment gets that nearest to its
-    /// middle; or without any.
+    /// Prepares curves that move and that are of several materials. Each curve has material indices, so many evenly from
+    /// each given point to the next (a closed curve goes on to its first point, an open one ends with its last), of which
+    /// each segment gets that nearest to its middle; or none at all.
     ///
     /// # Panics
-    /// As [`Self::moving`].
+    /// If curves or their points have other numbers at other times.
     pub fn with_material_indices(
         curves: &[(Curve, Vec<f64>)],
         material_indices: &[Vec<u16>],
@@ -320,7 +320,7 @@ impl Strands {
         self.frame_of(first, p, &self.frames[first + 1], &self.frames[first + 2], u)
     }
 
-    /// As [`Self::place`], at a time from 0, when the shutter opens, to 1, when it closes.
+    /// Everything a ray needs to know at `u` (0 to 1) of a segment, at a time from 0, when the shutter opens, to 1, when it closes.
     #[inline]
     pub fn frame_at(&self, segment: u32, u: f32, time: f32) -> YarnFrame {
         if self.later.is_empty() { self.frame(segment, u) } else { self.frame_between(segment, u, time) }

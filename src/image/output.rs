@@ -88,7 +88,7 @@ pub fn write_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) 
     replace(path, |temporary| write(temporary.as_file_mut()).map_err(|error| plain(&error)))
 }
 
-/// As [`write_file`], for files that are written again and again and must outlive the machine's failures: the content is
+/// Writes a file that is written again and again and must outlive the machine's failures: the content is
 /// on the disk before it takes the name `path`, and a program that is killed meanwhile leaves one file, `path.new`, that the
 /// next one writes over.
 ///

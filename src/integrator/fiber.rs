@@ -2,8 +2,9 @@
 
 use glam::Vec2;
 
-use super::{Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Sample, Scratch, add};
+use super::{Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Scratch, add};
 use crate::{
+    film::Sample,
     geometry::ray::Ray,
     geometry::tube::TubePlace,
     math::Rgb,

@@ -6,14 +6,12 @@
 //! put in its way. An explicit fibre scatters at its surface (`fiber`).
 
 mod fiber;
-mod parts;
 mod surface;
-
-pub use parts::LightParts;
 
 use glam::{Vec2, Vec3A};
 
 use crate::{
+    film::{ClothId, Sample},
     geometry::{
         ray::Ray,
         section::{Crossings, Section},
@@ -36,36 +34,6 @@ const MOST_PASSES: u32 = 10_000;
 /// Where a ray that passes a yarn starts again, in yarn radii behind the surface.
 const PASS_OFFSET: f32 = 1e-3;
 
-/// What one sample saw.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
-    /// Radiance.
-    pub radiance: Rgb,
-    /// 1 if the camera's ray met cloth or ground that scattered it, else 0.
-    pub alpha: f32,
-    /// Depth along the view and normal where it first scattered; zero without.
-    pub depth: f32,
-    /// As `depth`.
-    pub normal: Vec3A,
-    /// Albedo of what it first scattered at, 0 to 1.
-    pub albedo: Rgb,
-    /// The radiance by where it came from.
-    pub parts: LightParts,
-    /// The cloth at which it first scattered, if that comes first and is asked for.
-    pub cloth: Option<ClothId>,
-}
-
-/// A ply of a yarn of the scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ClothId {
-    /// Index of the fabric.
-    pub fabric: u32,
-    /// Index of the yarn within it.
-    pub yarn: u32,
-    /// Index of the ply within that.
-    pub ply: u32,
-}
-
 /// What was done, for the statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
@@ -75,9 +43,9 @@ pub struct Counters {
     pub bounce: u64,
     /// Rays towards lights.
     pub shadow: u64,
-    /// Camera paths that scattered at cloth, and their scattering events.
+    /// Camera paths that scattered at cloth.
     pub cloth_paths: u64,
-    /// As `cloth_paths`.
+    /// Scattering events at cloth, of all paths.
     pub events: u64,
     /// Samples that were not finite and were left out.
     pub invalid: u64,

@@ -2,8 +2,9 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::{Counters, Integrator, Path, ROULETTE_AFTER, Sample, Scratch, add};
+use super::{Counters, Integrator, Path, ROULETTE_AFTER, Scratch, add};
 use crate::{
+    film::Sample,
     geometry::ray::Ray,
     math::{Rgb, frame::orthonormal_basis},
     scattering::mis_weight,

@@ -85,7 +85,7 @@ pub(super) fn plan(film: &mut Film) {
 mod tests {
     use super::*;
     use crate::{
-        integrator::Sample,
+        film::Sample,
         math::{Rgb, sampler::Stream},
         scene::Layers,
     };

@@ -189,7 +189,7 @@ mod tests {
     use std::{io::Read as _, net::TcpListener};
 
     use super::*;
-    use crate::{integrator::Sample, math::Rgb, scene::Layers};
+    use crate::{film::Sample, math::Rgb, scene::Layers};
 
     fn film(value: f32) -> Film {
         let mut film = Film::new([3, 5, 803, 605], Layers::NONE, 1.0).unwrap();

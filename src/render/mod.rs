@@ -112,9 +112,9 @@ impl Job {
 pub struct Progress<'a> {
     /// What pixels have collected so far.
     pub film: &'a Film,
-    /// Samples per pixel taken so far, and at most to take.
+    /// Samples per pixel taken so far.
     pub spp: u32,
-    /// As `spp`.
+    /// Samples per pixel to take at most.
     pub spp_end: u32,
     /// Share of all work done, 0 to 1, by samples or by time, whichever ends first.
     pub share: f64,

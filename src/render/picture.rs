@@ -6,14 +6,13 @@ use std::{
 };
 
 use crate::{
-    film::Film,
+    film::{ClothId, Film, LightParts},
     image::{
         ImageError, cryptomatte,
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
         output::{self, Format},
         png::Display,
     },
-    integrator::{ClothId, LightParts},
     scene::{Layers, Scene, Storage},
 };
 
@@ -40,9 +39,9 @@ pub const PART_NAMES: [&str; LightParts::COUNT] = [
 /// What must be known of a scene to write its picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Size of the whole picture.
+    /// Width of the whole picture, pixels.
     pub width: u32,
-    /// As `width`.
+    /// Height of the whole picture, pixels.
     pub height: u32,
     /// Layers of an EXR.
     pub layers: Layers,
@@ -105,7 +104,7 @@ pub fn denoised_path(path: &Path) -> Option<PathBuf> {
 /// Writes a denoised picture as a file of its own.
 ///
 /// # Errors
-/// As [`write()`].
+/// If the file cannot be written; then nothing is left behind.
 pub fn write_denoised(path: &Path, frame: &Frame, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
     output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {

@@ -99,7 +99,7 @@ pub fn figure(picture: &Picture, caption: &str) -> Markup {
     figure_shown(picture, &Display::default(), caption)
 }
 
-/// As [`figure`], with exposure and tone mapping.
+/// A picture with its caption, shown with an exposure and a tone curve.
 pub fn figure_shown(picture: &Picture, display: &Display, caption: &str) -> Markup {
     html! {
         figure {

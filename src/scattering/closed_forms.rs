@@ -84,7 +84,7 @@ pub fn endless_back(loss: f64, back: f64) -> (f64, f64) {
     (once, once.powi(3) * (1.0 - loss) * (1.0 - loss))
 }
 
-/// As [`mean_steps`], for infinitely many fibres: a_F^2 / (1 - a_F^2), at most 1e6.
+/// The mean number of fibres passed on the way in (see [`mean_steps`]) for infinitely many fibres: a_F^2 / (1 - a_F^2), at most 1e6.
 pub fn endless_steps(loss: f64) -> f64 {
     let turned = loss * (2.0 - loss);
     if turned > 1e-6 { (1.0 - turned) / turned } else { 1e6 }
@@ -135,7 +135,7 @@ pub fn poisson_thrice_back(loss: f64, n: f64) -> f64 {
     }
 }
 
-/// As [`mean_steps`], for a Poisson number of fibres of mean n; `beyond_first` leaves out paths that turn back at the
+/// The mean number of fibres passed on the way in (see [`mean_steps`]) for a Poisson number of fibres of mean n; `beyond_first` leaves out paths that turn back at the
 /// very first fibre, which are single scattering.
 pub fn poisson_mean_steps(loss: f64, n: f64, beyond_first: bool) -> f64 {
     let e = loss * (2.0 - loss);

@@ -20,9 +20,9 @@ pub(crate) struct LobeFrame {
     pub(crate) y: Vec3A,
     /// The axis.
     pub(crate) z: Vec3A,
-    /// Sine and cosine of the camera's latitude.
+    /// Sine of the camera's latitude.
     pub(crate) sin: f32,
-    /// As `sin`.
+    /// Cosine of the camera's latitude.
     pub(crate) cos: f32,
 }
 

@@ -42,11 +42,11 @@ pub struct Lens {
 pub struct Camera {
     /// Where it stands, millimetres about the scene's middle.
     pub position: DVec3,
-    /// Unit vectors: to the right of the picture, up in it, and towards the viewer.
+    /// Unit vector to the right of the picture.
     pub right: DVec3,
-    /// As `right`.
+    /// Unit vector up in the picture.
     pub up: DVec3,
-    /// As `right`.
+    /// Unit vector from the picture towards the viewer.
     pub back: DVec3,
     /// How far the view opens.
     pub projection: Projection,

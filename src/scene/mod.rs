@@ -135,9 +135,9 @@ pub struct RenderSettings {
     pub model: Model,
     /// Lobes of single fibres that are left out, in every mode: the ablations of the paper's Fig. 6.
     pub without: Vec<FiberLobe>,
-    /// Picture size in pixels.
+    /// Width of the picture, pixels.
     pub width: u32,
-    /// As `width`.
+    /// Height of the picture, pixels.
     pub height: u32,
     /// The part that is rendered: x0, y0, x1, y1, the latter exclusive.
     pub crop: [u32; 4],

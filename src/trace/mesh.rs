@@ -29,9 +29,9 @@ pub struct SurfacePlace {
     pub normal: Vec3A,
     /// Unit normal for shading, on the same side.
     pub shading: Vec3A,
-    /// Texture coordinates, and by how much they change per length across the surface; zeros without.
+    /// Texture coordinates; zero for a mesh without.
     pub uv: Vec2,
-    /// As `uv`.
+    /// By how much texture coordinates change per millimetre across the surface; zero for a mesh without.
     pub uv_per_length: f32,
     /// Index into the scene's materials.
     pub material: usize,

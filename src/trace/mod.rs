@@ -237,7 +237,7 @@ impl World {
         Hit { t: raw.t, geometry, segment: raw.segment, normal, place }
     }
 
-    /// As [`Self::intersect`] and [`Self::transmittance`], with the number of hits that Embree offered each: what a ray
+    /// The nearest hit and the transmittance of a ray, and how many hits Embree offered to the filter of each: what a ray
     /// costs beyond its traversal.
     pub fn probe(&self, ray: &Ray, crossings: &mut Crossings) -> (Option<Hit>, f32, [u32; 2]) {
         if !ray.is_finite() {

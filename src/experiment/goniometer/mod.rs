@@ -43,9 +43,9 @@ pub struct Effort {
     pub seed: u32,
 }
 
-/// Cells of latitude and azimuth of a [`Distribution`].
+/// Cells of a [`Distribution`] over latitude.
 pub const ROWS: usize = 36;
-/// As [`ROWS`].
+/// Cells of a [`Distribution`] over azimuth.
 pub const COLUMNS: usize = 72;
 /// Groups of samples whose spread tells the error of the mean.
 const BATCHES: u64 = 32;

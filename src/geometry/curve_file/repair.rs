@@ -18,7 +18,7 @@ pub(super) enum Ends {
     Open,
     /// The last point is followed by the first.
     Closed,
-    /// As `Closed`, in a format where this is known to be wrong at times.
+    /// The last point is followed by the first, in a format whose mark of this is known to be wrong at times.
     MarkedClosed,
 }
 

@@ -38,9 +38,10 @@ pub enum Placement {
 /// The distribution of fibres over a ply's section, and their migration (Zhao et al. 2016, Eqs. 2 to 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distribution {
-    /// Acceptance is (1 - 2 epsilon) ((e - e^R) / (e - 1))^beta + epsilon at the distance R from the axis.
+    /// Least acceptance of a fibre: at the distance R from the axis it is
+    /// (1 - 2 epsilon) ((e - e^R) / (e - 1))^beta + epsilon.
     pub epsilon: f64,
-    /// As `epsilon`: 0 is even, more crowds fibres at the axis.
+    /// Exponent of the acceptance: 0 is even, more crowds fibres at the axis.
     pub beta: f64,
     /// A migrating fibre's distance from the axis lies between these multiples of its own.
     pub migration: [f64; 2],
@@ -171,7 +172,7 @@ impl<'a> Plies<'a> {
         self.counts(fibers)
     }
 
-    /// As [`Self::fiber_counts`], for one curve of each ply.
+    /// Control points and segments of one curve for each ply, before any is made.
     pub fn ply_counts(&self) -> (u64, u64) {
         self.counts(self.plies.len() as u64)
     }

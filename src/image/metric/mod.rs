@@ -44,7 +44,7 @@ pub struct Pair {
     pub width: usize,
     /// Linear colours of the picture that is tested, the top row first; black where either picture is not finite.
     pub test: Vec<[f32; 3]>,
-    /// As `test`, of the reference.
+    /// Linear colours of the reference, the top row first; black where either picture is not finite.
     pub reference: Vec<[f32; 3]>,
     /// Which pixels count.
     pub counted: Vec<bool>,

@@ -331,11 +331,11 @@ impl Motif {
 }
 
 impl ColorPlan {
-    /// Gives a fabric its variants and what varies. `grid` is asked for only if something depends on it.
+    /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them.
     pub(super) fn apply(
         &self,
         fabric: &mut Fabric,
-        grid: impl FnOnce(&Fabric) -> FabricCoordinates,
+        coordinates: impl FnOnce(&Fabric) -> FabricCoordinates,
         context: &Context<'_>,
         library: &Library,
     ) -> Option<()> {
@@ -352,45 +352,12 @@ impl ColorPlan {
             context.error(self.header, "colours of single fibres are those of their [fiber] table", None);
             return None;
         };
-        let grid = grid(fabric);
-        let all: Vec<&Yarn> = library.yarns.values().collect();
-        let place = |name: &String| library.yarns.keys().position(|n| n == name).unwrap_or(base);
-        let woven = grid.kinds.iter().any(|kind| *kind != StrandKind::Course);
-        if !rows.is_empty() && !columns.is_empty() && !woven {
-            let hint = "in a weave they are the yarns of wefts and of warps; elsewhere a `motif` says both";
-            context.error(self.header, "both `rows` and `columns` are given", Some(hint.to_owned()));
-            return None;
-        }
-        let list = |names: &[String], across: bool| {
-            let cells: Vec<usize> = if names.is_empty() { vec![base] } else { names.iter().map(place).collect() };
-            let (width, height) = if across { (cells.len(), 1) } else { (1, cells.len()) };
-            CellMap { width, height, cells, offset: [0; 2] }
-        };
-        let (by_row, by_column) = (list(rows, false), list(columns, true));
-        let motif = match motif {
-            None => None,
-            Some(motif) => {
-                let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| place(name)).collect();
-                match motif.cells(grid.extent, &yarns) {
-                    Ok(cells) => Some(cells),
-                    Err(problem) => {
-                        context.error(motif.span, problem, None);
-                        return None;
-                    }
-                }
-            }
-        };
-        let cells_of = |curve: usize| match (&motif, grid.kinds.get(curve)) {
-            (Some(motif), _) => motif,
-            // A weft keeps its colour all along, and so does a warp.
-            (None, Some(StrandKind::Warp)) => &by_column,
-            (None, Some(StrandKind::Weft)) => &by_row,
-            (None, _) if columns.is_empty() => &by_row,
-            (None, _) => &by_column,
-        };
-        for map in [&by_row, &by_column].into_iter().chain(&motif) {
-            let asked = (0..fabric.curves.len()).any(|curve| std::ptr::eq(cells_of(curve), map));
-            let wrong = map.cells.iter().find_map(|&yarn| other_build(all[yarn], all[base]));
+        let coordinates = coordinates(fabric);
+        let yarns: Vec<&Yarn> = library.yarns.values().collect();
+        let cells = self.cells(&coordinates, base, context, library)?;
+        for map in cells.maps() {
+            let asked = (0..fabric.curves.len()).any(|curve| std::ptr::eq(cells.of(curve, &coordinates), map));
+            let wrong = map.cells.iter().find_map(|&yarn| other_build(yarns[yarn], yarns[base]));
             if let Some(problem) = wrong.filter(|_| asked) {
                 context.error(self.header, problem, Some(SAME_BUILD.to_owned()));
                 return None;
@@ -406,40 +373,11 @@ impl ColorPlan {
                 }
             },
         };
+        let painter = Painter { coordinates: &coordinates, cells: &cells, texture, shades, yarns: &yarns };
         let mut variants = Variants::default();
-        let mut material_indices = Vec::with_capacity(fabric.curves.len());
-        for (index, (curve, radii)) in fabric.curves.iter().enumerate() {
-            let shade = shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
-            let shine = shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade));
-            let cells = cells_of(index);
-            let count = curve.points.len();
-            let steps = steps(curve, radii);
-            let places = if curve.closed { count * steps } else { (count - 1) * steps + 1 };
-            let mut row = Vec::with_capacity(places);
-            for place in 0..places {
-                let [x, y] = grid.between(index, place, steps, count);
-                let yarn = cells.at(x, y);
-                let (key, color) = match &texture {
-                    None => (Key { yarn, shade, levels: [0; 3] }, Vec3::splat(shine)),
-                    Some((texture, repeat)) => {
-                        let uv = |[x, y]: [f32; 2]| {
-                            [x / grid.extent[0] * repeat[0] as f32, y / grid.extent[1] * repeat[1] as f32]
-                        };
-                        let (here, next) = (uv([x, y]), uv(grid.between(index, place + 1, steps, count)));
-                        // As wide as to the next place, but for a jump from one end of a round to its other.
-                        let width = (next[0] - here[0]).hypot(next[1] - here[1]).min(0.25);
-                        let mut stream = Stream::new(hash2(index as u32, place as u32));
-                        let levels = texture
-                            .sample(here[0], here[1], width)
-                            .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
-                        let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
-                        (Key { yarn, shade: None, levels }, Vec3::from(color))
-                    }
-                };
-                row.push(variants.material_index(key, || all[key.yarn].dyed(color.to_array().map(f64::from))));
-            }
-            material_indices.push(row);
-        }
+        let curves = fabric.curves.iter().enumerate();
+        let material_indices =
+            curves.map(|(index, (curve, radii))| painter.paint(index, curve, radii, &mut variants)).collect();
         if variants.made.len() > usize::from(u16::MAX) {
             let hint = "fewer yarns, or a picture of fewer colours";
             context.error(self.header, "more than 65535 kinds and colours of yarn", Some(hint.to_owned()));
@@ -448,6 +386,118 @@ impl ColorPlan {
         fabric.variants = variants.made;
         fabric.material_indices = material_indices;
         Some(())
+    }
+
+    /// Which yarn lies where, as the layout says; `base` where it does not.
+    fn cells(
+        &self,
+        coordinates: &FabricCoordinates,
+        base: usize,
+        context: &Context<'_>,
+        library: &Library,
+    ) -> Option<LaidCells> {
+        let Layout { rows, columns, motif } = &self.layout;
+        let woven = coordinates.kinds.iter().any(|kind| *kind != StrandKind::Course);
+        if !rows.is_empty() && !columns.is_empty() && !woven {
+            let hint = "in a weave they are the yarns of wefts and of warps; elsewhere a `motif` says both";
+            context.error(self.header, "both `rows` and `columns` are given", Some(hint.to_owned()));
+            return None;
+        }
+        let index_of = |name: &String| library.yarns.keys().position(|n| n == name).unwrap_or(base);
+        let list = |names: &[String], across: bool| {
+            let cells: Vec<usize> = if names.is_empty() { vec![base] } else { names.iter().map(index_of).collect() };
+            let (width, height) = if across { (cells.len(), 1) } else { (1, cells.len()) };
+            CellMap { width, height, cells, offset: [0; 2] }
+        };
+        let motif = match motif {
+            None => None,
+            Some(motif) => {
+                let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| index_of(name)).collect();
+                match motif.cells(coordinates.extent, &yarns) {
+                    Ok(cells) => Some(cells),
+                    Err(problem) => {
+                        context.error(motif.span, problem, None);
+                        return None;
+                    }
+                }
+            }
+        };
+        let by_columns = !columns.is_empty();
+        Some(LaidCells { by_row: list(rows, false), by_column: list(columns, true), motif, by_columns })
+    }
+}
+
+/// Which yarn lies in each cell of a fabric.
+struct LaidCells {
+    by_row: CellMap,
+    by_column: CellMap,
+    /// In place of both, if there is one.
+    motif: Option<CellMap>,
+    /// Whether strands that are neither warp nor weft follow the columns.
+    by_columns: bool,
+}
+
+impl LaidCells {
+    fn maps(&self) -> impl Iterator<Item = &CellMap> {
+        [&self.by_row, &self.by_column].into_iter().chain(&self.motif)
+    }
+
+    /// The cells that a curve of the fabric runs through.
+    fn of(&self, curve: usize, coordinates: &FabricCoordinates) -> &CellMap {
+        match (&self.motif, coordinates.kinds.get(curve)) {
+            (Some(motif), _) => motif,
+            // A weft keeps its colour all along, and so does a warp.
+            (None, Some(StrandKind::Warp)) => &self.by_column,
+            (None, Some(StrandKind::Weft)) => &self.by_row,
+            (None, _) if !self.by_columns => &self.by_row,
+            (None, _) => &self.by_column,
+        }
+    }
+}
+
+/// Decides the colour at every place of a fabric's curves.
+struct Painter<'a> {
+    coordinates: &'a FabricCoordinates,
+    cells: &'a LaidCells,
+    /// A picture over the cloth, and how often it is repeated.
+    texture: Option<(Texture, [f64; 2])>,
+    /// How yarns differ in colour, if they do.
+    shades: Option<Variation>,
+    yarns: &'a [&'a Yarn],
+}
+
+impl Painter<'_> {
+    /// The material index at each place along a curve; variants are made as they are met.
+    fn paint(&self, index: usize, curve: &Curve, radii: &[f64], variants: &mut Variants) -> Vec<u16> {
+        let shade = self.shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
+        let shine = self.shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade));
+        let cells = self.cells.of(index, self.coordinates);
+        let count = curve.points.len();
+        let steps = steps(curve, radii);
+        let places = if curve.closed { count * steps } else { (count - 1) * steps + 1 };
+        let material_at = |place: usize| {
+            let [x, y] = self.coordinates.between(index, place, steps, count);
+            let yarn = cells.at(x, y);
+            let (key, color) = match &self.texture {
+                None => (Key { yarn, shade, levels: [0; 3] }, Vec3::splat(shine)),
+                Some((texture, repeat)) => {
+                    let extent = self.coordinates.extent;
+                    let uv = |[x, y]: [f32; 2]| [x / extent[0] * repeat[0] as f32, y / extent[1] * repeat[1] as f32];
+                    let next = self.coordinates.between(index, place + 1, steps, count);
+                    let (here, next) = (uv([x, y]), uv(next));
+                    // As wide as to the next place, but for a jump from one end of a round to its other.
+                    let width = (next[0] - here[0]).hypot(next[1] - here[1]).min(0.25);
+                    let mut stream = Stream::new(hash2(index as u32, place as u32));
+                    let levels = texture
+                        .sample(here[0], here[1], width)
+                        .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
+                    let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
+                    (Key { yarn, shade: None, levels }, Vec3::from(color))
+                }
+            };
+            variants.material_index(key, || self.yarns[key.yarn].dyed(color.to_array().map(f64::from)))
+        };
+        (0..places).map(material_at).collect()
     }
 }
 

@@ -22,7 +22,7 @@ impl LightParts {
 
     /// Adds light that was scattered `events` times, and at cloth first with the shares `lobes`, if at all.
     #[inline]
-    pub(super) fn add(&mut self, events: u32, lobes: Option<&LobeValues>, light: Rgb) {
+    pub fn add(&mut self, events: u32, lobes: Option<&LobeValues>, light: Rgb) {
         match lobes {
             Some(shares) => self.lobes[indirect(events)] += shares.scaled(light),
             None if events == 0 => self.emission += light,
@@ -32,7 +32,7 @@ impl LightParts {
 
     /// Adds light whose last scattering before the camera's path, number `events`, is its first at cloth.
     #[inline]
-    pub(super) fn add_lobes(&mut self, events: u32, found: LobeValues) {
+    pub fn add_lobes(&mut self, events: u32, found: LobeValues) {
         self.lobes[indirect(events)] += found;
     }
 

@@ -1,0 +1,36 @@
+//! What a film takes: one sample of a pixel.
+
+use glam::Vec3A;
+
+use super::LightParts;
+use crate::math::Rgb;
+
+/// The light of one path from the camera, and what it met first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Radiance.
+    pub radiance: Rgb,
+    /// 1 if the camera's ray met cloth or ground that scattered it, else 0.
+    pub alpha: f32,
+    /// Depth along the view where it first scattered, millimetres; zero without.
+    pub depth: f32,
+    /// Unit normal where it first scattered; zero without.
+    pub normal: Vec3A,
+    /// Albedo of what it first scattered at, 0 to 1.
+    pub albedo: Rgb,
+    /// The radiance by where it came from.
+    pub parts: LightParts,
+    /// The cloth at which it first scattered, if that comes first and is asked for.
+    pub cloth: Option<ClothId>,
+}
+
+/// A ply of a yarn of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ClothId {
+    /// Index of the fabric.
+    pub fabric: u32,
+    /// Index of the yarn within it.
+    pub yarn: u32,
+    /// Index of the ply within that.
+    pub ply: u32,
+}
