@@ -36,13 +36,13 @@ pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> Li
 
 /// Every yarn and fibre that a scene may name.
 pub(super) struct Library {
-    /// Those without mistakes.
+    /// Yarns without mistakes.
     pub(super) yarns: BTreeMap<String, Yarn>,
-    /// As `yarns`.
+    /// Fibres without mistakes.
     pub(super) fibers: BTreeMap<String, FiberMaterial>,
-    /// All names, also of those with mistakes, which are told already.
+    /// Names of all yarns, also of those with mistakes, which are told already.
     pub(super) yarn_names: Vec<String>,
-    /// As `yarn_names`.
+    /// Names of all fibres, also of those with mistakes, which are told already.
     pub(super) fiber_names: Vec<String>,
 }
 
@@ -174,6 +174,130 @@ fn flyaways(table: Reader<'_>, radius: f64) -> Flyaways {
     flyaways
 }
 
+/// How many plies a yarn has: as many as it has tables of them, or as `plies` says; `None` if that is too many.
+fn ply_count(table: &Reader<'_>, tables: usize, name: &str) -> Option<u64> {
+    let count = table.u64("plies", 1..=MAX_PLIES as u64);
+    match (count, tables) {
+        (Some(n), m) if m > 0 && n != m as u64 => {
+            table.error_at(
+                "plies",
+                format!("plies = {n}, but there are {m} [[yarn.{name}.ply]] tables"),
+                Some("leave `plies` out"),
+            );
+            Some(m as u64)
+        }
+        (_, m) if m > MAX_PLIES => {
+            table.error_at("ply", format!("{m} plies; at most {MAX_PLIES} are possible"), None);
+            None
+        }
+        (_, m) if m > 0 => Some(m as u64),
+        (n, _) => Some(n.unwrap_or(1)),
+    }
+}
+
+/// What the plies of a yarn have in common: lengths in the scene's unit but `touching`, which is in yarn radii.
+struct PlyMaker<'a> {
+    context: &'a Context<'a>,
+    radius: f64,
+    count: u64,
+    /// Of each ply's centre from the yarn's axis, if it is given.
+    distance: Option<f64>,
+    /// Radius of plies that touch each other.
+    touching: f64,
+    fibers: &'a BTreeMap<String, FiberMaterial>,
+}
+
+impl PlyMaker<'_> {
+    /// A ply with its fibre; what is wrong with its keys is told at `place`.
+    fn make(
+        &self,
+        keys: &PlyKeys,
+        place: &Reader<'_>,
+        index: usize,
+    ) -> Option<(PlyParameters, (String, FiberMaterial))> {
+        let ply_radius = keys.radius.map_or(self.touching, |r| r / self.radius);
+        if ply_radius > 1.0 + 1e-9 {
+            place.error_at("ply_radius", "a ply cannot be thicker than its yarn", Some("ply_radius <= radius"));
+        }
+        let short = ply_radius * keys.aspect.sqrt();
+        let long = ply_radius / keys.aspect.sqrt();
+        let in_the_middle = if self.count == 1 { 0.0 } else { (1.0 - short).max(0.0) };
+        let distance = self.distance.map_or(in_the_middle, |d| d / self.radius);
+        if distance.hypot(long).max(distance + short) > 1.0 + 1e-6 && self.count > 1 && distance + short > 1.0 + 1e-6 {
+            place.error_at(
+                "ply_distance",
+                "the ply reaches beyond the yarn's radius",
+                Some("ply_distance + ply_radius <= radius"),
+            );
+        }
+        let Some(n) = keys.fibers else {
+            if !place.has("fibers") {
+                let message = format!("missing key `fibers` in {}", place.title());
+                place.error(message, Some("the number of fibres in a ply"));
+            }
+            return None;
+        };
+        let fiber_radius = self.fiber_radius(keys, place, ply_radius, n)?;
+        let (name, material) = self.fiber(keys, place)?;
+        let ply = PlyParameters {
+            radius: ply_radius.min(1.0),
+            aspect: keys.aspect,
+            distance,
+            angle: keys.angle.unwrap_or(TAU * index as f64 / self.count as f64),
+            fibers: n as u32,
+            fiber_radius,
+            fiber_twist: radians(keys.fiber_twist),
+        };
+        Some((ply, (name.to_owned(), material.clone())))
+    }
+
+    /// Radius of each of `n` fibres, in yarn radii.
+    fn fiber_radius(&self, keys: &PlyKeys, place: &Reader<'_>, ply_radius: f64, n: u64) -> Option<f64> {
+        let fiber_radius = match (keys.fiber_radius, keys.density) {
+            (Some(r), _) => r / self.radius,
+            (None, Some(d)) => ply_radius * (d / n.max(1) as f64).sqrt(),
+            (None, None) => {
+                if !place.has("fiber_radius") && !place.has("density") {
+                    let message = format!("missing key `fiber_radius` in {}", place.title());
+                    place.error(message, Some("or give `density`, the share of the ply's section that fibres fill"));
+                }
+                return None;
+            }
+        };
+        if fiber_radius >= ply_radius {
+            let key = if keys.fiber_radius.is_some() { "fiber_radius" } else { "density" };
+            place.error_at(
+                key,
+                format!(
+                    "fibres of radius {:.4} do not fit a ply of radius {:.4}",
+                    fiber_radius * self.radius,
+                    ply_radius * self.radius
+                ),
+                None,
+            );
+        }
+        Some(fiber_radius)
+    }
+
+    /// Name and material of the ply's fibre.
+    fn fiber<'k>(&self, keys: &'k PlyKeys, place: &Reader<'_>) -> Option<(&'k str, &FiberMaterial)> {
+        let Some(name) = keys.fiber.as_deref() else {
+            if !place.has("fiber") {
+                let message = format!("missing key `fiber` in {}", place.title());
+                place.error(message, Some("the name of a [fiber.NAME] table"));
+            }
+            return None;
+        };
+        let material = self.fibers.get(name);
+        if material.is_none() {
+            let span = place.span("fiber").unwrap_or(place.header());
+            self.context.unknown(span, "fiber", name, self.fibers.keys().map(String::as_str));
+        }
+        Some((name, material?))
+    }
+}
+
+/// One `[yarn.NAME]`.
 fn yarn(
     name: &str,
     table: Reader<'_>,
@@ -186,23 +310,7 @@ fn yarn(
     let distance = table.f64("ply_distance", Range::at_least(0.0));
     let shared = PlyKeys::read(&table, None, context.sources);
     let ply_tables = table.tables("ply");
-    let count = table.u64("plies", 1..=MAX_PLIES as u64);
-    let count = match (count, ply_tables.len()) {
-        (Some(n), m) if m > 0 && n != m as u64 => {
-            table.error_at(
-                "plies",
-                format!("plies = {n}, but there are {m} [[yarn.{name}.ply]] tables"),
-                Some("leave `plies` out"),
-            );
-            m as u64
-        }
-        (_, m) if m > MAX_PLIES => {
-            table.error_at("ply", format!("{m} plies; at most {MAX_PLIES} are possible"), None);
-            return None;
-        }
-        (_, m) if m > 0 => m as u64,
-        (n, _) => n.unwrap_or(1),
-    };
+    let count = ply_count(&table, ply_tables.len(), name)?;
     let placement = table.table("packing").map_or(Placement::Regular, packing);
     let flyaways = table.table("flyaways").map(|t| flyaways(t, radius.unwrap_or(1.0)));
     let Some(radius) = radius else {
@@ -217,87 +325,19 @@ fn yarn(
     };
     let (touching, _) = touching_plies(count as u32);
 
-    let mut plies = Vec::new();
-    let mut materials = Vec::new();
-    let mut make = |keys: &PlyKeys, place: &Reader<'_>, index: usize| {
-        let ply_radius = keys.radius.map_or(touching, |r| r / radius);
-        if ply_radius > 1.0 + 1e-9 {
-            place.error_at("ply_radius", "a ply cannot be thicker than its yarn", Some("ply_radius <= radius"));
-        }
-        let short = ply_radius * keys.aspect.sqrt();
-        let long = ply_radius / keys.aspect.sqrt();
-        let distance = distance.map_or(if count == 1 { 0.0 } else { (1.0 - short).max(0.0) }, |d| d / radius);
-        if distance.hypot(long).max(distance + short) > 1.0 + 1e-6 && count > 1 && distance + short > 1.0 + 1e-6 {
-            place.error_at(
-                "ply_distance",
-                "the ply reaches beyond the yarn's radius",
-                Some("ply_distance + ply_radius <= radius"),
-            );
-        }
-        let Some(n) = keys.fibers else {
-            if !place.has("fibers") {
-                let message = format!("missing key `fibers` in {}", place.title());
-                place.error(message, Some("the number of fibres in a ply"));
-            }
-            return;
-        };
-        let fiber_radius = match (keys.fiber_radius, keys.density) {
-            (Some(r), _) => r / radius,
-            (None, Some(d)) => ply_radius * (d / n.max(1) as f64).sqrt(),
-            (None, None) => {
-                if !place.has("fiber_radius") && !place.has("density") {
-                    let message = format!("missing key `fiber_radius` in {}", place.title());
-                    place.error(message, Some("or give `density`, the share of the ply's section that fibres fill"));
-                }
-                return;
-            }
-        };
-        if fiber_radius >= ply_radius {
-            let key = if keys.fiber_radius.is_some() { "fiber_radius" } else { "density" };
-            place.error_at(
-                key,
-                format!(
-                    "fibres of radius {:.4} do not fit a ply of radius {:.4}",
-                    fiber_radius * radius,
-                    ply_radius * radius
-                ),
-                None,
-            );
-        }
-        let Some(fiber) = &keys.fiber else {
-            if !place.has("fiber") {
-                let message = format!("missing key `fiber` in {}", place.title());
-                place.error(message, Some("the name of a [fiber.NAME] table"));
-            }
-            return;
-        };
-        let Some(material) = fibers.get(fiber.as_str()) else {
-            let span = place.span("fiber").unwrap_or(place.header());
-            context.unknown(span, "fiber", fiber, fibers.keys().map(String::as_str));
-            return;
-        };
-        plies.push(PlyParameters {
-            radius: ply_radius.min(1.0),
-            aspect: keys.aspect,
-            distance,
-            angle: keys.angle.unwrap_or(TAU * index as f64 / count as f64),
-            fibers: n as u32,
-            fiber_radius,
-            fiber_twist: radians(keys.fiber_twist),
-        });
-        materials.push((fiber.clone(), material.clone()));
-    };
-    if ply_tables.is_empty() {
-        for index in 0..count as usize {
-            make(&shared, &table, index);
-        }
+    let maker = PlyMaker { context, radius, count, distance, touching, fibers };
+    let made: Vec<_> = if ply_tables.is_empty() {
+        (0..count as usize).filter_map(|index| maker.make(&shared, &table, index)).collect()
     } else {
-        for (index, ply) in ply_tables.into_iter().enumerate() {
+        let own = |(index, ply): (usize, Reader<'_>)| {
             let keys = PlyKeys::read(&ply, Some(&shared), context.sources);
-            make(&keys, &ply, index);
+            let made = maker.make(&keys, &ply, index);
             ply.finish();
-        }
-    }
+            made
+        };
+        ply_tables.into_iter().enumerate().filter_map(own).collect()
+    };
+    let (plies, materials): (Vec<_>, Vec<_>) = made.into_iter().unzip();
     table.finish();
     (plies.len() == count as usize).then(|| Yarn {
         name: name.to_owned(),
