@@ -338,7 +338,7 @@ impl<'a> Integrator<'a> {
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
-        let mut stream = path.sampler.stream(path.sampler.position());
+        let mut stream = path.sampler.even_stream();
         let vertex = yarn.vertex(section, &scratch.crossings, unscattered, path.throughput, u, &mut stream);
 
         if let Some((direct, light)) = self.light_at_yarn(

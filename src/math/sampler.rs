@@ -60,7 +60,15 @@ impl Sampler {
     /// Plain random numbers without end for this sample, one stream for each `key`: for rejection sampling.
     #[inline]
     pub fn stream(&self, key: u32) -> Stream {
-        Stream { state: hash2(self.pixel ^ key.wrapping_mul(0x85eb_ca6b), self.index), weyl: 0 }
+        let state = hash2(self.pixel ^ key.wrapping_mul(0x85eb_ca6b), self.index);
+        Stream { state, weyl: 0, even: [0.0; 4], used: 4 }
+    }
+
+    /// A stream of which the first four numbers are [`Self::next4`], for what must be even over a pixel's samples.
+    #[inline]
+    pub fn even_stream(&mut self) -> Stream {
+        let even = self.next4();
+        Stream { even, used: 0, ..self.stream(self.position()) }
     }
 
     /// Which set of four numbers comes next: a key for [`Self::stream`] that differs at each vertex of a path.
@@ -69,28 +77,35 @@ impl Sampler {
     }
 }
 
-/// Plain random numbers: a counter and a hash.
+/// Random numbers without end: plain ones by a counter and a hash, behind those of [`Sampler::even_stream`], if any.
 #[derive(Clone, Debug)]
 pub struct Stream {
     state: u32,
     weyl: u32,
+    even: [f32; 4],
+    /// How many of `even` are gone.
+    used: usize,
 }
 
 impl Stream {
     /// A stream of its own for a number.
     pub fn new(key: u32) -> Self {
-        Self { state: hash(key ^ 0xa511_e9b3), weyl: 0 }
+        Self { state: hash(key ^ 0xa511_e9b3), weyl: 0, even: [0.0; 4], used: 4 }
     }
 
     /// The next number in [0, 1).
     #[inline]
     #[allow(clippy::should_implement_trait, reason = "a number source without an end is not an iterator here")]
     pub fn next(&mut self) -> f32 {
+        if let Some(&number) = self.even.get(self.used) {
+            self.used += 1;
+            return number;
+        }
         self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
         unit(hash(self.state ^ self.weyl))
     }
 
-    /// A stream of its own, independent of what this one still gives.
+    /// A stream of its own, plain random and independent of what this one still gives.
     #[inline]
     pub fn fork(&mut self) -> Self {
         self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
@@ -117,6 +132,24 @@ mod tests {
             }
             let bound = if set_skip == 0 { 2e-4 } else { 0.02 };
             assert!(mean.iter().all(|m| (m - 0.5).abs() < bound), "{mean:?}");
+        }
+    }
+
+    #[test]
+    fn an_even_stream_spreads_its_first_numbers_over_the_samples() {
+        let n = 64;
+        let mut taken = [[0; 64]; 6];
+        for i in 0..n {
+            let mut sampler = Sampler::new(3, 17, 5, i);
+            sampler.set = 9;
+            let mut stream = sampler.even_stream();
+            for strata in &mut taken {
+                strata[(stream.next() * n as f32) as usize] += 1;
+            }
+            assert_eq!(sampler.position(), 10, "the same numbers are not drawn again");
+        }
+        for (number, strata) in taken.iter().enumerate() {
+            assert_eq!(strata.iter().all(|&count| count == 1), number < 4, "number {number}: {strata:?}");
         }
     }
 

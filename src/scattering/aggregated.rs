@@ -378,14 +378,16 @@ impl<'a> Vertex<'a> {
             return;
         }
         let optics = &self.yarn.plies[node.ply];
-        let lobe = choose(node.chance, stream.next());
-        let sin = match lobe {
+        // Before rejection sampling takes an unknown number of them: a stream's first numbers may be the even ones, and
+        // what lies in the way of the azimuth makes most of the noise under a wide light.
+        let [u_azimuth, u_lobe] = [stream.next(), stream.next()];
+        let sin = match choose(node.chance, u_lobe) {
             0 => sample_sine(node.kappa_r, node.sin, node.cos, u, stream),
             1 => sample_sine(node.kappa_tt, node.sin, node.cos, u, stream),
             _ => sample_sine_diffuse(u),
         };
         let frame = LobeFrame::new(node.tangent, self.camera);
-        let direction = frame.direction(sin, TAU * stream.next());
+        let direction = frame.direction(sin, TAU * u_azimuth);
         let value = self.node_value(&node, direction);
         let escape = self.escape_chance(&node, optics, value.clear);
         self.drawn = Drawn { direction, value, escape };
