@@ -40,7 +40,7 @@ fn a_floor_has_the_irradiance_of_the_closed_forms() {
         all += &table;
         sum += want;
     }
-    // All at once, chosen by power.
+    // All at once.
     let got = floor(&all, 256).mean()[1];
     assert!((got / sum - 1.0).abs() < 0.02, "all lights: {got}, not {sum}");
 }

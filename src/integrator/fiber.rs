@@ -40,8 +40,9 @@ impl Integrator<'_> {
         let fiber = fibers.fiber_at(hit.segment);
         let frame = LobeFrame::new(place.tangent, -path.ray.direction);
 
-        if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())
-            && let Some(towards) = light.sample(place.centre + place.radius * hit.normal, Vec2::new(u_x, u_y))
+        let here = place.centre + place.radius * hit.normal;
+        if let Some((light, chance)) = self.lights.choose(here, u_choice)
+            && let Some(towards) = light.sample(here, Vec2::new(u_x, u_y))
         {
             let local = frame.to_local(towards.direction);
             let (lobes, pdf) = fiber.evaluate(frame.sin, frame.cos, local, path.throughput);
@@ -76,6 +77,6 @@ impl Integrator<'_> {
         path.pdf = next.pdf;
         let direction = frame.to_world(next.wi);
         path.ray = Ray::new(place.leave(hit.normal, direction), direction);
-        (self.survives(path, next.weight, u_roulette, ROULETTE_AFTER_FIBERS), true)
+        (self.survives(path, here, next.weight, u_roulette, ROULETTE_AFTER_FIBERS), true)
     }
 }

@@ -16,7 +16,7 @@ use crate::{
         ray::Ray,
         section::{Crossings, Section},
     },
-    light::{AreaLight, Environment, Light},
+    light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
     scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnVertex},
     scene::{CurveKind, Fabric, Ground, Material, Scene},
@@ -69,12 +69,12 @@ pub struct Integrator<'a> {
     world: &'a World,
     ground: Option<Ground>,
     materials: &'a [Material],
-    /// Environment lights; several are added up.
-    environments: Vec<(&'a Environment, f32)>,
-    /// Surfaces that shine, each with its chance of being chosen.
-    area_lights: Vec<(&'a AreaLight, f32)>,
-    /// Lights for shadow rays: each with its chance, summed up.
-    lights: Vec<(&'a Light, f32, f32)>,
+    /// Environment lights, each with its index in `lights`; several are added up.
+    environments: Vec<(&'a Environment, Option<usize>)>,
+    /// Surfaces that shine, each with its index in `lights`.
+    area_lights: Vec<(&'a AreaLight, Option<usize>)>,
+    /// Lights for shadow rays.
+    lights: LightChooser<'a>,
     max_bounces: u32,
     /// Albedo of one fibre of each ply, of each fabric's yarn and then of its variants; empty if no layer holds it.
     albedos: Vec<Vec<Vec<Rgb>>>,
@@ -102,7 +102,7 @@ struct Path<'s> {
     throughput: Rgb,
     /// Density of the ray's direction, for weighing environment lights against their shadow rays; infinite from the camera.
     pdf: f32,
-    /// Where that direction was drawn.
+    /// Where that direction was drawn, and for which place a light was chosen.
     from: Vec3A,
     bounces: u32,
     passes: u32,
@@ -114,25 +114,13 @@ struct Path<'s> {
 impl<'a> Integrator<'a> {
     /// For a scene and its cloth.
     pub fn new(scene: &'a Scene, world: &'a World) -> Self {
-        let sampled: Vec<&Light> = scene.lights.iter().filter(|l| l.needs_shadow_rays() && l.power() > 0.0).collect();
-        let total: f32 = sampled.iter().map(|l| l.power()).sum();
-        let mut sum = 0.0;
-        let lights: Vec<_> = sampled
-            .into_iter()
-            .map(|light| {
-                let chance = light.power() / total;
-                sum += chance;
-                (light, chance, sum)
-            })
-            .collect();
-        let chance_of =
-            |light: &Light| lights.iter().find(|(l, _, _)| std::ptr::eq(*l, light)).map_or(0.0, |(_, c, _)| *c);
+        let lights = LightChooser::new(&scene.lights);
         let mut environments = Vec::new();
         let mut area_lights = Vec::new();
         for light in &scene.lights {
             match light {
-                Light::Environment(environment) => environments.push((environment, chance_of(light))),
-                Light::Area(area) => area_lights.push((area, chance_of(light))),
+                Light::Environment(environment) => environments.push((environment, lights.index_of(light))),
+                Light::Area(area) => area_lights.push((area, lights.index_of(light))),
                 Light::Distant { .. } | Light::Point { .. } | Light::Spot { .. } => {}
             }
         }
@@ -238,13 +226,14 @@ impl<'a> Integrator<'a> {
     #[inline]
     fn environment(&self, path: &Path<'_>) -> Rgb {
         let mut light = Rgb::ZERO;
-        for &(environment, chance) in &self.environments {
+        for &(environment, index) in &self.environments {
             if path.pdf == f32::INFINITY {
                 if environment.visible {
                     light += environment.radiance(path.ray.direction);
                 }
                 continue;
             }
+            let chance = self.lights.chance(index, path.from);
             let other = if chance > 0.0 { chance * environment.pdf(path.ray.direction) } else { 0.0 };
             light += environment.radiance(path.ray.direction) * mis_weight(path.pdf, other);
         }
@@ -270,9 +259,10 @@ impl<'a> Integrator<'a> {
             }
             return nearest.is_some();
         }
-        for &(light, chance) in &self.area_lights {
+        for &(light, index) in &self.area_lights {
             if met(light).is_some() {
-                let other = chance * light.shape.pdf(path.from, path.ray.direction, light.two_sided);
+                let other = self.lights.chance(index, path.from)
+                    * light.shape.pdf(path.from, path.ray.direction, light.two_sided);
                 let weight = mis_weight(path.pdf, other);
                 add(sample, path.bounces, path, path.throughput * light.radiance * weight);
             }
@@ -280,10 +270,11 @@ impl<'a> Integrator<'a> {
         false
     }
 
-    /// Whether a path may go on, along its new ray, after a scattering event of weight `weight`; surely for the first `sure`.
+    /// Whether a path may go on, along its new ray, after a scattering event of weight `weight` at `from`; surely for the
+    /// first `sure`.
     #[inline]
-    fn survives(&self, path: &mut Path<'_>, weight: Rgb, u: f32, sure: u32) -> bool {
-        path.from = path.ray.origin;
+    fn survives(&self, path: &mut Path<'_>, from: Vec3A, weight: Rgb, u: f32, sure: u32) -> bool {
+        path.from = from;
         path.throughput *= weight;
         path.bounces += 1;
         let largest = path.throughput.max_channel();
@@ -364,7 +355,8 @@ impl<'a> Integrator<'a> {
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
-        (self.survives(path, next.weight, u_roulette, ROULETTE_AFTER), true)
+        let node = section.point_on_ray(vertex.node_start());
+        (self.survives(path, node, next.weight, u_roulette, ROULETTE_AFTER), true)
     }
 
     /// Notes of what cloth a camera path met first.
@@ -398,8 +390,8 @@ impl<'a> Integrator<'a> {
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> Option<(LobeValues, Rgb)> {
-        let &(light, chance, _) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())?;
         let node = section.point_on_ray(vertex.node_start());
+        let (light, chance) = self.lights.choose(node, u_choice)?;
         let towards = light.sample(node, u)?;
         let local = section.to_local(towards.direction);
         let direct = vertex.evaluate(local, towards.pdf * chance);

@@ -52,7 +52,7 @@ impl Integrator<'_> {
         let wo = to_local(-path.ray.direction);
         let start = place.point + OFFSET * (1.0 + place.point.abs().max_element().max(t)) * place.normal;
 
-        if let Some(&(light, chance, _)) = self.lights.iter().find(|l| u_choice < l.2).or(self.lights.last())
+        if let Some((light, chance)) = self.lights.choose(start, u_choice)
             && let Some(towards) = light.sample(start, Vec2::new(light_x, light_y))
             && towards.direction.dot(place.normal) > 0.0
         {
@@ -73,6 +73,6 @@ impl Integrator<'_> {
         }
         path.ray = Ray::new(start, direction);
         path.pdf = next.pdf;
-        self.survives(path, next.weight, u_roulette, ROULETTE_AFTER)
+        self.survives(path, start, next.weight, u_roulette, ROULETTE_AFTER)
     }
 }

@@ -4,6 +4,7 @@
 //! and spots a radiant intensity (in a scene file per square of its unit, here radiance times square millimetres).
 //! No light blocks another or casts a shadow; one that the camera sees hides from it what is behind.
 
+mod chooser;
 mod environment;
 mod shape;
 
@@ -11,6 +12,7 @@ use std::f32::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3A};
 
+pub use chooser::LightChooser;
 pub use environment::{Environment, EnvironmentMap};
 pub use shape::Shape;
 
@@ -80,12 +82,12 @@ pub struct LightSample {
     pub pdf: f32,
 }
 
-/// The least share of a light's power that one which faces away is chosen by: it may still light some of the scene.
+/// The least share of a light's power that one which is seen edge on is chosen by: its centre does not tell all of it.
 const FACING_AWAY: f32 = 0.05;
 
 impl Light {
-    /// A measure of how much it lights the cloth, for choosing between lights: about the irradiance at the scene's
-    /// middle, and above 0 for every light that shines somewhere.
+    /// A measure of how much it lights the cloth: about the irradiance at the scene's middle, and above 0 for every light
+    /// that shines somewhere.
     pub fn power(&self) -> f32 {
         match self {
             Self::Environment(environment) => PI * environment.mean().mean(),
@@ -104,6 +106,37 @@ impl Light {
                 });
                 // That of a disk of the same area, which never exceeds pi times the radiance.
                 cos.max(FACING_AWAY) * light.radiance.mean() * area / (area / PI + centre.length_squared())
+            }
+        }
+    }
+
+    /// About the irradiance at a place where nothing stands in the way, on a surface that faces the light; 0 only if the
+    /// light gives nothing there.
+    #[inline]
+    pub(super) fn most_at(&self, at: Vec3A) -> f32 {
+        match self {
+            Self::Environment(_) | Self::Distant { .. } => self.power(),
+            Self::Point { position, intensity } => intensity.mean() / (*position - at).length_squared().max(1e-8),
+            Self::Spot { position, axis, intensity, cos_inner, cos_outer } => {
+                let way = at - *position;
+                let square = way.length_squared().max(1e-8);
+                spot_share(axis.dot(way) / square.sqrt(), *cos_inner, *cos_outer) * intensity.mean() / square
+            }
+            Self::Area(light) => {
+                let way = at - light.shape.centre();
+                let square = way.length_squared();
+                let cos = match light.shape.normal() {
+                    None => 1.0,
+                    Some(normal) => {
+                        let along = normal.dot(way);
+                        if along <= 0.0 && !light.two_sided {
+                            return 0.0;
+                        }
+                        (along.abs() / square.max(1e-20).sqrt()).max(FACING_AWAY)
+                    }
+                };
+                let area = light.shape.area();
+                cos * light.radiance.mean() * area / (area / PI + square)
             }
         }
     }

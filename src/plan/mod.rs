@@ -116,7 +116,7 @@ impl Plan {
         add(
             "light_choice",
             scene.lights.iter().filter(|l| l.needs_shadow_rays()).count() > 1,
-            "lights are chosen by power",
+            "each place chooses a light by what it can give there",
             "no more than one light is sampled",
         );
         add(

@@ -1,0 +1,137 @@
+//! Which light a shadow ray looks for, where there are several.
+
+use glam::Vec3A;
+
+use super::Light;
+
+/// Chooses between lights by what each can give at a place: power over distance, cone and facing, without what stands
+/// in the way. A light that gives nothing there is not chosen.
+#[derive(Clone, Debug)]
+pub struct LightChooser<'a> {
+    lights: Vec<&'a Light>,
+}
+
+impl<'a> LightChooser<'a> {
+    /// Between those of `lights` that need shadow rays and shine.
+    pub fn new(lights: &'a [Light]) -> Self {
+        Self { lights: lights.iter().filter(|light| light.needs_shadow_rays() && light.power() > 0.0).collect() }
+    }
+
+    /// The place of a light of these in [`Self::chance`]; `None` if shadow rays never look for it.
+    pub fn index_of(&self, light: &Light) -> Option<usize> {
+        self.lights.iter().position(|one| std::ptr::eq(*one, light))
+    }
+
+    /// Draws a light for the place `at` by `u` in [0, 1), with the chance that it had; `None` if none gives anything.
+    #[inline]
+    pub fn choose(&self, at: Vec3A, mut u: f32) -> Option<(&'a Light, f32)> {
+        if let &[light] = self.lights.as_slice() {
+            return Some((light, 1.0));
+        }
+        let mut total = 0.0;
+        let mut chosen = None;
+        // Of all so far each is held by its share, for which one number serves: what is left of it is even again.
+        for &light in &self.lights {
+            let given = light.most_at(at);
+            if given <= 0.0 {
+                continue;
+            }
+            total += given;
+            let share = given / total;
+            if u < share {
+                chosen = Some((light, given));
+                u /= share;
+            } else {
+                u = (u - share) / (1.0 - share);
+            }
+            u = u.clamp(0.0, 0.999_999_94);
+        }
+        chosen.map(|(light, given)| (light, given / total))
+    }
+
+    /// The chance of a light, by [`Self::index_of`], in [`Self::choose`] at a place.
+    #[inline]
+    pub fn chance(&self, index: Option<usize>, at: Vec3A) -> f32 {
+        let Some(index) = index else { return 0.0 };
+        if self.lights.len() == 1 {
+            return 1.0;
+        }
+        let given = self.lights[index].most_at(at);
+        if given > 0.0 { given / self.lights.iter().map(|light| light.most_at(at)).sum::<f32>() } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+    use crate::{
+        light::{AreaLight, Shape},
+        math::{Rgb, sampler::Stream},
+    };
+
+    fn lights() -> Vec<Light> {
+        let disk = |y: f32, normal| {
+            let shape = Shape::Disk { centre: Vec3A::new(2.0, y, 0.0), normal, radius: 1.0 };
+            Light::Area(AreaLight { shape, radiance: Rgb::splat(2.0), two_sided: false, visible: true })
+        };
+        let spot = |x: f32| Light::Spot {
+            position: Vec3A::new(x, 5.0, 0.0),
+            axis: Vec3A::NEG_Y,
+            intensity: Rgb::splat(40.0),
+            cos_inner: 0.99,
+            cos_outer: 0.97,
+        };
+        vec![
+            Light::Point { position: Vec3A::new(0.0, 1.0, 3.0), intensity: Rgb::splat(3.0) },
+            Light::Distant { towards: Vec3A::Y, one_minus_cos: 0.0, irradiance: Rgb::splat(0.2) },
+            spot(0.0),
+            spot(9.0),
+            disk(4.0, Vec3A::NEG_Y),
+            disk(4.0, Vec3A::Y),
+        ]
+    }
+
+    #[test]
+    fn lights_are_drawn_by_the_chances_that_are_told() {
+        let lights = lights();
+        let chooser = LightChooser::new(&lights);
+        for at in [Vec3A::ZERO, Vec3A::new(9.0, 0.1, 0.0), Vec3A::new(2.0, 6.0, 0.0)] {
+            let n = 200_000;
+            let mut counts = [0; 6];
+            for i in 0..n {
+                let (light, chance) =
+                    chooser.choose(at, (i as f32 + 0.5) / n as f32).expect("a point shines everywhere");
+                let index = chooser.index_of(light);
+                assert!((chooser.chance(index, at) / chance - 1.0).abs() < 1e-5);
+                counts[index.unwrap()] += 1;
+            }
+            for (index, count) in counts.into_iter().enumerate() {
+                let chance = chooser.chance(Some(index), at);
+                assert!(
+                    (f64::from(count) / f64::from(n) - f64::from(chance)).abs() < 1e-3,
+                    "{at}: {index} {count} {chance}"
+                );
+            }
+        }
+        // A spot far beside, and the backs of disks.
+        assert_eq!(chooser.chance(Some(3), Vec3A::ZERO), 0.0);
+        assert_eq!(chooser.chance(Some(5), Vec3A::ZERO), 0.0);
+        assert_eq!(chooser.chance(Some(4), Vec3A::new(2.0, 6.0, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn what_gives_light_can_be_chosen() {
+        let lights = lights();
+        let chooser = LightChooser::new(&lights);
+        let mut stream = Stream::new(8);
+        for _ in 0..20_000 {
+            let at = Vec3A::new(stream.next(), stream.next(), stream.next()) * 24.0 - 12.0;
+            for (index, light) in lights.iter().enumerate() {
+                let given = light.sample(at, Vec2::new(stream.next(), stream.next())).map_or(0.0, |s| s.weight.mean());
+                assert!(given <= 0.0 || chooser.chance(Some(index), at) > 0.0, "{light:?} at {at}");
+            }
+        }
+    }
+}
