@@ -161,7 +161,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let load = started.elapsed();
     log::phase("load", load);
     pool.install(|| {
-        let (world, made) = World::within(&scene, threads, memory.limit, memory.bytes())?;
+        let (world, made) = World::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
         warn(args, &scene, &world);
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);

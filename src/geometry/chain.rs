@@ -3,10 +3,11 @@
 use std::ops::{Mul, Sub};
 
 use glam::{DVec3, DVec4};
+use rayon::prelude::*;
 
 use super::{
     curve::{Basis, Curve},
-    spline::{SplinePoint, evaluate},
+    spline::{SplinePoint, Weights, evaluate},
 };
 
 /// A curve as a chain of segments that can be evaluated.
@@ -59,6 +60,12 @@ impl Chain {
         self.points.len() - 3
     }
 
+    /// The four control points of a segment.
+    #[inline]
+    pub(super) fn points_of(&self, segment: usize) -> &[DVec4; 4] {
+        self.points[segment..].first_chunk().expect("a segment has four points")
+    }
+
     pub(super) fn at(&self, segment: usize, u: f64) -> SplinePoint {
         let p = &self.points[segment..segment + 4];
         evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
@@ -100,26 +107,40 @@ impl Chain {
         Curve { basis: self.basis, closed, points, radii: None, flattening: None }
     }
 
-    /// Arc length at `steps` points of each segment, from the chain's start.
-    pub(super) fn lengths(&self, steps: usize) -> Vec<f64> {
-        let mut lengths = Vec::with_capacity(self.segments() * steps + 1);
-        lengths.push(0.0);
-        let mut sum = 0.0;
-        for segment in 0..self.segments() {
-            for step in 0..steps {
-                // Two-point Gauss quadrature of the speed.
-                let h = 1.0 / steps as f64;
-                let at = |x: f64| self.at(segment, (step as f64 + x) * h).d1.truncate().length();
-                sum += 0.5 * h * (at(0.211_324_865_405_187_1) + at(0.788_675_134_594_812_9));
-                lengths.push(sum);
+    /// Arc length from the chain's start to each of its knots.
+    pub(super) fn lengths(&self) -> Vec<f64> {
+        let nodes = GAUSS.map(|(u, weight)| (Weights::new(self.basis, u), weight));
+        let length_of = |segment: usize| {
+            let p = self.points_of(segment);
+            let mut length = 0.0;
+            for (node, weight) in &nodes {
+                length += weight * node.speed(p);
             }
+            length
+        };
+        let mut lengths = vec![0.0; self.segments() + 1];
+        let ends = lengths[1..].par_iter_mut().with_min_len(PARALLEL).enumerate();
+        ends.for_each(|(segment, length)| *length = length_of(segment));
+        let mut sum = 0.0;
+        for length in &mut lengths {
+            sum += *length;
+            *length = sum;
         }
         lengths
     }
 }
 
-/// Steps per given segment at which arc length is known.
-pub(super) const LENGTH_STEPS: usize = 8;
+/// Nodes and weights on 0..1 of Gauss's quadrature with four points, exact to the seventh power.
+pub(super) const GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_1),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+/// Segments for which a task of their own is worth while.
+const PARALLEL: usize = 4096;
+
 /// How a chain is resampled.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
@@ -131,47 +152,71 @@ pub(super) struct Fit {
     pub(super) longest: f64,
 }
 
+/// A place of a chain by the way to it: its segment, and where in it. Given `lengths` to the chain's knots.
+fn place_at(chain: &Chain, lengths: &[f64], along: f64) -> (usize, f64) {
+    let segment = lengths.partition_point(|&l| l <= along).clamp(1, lengths.len() - 1) - 1;
+    let span = lengths[segment + 1] - lengths[segment];
+    if span <= 0.0 {
+        return (segment, 0.0);
+    }
+    let t = ((along - lengths[segment]) / span).clamp(0.0, 1.0);
+    // The cubic that is right at both knots, in value and slope, if it rises from one to the other.
+    let slope = |u: f64| span / chain.at(segment, u).d1.truncate().length();
+    let (a, b) = (slope(0.0), slope(1.0));
+    if !(a <= 3.0 && b <= 3.0) {
+        return (segment, t);
+    }
+    (segment, (t * (a + t * (3.0 - 2.0 * a - b + t * (a + b - 2.0)))).clamp(0.0, 1.0))
+}
+
+/// Every so many segments a curve is looked at before it is looked at all along.
+const SPARSE: usize = 37;
+/// Knots around a segment which its shape depends on, as near as tells whether more knots are needed.
+const AROUND: usize = 8;
+
 /// Places on the chain (segment, and where in it) at equal arc length, as few as keep the curve through them within the
 /// tolerance of the old one; `None` if that takes the chain's own points.
 pub(super) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) -> Option<Vec<(usize, f64)>> {
     let total = lengths[lengths.len() - 1];
-    let place_at = |s: f64| {
-        let i = lengths.partition_point(|&l| l <= s).clamp(1, lengths.len() - 1) - 1;
-        let span = lengths[i + 1] - lengths[i];
-        let t = if span > 0.0 { ((s - lengths[i]) / span).clamp(0.0, 1.0) } else { 0.0 };
-        let place = i as f64 + t;
-        let segment = ((place / LENGTH_STEPS as f64) as usize).min(chain.segments() - 1);
-        (segment, place / LENGTH_STEPS as f64 - segment as f64)
-    };
-    let point_at = |s: f64| {
-        let (segment, u) = place_at(s);
-        chain.at(segment, u)
-    };
     let longest = fit.longest.max(total * 1e-7);
     let fewest = if closed { 4 } else { 1 };
-    let mut count = ((total / longest).ceil() as usize).max(fewest);
     // With as many points as were given, those given are exact; another basis may need some more.
     let exact = chain.basis == fit.basis;
     let most = if exact { chain.segments() } else { 2 * chain.segments() }.max(fewest);
-    count = count.min(most);
+    let mut count = ((total / longest).ceil() as usize).max(fewest).min(most);
     loop {
-        let knots: Vec<_> = (0..=count).map(|i| place_at(total * i as f64 / count as f64)).collect();
-        let made = chain.through(&knots, closed, fit.basis);
-        let worst = (0..count)
-            .flat_map(|i| [0.25, 0.5, 0.75].map(|u| (i, u)))
-            .map(|(i, u)| {
-                let want = point_at(total * (i as f64 + u) / count as f64);
-                let off = made.at(i, u).at.truncate() - want.at.truncate();
+        if exact && count >= most {
+            return None;
+        }
+        let knot = |i: usize| place_at(chain, lengths, total * i as f64 / count as f64);
+        // How far segment `of` of the curve `made`, which stands for segment `i` of `count`, is off the chain.
+        let off = |made: &Chain, of: usize, i: usize| {
+            [0.25, 0.5, 0.75].map(|u| {
+                let (segment, v) = place_at(chain, lengths, total * (i as f64 + u) / count as f64);
+                let want = chain.at(segment, v);
+                let off = made.at(of, u).at.truncate() - want.at.truncate();
                 // A shift along the yarn is no error of its shape.
                 let t = want.d1.truncate().try_normalize().unwrap_or(DVec3::ZERO);
                 (off - off.dot(t) * t).length()
             })
+        };
+        let largest = |errors: [f64; 3]| errors.into_iter().fold(0.0, f64::max);
+        let around = if fit.basis == Basis::BSpline { AROUND } else { 1 };
+        let mut worst = (around..count.saturating_sub(around))
+            .step_by(SPARSE)
+            .map(|i| {
+                let near: Vec<_> = (i - around..=i + 1 + around).map(knot).collect();
+                largest(off(&chain.through(&near, false, fit.basis), around, i))
+            })
             .fold(0.0, f64::max);
-        if worst <= fit.tolerance || (count >= most && !exact) {
-            return Some(knots);
-        }
-        if count >= most {
-            return None;
+        if worst <= fit.tolerance || count >= most {
+            let knots: Vec<_> = (0..count + 1).into_par_iter().with_min_len(PARALLEL).map(knot).collect();
+            let made = chain.through(&knots, closed, fit.basis);
+            let all = (0..count).into_par_iter().with_min_len(PARALLEL).map(|i| largest(off(&made, i, i)));
+            worst = all.reduce(|| 0.0, f64::max);
+            if worst <= fit.tolerance || count >= most {
+                return Some(knots);
+            }
         }
         // The error of a cubic falls with the third power of the spacing at least.
         let grow = (worst / fit.tolerance).powf(1.0 / 3.0).clamp(1.1, 2.0);
@@ -300,10 +345,37 @@ mod tests {
     fn a_straight_chain_is_as_long_as_it_is() {
         let points = [0.0, 1.0, 1.5, 4.0].map(|x| DVec3::new(0.6 * x, 0.8 * x, 0.0)).to_vec();
         let curve = Curve { basis: Basis::Linear, closed: false, points, radii: None, flattening: None };
-        let lengths = Chain::new(&curve, &[0.1; 4]).lengths(LENGTH_STEPS);
-        assert_eq!(lengths.len(), 3 * LENGTH_STEPS + 1);
-        for (segment, end) in [(1, 1.0), (2, 1.5), (3, 4.0)] {
-            assert!((lengths[segment * LENGTH_STEPS] - end).abs() < 1e-9, "{lengths:?}");
+        let lengths = Chain::new(&curve, &[0.1; 4]).lengths();
+        for (knot, end) in [0.0, 1.0, 1.5, 4.0].into_iter().enumerate() {
+            assert!((lengths[knot] - end).abs() < 1e-9, "{lengths:?}");
+        }
+    }
+
+    #[test]
+    fn lengths_are_those_of_many_small_steps_and_places_lie_where_they_say() {
+        for (basis, n) in [(Basis::CatmullRom, 12), (Basis::BSpline, 12), (Basis::CatmullRom, 60)] {
+            let (curve, radii) = wave(n, true, basis);
+            let chain = Chain::new(&curve, &radii);
+            let lengths = chain.lengths();
+            let steps = 4000;
+            let mut sum = 0.0;
+            for segment in 0..chain.segments() {
+                for k in 0..steps {
+                    let at = |k: u32| chain.at(segment, f64::from(k) / f64::from(steps)).at.truncate();
+                    if k == steps / 3 {
+                        let (found, u) = place_at(&chain, &lengths, sum);
+                        assert_eq!(found, segment);
+                        assert!((u - 1.0 / 3.0).abs() < 5e-3, "{basis:?} {n} {segment}: {u}");
+                    }
+                    sum += at(k).distance(at(k + 1));
+                }
+                // The spacing of 12 points is coarser than any yarn's.
+                assert!(
+                    (lengths[segment + 1] / sum - 1.0).abs() < 1e-5,
+                    "{basis:?} {n}: {} {sum}",
+                    lengths[segment + 1]
+                );
+            }
         }
     }
 
@@ -312,7 +384,7 @@ mod tests {
         let (curve, radii) = wave(200, true, Basis::CatmullRom);
         let chain = Chain::new(&curve, &radii);
         let fit = Fit { basis: Basis::CatmullRom, tolerance: 0.01, longest: 2.0 };
-        let lengths = chain.lengths(LENGTH_STEPS);
+        let lengths = chain.lengths();
         let knots = resample(&chain, &lengths, true, &fit).expect("fewer than given");
         assert!(knots.len() < 60, "{}", knots.len());
         let made = chain.through(&knots, true, fit.basis);

@@ -64,6 +64,32 @@ pub(crate) fn evaluate(basis: Basis, p: [DVec4; 4], u: f64) -> SplinePoint {
     SplinePoint { at: sum(a), d1: sum(b) }
 }
 
+/// The weights of a place in a segment, for many segments at the same place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Weights([[f64; 4]; 3]);
+
+impl Weights {
+    /// At `u` in 0..1.
+    pub(crate) fn new(basis: Basis, u: f64) -> Self {
+        Self(weights_f64(basis, u))
+    }
+
+    /// As [`evaluate`].
+    #[inline]
+    pub(crate) fn evaluate(&self, p: &[DVec4; 4]) -> SplinePoint {
+        let sum = |w: &[f64; 4]| w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3];
+        let [a, b, _] = &self.0;
+        SplinePoint { at: sum(a), d1: sum(b) }
+    }
+
+    /// Speed at that place: the length of the first derivative.
+    #[inline]
+    pub(crate) fn speed(&self, p: &[DVec4; 4]) -> f64 {
+        let w = &self.0[1];
+        (w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3]).truncate().length()
+    }
+}
+
 /// Evaluates a segment in single precision: position with the radius in `w`, first and second derivative.
 #[inline]
 pub(crate) fn evaluate_f32(basis: Basis, p: &[Vec4; 4], u: f32) -> (Vec4, Vec3A, Vec3A) {

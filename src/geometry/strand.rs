@@ -4,16 +4,20 @@
 //! that does not turn about the yarn (rotation-minimising, by double reflection: Wang et al., "Computation of
 //! Rotation Minimizing Frames", ACM TOG 2008), and the phase of the plies against it, closed at seams.
 
-use std::{f64::consts::TAU, sync::Arc};
+use std::{
+    borrow::Cow,
+    f64::consts::{FRAC_PI_2, TAU},
+    sync::Arc,
+};
 
-use glam::{DVec2, DVec3, Vec2, Vec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    chain::{Chain, Fit, LENGTH_STEPS, nearest_indices, resample},
+    chain::{Chain, Fit, GAUSS, nearest_indices, resample},
     curve::{Basis, Curve},
     section::{Pressed, ROUND, YarnFrame},
-    spline::{SplinePoint, evaluate_f32},
+    spline::{SplinePoint, Weights, evaluate_f32},
     tube::curve_of,
 };
 
@@ -50,24 +54,59 @@ pub struct TightBend {
     pub fold: f64,
 }
 
-/// What is known at a control point beyond its position and radius.
+/// What is known at a control point beyond its position and radius, in 12 bytes.
 #[derive(Clone, Copy, Debug)]
 struct PointFrame {
-    /// Rotation-minimising normal at the knot that this point stands for.
-    normal: Vec3,
+    /// Rotation-minimising normal at the knot that this point stands for, in units of 1 / [`UNIT`].
+    normal: [i16; 3],
+    /// Whole turns of the plies along the segment that starts here, beyond what its ends' phases tell.
+    turns: i16,
     /// Phase of the plies there, within a turn.
     phase: f32,
-    /// By how much the phase grows along the segment that starts here.
+}
+
+/// A unit vector's length in [`PointFrame::normal`], which is exact to 2e-5 radians.
+const UNIT: f64 = 32_000.0;
+
+impl PointFrame {
+    /// At the `phase`, from which on it grows by `growth` to the next one, `next`, a turn being as good as another.
+    fn new(normal: DVec3, phase: f64, growth: f64, next: f64) -> Self {
+        let turns = ((growth - f64::from(next as f32) + f64::from(phase as f32)) / TAU).round();
+        let n = (UNIT * normal).round();
+        Self { normal: [n.x as i16, n.y as i16, n.z as i16], turns: turns as i16, phase: phase as f32 }
+    }
+
+    #[inline]
+    fn normal(&self) -> Vec3A {
+        let [x, y, z] = self.normal;
+        Vec3A::new(f32::from(x), f32::from(y), f32::from(z))
+    }
+}
+
+/// What a segment knows of the frame along it.
+#[derive(Clone, Copy)]
+struct SegmentFrame {
+    /// Normals at its ends, of one length.
+    normals: [Vec3A; 2],
+    /// Phase at its start, and by how much it grows to its end.
+    phase: f32,
     growth: f32,
 }
 
-impl PointFrame {
+impl SegmentFrame {
+    #[inline]
+    fn new(frames: &[PointFrame], first: usize) -> Self {
+        let (a, b) = (&frames[first + 1], &frames[first + 2]);
+        let growth = b.phase - a.phase + std::f32::consts::TAU * f32::from(a.turns);
+        Self { normals: [a.normal(), b.normal()], phase: a.phase, growth }
+    }
+
     /// The frame a share `s` of the way to that of a later time.
     fn towards(&self, later: &Self, s: f32) -> Self {
         let turn = later.phase - self.phase;
         let turn = turn - std::f32::consts::TAU * (turn / std::f32::consts::TAU).round();
         Self {
-            normal: self.normal.lerp(later.normal, s),
+            normals: std::array::from_fn(|i| self.normals[i].lerp(later.normals[i], s)),
             phase: self.phase + s * turn,
             growth: self.growth + s * (later.growth - self.growth),
         }
@@ -122,7 +161,7 @@ struct Strand {
 
 impl Strands {
     /// Prepares `curves`, each with its radii in the same unit; yarns are independent and made in parallel.
-    pub fn new(curves: &[(Curve, Vec<f64>)], options: &StrandOptions) -> Self {
+    pub fn new<'a>(curves: impl Into<Cow<'a, [(Curve, Vec<f64>)]>>, options: &StrandOptions) -> Self {
         Self::moving(curves, StrandMotion::default(), options)
     }
 
@@ -130,78 +169,60 @@ impl Strands {
     ///
     /// # Panics
     /// If curves or their points have other numbers at other times.
-    pub fn moving(curves: &[(Curve, Vec<f64>)], motion: StrandMotion<'_>, options: &StrandOptions) -> Self {
+    pub fn moving<'a>(
+        curves: impl Into<Cow<'a, [(Curve, Vec<f64>)]>>,
+        motion: StrandMotion<'_>,
+        options: &StrandOptions,
+    ) -> Self {
         Self::with_material_indices(curves, &[], motion, options)
     }
 
     /// Prepares curves that move and that are of several materials. Each curve has material indices, so many evenly from
     /// each given point to the next (a closed curve goes on to its first point, an open one ends with its last), of which
-    /// each segment gets that nearest to its middle; or none at all.
+    /// each segment gets that nearest to its middle; or none at all. Curves that are handed over are freed as yarns are
+    /// made of them.
     ///
     /// # Panics
     /// If curves or their points have other numbers at other times.
-    pub fn with_material_indices(
-        curves: &[(Curve, Vec<f64>)],
+    pub fn with_material_indices<'a>(
+        curves: impl Into<Cow<'a, [(Curve, Vec<f64>)]>>,
         material_indices: &[Vec<u16>],
         motion: StrandMotion<'_>,
         options: &StrandOptions,
     ) -> Self {
-        let made: Vec<Strand> = curves
-            .par_iter()
-            .enumerate()
-            .map(|(yarn, (curve, radii))| {
-                let phase = if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
-                let later: Vec<&[DVec3]> = motion.later.iter().map(|curves| curves[yarn].as_slice()).collect();
-                let rest = motion.rest.map(|curves| curves[yarn].as_slice());
-                let material_indices = material_indices.get(yarn).map_or(&[][..], Vec::as_slice);
-                Strand::new(curve, radii, material_indices, &later, rest, options, phase)
-            })
-            .collect();
-        let mut strands = Self {
-            basis: options.basis,
-            points: Arc::new([]),
-            segments: Arc::new([]),
-            frames: Vec::new(),
-            later: Vec::new(),
-            flattening: Vec::new(),
-            material_indices: Vec::with_capacity(made.iter().map(|s| s.material_indices.len()).sum()),
-            first_segments: Vec::with_capacity(made.len() + 1),
-            tight_bends: Vec::new(),
-            length: 0.0,
-        };
-        let count: usize = made.iter().map(|s| s.poses[0].0.len()).sum();
-        let mut segments = Vec::with_capacity(count.saturating_sub(3 * made.len()));
-        let flattened = made.iter().any(|s| !s.flattening.is_empty());
-        let mut poses: Vec<(Vec<Vec4>, Vec<PointFrame>)> =
-            (0..=motion.later.len()).map(|_| (Vec::with_capacity(count), Vec::with_capacity(count))).collect();
-        for (yarn, strand) in made.into_iter().enumerate() {
-            strands.first_segments.push(segments.len() as u32);
-            let first = poses[0].0.len() as u32;
-            let points = strand.poses[0].0.len();
-            segments.extend(first..first + points.saturating_sub(3) as u32);
-            if flattened {
-                strands.flattening.extend(strand.flattening);
-                strands.flattening.resize(first as usize + points, ROUND);
+        let mut curves = curves.into();
+        let mut joined = Joined::new(curves.len(), motion.later.len());
+        let mut first = 0;
+        while first < curves.len() {
+            // A few at a time, so that what is not joined yet stays small.
+            let mut points = 0;
+            let fits = |(curve, _): &&(Curve, Vec<f64>)| {
+                let before = points;
+                points += curve.points.len();
+                before < BATCH
+            };
+            let end = first + curves[first..].iter().take_while(fits).count();
+            let made: Vec<Strand> = (first..end)
+                .into_par_iter()
+                .map(|yarn| {
+                    let (curve, radii) = &curves[yarn];
+                    let phase =
+                        if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
+                    let later: Vec<&[DVec3]> = motion.later.iter().map(|curves| curves[yarn].as_slice()).collect();
+                    let rest = motion.rest.map(|curves| curves[yarn].as_slice());
+                    let material_indices = material_indices.get(yarn).map_or(&[][..], Vec::as_slice);
+                    Strand::new(curve, radii, material_indices, &later, rest, options, phase)
+                })
+                .collect();
+            if let Cow::Owned(curves) = &mut curves {
+                for (curve, radii) in &mut curves[first..end] {
+                    (curve.points, *radii) = (Vec::new(), Vec::new());
+                }
             }
-            for (all, (points, frames)) in poses.iter_mut().zip(strand.poses) {
-                all.0.extend(points);
-                all.1.extend(frames);
-            }
-            strands.material_indices.extend(strand.material_indices);
-            strands.length += strand.length;
-            strands.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
+            made.into_iter().for_each(|strand| joined.push(strand));
+            first = end;
         }
-        strands.first_segments.push(segments.len() as u32);
-        if strands.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
-            strands.flattening = Vec::new();
-        }
-        let mut poses = poses.into_iter().map(|(points, frames)| Pose { points: points.into(), frames });
-        if let Some(first) = poses.next() {
-            (strands.points, strands.frames) = (first.points, first.frames);
-        }
-        strands.later = poses.collect();
-        strands.segments = segments.into();
-        strands
+        joined.finish(options.basis)
     }
 
     /// The basis of the control points.
@@ -298,11 +319,16 @@ impl Strands {
     /// Length of one yarn in scene units, from step to step.
     pub fn length_of(&self, yarn: usize) -> f64 {
         const STEPS: u8 = 4;
-        let centre = |segment, k| self.frame(segment, f32::from(k) / f32::from(STEPS)).centre;
-        self.segments_of(yarn)
-            .flat_map(|segment| (0..STEPS).map(move |k| (segment, k)))
-            .map(|(segment, k)| f64::from(centre(segment, k).distance(centre(segment, k + 1))))
-            .sum()
+        let mut length = 0.0;
+        for segment in self.segments_of(yarn) {
+            let mut before = self.frame(segment, 0.0).centre;
+            for k in 1..=STEPS {
+                let here = self.frame(segment, f32::from(k) / f32::from(STEPS)).centre;
+                length += f64::from(here.distance(before));
+                before = here;
+            }
+        }
+        length
     }
 
     /// Mean radius of one yarn's control points.
@@ -317,7 +343,7 @@ impl Strands {
     pub fn frame(&self, segment: u32, u: f32) -> YarnFrame {
         let first = self.segments[segment as usize] as usize;
         let p: &[Vec4; 4] = self.points[first..first + 4].try_into().expect("a segment has four points");
-        self.frame_of(first, p, &self.frames[first + 1], &self.frames[first + 2], u)
+        self.frame_of(first, p, &SegmentFrame::new(&self.frames, first), u)
     }
 
     /// Everything a ray needs to know at `u` (0 to 1) of a segment, at a time from 0, when the shutter opens, to 1, when it closes.
@@ -338,17 +364,17 @@ impl Strands {
         let first = self.segments[segment as usize] as usize;
         // As Embree moves them.
         let p = std::array::from_fn(|i| points[first + i].lerp(next_points[first + i], s));
-        let frame = |i: usize| frames[first + i].towards(&next_frames[first + i], s);
-        self.frame_of(first, &p, &frame(1), &frame(2), u)
+        let frame = SegmentFrame::new(frames, first).towards(&SegmentFrame::new(next_frames, first), s);
+        self.frame_of(first, &p, &frame, u)
     }
 
     #[inline]
-    fn frame_of(&self, first: usize, p: &[Vec4; 4], a: &PointFrame, b: &PointFrame, u: f32) -> YarnFrame {
+    fn frame_of(&self, first: usize, p: &[Vec4; 4], frame: &SegmentFrame, u: f32) -> YarnFrame {
         let (at, d1, d2) = evaluate_f32(self.basis, p, u);
         let speed_squared = d1.length_squared().max(1e-30);
         let tangent = d1 / speed_squared.sqrt();
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
-        let normal = Vec3A::from(a.normal + u * (b.normal - a.normal));
+        let normal = frame.normals[0].lerp(frame.normals[1], u);
         let normal = normal - normal.dot(tangent) * tangent;
         let (flattening, flattening_turn) = if self.flattening.is_empty() {
             (ROUND, 0.0)
@@ -366,7 +392,7 @@ impl Strands {
             curvature,
             radius: at.w,
             normal: normal / normal.length().max(1e-10),
-            phase: a.phase + u * a.growth,
+            phase: frame.phase + u * frame.growth,
             flattening,
             flattening_turn,
         }
@@ -376,8 +402,79 @@ impl Strands {
 /// The flattest section there is: short over long axis.
 pub const FLATTEST: f64 = 0.05;
 
-/// Steps per resampled segment along which frames are carried.
-const FRAME_STEPS: usize = 16;
+/// Points of curves that are made into yarns at a time.
+const BATCH: usize = 1 << 20;
+
+/// Yarns one behind the other.
+struct Joined {
+    poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
+    /// Of the points of all yarns up to the last that is pressed flat.
+    flattening: Vec<Vec2>,
+    segments: Vec<u32>,
+    material_indices: Vec<u16>,
+    first_segments: Vec<u32>,
+    tight_bends: Vec<TightBend>,
+    length: f64,
+}
+
+impl Joined {
+    fn new(yarns: usize, later: usize) -> Self {
+        Self {
+            poses: vec![(Vec::new(), Vec::new()); 1 + later],
+            flattening: Vec::new(),
+            segments: Vec::new(),
+            material_indices: Vec::new(),
+            first_segments: Vec::with_capacity(yarns + 1),
+            tight_bends: Vec::new(),
+            length: 0.0,
+        }
+    }
+
+    fn push(&mut self, strand: Strand) {
+        let yarn = self.first_segments.len();
+        self.first_segments.push(self.segments.len() as u32);
+        let first = self.poses[0].0.len() as u32;
+        self.segments.extend(first..first + strand.poses[0].0.len().saturating_sub(3) as u32);
+        if !strand.flattening.is_empty() {
+            self.flattening.resize(first as usize, ROUND);
+            self.flattening.extend(strand.flattening);
+        }
+        for (all, (points, frames)) in self.poses.iter_mut().zip(strand.poses) {
+            all.0.extend(points);
+            all.1.extend(frames);
+        }
+        self.material_indices.extend(strand.material_indices);
+        self.length += strand.length;
+        self.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
+    }
+
+    fn finish(mut self, basis: Basis) -> Strands {
+        self.first_segments.push(self.segments.len() as u32);
+        if self.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
+            self.flattening = Vec::new();
+        } else {
+            self.flattening.resize(self.poses[0].0.len(), ROUND);
+        }
+        let pose = |(points, mut frames): (Vec<Vec4>, Vec<PointFrame>)| {
+            frames.shrink_to_fit();
+            Pose { points: points.into(), frames }
+        };
+        let mut poses = self.poses.into_iter().map(pose);
+        let first = poses.next().expect("yarns are somewhere when the shutter opens");
+        Strands {
+            basis,
+            points: first.points,
+            segments: self.segments.into(),
+            frames: first.frames,
+            later: poses.collect(),
+            flattening: self.flattening,
+            material_indices: self.material_indices,
+            first_segments: self.first_segments,
+            tight_bends: self.tight_bends,
+            length: self.length,
+        }
+    }
+}
 
 impl Strand {
     fn new(
@@ -390,7 +487,7 @@ impl Strand {
         phase: f64,
     ) -> Self {
         let chain = Chain::new(curve, radii);
-        let lengths = chain.lengths(LENGTH_STEPS);
+        let lengths = chain.lengths();
         let total = lengths[lengths.len() - 1];
         let closed = curve.closed && curve.points.len() >= 3;
         let mean_radius = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
@@ -483,6 +580,7 @@ struct Winding {
 }
 
 /// A knot of a chain.
+#[derive(Clone, Copy)]
 struct Knot {
     tangent: DVec3,
     normal: DVec3,
@@ -490,40 +588,42 @@ struct Knot {
     turned: f64,
 }
 
+/// Segments along which a normal is carried in one go; longer chains are cut, whatever the number of threads.
+const STRETCH: usize = 16_384;
+
 impl Winding {
     /// Carries the normal along the chain and integrates the phase of the plies.
     fn new(chain: &Chain, options: &StrandOptions) -> Self {
         let segments = chain.segments();
-        let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
-        let mut here = chain.at(0, 0.0);
-        let mut tangent = tangent_of(&here, DVec3::X);
-        // Any rule will do for where the turning starts; this one is easy to reproduce: +z, laid across the yarn.
-        let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
-        let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
-        let start = normal;
-        let mut knots = Vec::with_capacity(segments + 1);
-        let mut turned = 0.0;
-        let (mut fold, mut tight): (f64, Option<(usize, f64)>) = (0.0, None);
-        knots.push(Knot { tangent, normal, turned });
-        for segment in 0..segments {
-            for step in 1..=FRAME_STEPS {
-                let next = chain.at(segment, step as f64 / FRAME_STEPS as f64);
-                let next_tangent = tangent_of(&next, tangent);
-                normal = double_reflection(here.at.truncate(), tangent, next.at.truncate(), next_tangent, normal);
-                let distance = next.at.truncate().distance(here.at.truncate());
-                let radius = (0.5 * (here.at.w + next.at.w)).max(1e-300);
-                turned += options.ply_rate * distance / radius;
-                // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
-                // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
-                fold = (fold + tangent.angle_between(next_tangent) - distance / radius).max(0.0);
-                if fold > SEEN_FOLD && tight.is_none_or(|(_, worst)| fold > worst) {
-                    tight = Some((segment, fold));
+        let starts: Vec<usize> = (0..segments.max(1)).step_by(STRETCH).collect();
+        let stretches: Vec<_> = starts
+            .into_par_iter()
+            .map(|start| carry(chain, start, (start + STRETCH).min(segments), options.ply_rate))
+            .collect();
+        // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
+        let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
+        let mut tight: Option<(usize, f64)> = None;
+        for (mut stretch, its_tight) in stretches {
+            if let Some(end) = knots.pop() {
+                let first = stretch[0];
+                let (sin, cos) = (end.normal.dot(first.tangent.cross(first.normal)), end.normal.dot(first.normal));
+                let size = sin.hypot(cos);
+                let (sin, cos) = if size > 0.0 { (sin / size, cos / size) } else { (0.0, 1.0) };
+                for knot in &mut stretch {
+                    knot.normal = cos * knot.normal + sin * knot.tangent.cross(knot.normal);
+                    knot.turned += end.turned;
                 }
-                (here, tangent) = (next, next_tangent);
             }
-            knots.push(Knot { tangent, normal, turned });
+            knots.append(&mut stretch);
+            if let Some((_, fold)) = its_tight
+                && tight.is_none_or(|(_, worst)| fold > worst)
+            {
+                tight = its_tight;
+            }
         }
-        Self { knots, angle: tangent.dot(start.cross(normal)).atan2(start.dot(normal)), tight }
+        let (start, end) = (knots[0].normal, knots[knots.len() - 1]);
+        let angle = end.tangent.dot(start.cross(end.normal)).atan2(start.dot(end.normal));
+        Self { knots, angle, tight }
     }
 
     /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
@@ -537,12 +637,11 @@ impl Winding {
         let turned = |i: usize| at_rest.knots[i].turned - missing * i as f64 / segments as f64;
         // Knot i is where segment i starts: the second of its four points.
         let frame = |i: usize| {
-            let angle = turned(i.min(segments));
-            let growth = turned((i + 1).min(segments)) - angle;
-            let wrapped = phase + angle;
-            let wrapped = wrapped - TAU * (wrapped / TAU).round();
+            let angle = |i: usize| phase + turned(i.min(segments));
+            let within = |angle: f64| angle - TAU * (angle / TAU).round();
+            let growth = angle(i + 1) - angle(i);
             let normal = self.knots[i.min(segments)].normal;
-            PointFrame { normal: normal.as_vec3(), phase: wrapped as f32, growth: growth as f32 }
+            PointFrame::new(normal, within(angle(i)), growth, within(angle(i + 1)))
         };
         let mut frames = Vec::with_capacity(segments + 3);
         frames.push(frame(0));
@@ -550,6 +649,51 @@ impl Winding {
         frames.push(frame(segments));
         frames
     }
+}
+
+/// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
+/// knots from there to there, and the tightest bend.
+fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, Option<(usize, f64)>) {
+    let [a, b, c, d] = GAUSS;
+    let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (Weights::new(chain.basis, u), weight));
+    let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
+    // Where the segment before ends: straight segments do not go on as they began.
+    let mut here = if start == 0 { chain.at(0, 0.0) } else { chain.at(start - 1, 1.0) };
+    let mut tangent = tangent_of(&here, DVec3::X);
+    // Any rule will do for where the turning starts; this one is easy to reproduce: +z, laid across the yarn.
+    let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
+    let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
+    let mut turned = 0.0;
+    let (mut fold, mut tight): (f64, Option<(usize, f64)>) = (0.0, None);
+    let mut knots = Vec::with_capacity(end - start + 1);
+    knots.push(Knot { tangent, normal, turned });
+    for segment in start..end {
+        let points = chain.points_of(segment);
+        for (weights, weight) in &nodes {
+            let next = weights.evaluate(points);
+            let velocity = next.d1.truncate();
+            let speed = velocity.length();
+            let next_tangent = velocity.try_normalize().unwrap_or(tangent);
+            normal = double_reflection(here.at.truncate(), tangent, next.at.truncate(), next_tangent, normal);
+            turned += weight * ply_rate * speed / next.at.w.max(1e-300);
+            // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
+            // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
+            let distance = next.at.truncate().distance(here.at.truncate());
+            let forward = distance / (0.5 * (here.at.w + next.at.w)).max(1e-300);
+            // An angle is at most pi / 2 times its chord.
+            if fold > 0.0 || FRAC_PI_2 * tangent.distance(next_tangent) > forward {
+                fold = (fold + tangent.angle_between(next_tangent) - forward).max(0.0);
+                if fold > SEEN_FOLD && tight.is_none_or(|(_, worst)| fold > worst) {
+                    tight = Some((segment, fold));
+                }
+            }
+            (here, tangent) = (next, next_tangent);
+        }
+        // Rounding must not accumulate over thousands of segments.
+        normal = (normal - normal.dot(tangent) * tangent).try_normalize().unwrap_or(normal);
+        knots.push(Knot { tangent, normal, turned });
+    }
+    (knots, tight)
 }
 
 /// Carries `normal` from one point of a curve to the next without turning it about the tangent.
@@ -563,9 +707,7 @@ fn double_reflection(from: DVec3, tangent: DVec3, to: DVec3, next_tangent: DVec3
     let (n, t) = (reflect(normal, step, c1), reflect(tangent, step, c1));
     let turn = next_tangent - t;
     let c2 = turn.length_squared();
-    let carried = if c2 > 1e-300 { reflect(n, turn, c2) } else { n };
-    // Rounding must not accumulate over thousands of segments.
-    (carried - carried.dot(next_tangent) * next_tangent).try_normalize().unwrap_or(normal)
+    if c2 > 1e-300 { reflect(n, turn, c2) } else { n }
 }
 
 #[cfg(test)]
@@ -765,7 +907,7 @@ mod tests {
             flattening: None,
         };
         let s = strands(curve, 0.5, &options(Basis::CatmullRom));
-        let total: f32 = (0..s.segments().len()).map(|i| s.frames[i + 1].growth).sum();
+        let total: f32 = (0..s.segments().len()).map(|i| SegmentFrame::new(&s.frames, i).growth).sum();
         assert!((f64::from(total) - 0.4 * 49.0 * 0.4 / 0.5).abs() < 1e-3, "{total}");
         assert_eq!(s.frame(0, 0.0).phase, 0.7);
         assert!((s.frame(3, 0.3).normal - Vec3A::Z).length() < 1e-6, "a straight yarn carries +z along");
@@ -827,6 +969,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(Strands::new(&[], &options(Basis::CatmullRom)).yarns(), 0);
+        assert_eq!(Strands::new(Vec::new(), &options(Basis::CatmullRom)).yarns(), 0);
     }
 }

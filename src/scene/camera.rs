@@ -1,6 +1,7 @@
 //! From a pixel to a ray.
 
 use glam::{DQuat, DVec3, Vec2, Vec3, Vec3A};
+use rayon::prelude::*;
 
 use crate::{geometry::ray::Ray, math::warp};
 
@@ -66,16 +67,15 @@ impl Camera {
     /// height), keeping its directions; `margin` is the share of the picture left free on each side.
     pub fn framing<'a>(
         &self,
-        points: impl Iterator<Item = (&'a DVec3, f64)> + Clone,
+        points: impl ParallelIterator<Item = (&'a DVec3, f64)> + Clone,
         aspect: f64,
         margin: f64,
     ) -> Self {
-        let axis = |d: DVec3| {
-            points
-                .clone()
-                .fold((f64::MAX, f64::MIN), |(low, high), (p, r)| (low.min(p.dot(d) - r), high.max(p.dot(d) + r)))
-        };
-        let (x, y, z) = (axis(self.right), axis(self.up), axis(self.back));
+        let axes = [self.right, self.up, self.back];
+        let [x, y, z] = points.clone().map(|(p, r)| axes.map(|axis| (p.dot(axis) - r, p.dot(axis) + r))).reduce(
+            || [(f64::MAX, f64::MIN); 3],
+            |a, b| std::array::from_fn(|i| (a[i].0.min(b[i].0), a[i].1.max(b[i].1))),
+        );
         if x.0 > x.1 {
             return *self;
         }
@@ -98,7 +98,7 @@ impl Camera {
                         let side = ((q.dot(self.right).abs() + r) / slope_x).max((q.dot(self.up).abs() + r) / slope_y);
                         q.dot(self.back) + side
                     })
-                    .fold(0.0, f64::max);
+                    .reduce(|| 0.0, f64::max);
                 Self { position: centre + distance.max(1e-9) * self.back, ..*self }
             }
         }
@@ -205,7 +205,7 @@ mod tests {
             {
                 let points = cloud();
                 let camera = Camera::looking_at(direction, DVec3::ZERO, DVec3::Y, projection).unwrap();
-                let camera = camera.framing(points.iter().map(|p| (p, 0.5)), aspect, 0.05);
+                let camera = camera.framing(points.par_iter().map(|p| (p, 0.5)), aspect, 0.05);
                 let mut widest: f64 = 0.0;
                 for p in &points {
                     let q = *p - camera.position;

@@ -5,6 +5,8 @@
 
 use std::fmt::{Debug, Write as _};
 
+use glam::DVec3;
+use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
 use super::{AlbedoTexture, Camera, CurveKind, Fabric, FabricMotion, Material, Object, RenderSettings, Scene, Yarn};
@@ -229,25 +231,33 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
     key("phase", phases);
     key("seed", seed);
     if !variants.is_empty() {
-        key("colors", &(variants, material_indices));
+        let of_curve = |indices: &Vec<u16>| {
+            let mut hash = Hash::default();
+            indices.iter().for_each(|index| hash.bytes(&index.to_le_bytes()));
+            hash
+        };
+        key("colors", &(variants, in_order(material_indices.par_iter().map(of_curve))));
     }
-    let mut hash = Hash::default();
-    for (Curve { basis, closed, points, radii: _, flattening }, radii) in curves {
+    let of_curve = |(Curve { basis, closed, points, radii: _, flattening }, radii): &(Curve, Vec<f64>)| {
+        let mut hash = Hash::default();
         let pressed = flattening.as_ref().map(Vec::len);
         hash.bytes(format!("{basis:?} {closed} {} {} {pressed:?}", points.len(), radii.len()).as_bytes());
         flattening.iter().flatten().for_each(|v| hash.numbers(&v.to_array()));
         points.iter().for_each(|p| hash.numbers(&p.to_array()));
         hash.numbers(radii);
-    }
-    key("curves", &hash.word());
+        hash
+    };
+    key("curves", &in_order(curves.par_iter().map(of_curve)));
     let FabricMotion { later, rest } = motion;
     if !later.is_empty() || rest.is_some() {
-        let mut hash = Hash::default();
-        for points in later.iter().flatten().chain(rest.iter().flatten()) {
+        let of_points = |points: &Vec<DVec3>| {
+            let mut hash = Hash::default();
             hash.bytes(&points.len().to_le_bytes());
             points.iter().for_each(|p| hash.numbers(&p.to_array()));
-        }
-        key("shutter", &(later.len(), rest.is_some(), hash.word()));
+            hash
+        };
+        let poses: Vec<&Vec<DVec3>> = later.iter().flatten().chain(rest.iter().flatten()).collect();
+        key("shutter", &(later.len(), rest.is_some(), in_order(poses.into_par_iter().map(of_points))));
     }
     key("curve_basis", basis);
     key("curve_tolerance", &(tolerance, longest_segment));
@@ -313,6 +323,14 @@ impl Hash {
     fn word(&self) -> String {
         format!("{:032x}", self.0.finish_128())
     }
+}
+
+/// One word for hashes in order, each made on any core.
+fn in_order(hashes: impl IndexedParallelIterator<Item = Hash>) -> String {
+    let hashes: Vec<u128> = hashes.map(|hash| hash.0.finish_128()).collect();
+    let mut all = Hash::default();
+    hashes.iter().for_each(|hash| all.bytes(&hash.to_le_bytes()));
+    all.word()
 }
 
 fn hashed(bytes: &[u8]) -> String {

@@ -18,6 +18,7 @@ pub mod view;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec2};
+use rayon::prelude::*;
 
 pub use builder::{SceneBuilder, SceneError};
 pub use camera::Camera;
@@ -302,7 +303,7 @@ pub struct Fabric {
     pub origin: String,
     /// What they are.
     pub kind: CurveKind,
-    /// Curves and their radii, millimetres, about the scene's middle.
+    /// Curves and their radii, millimetres, about the scene's middle. None are left in a render: its yarns are made of them.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.
     pub motion: FabricMotion,
@@ -466,23 +467,24 @@ impl Scene {
 
 /// The box around the control points of `fabrics`, with their radii.
 pub fn bounds(fabrics: &[Fabric]) -> Option<(DVec3, DVec3)> {
-    fabrics
-        .iter()
-        .flat_map(|f| &f.curves)
-        .flat_map(|(c, radii)| c.points.iter().zip(radii))
-        .map(|(p, &r)| (*p - r, *p + r))
-        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    let joined = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+    let of_curve = |(curve, radii): &(Curve, Vec<f64>)| {
+        curve.points.iter().zip(radii).map(|(p, &r)| (*p - r, *p + r)).reduce(joined)
+    };
+    fabrics.par_iter().flat_map(|f| &f.curves).filter_map(of_curve).reduce_with(joined)
 }
 
 /// Moves curves by a transform whose scale is the same along all axes; radii grow with it.
 pub fn transform_curves(curves: &mut [(Curve, Vec<f64>)], by: &DAffine3) {
     let scale = by.matrix3.x_axis.length();
-    for (curve, radii) in curves {
+    curves.par_iter_mut().for_each(|(curve, radii)| {
         for p in &mut curve.points {
             *p = by.transform_point3(*p);
         }
-        for r in radii {
-            *r *= scale;
+        if scale != 1.0 {
+            for r in radii {
+                *r *= scale;
+            }
         }
-    }
+    });
 }

@@ -1,6 +1,7 @@
 //! A camera as it is asked for, before it is known where the cloth lies.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{
     Fabric, Object,
@@ -80,24 +81,24 @@ impl CameraSetup {
         aspect: f64,
         frame: f64,
     ) -> (Camera, Vec<Camera>) {
-        let frame_all = |margin, points: &mut dyn Iterator<Item = (&DVec3, f64)>| -> Camera {
-            let points: Vec<(DVec3, f64)> = points.map(|(p, r)| (*p, r)).collect();
-            let points = points.iter().map(|(p, r)| (p, *r));
+        let frame_all = |margin, clouds: &[Cloud<'_>]| -> Camera {
             if !self.motion.turns() {
-                return self.camera.framing(points, aspect, margin);
+                return self.camera.framing(clouds.par_iter().flat_map_iter(Cloud::points), aspect, margin);
             }
             // From every side, so that the camera keeps its distance.
-            let outline = motion::revolved(points, self.up);
-            self.camera.framing(outline.iter().map(|p| (p, 0.0)), aspect, margin)
+            let outline = motion::revolved(clouds.iter().flat_map(Cloud::points), self.up);
+            self.camera.framing(outline.par_iter().map(|p| (p, 0.0)), aspect, margin)
         };
         let still = match self.margin {
             None => Camera { position: self.camera.position - middle, ..self.camera },
             Some(margin) if fabrics.is_empty() => {
-                frame_all(margin, &mut objects.iter().flat_map(|o| &o.mesh.points).map(|p| (p, 0.0)))
+                let meshes: Vec<_> = objects.iter().map(|o| Cloud { points: &o.mesh.points, radii: &[] }).collect();
+                frame_all(margin, &meshes)
             }
             Some(margin) => {
                 let curves = fabrics.iter().flat_map(|f| &f.curves);
-                frame_all(margin, &mut curves.flat_map(|(c, radii)| c.points.iter().zip(radii.iter().copied())))
+                let curves: Vec<_> = curves.map(|(c, radii)| Cloud { points: &c.points, radii }).collect();
+                frame_all(margin, &curves)
             }
         };
         let (mut camera, mut path) = self.motion.poses(&still, self.aim.as_ref(), middle, self.up, frame);
@@ -107,6 +108,20 @@ impl CameraSetup {
             }
         }
         (camera, path)
+    }
+}
+
+/// Points that a camera shall frame, and their radii unless they have none.
+struct Cloud<'a> {
+    points: &'a [DVec3],
+    radii: &'a [f64],
+}
+
+impl<'a> Cloud<'a> {
+    fn points(&self) -> impl Iterator<Item = (&'a DVec3, f64)> + Clone + use<'a> {
+        let radii = self.radii;
+        let radius = move |i: usize| radii.get(i).copied().unwrap_or(0.0);
+        self.points.iter().enumerate().map(move |(i, p)| (p, radius(i)))
     }
 }
 

@@ -1,12 +1,12 @@
 //! What stands for the cloth in each mode, and how much memory it takes, known before it is made.
 
-use std::{f64::consts::TAU, fmt, iter::Sum};
+use std::{borrow::Cow, f64::consts::TAU, fmt, iter::Sum};
 
 use super::{CurveGeometry, FiberGeometry, YarnGeometry, yarn_of_shape, yarn_scatterer};
 use crate::{
     ffi::embree::EmbreeError,
     geometry::{
-        curve::Basis,
+        curve::{Basis, Curve},
         fiber::Plies,
         strand::{StrandMotion, StrandOptions, Strands},
         tube::Tubes,
@@ -21,7 +21,7 @@ const BVH_BYTES: [f64; 2] = [44.0, 119.0];
 /// Bytes of a control point with its radius, of what a yarn keeps beside it, and of a segment's index.
 const POINT_BYTES: u64 = 16;
 /// As `POINT_BYTES`.
-const FRAME_BYTES: u64 = 20;
+const FRAME_BYTES: u64 = 12;
 /// Of what presses a point's section flat, in yarns that are.
 const FLATTENING_BYTES: u64 = 8;
 /// As `POINT_BYTES`.
@@ -125,8 +125,11 @@ struct Prepared<'a> {
 
 enum Of<'a> {
     Yarns { yarn: &'a Yarn, shape: Box<YarnShape>, strands: Strands },
-    Fibers { material: FiberBcsdf },
+    Fibers { curves: Given<'a>, material: FiberBcsdf },
 }
+
+/// The curves of a fabric: the scene's, or taken out of it.
+pub(super) type Given<'a> = Cow<'a, [(Curve, Vec<f64>)]>;
 
 /// A scene's cloth before it is turned into curves for Embree.
 pub(super) struct Preparation<'a> {
@@ -135,20 +138,22 @@ pub(super) struct Preparation<'a> {
 }
 
 impl<'a> Preparation<'a> {
-    pub(super) fn new(scene: &'a Scene) -> Self {
+    /// For the curves of each fabric of a scene; those handed over are freed on the way.
+    pub(super) fn new(scene: &'a Scene, curves: impl IntoIterator<Item = Given<'a>>) -> Self {
         let fabrics = scene
             .fabrics
             .iter()
+            .zip(curves)
             .enumerate()
-            .map(|(index, fabric)| {
+            .map(|(index, (fabric, curves))| {
                 let of = match fabric.kind {
                     CurveKind::Yarn(yarn) => {
                         let yarn = &scene.yarns[yarn];
                         let shape = Box::new(yarn.shape());
-                        let strands = strands(fabric, &shape);
+                        let strands = strands(fabric, curves, &shape);
                         Of::Yarns { yarn, shape, strands }
                     }
-                    CurveKind::Fiber(fiber) => Of::Fibers { material: FiberBcsdf::new(&scene.fibers[fiber].1) },
+                    CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
                 };
                 Prepared { index, fabric, of }
             })
@@ -157,8 +162,13 @@ impl<'a> Preparation<'a> {
     }
 
     /// As [`Self::new`], refused if all would take more memory than `limit` with what is taken `beside`, bytes.
-    pub(super) fn checked(scene: &'a Scene, limit: Option<u64>, beside: u64) -> Result<Self, BuildError> {
-        let preparation = Self::new(scene);
+    pub(super) fn checked(
+        scene: &'a Scene,
+        curves: impl IntoIterator<Item = Given<'a>>,
+        limit: Option<u64>,
+        beside: u64,
+    ) -> Result<Self, BuildError> {
+        let preparation = Self::new(scene, curves);
         let needed: Estimate = preparation.estimates().sum();
         match limit {
             Some(limit) if needed.bytes() + beside > limit => Err(BuildError::Memory { needed, beside, limit }),
@@ -173,8 +183,7 @@ impl<'a> Preparation<'a> {
             let compact = self.scene.render.compact_bvh;
             let colored = !prepared.fabric.variants.is_empty();
             match &prepared.of {
-                Of::Fibers { .. } => {
-                    let curves = &prepared.fabric.curves;
+                Of::Fibers { curves, .. } => {
                     let points: u64 = curves.iter().map(|(c, _)| c.points.len() as u64).sum();
                     estimate.add(points, points, false, compact);
                 }
@@ -222,11 +231,11 @@ impl<'a> Preparation<'a> {
         for prepared in self.fabrics {
             let index = prepared.index;
             match prepared.of {
-                Of::Fibers { material } => all.push(CurveGeometry::Fibers(FiberGeometry {
+                Of::Fibers { curves, material } => all.push(CurveGeometry::Fibers(FiberGeometry {
                     fabric: index,
                     ply: 0,
                     first_tubes: Vec::new(),
-                    tubes: Tubes::new(&prepared.fabric.curves),
+                    tubes: Tubes::new(&curves),
                     fiber: material,
                     variants: Vec::new(),
                     material_indices: Vec::new(),
@@ -297,9 +306,9 @@ impl<'a> Preparation<'a> {
     }
 }
 
-fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
+fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
     Strands::with_material_indices(
-        &fabric.curves,
+        curves,
         &fabric.material_indices,
         StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref() },
         &StrandOptions {
@@ -316,7 +325,7 @@ fn strands(fabric: &Fabric, shape: &YarnShape) -> Strands {
 /// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
 fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usize) -> (Strands, YarnShape) {
     let strands = Strands::new(
-        &plies.ply_curves(slot),
+        plies.ply_curves(slot),
         &StrandOptions {
             basis: Basis::BSpline,
             tolerance: 0.0,

@@ -9,6 +9,7 @@ mod filter;
 mod mesh;
 
 use std::{
+    borrow::Cow,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -33,8 +34,8 @@ use crate::{
     },
     scene::{Model, Scene, Yarn},
 };
-use build::Preparation;
 pub use build::{BuildError, Estimate};
+use build::{Given, Preparation};
 use filter::{Counting, GapFilter, ShadowFilter};
 pub use mesh::SurfacePlace;
 use mesh::TriangleMesh;
@@ -134,21 +135,33 @@ impl World {
     /// # Errors
     /// What Embree says, mostly that memory is short; or that the scene would take more than it may.
     pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
-        Self::within(scene, threads, scene.render.max_memory, 0)
+        Self::with_curves(scene, borrowed(scene), threads, scene.render.max_memory, 0)
     }
 
-    /// As [`Self::new`], within a `limit` of bytes of which some are taken `beside`: by a film, by textures.
+    /// As [`Self::new`], within a `limit` of bytes of which some are taken `beside`: by a film, by textures. Frees the
+    /// scene's curves on the way: it has none afterwards.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn within(
+    pub fn consuming(
+        scene: &mut Scene,
+        threads: usize,
+        limit: Option<u64>,
+        beside: u64,
+    ) -> Result<(Self, BuildTimes), BuildError> {
+        let curves = scene.fabrics.iter_mut().map(|fabric| Cow::Owned(std::mem::take(&mut fabric.curves))).collect();
+        Self::with_curves(scene, curves, threads, limit, beside)
+    }
+
+    fn with_curves(
         scene: &Scene,
+        curves: Vec<Given<'_>>,
         threads: usize,
         limit: Option<u64>,
         beside: u64,
     ) -> Result<(Self, BuildTimes), BuildError> {
         let started = Instant::now();
-        let preparation = Preparation::checked(scene, limit, beside)?;
+        let preparation = Preparation::checked(scene, curves, limit, beside)?;
         let curves = preparation.geometries();
         let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
         let generate = started.elapsed();
@@ -362,9 +375,13 @@ impl YarnGeometry {
     }
 }
 
+fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
+    scene.fabrics.iter().map(|fabric| Cow::Borrowed(&*fabric.curves)).collect()
+}
+
 /// What the curves of each fabric will take, without making them.
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
-    Preparation::new(scene).estimates().collect()
+    Preparation::new(scene, borrowed(scene)).estimates().collect()
 }
 
 /// The curves that a scene's cloth is in its mode, as Embree would get them: millimetres, where the scene's file has them.
@@ -372,7 +389,7 @@ pub fn estimates(scene: &Scene) -> Vec<Estimate> {
 /// # Errors
 /// If they would take more memory than the scene may.
 pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
-    let geometries = Preparation::checked(scene, scene.render.max_memory, 0)?.geometries();
+    let geometries = Preparation::checked(scene, borrowed(scene), scene.render.max_memory, 0)?.geometries();
     let mut curves: Vec<Curve> = geometries
         .iter()
         .flat_map(|geometry| match geometry {

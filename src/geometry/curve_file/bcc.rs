@@ -17,6 +17,7 @@
 use std::io::{self, Write};
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::repair::{Ends, Repair};
 use super::{CurveFileError, FileLocation, ReadOptions, counted, quoted};
@@ -42,6 +43,9 @@ impl Header {
         3 * self.float_bytes
     }
 }
+
+/// Curves read at a time, on all cores.
+const BATCH: usize = 4096;
 
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
     let header = parse_header(bytes)?;
@@ -85,11 +89,18 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         repair.note(format!("the axis that points up should be 1 or 2 but is {}; ignored", header.up));
     }
     let mut start = HEADER_BYTES;
-    for index in 0..header.curves {
-        let curve = RawCurve::at(bytes, start, index, &header)?;
-        let ends = if curve.closed { Ends::MarkedClosed } else { Ends::Open };
-        repair.add(header.basis, ends, curve.points(index, &header)?, None);
-        start = curve.end;
+    for first in (0..header.curves).step_by(BATCH) {
+        let mut batch = Vec::new();
+        for index in first..header.curves.min(first + BATCH as u64) {
+            let curve = RawCurve::at(bytes, start, index, &header)?;
+            start = curve.end;
+            batch.push((index, curve));
+        }
+        let points: Vec<_> = batch.par_iter().map(|(index, curve)| curve.points(*index, &header)).collect();
+        for ((_, curve), points) in batch.iter().zip(points) {
+            let ends = if curve.closed { Ends::MarkedClosed } else { Ends::Open };
+            repair.add(header.basis, ends, points?, None);
+        }
     }
     Ok(CurveSet { up_axis, ..repair.finish() })
 }

@@ -157,6 +157,9 @@ fn has_wide_gap(points: &[DVec3]) -> bool {
 
 /// Drops points equal to the one before, but keeps runs of up to `end_repeats` at both ends.
 fn drop_duplicates(points: &mut Vec<DVec3>, radii: Option<&mut Vec<f64>>, end_repeats: usize) {
+    if points.windows(2).all(|pair| pair[0] != pair[1]) {
+        return;
+    }
     let run = |same: &mut dyn Iterator<Item = bool>| 1 + same.take_while(|&same| same).count();
     let head = run(&mut points.windows(2).map(|pair| pair[0] == pair[1]));
     let tail = run(&mut points.windows(2).rev().map(|pair| pair[0] == pair[1]));

@@ -12,7 +12,7 @@
 pub mod flyaway;
 pub mod packing;
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, sync::OnceLock};
 
 use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -140,15 +140,17 @@ pub struct Plies<'a> {
     strands: &'a Strands,
     plies: &'a [PlyParameters],
     shape: &'a YarnShape,
-    /// Steps along each yarn: at least one for each of its segments.
-    steps: Vec<usize>,
+    /// The longest step along a yarn, in yarn radii.
+    longest_step: f64,
+    /// Steps along each yarn, found when first asked for: yarns that stay whole need none.
+    steps: OnceLock<Vec<usize>>,
     seed: u32,
 }
 
 impl<'a> Plies<'a> {
     /// For `strands` whose phases belong to `shape`, made of `plies`. Fibres are random by `seed`.
     pub fn new(strands: &'a Strands, plies: &'a [PlyParameters], shape: &'a YarnShape, seed: u32) -> Self {
-        let step = plies
+        let longest_step = plies
             .iter()
             .zip(&shape.plies)
             .map(|(p, s)| {
@@ -157,13 +159,18 @@ impl<'a> Plies<'a> {
                 step_for(own, p.radius, tolerance).min(step_for(f64::from(shape.ply_rate), p.distance, tolerance))
             })
             .fold(f64::MAX, f64::min);
-        let steps = (0..strands.yarns())
-            .map(|yarn| {
-                let radii = strands.length_of(yarn) / strands.mean_radius_of(yarn);
-                strands.segments_of(yarn).len().max((radii / step).ceil().min(MOST_STEPS) as usize)
-            })
-            .collect();
-        Self { strands, plies, shape, steps, seed }
+        Self { strands, plies, shape, longest_step, steps: OnceLock::new(), seed }
+    }
+
+    /// Steps along each yarn: at least one for each of its segments.
+    fn steps(&self) -> &[usize] {
+        self.steps.get_or_init(|| {
+            let steps_of = |yarn| {
+                let radii = self.strands.length_of(yarn) / self.strands.mean_radius_of(yarn);
+                self.strands.segments_of(yarn).len().max((radii / self.longest_step).ceil().min(MOST_STEPS) as usize)
+            };
+            (0..self.strands.yarns()).into_par_iter().map(steps_of).collect()
+        })
     }
 
     /// Control points and segments of all fibres together, before any is made.
@@ -178,8 +185,8 @@ impl<'a> Plies<'a> {
     }
 
     fn counts(&self, curves: u64) -> (u64, u64) {
-        let steps: u64 = self.steps.iter().map(|&steps| steps as u64).sum();
-        (curves * (steps + 3 * self.steps.len() as u64), curves * steps)
+        let steps: u64 = self.steps().iter().map(|&steps| steps as u64).sum();
+        (curves * (steps + 3 * self.steps().len() as u64), curves * steps)
     }
 
     /// Direction from the yarn's axis to a ply at a step, in the section.
@@ -205,7 +212,7 @@ impl<'a> Plies<'a> {
     fn fibers_of(&self, yarn: usize, ply: usize, placement: Placement) -> Vec<Vec<Vec4>> {
         let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
         let guide = Guide::new(self.strands, yarn);
-        let places: Vec<(f64, YarnFrame)> = guide.steps(self.steps[yarn]).map(|s| (s, guide.frame_at(s))).collect();
+        let places: Vec<(f64, YarnFrame)> = guide.steps(self.steps()[yarn]).map(|s| (s, guide.frame_at(s))).collect();
         let mut stream = Stream::new(hash2(hash2(self.seed, yarn as u32), ply as u32));
         let start = TAU * f64::from(stream.next());
         let core = f64::from(shape.core_radius);
@@ -243,7 +250,7 @@ impl<'a> Plies<'a> {
     pub fn material_indices_along(&self, curves: usize) -> Vec<u16> {
         let mut material_indices = Vec::new();
         for yarn in 0..self.strands.yarns() {
-            let (guide, steps) = (Guide::new(self.strands, yarn), self.steps[yarn]);
+            let (guide, steps) = (Guide::new(self.strands, yarn), self.steps()[yarn]);
             let half = 0.5 * guide.length() / steps.max(1) as f64;
             let below = guide.steps(steps).take(steps).map(|start| guide.segment_at(start + half));
             let along: Vec<u16> = below.filter_map(|segment| self.strands.material_index(segment)).collect();
@@ -267,7 +274,7 @@ impl<'a> Plies<'a> {
             .into_par_iter()
             .map(|yarn| {
                 let guide = Guide::new(self.strands, yarn);
-                let places: Vec<YarnFrame> = guide.steps(self.steps[yarn]).map(|s| guide.frame_at(s)).collect();
+                let places: Vec<YarnFrame> = guide.steps(self.steps()[yarn]).map(|s| guide.frame_at(s)).collect();
                 let knots: Vec<Vec3> =
                     places.iter().map(|p| point(p, f64::from(shape.distance) * self.axis(p, shape))).collect();
                 let points = spline_through(&knots, |_| 0.0);

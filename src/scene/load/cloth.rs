@@ -6,6 +6,7 @@ use std::{
 };
 
 use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::{
     super::{CurveKind, Fabric, FabricMotion, Mode, Yarn, defaults, transform_curves},
@@ -404,9 +405,7 @@ impl CurveFile {
         }
         warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
         let scale = self.unit.or(set.unit_mm).unwrap_or(context.unit);
-        for p in set.curves.iter_mut().flat_map(|c| &mut c.points) {
-            *p *= scale;
-        }
+        set.curves.par_iter_mut().for_each(|c| c.points.iter_mut().for_each(|p| *p *= scale));
         Some((set, scale))
     }
 }
