@@ -101,7 +101,7 @@ impl fmt::Display for ChartError {
 impl std::error::Error for ChartError {}
 
 impl ChartError {
-    fn new(line: Option<usize>, problem: impl Into<String>, hint: impl Into<String>) -> Self {
+    pub(super) fn new(line: Option<usize>, problem: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { line, problem: problem.into(), hint: hint.into() }
     }
 }

@@ -16,6 +16,7 @@ use super::{
     chart::{Chart, ChartError, Stitch},
     relax::{Ends, Relaxation, Rope},
     revolution::Revolution,
+    tile::RelaxedRows,
 };
 use crate::geometry::curve::{Basis, Curve};
 
@@ -177,6 +178,20 @@ impl Knit {
         let order = Order::new(&rows, [cell_width, chart_rows], [width, height], self.points);
         relaxation.run(CELL_ROUNDS, |ropes| order.tidy(ropes));
         Cell { wide, high, period, rows: relaxation.ropes.into_iter().map(|rope| rope.points).collect() }
+    }
+
+    /// A repeat of the chart as it relaxes: what a [`super::tile::Tile`] is made of.
+    ///
+    /// # Errors
+    /// A chart that grows or shrinks has no repeat.
+    pub(super) fn relaxed_rows(&self) -> Result<RelaxedRows, ChartError> {
+        let width = self.chart.even_width(LARGEST_CELL).filter(|w| w * self.chart.rows() <= LARGEST_CELL);
+        let Some(width) = width else {
+            let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
+            return Err(ChartError::new(None, "a chart with shaping has no repeat that could be laid", hint));
+        };
+        let Cell { wide, high, period, rows } = self.cell(width, self.gauge());
+        Ok(RelaxedRows { period, counts: [wide, high], rows })
     }
 
     /// Lays a relaxed cell out over the piece.

@@ -1,0 +1,484 @@
+//! A patch of cloth that repeats along x and y: what is laid over garments.
+//!
+//! Every maker of cloth can give one: a [`Knit`], a [`Weave`], a periodic curve file. A tile knows its stitches and its
+//! yarns and nothing of where they came from.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::{
+    StrandKind,
+    chart::ChartError,
+    knit::Knit,
+    relax::{Ends, Relaxation, Rope},
+    weave::{TooTight, Weave},
+};
+use crate::geometry::{chain::spline_through, curve::Basis, spline::evaluate};
+
+/// A periodic patch of cloth in the plane z = 0, right side towards +z, its lower left corner at the origin.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// Its width and height, after which it repeats, in the unit of all its lengths.
+    pub period: DVec2,
+    /// Stitches and rows of a knit in it, ends and picks of a weave.
+    pub counts: [u32; 2],
+    /// Its yarns, each once.
+    pub strands: Vec<TileStrand>,
+}
+
+/// One yarn of a [`Tile`] from its start to where it repeats.
+#[derive(Clone, Debug)]
+pub struct TileStrand {
+    /// What it is in its cloth.
+    pub kind: StrandKind,
+    /// Which of its kind in the tile, from 0: row of a knit, warp or weft.
+    pub index: u32,
+    /// Points that it passes through smoothly; the point after the last is the first one, `step` periods on.
+    pub points: Vec<DVec3>,
+    /// How many periods across and up lie between its start and its own continuation; both 0 for a ring.
+    pub step: [i32; 2],
+    /// Its outer radius.
+    pub radius: f64,
+    /// At each point the direction of the section's shorter axis times the ratio of both axes; empty if it is round.
+    pub flattening: Vec<DVec3>,
+    /// At each point its place in stitches and rows (ends and picks) from the tile's corner: what colours are laid by.
+    pub coordinates: Vec<[f32; 2]>,
+}
+
+/// A cell of a knit as its maker relaxes it: see [`Tile::of_rows`].
+pub(super) struct RelaxedRows {
+    pub(super) period: DVec2,
+    pub(super) counts: [u32; 2],
+    pub(super) rows: Vec<Vec<DVec3>>,
+}
+
+impl Tile {
+    /// The repeat of a knit at its own gauge, in the unit of `diameter`.
+    ///
+    /// # Errors
+    /// A chart that grows or shrinks has no repeat.
+    pub fn of_knit(knit: &Knit, diameter: f64) -> Result<Self, ChartError> {
+        Ok(Self::of_rows(knit.relaxed_rows()?, diameter))
+    }
+
+    /// A tile of rows in units of the yarn's diameter, each evenly divided among its stitches.
+    fn of_rows(cell: RelaxedRows, diameter: f64) -> Self {
+        let [wide, _] = cell.counts;
+        let strand = |(row, points): (usize, Vec<DVec3>)| {
+            let per_stitch = points.len() as f64 / f64::from(wide);
+            let place = |i: usize| {
+                let wale = i as f64 / per_stitch;
+                // A loop reaches from the middle of the row below to the middle of the row above.
+                let head = 0.5 - 0.5 * (TAU * wale).cos();
+                [wale as f32, (row as f64 + head) as f32]
+            };
+            TileStrand {
+                kind: StrandKind::Course,
+                index: row as u32,
+                coordinates: (0..points.len()).map(place).collect(),
+                points: points.into_iter().map(|p| p * diameter).collect(),
+                step: [1, 0],
+                radius: 0.5 * diameter,
+                flattening: Vec::new(),
+            }
+        };
+        let strands = cell.rows.into_iter().enumerate().map(strand).collect();
+        Self { period: cell.period * diameter, counts: cell.counts, strands }
+    }
+
+    /// The repeat of a weave; its numbers of warps and wefts do not matter.
+    ///
+    /// # Errors
+    /// As [`Weave::spacing`].
+    pub fn of_weave(weave: &Weave) -> Result<Self, TooTight> {
+        let [warp_spacing, weft_spacing] = weave.spacing()?;
+        let (warps, wefts) = (weave.draft.warps() as u32, weave.draft.wefts() as u32);
+        // The one in the middle of three repeats has its like on both sides.
+        let piece = Weave { warps: 3 * warps, wefts: 3 * wefts, ..weave.clone() };
+        let (width, height) = (f64::from(warps) * warp_spacing, f64::from(wefts) * weft_spacing);
+        let corner = DVec3::new(-0.5 * width, -0.5 * height, 0.0);
+        let mut strands = Vec::new();
+        for strand in piece.strands()? {
+            let is_warp = strand.kind == StrandKind::Warp;
+            let (own, along, axis) = if is_warp { (warps, wefts, 1) } else { (wefts, warps, 0) };
+            if !(own..2 * own).contains(&strand.index) {
+                continue;
+            }
+            // From one crossing to the same one a repeat later: crossings are points.
+            let from = along as f32 + 0.5 - 1e-4;
+            let inside = |c: &[f32; 2]| (from..from + along as f32).contains(&c[axis]);
+            let both = strand.curve.points.iter().zip(&strand.coordinates).filter(|(_, c)| inside(c));
+            strands.push(TileStrand {
+                kind: strand.kind,
+                index: strand.index - own,
+                points: both.clone().map(|(p, _)| *p - corner).collect(),
+                step: if is_warp { [0, 1] } else { [1, 0] },
+                radius: if is_warp { weave.warp_radius } else { weave.weft_radius },
+                flattening: Vec::new(),
+                coordinates: both.map(|(_, c)| [c[0] - warps as f32, c[1] - wefts as f32]).collect(),
+            });
+        }
+        Ok(Self { period: DVec2::new(width, height), counts: [warps, wefts], strands })
+    }
+
+    /// A tile of endless yarns of which nothing else is known: stitches and rows are counted from their shape.
+    pub fn of_strands(period: DVec2, mut strands: Vec<TileStrand>) -> Self {
+        // Most start at their lower left.
+        let upright = |s: &TileStrand| s.step[0] == 0 && s.step[1] != 0;
+        let warps = strands.iter().filter(|s| upright(s)).count() as u32;
+        let across = strands.iter().filter(|s| s.step[0] != 0).map(|s| s.step[0].unsigned_abs()).sum::<u32>().max(1);
+        let columns = if warps > 0 {
+            warps
+        } else {
+            strands.iter().filter(|s| s.step[0] != 0).map(|s| s.heads() / s.step[0].unsigned_abs()).max().unwrap_or(1)
+        };
+        let counts = [columns.max(1), across];
+        let (mut warp, mut row) = (0, 0);
+        let stitch = period / DVec2::new(f64::from(counts[0]), f64::from(counts[1]));
+        for strand in &mut strands {
+            let number = if upright(strand) { &mut warp } else { &mut row };
+            strand.index = *number;
+            *number += 1;
+            strand.kind = match (upright(strand), warps > 0) {
+                (true, _) => StrandKind::Warp,
+                (false, true) => StrandKind::Weft,
+                (false, false) => StrandKind::Course,
+            };
+            strand.coordinates =
+                strand.points.iter().map(|p| [(p.x / stitch.x) as f32, (p.y / stitch.y) as f32]).collect();
+        }
+        Self { period, counts, strands }
+    }
+
+    /// Width and height of a stitch.
+    pub fn stitch(&self) -> DVec2 {
+        self.period / DVec2::new(f64::from(self.counts[0]), f64::from(self.counts[1]))
+    }
+
+    /// Length of all its yarns.
+    pub fn length(&self) -> f64 {
+        self.strands.iter().map(|s| s.length(self.period)).sum()
+    }
+
+    /// The thickest yarn's diameter.
+    pub fn diameter(&self) -> f64 {
+        2.0 * self.strands.iter().map(|s| s.radius).fold(0.0, f64::max)
+    }
+
+    /// The tile, its yarns and their thickness, times a number.
+    pub fn scaled(mut self, by: f64) -> Self {
+        self.period *= by;
+        for strand in &mut self.strands {
+            strand.radius *= by;
+            strand.points.iter_mut().for_each(|p| *p *= by);
+        }
+        self
+    }
+
+    /// The same cloth pulled to another period: yarns keep length and thickness, loops open, close and turn. Yarns of
+    /// unequal thickness are only moved apart.
+    pub fn pulled(&self, period: DVec2, rounds: usize) -> Self {
+        let stretch = period / self.period;
+        let mut out = self.clone();
+        out.period = period;
+        for strand in &mut out.strands {
+            for p in &mut strand.points {
+                (p.x, p.y) = (p.x * stretch.x, p.y * stretch.y);
+            }
+        }
+        let diameter = self.diameter();
+        let even = self.strands.iter().all(|s| (2.0 * s.radius - diameter).abs() < 1e-6 * diameter);
+        if !even || diameter <= 0.0 || self.strands.iter().any(|s| s.step[0] != 0 && s.step[1] != 0) {
+            return out;
+        }
+        let rope = |(moved, at_rest): (&TileStrand, &TileStrand)| Rope {
+            points: moved.points.iter().map(|p| *p / diameter).collect(),
+            pinned: vec![false; moved.points.len()],
+            ends: Ends::Joined(moved.jump(period) / diameter),
+            rest: at_rest.length(self.period) / diameter / moved.points.len() as f64,
+        };
+        let ropes = out.strands.iter().zip(&self.strands).map(rope).collect();
+        let mut relaxation = Relaxation { ropes, period: Some(period / diameter) };
+        relaxation.run(rounds, |_| {});
+        for (strand, rope) in out.strands.iter_mut().zip(relaxation.ropes) {
+            strand.points = rope.points.into_iter().map(|p| p * diameter).collect();
+        }
+        out
+    }
+
+    /// So many tiles beside and above each other as one: what is relaxed must not meet its own images.
+    pub fn repeated(&self, across: u32, up: u32) -> Self {
+        let [columns, rows] = self.counts;
+        let mut strands = Vec::new();
+        for strand in &self.strands {
+            // Along its way copies continue each other, if it goes straight across or up.
+            let [run, beside] = match strand.step {
+                [1 | -1, 0] => [across, 1],
+                [0, 1 | -1] => [up, 0],
+                _ => [1, 2],
+            };
+            let copies: Vec<[u32; 2]> = match beside {
+                0 => (0..across).map(|x| [x, 0]).collect(),
+                1 => (0..up).map(|y| [0, y]).collect(),
+                _ => (0..up).flat_map(|y| (0..across).map(move |x| [x, y])).collect(),
+            };
+            for (number, [x, y]) in copies.into_iter().enumerate() {
+                let mut copy = TileStrand {
+                    points: Vec::new(),
+                    flattening: Vec::new(),
+                    coordinates: Vec::new(),
+                    ..strand.clone()
+                };
+                copy.index = strand.index + number as u32 * if beside == 0 { columns } else { rows };
+                let step = DVec2::new(f64::from(strand.step[0]), f64::from(strand.step[1]));
+                for k in 0..run {
+                    let tiles = DVec2::new(f64::from(x), f64::from(y)) + f64::from(k) * step;
+                    let shift = (tiles * self.period).extend(0.0);
+                    let stitches = tiles * DVec2::new(f64::from(columns), f64::from(rows));
+                    copy.points.extend(strand.points.iter().map(|p| *p + shift));
+                    copy.flattening.extend(&strand.flattening);
+                    let moved = |c: &[f32; 2]| [c[0] + stitches.x as f32, c[1] + stitches.y as f32];
+                    copy.coordinates.extend(strand.coordinates.iter().map(moved));
+                }
+                strands.push(copy);
+            }
+        }
+        let period = self.period * DVec2::new(f64::from(across), f64::from(up));
+        Self { period, counts: [columns * across, rows * up], strands }
+    }
+}
+
+impl TileStrand {
+    /// From its start to its own continuation.
+    pub fn jump(&self, period: DVec2) -> DVec3 {
+        (DVec2::new(f64::from(self.step[0]), f64::from(self.step[1])) * period).extend(0.0)
+    }
+
+    /// Point i, where those before the first and after the last are of the repeats around.
+    fn around(&self, i: isize, period: DVec2) -> DVec3 {
+        let n = self.points.len() as isize;
+        self.points[i.rem_euclid(n) as usize] + self.jump(period) * i.div_euclid(n) as f64
+    }
+
+    /// The place between point i and the next.
+    fn at(&self, i: isize, u: f64, period: DVec2) -> DVec3 {
+        let p = [-1, 0, 1, 2].map(|k| self.around(i + k, period).extend(0.0));
+        evaluate(Basis::CatmullRom, p, u).at.truncate()
+    }
+
+    /// Its length from its start to its own continuation.
+    pub fn length(&self, period: DVec2) -> f64 {
+        self.lengths(period).last().copied().unwrap_or(0.0)
+    }
+
+    /// Length from the start to steps between points, [`STEPS`] each.
+    fn lengths(&self, period: DVec2) -> Vec<f64> {
+        let mut lengths = vec![0.0];
+        let mut here = self.at(0, 0.0, period);
+        for i in 0..self.points.len() as isize {
+            for k in 1..=STEPS {
+                let next = self.at(i, k as f64 / STEPS as f64, period);
+                lengths.push(lengths[lengths.len() - 1] + next.distance(here));
+                here = next;
+            }
+        }
+        lengths
+    }
+
+    /// Places of `count` points evenly along the yarn, in points from the first, the first among them.
+    pub fn evenly(&self, count: usize, period: DVec2) -> Vec<f64> {
+        let lengths = self.lengths(period);
+        let total = lengths[lengths.len() - 1];
+        (0..count)
+            .map(|k| {
+                let wanted = total * k as f64 / count as f64;
+                let i = lengths.partition_point(|&l| l <= wanted).clamp(1, lengths.len() - 1) - 1;
+                let span = (lengths[i + 1] - lengths[i]).max(1e-300);
+                (i as f64 + ((wanted - lengths[i]) / span).clamp(0.0, 1.0)) / STEPS as f64
+            })
+            .collect()
+    }
+
+    /// Control points of the uniform cubic B-spline that passes through its places, given in points from the first. As
+    /// the points, they repeat one step on.
+    pub fn spline(&self, places: &[f64], period: DVec2) -> Vec<DVec3> {
+        // After so many knots a B-spline has forgotten another.
+        const FAR: usize = 28;
+        let n = places.len();
+        let knot = |k: usize| {
+            let (turn, place) = (k / n, places[k % n]);
+            let i = place.floor();
+            self.at(i as isize, place - i, period) + self.jump(period) * turn as f64
+        };
+        // The repeats before the first are counted from some way back.
+        let back = FAR.div_ceil(n) * n;
+        let knots = (0..back + n + FAR).map(knot).collect::<Vec<_>>();
+        let shift = self.jump(period) * (back / n) as f64;
+        // One control point lies before the first knot.
+        spline_through(knots.into_iter()).iter().skip(back + 1).take(n).map(|p| *p - shift).collect()
+    }
+
+    /// How often it rises to a head: as many loops as a row of a knit has in a period.
+    fn heads(&self) -> u32 {
+        let (low, high) = self.points.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
+        let middle = 0.5 * (low + high);
+        let n = self.points.len();
+        let rises = (0..n).filter(|&i| self.points[i].y < middle && self.points[(i + 1) % n].y >= middle).count();
+        rises.max(1) as u32
+    }
+}
+
+/// One link of a chain of loops, each drawn through the one before, as it relaxes with links `link` apart: control points
+/// of a B-spline in yarn diameters, x along the chain, y across, z out of the front, where loops lie as a row of V. The
+/// next link is the same, `link` further on.
+pub fn chain(link: f64) -> Vec<DVec3> {
+    const LINKS: usize = 4;
+    const POINTS: usize = 16;
+    // Out of the loop before, along the front, round, back, and behind to the next.
+    let way = [
+        [0.3, -0.3, 0.0],
+        [0.8, -0.8, 0.8],
+        [0.5 * link + 0.4, -1.0, 0.95],
+        [link + 0.5, -0.95, 0.5],
+        [link + 1.15, -0.35, 0.2],
+        [link + 1.15, 0.35, 0.2],
+        [link + 0.5, 0.95, 0.5],
+        [0.5 * link + 0.4, 1.0, 0.95],
+        [0.8, 0.8, 0.8],
+        [0.3, 0.3, 0.0],
+        [0.2, 0.2, -0.8],
+        [0.6 * link, 0.0, -0.9],
+    ];
+    let period = DVec2::new(LINKS as f64 * link, 20.0);
+    let strand = TileStrand {
+        kind: StrandKind::Course,
+        index: 0,
+        points: (0..LINKS).flat_map(|k| way.map(|[x, y, z]| DVec3::new(x + k as f64 * link, y, z))).collect(),
+        step: [1, 0],
+        radius: 0.5,
+        flattening: Vec::new(),
+        coordinates: Vec::new(),
+    };
+    let places = strand.evenly(LINKS * 2 * POINTS, period);
+    let points = places.iter().map(|p| strand.at(p.floor() as isize, p.fract(), period)).collect();
+    let fine = TileStrand { points, ..strand };
+    let length = fine.length(period);
+    let count = fine.points.len();
+    let rope = Rope {
+        pinned: vec![false; count],
+        ends: Ends::Joined(fine.jump(period)),
+        rest: length / count as f64,
+        points: fine.points.clone(),
+    };
+    let mut relaxation = Relaxation { ropes: vec![rope], period: Some(period) };
+    relaxation.run(300, |_| {});
+    let relaxed = TileStrand { points: relaxation.ropes.swap_remove(0).points, ..fine };
+    let places = relaxed.evenly(LINKS * POINTS, period);
+    relaxed.spline(&places, period).into_iter().take(POINTS).collect()
+}
+
+/// Steps between two points at which lengths are known.
+const STEPS: usize = 4;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pattern::{
+        chart::Chart,
+        draft::Draft,
+        knit::{Form, POINTS, ROW_HEIGHT, STITCH_WIDTH, YARN_PER_STITCH},
+        weave,
+    };
+
+    fn stockinette() -> Tile {
+        let knit = Knit {
+            chart: Chart::named("stockinette").unwrap(),
+            stitches: 1,
+            rows: 1,
+            form: Form::Flat,
+            stitch_width: Some(STITCH_WIDTH),
+            row_height: Some(ROW_HEIGHT),
+            yarn_per_stitch: YARN_PER_STITCH,
+            points: POINTS,
+        };
+        Tile::of_knit(&knit, 0.5).unwrap()
+    }
+
+    #[test]
+    fn a_knit_gives_its_repeat() {
+        let tile = stockinette();
+        assert!((tile.stitch() - 0.5 * DVec2::new(STITCH_WIDTH, ROW_HEIGHT)).length() < 1e-9, "{}", tile.stitch());
+        let per_stitch = tile.length() / f64::from(tile.counts[0] * tile.counts[1]) / 0.5;
+        assert!((per_stitch - YARN_PER_STITCH).abs() < 0.4, "{per_stitch}");
+        assert_eq!(tile.strands.len(), tile.counts[1] as usize);
+        let last = tile.strands[0].coordinates.last().unwrap()[0];
+        assert!(last < tile.counts[0] as f32 && last > tile.counts[0] as f32 - 0.1);
+    }
+
+    #[test]
+    fn a_weave_gives_its_repeat() {
+        let weave = Weave {
+            draft: Draft::named("twill 2/1").unwrap(),
+            warps: 7,
+            wefts: 7,
+            warp_radius: 0.5,
+            weft_radius: 0.5,
+            warp_spacing: None,
+            weft_spacing: None,
+            crimp: 0.5,
+            points: weave::POINTS,
+        };
+        let tile = Tile::of_weave(&weave).unwrap();
+        assert_eq!((tile.counts, tile.strands.len()), ([3, 3], 6));
+        for strand in &tile.strands {
+            assert!(strand.points.iter().all(|p| p.x > -1e-9 && p.y > -1e-9 && p.z.abs() <= 0.6));
+            let along = usize::from(strand.kind == StrandKind::Warp);
+            assert_eq!(strand.step[along], 1);
+            // It goes on where it stopped: no step is longer than another by much.
+            let step = |i: isize| strand.around(i + 1, tile.period).distance(strand.around(i, tile.period));
+            let n = strand.points.len() as isize;
+            assert!(step(n - 1) < 1.5 * step(n - 2), "{} {}", step(n - 1), step(n - 2));
+        }
+    }
+
+    #[test]
+    fn splines_pass_their_places_and_repeat() {
+        let tile = stockinette();
+        let strand = &tile.strands[0];
+        let count = 12 * tile.counts[0] as usize;
+        let places = strand.evenly(count, tile.period);
+        let control = strand.spline(&places, tile.period);
+        assert_eq!(control.len(), count);
+        let at = |k: isize| {
+            control[k.rem_euclid(count as isize) as usize]
+                + strand.jump(tile.period) * k.div_euclid(count as isize) as f64
+        };
+        for (k, place) in places.iter().enumerate() {
+            let k = k as isize;
+            let passed = (at(k - 1) + 4.0 * at(k) + at(k + 1)) / 6.0;
+            let want = strand.at(place.floor() as isize, place.fract(), tile.period);
+            assert!(passed.distance(want) < 1e-9, "{k}: {passed} {want}");
+        }
+    }
+
+    #[test]
+    fn pulling_keeps_length_and_thickness() {
+        let tile = stockinette();
+        for (x, y) in [(1.15, 1.0), (1.0, 1.12), (0.9, 1.05)] {
+            let pulled = tile.pulled(tile.period * DVec2::new(x, y), 150);
+            let grown = pulled.length() / tile.length();
+            assert!((grown - 1.0).abs() < 0.03, "{x} {y}: {grown}");
+            assert_eq!(pulled.diameter(), tile.diameter());
+        }
+    }
+
+    #[test]
+    fn repeating_keeps_stitches_and_length() {
+        let tile = stockinette();
+        let four = tile.repeated(2, 2);
+        assert_eq!(four.counts, tile.counts.map(|c| 2 * c));
+        assert!((four.length() - 4.0 * tile.length()).abs() < 1e-9);
+        assert_eq!(four.strands.len(), 2 * tile.strands.len());
+    }
+}
