@@ -15,7 +15,7 @@ use crate::{
     },
     plan::{Memory, Plan},
     render::film_file,
-    scene::{CurveKind, Fabric, Scene},
+    scene::{CurveKind, Fabric, GarmentFacts, Scene},
     trace::{self, Estimate},
 };
 
@@ -45,7 +45,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let (report, text) = if film_file::is_film(&args.file) {
         film_report(&args.file)?
     } else if is_scene {
-        let scene = args.options.load(&args.file)?;
+        let scene = args.options.load_or_survey(&args.file, true)?;
         scene_report(&scene)
     } else {
         let set =
@@ -158,9 +158,54 @@ fn length(fabric: &Fabric) -> f64 {
     fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
 }
 
+/// A garment for programs: the keys that INTERFACE promises, and what else is known.
+fn garment_json(facts: &GarmentFacts) -> Value {
+    let panels: Vec<Value> =
+        facts.panels.iter().map(|(name, stitches)| json!({"panel": name, "stitches": stitches})).collect();
+    let [p5, p50, p95] = facts.uv_ratio;
+    json!({
+        "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
+        "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
+        "overlap": facts.overlap.map(|[share, deepest]| json!({"share": share, "deepest": deepest})),
+        "control_points": facts.control_points,
+        "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
+        "repairs": facts.repairs,
+    })
+}
+
+fn garment_lines(facts: &GarmentFacts) -> String {
+    let [p5, p50, p95] = facts.uv_ratio;
+    let mut text = format!(
+        "  garment   {}: {} stitches of {} in {} panels, about {:.1} m of yarn, {} control points\n  stretch   3-D over \
+         flat lengths {p5:.3} to {p95:.3}, median {p50:.3}; {:.1} % of the cloth is stretched by more than a tenth\n",
+        facts.path,
+        facts.stitches,
+        facts.cloth,
+        facts.panels.len(),
+        facts.yarn_length / 1000.0,
+        facts.control_points,
+        100.0 * facts.stretched
+    );
+    if let Some(weight) = facts.weight {
+        text += &format!("  weight    {weight:.1} g of yarn\n");
+    }
+    if let Some([share, deepest]) = facts.overlap {
+        let (share, deepest) = (100.0 * share, 100.0 * deepest);
+        text += &format!(
+            "  loops     {share:.1} % of the yarn overlaps where it lies flat, by at most {deepest:.0} % of its diameter\n"
+        );
+    }
+    for repair in &facts.repairs {
+        text += &format!("  repair    {repair}\n");
+    }
+    text
+}
+
 fn scene_report(scene: &Scene) -> (Value, String) {
     let estimates = trace::estimates(scene);
-    let total: Estimate = estimates.iter().copied().sum();
+    let not_laid = scene.garments.iter().filter(|_| scene.fabrics.is_empty());
+    let not_laid = not_laid.map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
+    let total: Estimate = estimates.iter().copied().chain(not_laid).sum();
     let plan = Plan::new(scene);
     let memory = Memory::new(scene);
     let beside = |bytes: u64, what: &str| match bytes {
@@ -168,7 +213,9 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         _ => format!(", {} of {what}", bytes_in_words(bytes)),
     };
     let render = &scene.render;
-    let (low, high) = scene.bounds().map_or((DVec3::ZERO, DVec3::ZERO), |(a, b)| (a + scene.middle, b + scene.middle));
+    let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
+    let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
     let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
     let fabrics: Vec<Value> = scene
         .fabrics
@@ -192,12 +239,16 @@ fn scene_report(scene: &Scene) -> (Value, String) {
             .map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes}))
             .collect()
     };
-    let found = overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice())));
+    // Of garments that are not laid only their tile is measured.
+    let found = (!scene.fabrics.is_empty())
+        .then(|| overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice()))))
+        .flatten();
+    let garments: Vec<Value> = scene.garments.iter().map(garment_json).collect();
     let report = json!({
         "scene": scene.path, "fingerprint": scene.fingerprint,
         "mode": render.mode.name(), "model": render.model.name(),
         "image": {"width": render.width, "height": render.height, "spp": render.spp},
-        "fabrics": fabrics, "overlap": overlap_json(found),
+        "fabrics": fabrics, "garments": garments, "overlap": overlap_json(found),
         "bounds_mm": [list(low), list(high)],
         "memory": {
             "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
@@ -232,6 +283,9 @@ fn scene_report(scene: &Scene) -> (Value, String) {
             f.control_points(),
             estimate.segments
         );
+    }
+    for facts in &scene.garments {
+        text += &garment_lines(facts);
     }
     text += &overlap_line(found);
     text += &format!(

@@ -9,6 +9,7 @@ use super::{
     Failure,
     fibers::{self, FibersArgs},
     files::{Attempts, Files},
+    garment::{self, GarmentArgs},
     log,
 };
 use crate::{
@@ -30,6 +31,7 @@ use crate::{
 const EXAMPLES: &str = "Examples:
   yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.bcc
   yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --form tube -o shaped.hair
+  yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
   yarnray render scenes/glove.toml --curves rib.bcc --set fabric.0.source.unit=mm -o rib.png
 
@@ -49,6 +51,8 @@ enum What {
     Knit(KnitArgs),
     /// Woven cloth from a draft.
     Weave(WeaveArgs),
+    /// The yarns of a scene's cloth, such as those laid on a garment.
+    Garment(Box<GarmentArgs>),
     /// The explicit fibres or plies of a scene's cloth.
     Fibers(Box<FibersArgs>),
 }
@@ -154,6 +158,7 @@ pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
     match &args.what {
         What::Knit(args) => knit(args),
         What::Weave(args) => weave(args),
+        What::Garment(args) => garment::run(args),
         What::Fibers(args) => fibers::run(args),
     }
 }

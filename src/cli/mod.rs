@@ -8,6 +8,7 @@ mod compare;
 mod converge;
 mod fibers;
 mod files;
+mod garment;
 mod info;
 mod log;
 mod make;
@@ -288,7 +289,13 @@ fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValues
 impl SceneArgs {
     /// Loads a scene with these options.
     fn load(&self, path: &std::path::Path) -> Result<Scene, LoadError> {
+        self.load_or_survey(path, false)
+    }
+
+    /// As [`Self::load`]; a survey lays no yarns on garments.
+    fn load_or_survey(&self, path: &std::path::Path, survey: bool) -> Result<Scene, LoadError> {
         let mut options = LoadOptions {
+            survey,
             assignments: self.set.clone(),
             curves: self.curves.clone(),
             frame: self.frame,

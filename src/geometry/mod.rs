@@ -4,6 +4,7 @@ mod chain;
 pub mod curve;
 pub mod curve_file;
 pub mod fiber;
+pub mod garment;
 pub mod mesh;
 pub mod obj;
 pub mod pattern;

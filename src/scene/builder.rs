@@ -5,8 +5,8 @@ use std::{collections::HashSet, f64::consts::TAU, fmt};
 use glam::{DAffine3, DVec3};
 
 use super::{
-    CurveKind, Fabric, FabricMotion, Ground, Layers, Material, Mode, Object, RenderSettings, Scene, Storage, Yarn,
-    bounds, defaults, force, identity, view::CameraSetup,
+    CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Mode, Object, RenderSettings, Scene,
+    Storage, Yarn, bounds, defaults, force, identity, view::CameraSetup,
 };
 use crate::{
     geometry::{
@@ -48,6 +48,8 @@ pub struct SceneBuilder {
     pub lights: Vec<Light>,
     /// The floor, if there is one.
     pub ground: Option<GroundSetup>,
+    /// What is known of fabrics that are laid on garments.
+    pub garments: Vec<GarmentFacts>,
     /// What the user should know already.
     pub warnings: Vec<String>,
 }
@@ -119,6 +121,7 @@ impl SceneBuilder {
         self.check()?;
         let Self { name, render, output, camera, yarns, fibers, mut fabrics, mut objects, materials, .. } = self;
         let (mut lights, ground, warnings) = (self.lights, self.ground, self.warnings);
+        let garments = self.garments;
         tell_names_apart(&mut fabrics);
 
         // Single precision is kept for what is near: the middle of the cloth becomes the origin.
@@ -160,6 +163,7 @@ impl SceneBuilder {
             lights,
             ground,
             middle,
+            garments,
             identity: Vec::new(),
             fingerprint: String::new(),
             warnings,
@@ -305,6 +309,7 @@ impl Yarn {
             fibers: vec![fiber; plies as usize],
             placement: Placement::Regular,
             flyaways: None,
+            tex: None,
             tilted: defaults::TILTED,
             name,
             radius,

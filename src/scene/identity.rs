@@ -43,6 +43,8 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         middle,
         identity: _,
         fingerprint: _,
+        // Facts about fabrics, which are here themselves.
+        garments: _,
         warnings: _,
     } = scene;
     let mut keys = Keys::default();
@@ -191,7 +193,7 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
 }
 
 fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
-    let Yarn { name, radius, plies, ply_twist, fibers, placement, flyaways, tilted } = yarn;
+    let Yarn { name, radius, plies, ply_twist, fibers, placement, flyaways, tex: _, tilted } = yarn;
     let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("yarn.{name}.{key}"), value);
     key("radius", radius);
     key("ply", plies);

@@ -259,6 +259,8 @@ pub struct Yarn {
     pub placement: Placement,
     /// Fibres that leave the plies.
     pub flyaways: Option<Flyaways>,
+    /// Grams in a kilometre, if known.
+    pub tex: Option<f64>,
     /// Whether rays see plies as tilted cylinders; false is the paper's perpendicular section.
     pub tilted: bool,
 }
@@ -349,6 +351,38 @@ impl Fabric {
     }
 }
 
+/// What is known of a garment and of the cloth on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GarmentFacts {
+    /// Its mesh.
+    pub path: String,
+    /// The name of its cloth.
+    pub cloth: String,
+    /// Its panels, each with its number of stitches.
+    pub panels: Vec<(String, u64)>,
+    /// Stitches of all panels; crossings of a weave.
+    pub stitches: u64,
+    /// Length of all yarns, millimetres; without seams and finished edges where it was not laid.
+    pub yarn_length: f64,
+    /// Weight of all yarns, grams, where every yarn's `tex` is known.
+    pub weight: Option<f64>,
+    /// How far the yarns of its cloth run into each other where it lies flat: share of their length, and the deepest in
+    /// diameters. Of several cloths that with the most.
+    pub overlap: Option<[f64; 2]>,
+    /// About as many control points.
+    pub control_points: u64,
+    /// 3-D length over length as cut, by area: at 5, 50 and 95 %.
+    pub uv_ratio: [f64; 3],
+    /// Share of the area that is stretched by more than a tenth.
+    pub stretched: f64,
+    /// Millimetres per unit of its texture coordinates.
+    pub uv_mm: f64,
+    /// The box around its mesh, millimetres, before the fabric is moved to its place.
+    pub bounds: (DVec3, DVec3),
+    /// What was repaired or found out, one line each.
+    pub repairs: Vec<String>,
+}
+
 /// A floor.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground {
@@ -422,6 +456,8 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// What was subtracted from all positions, millimetres.
     pub middle: DVec3,
+    /// What is known of the fabrics that are laid on garments.
+    pub garments: Vec<GarmentFacts>,
     /// Every key that changes the picture, with its value: [`identity::identity`].
     pub identity: Vec<(String, String)>,
     /// A fingerprint of everything that changes the picture.

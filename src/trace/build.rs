@@ -108,6 +108,13 @@ impl Estimate {
         self.geometry_bytes + self.bvh_bytes
     }
 
+    /// That of aggregated yarns of so many control points in all.
+    pub fn of_yarns(points: u64, compact: bool) -> Self {
+        let mut estimate = Self::default();
+        estimate.add(points, points, true, compact);
+        estimate
+    }
+
     fn add(&mut self, points: u64, segments: u64, framed: bool, compact: bool) {
         self.points += points;
         self.segments += segments;

@@ -102,6 +102,7 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
         tilted: true,
         placement: Placement::Regular,
         flyaways: None,
+        tex: None,
     }
 }
 

@@ -21,7 +21,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::curve::{Basis, CurveSet};
+use super::{
+    curve::{Basis, CurveSet},
+    pattern::tile::Tile,
+};
 
 pub use bcc::write_bcc;
 pub use hair::write_hair;
@@ -145,7 +148,15 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileErr
     read_unnamed(path, options).map_err(|error| error.in_file(path))
 }
 
-fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+/// Reads a periodic curve file (PYP) as the tile that it repeats, millimetres.
+///
+/// # Errors
+/// As [`read`]; a file of another format.
+pub fn read_tile(path: &Path) -> Result<Tile, CurveFileError> {
+    read_bytes(path).and_then(|bytes| pyp::tile(&bytes)).map_err(|error| error.in_file(path))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
     let unreadable = |error: std::io::Error| {
         let problem = match error.kind() {
             std::io::ErrorKind::NotFound => "no such file".to_owned(),
@@ -159,7 +170,11 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     if !metadata.is_file() {
         return Err(CurveFileError::new(FileLocation::File, "expected a regular file, found a folder, pipe or device"));
     }
-    let bytes = fs::read(path).map_err(unreadable)?;
+    fs::read(path).map_err(unreadable)
+}
+
+fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    let bytes = read_bytes(path)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
         CurveFileError::new(
             FileLocation::File,

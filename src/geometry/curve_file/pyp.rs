@@ -12,11 +12,17 @@
 //! file holds one period.
 
 use arrayvec::ArrayVec;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::repair::{Ends, Repair};
 use super::{CurveFileError, FileLocation, ReadOptions, counted, lines, number, quoted};
-use crate::geometry::curve::{Basis, CurveSet};
+use crate::geometry::{
+    curve::{Basis, CurveSet},
+    pattern::{
+        StrandKind,
+        tile::{Tile, TileStrand},
+    },
+};
 
 const MILLIMETRES_PER_METRE: f64 = 1000.0;
 const CUT_SHORT: &str = "is the file cut short?";
@@ -42,6 +48,32 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         yarn.lay_out(&cell, options.tile, &mut repair)?;
     }
     Ok(CurveSet { unit_mm: Some(MILLIMETRES_PER_METRE), ..repair.finish() })
+}
+
+/// The cell itself, millimetres.
+pub(super) fn tile(bytes: &[u8]) -> Result<Tile, CurveFileError> {
+    let cell = PatternCell::parse(bytes)?;
+    let strand = |yarn: Yarn| {
+        let points = yarn.stops.iter().map(|&(vertex, offset)| place(&cell, vertex, offset));
+        let mut points: Vec<DVec3> = points.collect::<Result<_, _>>()?;
+        let mut step = yarn.shift.map(|s| s as i32);
+        // Which way the file walks along a yarn does not matter.
+        if step[0] < 0 || (step[0] == 0 && step[1] < 0) {
+            points.reverse();
+            step = step.map(|s| -s);
+        }
+        Ok(TileStrand {
+            kind: StrandKind::Course,
+            index: 0,
+            points: points.into_iter().map(|p| p * MILLIMETRES_PER_METRE).collect(),
+            step,
+            radius: cell.radius * MILLIMETRES_PER_METRE,
+            flattening: Vec::new(),
+            coordinates: Vec::new(),
+        })
+    };
+    let strands = cell.yarns().map(strand).collect::<Result<_, CurveFileError>>()?;
+    Ok(Tile::of_strands(DVec2::from(cell.period) * MILLIMETRES_PER_METRE, strands))
 }
 
 /// The file's content, checked: each vertex has one edge that leaves and one that arrives.

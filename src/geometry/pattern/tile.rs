@@ -11,10 +11,15 @@ use super::{
     StrandKind,
     chart::ChartError,
     knit::Knit,
+    overlap::{Overlap, overlap},
     relax::{Ends, Relaxation, Rope},
     weave::{TooTight, Weave},
 };
-use crate::geometry::{chain::spline_through, curve::Basis, spline::evaluate};
+use crate::geometry::{
+    chain::spline_through,
+    curve::{Basis, Curve},
+    spline::evaluate,
+};
 
 /// A periodic patch of cloth in the plane z = 0, right side towards +z, its lower left corner at the origin.
 #[derive(Clone, Debug)]
@@ -124,7 +129,6 @@ impl Tile {
 
     /// A tile of endless yarns of which nothing else is known: stitches and rows are counted from their shape.
     pub fn of_strands(period: DVec2, mut strands: Vec<TileStrand>) -> Self {
-        // Most start at their lower left.
         let upright = |s: &TileStrand| s.step[0] == 0 && s.step[1] != 0;
         let warps = strands.iter().filter(|s| upright(s)).count() as u32;
         let across = strands.iter().filter(|s| s.step[0] != 0).map(|s| s.step[0].unsigned_abs()).sum::<u32>().max(1);
@@ -136,6 +140,25 @@ impl Tile {
         let counts = [columns.max(1), across];
         let (mut warp, mut row) = (0, 0);
         let stitch = period / DVec2::new(f64::from(counts[0]), f64::from(counts[1]));
+        // The middle of the lowest row, and of the leftmost warp, half a stitch from the corner.
+        let middle = |s: &TileStrand| s.points.iter().sum::<DVec3>() / s.points.len().max(1) as f64;
+        let least = |axis: usize, upright_ones: bool| {
+            let own = strands.iter().filter(|s| upright(s) == upright_ones && s.step != [0, 0]);
+            own.map(|s| middle(s)[axis].rem_euclid(period[axis])).reduce(f64::min)
+        };
+        let corner = DVec2::new(
+            least(0, true).map_or(0.0, |x| x - 0.5 * stitch.x),
+            least(1, false).map_or(0.0, |y| y - 0.5 * stitch.y),
+        );
+        for strand in &mut strands {
+            let to = DVec2::new(middle(strand).x, middle(strand).y) - corner + 1e-6 * stitch;
+            let mut shift = -(to / period).floor() * period;
+            // Along its own way a yarn may begin anywhere.
+            shift[usize::from(upright(strand))] = 0.0;
+            strand.points.iter_mut().for_each(|p| *p += (shift - corner).extend(0.0));
+        }
+        let order = |s: &TileStrand| middle(s)[usize::from(!upright(s))];
+        strands.sort_by(|a, b| upright(a).cmp(&upright(b)).then(order(a).total_cmp(&order(b))));
         for strand in &mut strands {
             let number = if upright(strand) { &mut warp } else { &mut row };
             strand.index = *number;
@@ -205,6 +228,23 @@ impl Tile {
             strand.points = rope.points.into_iter().map(|p| p * diameter).collect();
         }
         out
+    }
+
+    /// How far its yarns run into each other, lying flat.
+    pub fn overlap(&self) -> Option<Overlap> {
+        // Enough of it that most of the yarn has all its neighbours.
+        let count = (16.0 * self.diameter() / self.period).ceil().max(DVec2::splat(3.0)).as_uvec2();
+        let piece = self.repeated(count.x, count.y);
+        let curves: Vec<(Curve, Vec<f64>)> = piece
+            .strands
+            .into_iter()
+            .map(|s| {
+                let radii = vec![s.radius; s.points.len()];
+                let closed = s.step == [0, 0];
+                (Curve { basis: Basis::CatmullRom, closed, points: s.points, radii: None, flattening: None }, radii)
+            })
+            .collect();
+        overlap(curves.iter().map(|(curve, radii)| (curve, radii.as_slice())))
     }
 
     /// So many tiles beside and above each other as one: what is relaxed must not meet its own images.
@@ -409,6 +449,8 @@ mod tests {
     fn a_knit_gives_its_repeat() {
         let tile = stockinette();
         assert!((tile.stitch() - 0.5 * DVec2::new(STITCH_WIDTH, ROW_HEIGHT)).length() < 1e-9, "{}", tile.stitch());
+        let found = tile.overlap().unwrap();
+        assert!(found.share < 0.05 && found.nearest < 1.1, "{found:?}");
         let per_stitch = tile.length() / f64::from(tile.counts[0] * tile.counts[1]) / 0.5;
         assert!((per_stitch - YARN_PER_STITCH).abs() < 0.4, "{per_stitch}");
         assert_eq!(tile.strands.len(), tile.counts[1] as usize);

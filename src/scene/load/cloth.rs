@@ -9,9 +9,10 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    super::{CurveKind, Fabric, FabricMotion, Mode, Yarn, defaults, transform_curves},
+    super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Mode, Yarn, defaults, transform_curves},
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan, FabricCoordinates},
+    garment::{self, GarmentPlan},
     pattern::{self, KnitPlan, WeavePlan},
     placement, radians, sequence,
     yarns::Library,
@@ -41,6 +42,8 @@ pub(super) struct Detail {
     pub(super) can_move: bool,
     /// When it opens and closes, in frames from the frame's own time.
     pub(super) shutter: Option<[f64; 2]>,
+    /// Whether garments are only measured, not laid.
+    pub(super) survey: bool,
 }
 
 impl Detail {
@@ -55,7 +58,7 @@ impl Detail {
         });
         let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(defaults::FRAME, |f| f as u32);
         let can_move = table.is_none_or(|t| t.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name());
-        Self { basis, tolerance, longest_segment, frame, can_move, shutter: None }
+        Self { basis, tolerance, longest_segment, frame, can_move, shutter: None, survey: false }
     }
 }
 
@@ -63,6 +66,7 @@ enum Source {
     File(CurveFile),
     Knit(KnitPlan),
     Weave(WeavePlan),
+    Garment(GarmentPlan),
     Straight { count: u32, length: f64, spacing: f64 },
 }
 
@@ -147,7 +151,7 @@ pub(super) fn plan(
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
             let fallback = if fiber.is_some() { defaults::FIBER_RADIUS } else { 0.5 };
             let known = Yarns { library, own, radius, fallback };
-            source(source_table, context, &known, curves)
+            source(source_table, &table, context, &known, curves)
         }
         None if curves.is_some() => {
             curves.map(|path| file_source(path.to_owned(), table.header(), None, None, context))
@@ -216,8 +220,14 @@ impl Yarns<'_> {
     }
 }
 
-fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: Option<&Path>) -> Option<Source> {
-    let kinds = [("file", 0), ("knit", 1), ("weave", 2), ("straight", 3), ("stockinette", 4)];
+fn source(
+    table: Reader<'_>,
+    fabric: &Reader<'_>,
+    context: &Context<'_>,
+    yarns: &Yarns<'_>,
+    curves: Option<&Path>,
+) -> Option<Source> {
+    let kinds = [("file", 0), ("knit", 1), ("weave", 2), ("straight", 3), ("stockinette", 4), ("garment", 5)];
     let kind = table.kind("type", &kinds);
     let header = table.header();
     let made = match kind {
@@ -244,6 +254,7 @@ fn source(table: Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>, curves: O
         Some(2) => pattern::weave(&table, context, yarns).map(Source::Weave),
         // Short for a flat knit of that pattern.
         Some(4) => pattern::stockinette(&table).map(Source::Knit),
+        Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
         Some(3) => Some(Source::Straight {
             count: table.u64_or("count", 1, 1..=1_000_000) as u32,
             length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
@@ -266,6 +277,22 @@ struct Made {
     curves: Vec<(Curve, Vec<f64>)>,
     /// Where their points are in the cloth, if that is known.
     coordinates: Option<FabricCoordinates>,
+    /// Their colours, if they are not the fabric's.
+    color: Option<ColorPlan>,
+    motion: FabricMotion,
+    /// Whether there are no more points than are needed.
+    exact: bool,
+}
+
+impl Made {
+    fn new(
+        origin: String,
+        kind: CurveKind,
+        curves: Vec<(Curve, Vec<f64>)>,
+        coordinates: Option<FabricCoordinates>,
+    ) -> Self {
+        Self { origin, kind, curves, coordinates, color: None, motion: FabricMotion::default(), exact: false }
+    }
 }
 
 impl FabricPlan {
@@ -277,6 +304,7 @@ impl FabricPlan {
         library: &Library,
         detail: &Detail,
         warnings: &mut Vec<String>,
+        garments: &mut Vec<GarmentFacts>,
     ) -> Option<Vec<Fabric>> {
         let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(CurveKind::Yarn);
         let (kind, own_radius) = match &self.kind {
@@ -293,16 +321,28 @@ impl FabricPlan {
             };
             curves.into_iter().map(with).collect()
         };
-        let mut motion = FabricMotion::default();
         let made = match self.source {
+            Source::Garment(plan) => {
+                let (tension, places) = (self.color.tension(), self.color.needs_places());
+                let (panels, facts) = {
+                    let name = match &self.kind {
+                        KindName::Yarn(name) | KindName::Fiber(name) => name.as_str(),
+                    };
+                    plan.make((name, radius), tension, places, context, library, detail, warnings)?
+                };
+                garments.push(facts);
+                panels
+                    .into_iter()
+                    .map(|panel| {
+                        let kind = panel.yarn.as_deref().map_or(Some(kind), place_of)?;
+                        let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
+                        Some(Made { color: panel.color, motion: panel.motion, exact: true, ..made })
+                    })
+                    .collect::<Option<Vec<Made>>>()?
+            }
             Source::Knit(plan) => {
                 let (curves, coordinates) = plan.curves(2.0 * radius, context)?;
-                vec![Made {
-                    origin: plan.origin(),
-                    kind,
-                    curves: with_radius(curves, radius),
-                    coordinates: Some(coordinates),
-                }]
+                vec![Made::new(plan.origin(), kind, with_radius(curves, radius), Some(coordinates))]
             }
             Source::Weave(plan) => {
                 let [(warps, mut coordinates), (wefts, weft_coordinates)] = plan.curves(context)?;
@@ -312,19 +352,19 @@ impl FabricPlan {
                 if weft == kind {
                     warps.extend(wefts);
                     coordinates.join(weft_coordinates);
-                    vec![Made { origin: plan.origin(), kind, curves: warps, coordinates: Some(coordinates) }]
+                    vec![Made::new(plan.origin(), kind, warps, Some(coordinates))]
                 } else {
                     let (warp_origin, weft_origin) =
                         (format!("{}, warp", plan.origin()), format!("{}, weft", plan.origin()));
                     vec![
-                        Made { origin: warp_origin, kind, curves: warps, coordinates: Some(coordinates) },
-                        Made { origin: weft_origin, kind: weft, curves: wefts, coordinates: Some(weft_coordinates) },
+                        Made::new(warp_origin, kind, warps, Some(coordinates)),
+                        Made::new(weft_origin, weft, wefts, Some(weft_coordinates)),
                     ]
                 }
             }
             Source::Straight { count, length, spacing } => {
                 let curves = with_radius(straight(count, length, spacing), radius);
-                vec![Made { origin: format!("{count} straight"), kind, curves, coordinates: None }]
+                vec![Made::new(format!("{count} straight"), kind, curves, None)]
             }
             Source::File(file) => {
                 let mut read = |path: &Path| {
@@ -345,14 +385,13 @@ impl FabricPlan {
                     }
                     Some(curves)
                 };
-                let (path, curves, of_file) = sequence::read(&file, detail, context, &mut read)?;
-                motion = of_file;
-                vec![Made { origin: path.display().to_string(), kind, curves, coordinates: None }]
+                let (path, curves, motion) = sequence::read(&file, detail, context, &mut read)?;
+                vec![Made { motion, ..Made::new(path.display().to_string(), kind, curves, None) }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
         let name = self.name.unwrap_or_else(|| self.kind.into_name());
-        let fabric = |Made { origin, kind, curves, coordinates }: Made| {
+        let fabric = |Made { origin, kind, curves, coordinates, color, motion, exact }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -364,17 +403,17 @@ impl FabricPlan {
                 origin,
                 kind,
                 curves,
-                motion: std::mem::take(&mut motion),
+                motion,
                 variants: Vec::new(),
                 material_indices: Vec::new(),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
-                tolerance: detail.tolerance,
+                tolerance: if exact { 0.0 } else { detail.tolerance },
                 longest_segment: detail.longest_segment,
             };
             fabric.transform(&self.transform);
-            self.color.apply(
+            color.as_ref().unwrap_or(&self.color).apply(
                 &mut fabric,
                 |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
                 context,

@@ -19,6 +19,7 @@ use super::{
 use crate::{
     geometry::{
         curve::Curve,
+        garment::Tension,
         pattern::{PatternStrand, StrandKind},
     },
     image::{self, png::srgb_to_linear, texture::Texture},
@@ -62,6 +63,13 @@ impl FabricCoordinates {
         (curves.collect(), grid)
     }
 
+    /// That of yarns laid on a garment, by stitches and rows from the corner of each panel.
+    pub(super) fn laid(points: Vec<Vec<[f32; 2]>>, kinds: Vec<StrandKind>) -> Self {
+        let most = |k: usize| points.iter().flatten().map(|c| c[k]).fold(1.0, f32::max).ceil();
+        let extent = [most(0), most(1)];
+        Self { points, kinds, extent }
+    }
+
     /// Of the curves of both, this one's first.
     pub(super) fn join(&mut self, other: Self) {
         self.points.extend(other.points);
@@ -102,6 +110,8 @@ struct Motif {
     /// Of an image: drawn once over the whole fabric, not a pixel for each stitch.
     stretched: bool,
     offset: [i64; 2],
+    /// Whether it begins anew across and up.
+    again: [bool; 2],
     span: Span,
 }
 
@@ -137,6 +147,8 @@ struct Variation {
     phase: f64,
     /// Of the colour, relative.
     color: f64,
+    /// Of the size of loops, on garments.
+    tension: f64,
 }
 
 /// The colour work of a fabric as it is written.
@@ -186,8 +198,9 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
         let radius = vary.f64_or("radius", 0.0, Range::between(0.0, 0.5));
         let phase = radians(vary.f64_or("phase", 0.0, Range::between(0.0, 360.0)));
         let color = vary.f64_or("color", 0.0, Range::between(0.0, 1.0));
+        let tension = vary.f64_or("tension", 0.0, Range::between(0.0, 0.2));
         vary.finish();
-        Variation { seed, radius, phase, color }
+        Variation { seed, radius, phase, color, tension }
     });
     ColorPlan { layout, tint, variation, header: table.header() }
 }
@@ -204,6 +217,8 @@ fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&str, Span)) -
     let rows = table.strings("rows");
     let image = table.string("image").map(|p| context.resolve(p, table.span("image").unwrap_or(table.header())));
     let stretched = table.one_of_or("fit", false, &[("stitch", false), ("fabric", true)]);
+    let repeats = [("both", [true; 2]), ("across", [true, false]), ("up", [false, true]), ("none", [false; 2])];
+    let again = table.one_of_or("repeat", [true; 2], &repeats);
     let offset = table.vec2("offset", Range::between(-1e6, 1e6)).unwrap_or([0.0; 2]).map(|o| o.round() as i64);
     let mut key = Vec::new();
     if let Some(yarns) = table.required_table("yarns") {
@@ -250,7 +265,7 @@ fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&str, Span)) -
         }
     };
     table.finish();
-    Some(Motif { cells: cells?, key, stretched, offset, span })
+    Some(Motif { cells: cells?, key, stretched, offset, again, span })
 }
 
 /// `#rrggbb`, as sRGB.
@@ -267,18 +282,26 @@ struct CellMap {
     /// Rows from the bottom.
     cells: Vec<usize>,
     offset: [i64; 2],
+    /// Whether it begins anew across and up, and what is where it does not.
+    again: [bool; 2],
+    ground: usize,
 }
 
 impl CellMap {
     fn at(&self, x: f32, y: f32) -> usize {
-        let cell = |v: f32, offset: i64, n: usize| (v.floor() as i64 - offset).rem_euclid(n as i64) as usize;
-        let (x, y) = (cell(x, self.offset[0], self.width), cell(y, self.offset[1], self.height));
-        self.cells[y * self.width + x]
+        let place = |v: f32, offset: i64| v.floor() as i64 - offset;
+        let (x, y) = (place(x, self.offset[0]), place(y, self.offset[1]));
+        let (w, h) = (self.width as i64, self.height as i64);
+        let outside = |v: i64, n: i64, again: bool| !again && !(0..n).contains(&v);
+        if outside(x, w, self.again[0]) || outside(y, h, self.again[1]) {
+            return self.ground;
+        }
+        self.cells[(y.rem_euclid(h) * w + x.rem_euclid(w)) as usize]
     }
 }
 
 impl Motif {
-    fn cells(&self, extent: [f32; 2], yarns: &[usize]) -> Result<CellMap, String> {
+    fn cells(&self, extent: [f32; 2], yarns: &[usize], ground: usize) -> Result<CellMap, String> {
         match &self.cells {
             Cells::Text(rows) => {
                 let width = rows[0].chars().count();
@@ -287,14 +310,14 @@ impl Motif {
                     place.map_or(yarns[0], |p| yarns[p])
                 };
                 let cells = rows.iter().rev().flat_map(|row| row.chars().map(yarn)).collect();
-                Ok(CellMap { width, height: rows.len(), cells, offset: self.offset })
+                Ok(CellMap { width, height: rows.len(), cells, offset: self.offset, again: self.again, ground })
             }
-            Cells::Image(path) => self.image(path, extent, yarns),
+            Cells::Image(path) => self.image(path, extent, yarns, ground),
         }
     }
 
     /// A cell for each pixel, or for each stitch the mean of the pixels over it; the yarn of the nearest colour.
-    fn image(&self, path: &Path, extent: [f32; 2], yarns: &[usize]) -> Result<CellMap, String> {
+    fn image(&self, path: &Path, extent: [f32; 2], yarns: &[usize], ground: usize) -> Result<CellMap, String> {
         let picture = image::read(path).map_err(|e| e.to_string())?;
         let [r, g, b] = picture.rgb().ok_or_else(|| format!("{}: no colour channels", path.display()))?;
         let (w, h) = (picture.width, picture.height);
@@ -326,11 +349,22 @@ impl Motif {
                 cells.push(yarns[nearest.unwrap_or(0)]);
             }
         }
-        Ok(CellMap { width, height, cells, offset: self.offset })
+        Ok(CellMap { width, height, cells, offset: self.offset, again: self.again, ground })
     }
 }
 
 impl ColorPlan {
+    /// How loops of a garment vary, if they do.
+    pub(super) fn tension(&self) -> Option<Tension> {
+        self.variation.filter(|v| v.tension > 0.0).map(|v| Tension { seed: v.seed, spread: v.tension })
+    }
+
+    /// Whether colours depend on places in the cloth.
+    pub(super) fn needs_places(&self) -> bool {
+        let Layout { rows, columns, motif } = &self.layout;
+        !rows.is_empty() || !columns.is_empty() || motif.is_some() || self.tint.is_some()
+    }
+
     /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them.
     pub(super) fn apply(
         &self,
@@ -407,13 +441,13 @@ impl ColorPlan {
         let list = |names: &[String], across: bool| {
             let cells: Vec<usize> = if names.is_empty() { vec![base] } else { names.iter().map(index_of).collect() };
             let (width, height) = if across { (cells.len(), 1) } else { (1, cells.len()) };
-            CellMap { width, height, cells, offset: [0; 2] }
+            CellMap { width, height, cells, offset: [0; 2], again: [true; 2], ground: base }
         };
         let motif = match motif {
             None => None,
             Some(motif) => {
                 let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| index_of(name)).collect();
-                match motif.cells(coordinates.extent, &yarns) {
+                match motif.cells(coordinates.extent, &yarns, base) {
                     Ok(cells) => Some(cells),
                     Err(problem) => {
                         context.error(motif.span, problem, None);
@@ -563,7 +597,7 @@ mod tests {
 
     fn motif(cells: Cells, key: [&str; 2], stretched: bool) -> Motif {
         let key = key.map(|k| (k.to_owned(), String::new())).to_vec();
-        Motif { cells, key, stretched, offset: [0; 2], span: span() }
+        Motif { cells, key, stretched, offset: [0; 2], again: [true; 2], span: span() }
     }
 
     /// The cells of a map as they are seen, the top row first.
@@ -578,11 +612,11 @@ mod tests {
     fn a_motif_stands_upright_and_repeats() {
         let rows = LETTER.map(str::to_owned).to_vec();
         let mut letter = motif(Cells::Text(rows), [".", "#"], false);
-        let map = letter.cells([8.0, 5.0], &[0, 1]).unwrap();
+        let map = letter.cells([8.0, 5.0], &[0, 1], 0).unwrap();
         assert_eq!(drawn(&map, 4, 5), LETTER);
         assert_eq!(drawn(&map, 8, 1), ["#...#..."]);
         letter.offset = [1, 0];
-        let map = letter.cells([8.0, 5.0], &[0, 1]).unwrap();
+        let map = letter.cells([8.0, 5.0], &[0, 1], 0).unwrap();
         assert_eq!(drawn(&map, 4, 1), [".#.."]);
     }
 
@@ -604,14 +638,14 @@ mod tests {
         }
         encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
         let stretched = motif(Cells::Image(path.clone()), ["#ffffff", "#c02020"], true);
-        let map = stretched.cells([4.0, 5.0], &[0, 1]).unwrap();
+        let map = stretched.cells([4.0, 5.0], &[0, 1], 0).unwrap();
         assert_eq!(drawn(&map, 4, 5), LETTER);
         let pixels = motif(Cells::Image(path), ["#ffffff", "#c02020"], false);
-        let map = pixels.cells([4.0, 5.0], &[0, 1]).unwrap();
+        let map = pixels.cells([4.0, 5.0], &[0, 1], 0).unwrap();
         assert_eq!(drawn(&map, 12, 15)[0], "#.##.##.##.#".replace('.', "#"));
         assert_eq!(drawn(&map, 12, 15)[1], "#.##.##.##.#");
         let absent = motif(Cells::Image(folder.path().join("no.png")), ["#ffffff", "#000000"], true);
-        assert!(absent.cells([4.0, 5.0], &[0, 1]).is_err());
+        assert!(absent.cells([4.0, 5.0], &[0, 1], 0).is_err());
     }
 
     #[test]
@@ -622,7 +656,7 @@ mod tests {
 
     #[test]
     fn shades_have_the_spread_that_is_asked_for() {
-        let variation = Variation { seed: 1, radius: 0.0, phase: 0.0, color: 0.1 };
+        let variation = Variation { seed: 1, radius: 0.0, phase: 0.0, color: 0.1, tension: 0.0 };
         let all: Vec<f64> = (0..SHADES).map(|s| f64::from(shine(variation, s))).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let deviation = (all.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / all.len() as f64).sqrt();

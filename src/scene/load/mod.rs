@@ -6,6 +6,7 @@
 mod cloth;
 mod color;
 mod definitions;
+mod garment;
 mod mesh;
 mod motion;
 mod pattern;
@@ -49,6 +50,8 @@ pub struct LoadOptions {
     pub curves: Option<PathBuf>,
     /// `--frame`: the camera frames what there is.
     pub frame: bool,
+    /// Measure garments, but lay no yarns on them: they are in [`Scene::garments`] only.
+    pub survey: bool,
 }
 
 /// Why a scene could not be loaded: text for the user, one or more messages with their places.
@@ -302,6 +305,7 @@ impl Plans {
         let materials = mesh::materials(root, context);
         let meshes = mesh::meshes(root, context, &materials);
         let camera = view::camera(root, context, options.frame);
+        detail.survey = options.survey;
         detail.shutter = camera.as_ref().and_then(|camera| camera.motion.shutter);
         let lights = view::lights(root, context);
         let ground = view::ground(root, context, &materials);
@@ -311,9 +315,10 @@ impl Plans {
     /// Reads the files; what is wrong with them is told.
     fn make(self, name: &str, context: &Context<'_>) -> Option<SceneBuilder> {
         let mut warnings = Vec::new();
+        let mut garments = Vec::new();
         let fabrics = self.fabrics.into_iter().flatten().enumerate();
         let fabrics = fabrics
-            .filter_map(|(i, plan)| plan.make(i, context, &self.library, &self.detail, &mut warnings))
+            .filter_map(|(i, plan)| plan.make(i, context, &self.library, &self.detail, &mut warnings, &mut garments))
             .flatten()
             .collect();
         let mut made = Vec::new();
@@ -332,6 +337,7 @@ impl Plans {
             materials: made.into_iter().map(|(_, material)| material).collect(),
             lights,
             ground,
+            garments,
             warnings,
         })
     }

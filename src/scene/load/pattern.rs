@@ -47,8 +47,8 @@ impl KnitPlan {
     }
 }
 
-/// Reads the keys of a knit.
-pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
+/// `pattern` or `chart`: its name, the chart, and where its rows were written.
+pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Chart>, Vec<Span>) {
     let chart_rows = table.strings("chart");
     if table.has("chart") && chart_rows.is_empty() {
         // A value of another type is told already.
@@ -83,6 +83,12 @@ pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>)
             }
         }
     };
+    (name.to_owned(), chart, chart_rows.iter().map(|(_, span)| *span).collect())
+}
+
+/// Reads the keys of a knit.
+pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
+    let (name, chart, lines) = chart(table, context);
     let profile = table.pairs("profile", Range::FINITE);
     let forms = [("flat", 0), ("tube", 1), ("revolution", 2)];
     let form = match table.one_of_or("form", if profile.is_some() { 2 } else { 0 }, &forms) {
@@ -93,14 +99,13 @@ pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>)
     if let (Some(Form::Flat | Form::Tube), true) = (&form, profile.is_some()) {
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
-    let lines = chart_rows.iter().map(|(_, span)| *span).collect();
-    let rows = if lines_are_all(&form, &chart_rows) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
-    counted(table, chart, form, name, rows, lines)
+    let rows = if lines_are_all(&form, &lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
+    counted(table, chart, form, &name, rows, lines)
 }
 
 /// Shaped pieces are knitted once, from the first row of the chart to the last.
-fn lines_are_all(form: &Option<Form>, chart_rows: &[(&str, Span)]) -> bool {
-    matches!(form, Some(Form::Revolution(_))) && !chart_rows.is_empty()
+fn lines_are_all(form: &Option<Form>, lines: &[Span]) -> bool {
+    matches!(form, Some(Form::Revolution(_))) && !lines.is_empty()
 }
 
 /// `type = "stockinette"`: a flat knit of that pattern.
@@ -219,7 +224,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
 }
 
 /// `draft`: a name, or rows of a matrix.
-fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
+pub(super) fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
     let rows = table.strings("draft");
     let read: Result<(String, Draft), DraftError> = match rows.as_slice() {
         [] if table.has("draft") => {

@@ -102,7 +102,7 @@ pub(super) fn read(
 }
 
 /// Times at which to know the curves, evenly spaced from the opening of the shutter to its closing, in frames.
-fn times(frame: u32, shutter: Option<[f64; 2]>) -> Vec<f64> {
+pub(super) fn times(frame: u32, shutter: Option<[f64; 2]>) -> Vec<f64> {
     let frame = f64::from(frame);
     let Some([open, close]) = shutter else { return vec![frame] };
     let (open, close) = (frame + open, frame + close);

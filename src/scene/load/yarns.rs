@@ -305,6 +305,7 @@ fn yarn(
     fibers: &BTreeMap<String, FiberMaterial>,
     tilted: bool,
 ) -> Option<Yarn> {
+    let tex = table.f64("tex", Range::POSITIVE);
     let radius = table.f64("radius", Range::POSITIVE);
     let ply_twist = table.f64_or("ply_twist", 0.0, TWIST);
     let distance = table.f64("ply_distance", Range::at_least(0.0));
@@ -347,6 +348,7 @@ fn yarn(
         fibers: materials,
         placement,
         flyaways,
+        tex,
         tilted,
     })
 }

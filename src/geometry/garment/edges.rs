@@ -1,0 +1,235 @@
+//! What ends cloth: chains along free edges, overcast edges of weaves, and the yarns of seams.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{lay::LaidYarn, surface::Pose};
+use crate::geometry::pattern::{StrandKind, tile::chain};
+
+/// How panels are sewn together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SeamKind {
+    /// They only meet.
+    None,
+    /// A yarn goes to and fro behind both edges, and is not seen from the right side.
+    Mattress,
+    /// Threads over and over both edges on the wrong side.
+    Overlock,
+}
+
+/// A way along the edge of cloth: fine vertices of the sewn mesh one after the other, the cloth to the left.
+#[derive(Clone, Debug)]
+pub(super) struct Way {
+    pub(super) vertices: Vec<u32>,
+    pub(super) closed: bool,
+    /// The panel to the left, of the first edge.
+    pub(super) panel: u32,
+}
+
+/// Joins edges `[from, to]` of one kind to ways.
+pub(super) fn ways(edges: &[([u32; 2], u32, Option<u32>)]) -> Vec<Way> {
+    // Of a branching only one way goes on.
+    let mut next: HashMap<u32, usize> = HashMap::with_capacity(edges.len());
+    let mut before: HashMap<u32, usize> = HashMap::with_capacity(edges.len());
+    for (i, (ends, ..)) in edges.iter().enumerate() {
+        next.entry(ends[0]).or_insert(i);
+        before.entry(ends[1]).or_insert(i);
+    }
+    let mut used = vec![false; edges.len()];
+    let mut out = Vec::new();
+    // Open ways from their starts, then what is left: rings.
+    for starts_only in [true, false] {
+        for start in 0..edges.len() {
+            if used[start] || (starts_only && before.contains_key(&edges[start].0[0])) {
+                continue;
+            }
+            let mut vertices = vec![edges[start].0[0]];
+            let mut at = start;
+            loop {
+                used[at] = true;
+                vertices.push(edges[at].0[1]);
+                match next.get(&edges[at].0[1]) {
+                    Some(&i) if !used[i] => at = i,
+                    _ => break,
+                }
+            }
+            let closed = vertices.len() > 3 && vertices[0] == vertices[vertices.len() - 1];
+            out.push(Way { vertices, closed, panel: edges[start].1 });
+        }
+    }
+    out
+}
+
+/// A way in one frame, walked by its length.
+struct Rail<'a> {
+    pose: &'a Pose,
+    way: &'a Way,
+    lengths: Vec<f64>,
+}
+
+impl<'a> Rail<'a> {
+    fn new(pose: &'a Pose, way: &'a Way) -> Self {
+        let mut lengths = vec![0.0];
+        for pair in way.vertices.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|v| pose.vertex(v).0);
+            lengths.push(lengths[lengths.len() - 1] + a.distance(b));
+        }
+        Self { pose, way, lengths }
+    }
+
+    fn length(&self) -> f64 {
+        self.lengths[self.lengths.len() - 1]
+    }
+
+    /// Position at a share of the length, and unit vectors along, inwards (to the left) and out.
+    fn at(&self, share: f64) -> [DVec3; 4] {
+        let total = self.length();
+        let share = if self.way.closed { share.rem_euclid(1.0) } else { share };
+        let s = share * total;
+        let n = self.lengths.len();
+        let i = self.lengths.partition_point(|&l| l <= s).clamp(1, n - 1) - 1;
+        let t = (s - self.lengths[i]) / (self.lengths[i + 1] - self.lengths[i]).max(1e-300);
+        let vertex = |k: isize| {
+            let last = n as isize - 1;
+            let k = if self.way.closed { k.rem_euclid(last) } else { k.clamp(0, last) };
+            self.pose.vertex(self.way.vertices[k as usize])
+        };
+        let i = i as isize;
+        let ((a, na), (b, nb)) = (vertex(i), vertex(i + 1));
+        let direction = |k: isize| (vertex(k + 1).0 - vertex(k - 1).0).normalize_or(DVec3::X);
+        let along = direction(i).lerp(direction(i + 1), t.clamp(0.0, 1.0)).normalize_or(DVec3::X);
+        // Smoothly through the vertices: Hermite with directions of both ends.
+        let chord = a.distance(b);
+        let (h, t1) = (t.clamp(0.0, 1.0), t - t.clamp(0.0, 1.0));
+        let (h2, h3) = (h * h, h * h * h);
+        let at = a * (2.0 * h3 - 3.0 * h2 + 1.0)
+            + b * (3.0 * h2 - 2.0 * h3)
+            + direction(i) * chord * (h3 - 2.0 * h2 + h)
+            + direction(i + 1) * chord * (h3 - h2)
+            + along * (t1 * chord);
+        let out = na.lerp(nb, h);
+        let out = (out - out.dot(along) * along).normalize_or(DVec3::Y);
+        [at, along, out.cross(along), out]
+    }
+
+    /// A place so many steps along, mm in and out.
+    fn place(&self, share: f64, inward: f64, out: f64) -> DVec3 {
+        let [at, _, to_left, up] = self.at(share);
+        at + to_left * inward + up * out
+    }
+}
+
+/// What runs along a way.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Finish {
+    /// Links of a chain, so far apart, mm, of yarn of a radius.
+    Chain { link: f64, radius: f64 },
+    /// Thread over and over the edge, as far in as `reach`.
+    Overcast { radius: f64, reach: f64 },
+    /// To and fro behind a seam, a turn each `step`.
+    Mattress { step: f64, radius: f64 },
+    /// Over both edges behind a seam.
+    Overlock { radius: f64, reach: f64 },
+}
+
+/// Length of a link as it relaxes, in diameters.
+const LINK: f64 = 3.2;
+/// A chain's middle is so far inside the edge, in diameters of its yarn.
+pub(super) const CHAIN_INSIDE: f64 = 1.1;
+
+/// The yarns along some ways in all frames: for each frame the same yarns.
+pub(super) fn finish(poses: &[Pose], ways: &[(Way, Finish)]) -> Vec<Vec<LaidYarn>> {
+    let counts: Vec<usize> = ways
+        .iter()
+        .map(|(way, finish)| {
+            // As many links in all frames as in the first.
+            let length = Rail::new(&poses[0], way).length();
+            let step = match finish {
+                Finish::Chain { link, .. } => *link,
+                Finish::Overcast { radius, .. } => 2.6 * radius,
+                Finish::Mattress { step, .. } => *step,
+                Finish::Overlock { radius, .. } => 6.0 * radius,
+            };
+            ((length / step).round() as usize).max(1)
+        })
+        .collect();
+    let link = chain(LINK);
+    poses
+        .iter()
+        .map(|pose| {
+            let one = |((way, finish), &count): (&(Way, Finish), &usize)| {
+                let rail = Rail::new(pose, way);
+                let (points, radius) = points(&rail, finish, count, &link);
+                LaidYarn { points, closed: way.closed, radius, kind: StrandKind::Course, coordinates: Vec::new() }
+            };
+            ways.par_iter().zip(&counts).map(one).collect()
+        })
+        .collect()
+}
+
+fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Vec<DVec3>, f64) {
+    let share = |step: f64| step / count as f64;
+    let mut out = Vec::new();
+    let radius = match *finish {
+        Finish::Chain { radius, .. } => {
+            let d = 2.0 * radius;
+            for i in 0..count {
+                for p in link {
+                    let along = i as f64 + p.x / LINK;
+                    // An open chain's last loop ends in its last link.
+                    if !rail.way.closed && along > count as f64 {
+                        continue;
+                    }
+                    out.push(rail.place(share(along), d * (CHAIN_INSIDE + p.y), d * p.z));
+                }
+            }
+            radius
+        }
+        Finish::Overcast { radius, reach } => {
+            // Round the edge: eight places of each turn.
+            for i in 0..count * 8 {
+                let turn = i as f64 / 8.0;
+                let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+                out.push(rail.place(share(turn), 0.5 * reach * (1.0 - cos) - radius, 0.5 * reach * sin));
+            }
+            radius
+        }
+        Finish::Mattress { step: _, radius } => {
+            let d = 2.0 * radius;
+            for i in 0..count {
+                for (along, side, deep) in [
+                    (0.0, 1.3, 1.5),
+                    (0.2, 1.0, 1.7),
+                    (0.5, 0.0, 1.75),
+                    (0.7, -1.0, 1.7),
+                    (0.8, -1.3, 1.5),
+                    (0.9, -1.0, 1.6),
+                ] {
+                    out.push(rail.place(share(i as f64 + along), side * d, -deep * d));
+                }
+            }
+            radius
+        }
+        Finish::Overlock { radius, reach } => {
+            let d = 2.0 * radius;
+            for i in 0..count {
+                for (along, side, deep) in [
+                    (0.0, 1.0, 1.0),
+                    (0.15, 0.95, 1.9),
+                    (0.3, 0.0, 2.2),
+                    (0.45, -0.95, 1.9),
+                    (0.5, -1.0, 1.0),
+                    (0.65, -0.95, 1.7),
+                    (0.8, 0.0, 2.0),
+                    (0.95, 0.95, 1.7),
+                ] {
+                    out.push(rail.place(share(i as f64 + along), side * reach, -(deep * d + 0.4 * reach)));
+                }
+            }
+            radius
+        }
+    };
+    (out, radius)
+}

@@ -1,0 +1,311 @@
+//! Yarns of a panel: rows across it, turned at their ends, or warps and wefts.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    lattice::{Lattice, Sheet},
+    strain::{Shape, Shapes},
+};
+use crate::{
+    geometry::pattern::StrandKind,
+    math::{
+        sampler::{Stream, hash2},
+        warp::normal,
+    },
+};
+
+/// A yarn as it lies, a B-spline.
+#[derive(Clone, Debug)]
+pub struct LaidYarn {
+    /// Control points, mm.
+    pub points: Vec<DVec3>,
+    /// Whether the last is followed by the first.
+    pub closed: bool,
+    /// Outer radius, mm.
+    pub radius: f64,
+    /// What it is in the cloth.
+    pub kind: StrandKind,
+    /// At each control point its stitch and row from the panel's lower left corner; empty where it was not asked for.
+    pub coordinates: Vec<[f32; 2]>,
+}
+
+/// How loops differ from stitch to stitch and from row to row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tension {
+    /// Start of what is random.
+    pub seed: u32,
+    /// Standard deviation of the size of loops.
+    pub spread: f64,
+}
+
+/// A run of stitches of a line, walked forwards or backwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    line: usize,
+    first: usize,
+    last: usize,
+    backwards: bool,
+    /// It goes round and meets itself.
+    ring: bool,
+}
+
+impl Run {
+    /// The corner at which it ends, in stitches.
+    fn end(&self) -> usize {
+        if self.backwards { self.first } else { self.last }
+    }
+
+    fn start(&self) -> usize {
+        if self.backwards { self.last } else { self.first }
+    }
+}
+
+/// A yarn goes on over so many stitches, then another begins: pieces of work for all threads.
+const LONGEST: usize = 6000;
+/// A row's end and the next row's are joined if they are no further apart, in stitches.
+const FURTHEST: usize = 3;
+
+/// Lays the yarns of a panel in several frames at once: for each frame the same yarns.
+pub(super) fn lay(
+    sheets: &[Sheet<'_>],
+    shapes: &Shapes,
+    tension: Option<Tension>,
+    coordinates: bool,
+) -> Vec<Vec<LaidYarn>> {
+    let lattice = sheets[0].lattice;
+    let chains: Vec<(usize, Vec<Run>)> = (0..2)
+        .filter(|&axis| shapes.has_axis(axis))
+        .flat_map(|axis| chains(lattice, axis).into_iter().map(move |chain| (axis, chain)))
+        .collect();
+    // What repeats is centred on the panel, but where it goes round.
+    let shift = [0, 1].map(|axis| {
+        let (n, repeat) = (lattice.counts[axis], shapes.counts[axis]);
+        if axis == 0 && !lattice.ring { (repeat - (n % repeat) / 2) % repeat } else { 0 }
+    });
+    let frames = sheets.iter().map(|sheet| {
+        let one = |(axis, chain): &(usize, Vec<Run>)| {
+            let mut layer = Layer {
+                sheet,
+                shapes,
+                shift,
+                tension,
+                axis: *axis,
+                out: Vec::new(),
+                places: coordinates.then(Vec::new),
+            };
+            let (closed, shape) = (chain[0].ring, layer.shape(chain[0].line));
+            layer.chain(chain);
+            LaidYarn {
+                points: layer.out,
+                closed,
+                radius: shape.radius,
+                kind: shape.kind,
+                coordinates: layer.places.unwrap_or_default(),
+            }
+        };
+        chains.par_iter().map(one).collect()
+    });
+    frames.collect()
+}
+
+/// Runs of an axis, each joined to the nearest of the next line.
+fn chains(lattice: &Lattice, axis: usize) -> Vec<Vec<Run>> {
+    let mut done: Vec<Vec<Run>> = Vec::new();
+    let mut open: Vec<Vec<Run>> = Vec::new();
+    for line in 0..lattice.counts[1 - axis] {
+        let mut next: Vec<Vec<Run>> = Vec::new();
+        let mut waiting = std::mem::take(&mut open);
+        for [first, last] in lattice.runs(axis, line) {
+            let ring = axis == 0 && lattice.ring && last - first == lattice.counts[0];
+            if ring {
+                done.push(vec![Run { line, first, last, backwards: false, ring }]);
+                continue;
+            }
+            let mate = waiting.iter().position(|chain| {
+                let before = chain[chain.len() - 1];
+                let backwards = !before.backwards;
+                let start = if backwards { last } else { first };
+                let length: usize = chain.iter().map(|r| r.last - r.first).sum();
+                start.abs_diff(before.end()) <= FURTHEST && length < LONGEST
+            });
+            let mut chain = mate.map_or_else(Vec::new, |i| waiting.remove(i));
+            let backwards = chain.last().is_some_and(|run| !run.backwards);
+            chain.push(Run { line, first, last, backwards, ring });
+            next.push(chain);
+        }
+        done.append(&mut waiting);
+        open = next;
+    }
+    done.append(&mut open);
+    done
+}
+
+struct Layer<'a> {
+    sheet: &'a Sheet<'a>,
+    shapes: &'a Shapes,
+    shift: [usize; 2],
+    tension: Option<Tension>,
+    axis: usize,
+    out: Vec<DVec3>,
+    places: Option<Vec<[f32; 2]>>,
+}
+
+impl<'a> Layer<'a> {
+    fn shape(&self, line: usize) -> &'a Shape {
+        let shape = self.shapes.of_line(self.axis, line + self.shift[1 - self.axis]);
+        shape.expect("a tile has a yarn for each of its lines")
+    }
+
+    /// A place in stitches across, rows up, mm out.
+    fn push(&mut self, p: Vec3, run: &Run) {
+        let (at, normal) = self.sheet.at(p.x, p.y);
+        self.out.push((at + normal * p.z).as_dvec3());
+        if let Some(places) = &mut self.places {
+            // Colours are by stitches of the panel: what reaches over the border is of the last one.
+            let mut place = [p.x, p.y];
+            place[self.axis] = place[self.axis].clamp(run.first as f32 + 0.01, run.last as f32 - 0.01);
+            place[1 - self.axis] = run.line as f32 + 0.5;
+            if self.shapes.strands[0].kind == StrandKind::Course {
+                let head = (p.y - run.line as f32).clamp(-0.2, 1.2);
+                place[1] = run.line as f32 + head.clamp(0.02, 0.98);
+            }
+            places.push(place);
+        }
+    }
+
+    fn chain(&mut self, runs: &[Run]) {
+        if !runs[0].ring {
+            self.tail(&runs[0], true);
+        }
+        for (i, run) in runs.iter().enumerate() {
+            self.stitches(run);
+            if let Some(next) = runs.get(i + 1) {
+                self.turn(run, next);
+            }
+        }
+        let last = runs[runs.len() - 1];
+        if !last.ring {
+            self.tail(&last, false);
+        }
+    }
+
+    /// All control points of a run's stitches.
+    fn stitches(&mut self, run: &Run) {
+        let (sheet, axis) = (self.sheet, self.axis);
+        let stretch = |s: usize| {
+            let (x, y) = if axis == 0 { (s, run.line) } else { (run.line, s) };
+            sheet.stretch(x as isize, y as isize)
+        };
+        let per_stitch = self.shape(run.line).per_stitch;
+        let count = run.last - run.first;
+        let order = |i: usize| if run.backwards { run.last - 1 - i } else { run.first + i };
+        let (mut before, mut here) = (stretch(order(0)), stretch(order(0)));
+        // The end of a run's last stitch is the start of one that is not there.
+        let far_end = |layer: &mut Self, stretch| {
+            let place = layer.place(run.line, run.last, 0, stretch);
+            layer.push(place, run);
+        };
+        if run.backwards {
+            far_end(self, here);
+        }
+        for i in 0..count {
+            let s = order(i);
+            let next = stretch(order((i + 1).min(count - 1)));
+            for k in 0..per_stitch {
+                // Stretch changes evenly from the middle of a stitch to that of the next.
+                let t = (k as f32 + 0.5) / per_stitch as f32 - 0.5;
+                let (other, share) = if t < 0.0 { (before, -t) } else { (next, t) };
+                let mixed = [0, 1].map(|a| here[a] + share * (other[a] - here[a]));
+                let k = if run.backwards { per_stitch - 1 - k } else { k };
+                let place = self.place(run.line, s, k, mixed);
+                self.push(place, run);
+            }
+            (before, here) = (here, next);
+        }
+        if !run.ring && !run.backwards {
+            far_end(self, here);
+        }
+    }
+
+    /// Control point k of stitch s of a line.
+    fn place(&self, line: usize, s: usize, k: usize, stretch: [f32; 2]) -> Vec3 {
+        let shape = self.shape(line);
+        let count = self.shapes.counts[self.axis];
+        let stitch = s + self.shift[self.axis];
+        let mut p = self.shapes.control(shape, (stitch % count) * shape.per_stitch + k, stretch);
+        p[self.axis] += (stitch / count * count) as f32 - self.shift[self.axis] as f32;
+        p[1 - self.axis] += line as f32 - shape.index as f32;
+        if let Some(tension) = self.tension {
+            let deviate = |what: u32, which: u32| {
+                normal(Stream::new(hash2(hash2(tension.seed ^ self.sheet.lattice.panel, what), which)).next())
+            };
+            let own = deviate(line as u32, 1 + s as u32) * 0.8 + deviate(line as u32 ^ 0x5bd1_e995, 0) * 0.6;
+            let size = 1.0 + tension.spread as f32 * own;
+            let middle = line as f32 + 0.5;
+            p[1 - self.axis] = middle + (p[1 - self.axis] - middle) * size;
+        }
+        p
+    }
+
+    /// By how much a turn goes beyond the last stitch, in stitches: half a round of the way to the next row.
+    fn bulge(&self) -> f32 {
+        let stitch = self.sheet.lattice.stitch;
+        let [along, across] = [stitch[self.axis], stitch[1 - self.axis]];
+        (turn(across, self.shapes.diameter) / along) as f32
+    }
+
+    /// From the end of a run round to the start of the next.
+    fn turn(&mut self, run: &Run, next: &Run) {
+        let outward = if run.backwards { -1.0 } else { 1.0 };
+        let corner = if self.axis == 0 { [run.end(), run.line + 1] } else { [run.line + 1, run.end()] };
+        // At a seam the selvedge goes to the wrong side.
+        let sewn = !self.sheet.lattice.is_free(corner[0], corner[1]);
+        let bulge = self.bulge() * outward * if sewn { 0.3 } else { 1.0 };
+        let deep = if sewn { 1.5 * self.shapes.diameter as f32 } else { 0.0 };
+        let from = self.place(run.line, run.end(), 0, [1.0; 2]);
+        let to = self.place(next.line, next.start(), 0, [1.0; 2]);
+        for (share, out) in [(0.12_f32, 0.62), (0.5, 1.0), (0.88, 0.62)] {
+            let mut p = from.lerp(to, share);
+            p[self.axis] += bulge * out;
+            p.z -= deep * out;
+            self.push(p, run);
+        }
+    }
+
+    /// The end of a yarn: over the border to the wrong side, and back behind the stitches.
+    fn tail(&mut self, run: &Run, first: bool) {
+        let corner = if first { run.start() } else { run.end() };
+        let outward = if (corner == run.last) == (run.last > run.first) { 1.0_f32 } else { -1.0 };
+        let from = self.place(run.line, corner, 0, [1.0; 2]);
+        let bulge = self.bulge();
+        let d = self.shapes.diameter as f32;
+        let inward = (run.last - run.first).min(3) as f32;
+        // Out, up or down, behind, and in.
+        let way = [
+            (0.62 * bulge, 0.05, 0.0),
+            (0.7 * bulge, 0.25, -0.9 * d),
+            (-0.3, 0.3, -1.6 * d),
+            (-0.6 * inward, 0.3, -1.6 * d),
+            (-inward, 0.3, -1.5 * d),
+        ];
+        let place = |(along, up, out): (f32, f32, f32)| {
+            let mut p = from;
+            p[self.axis] += outward * along;
+            p[1 - self.axis] += up;
+            p.z = if out == 0.0 { p.z } else { out };
+            p
+        };
+        let places: Vec<Vec3> = way.into_iter().map(place).collect();
+        if first {
+            places.into_iter().rev().for_each(|p| self.push(p, run));
+        } else {
+            places.into_iter().for_each(|p| self.push(p, run));
+        }
+    }
+}
+
+/// How far a turn from a row to the next reaches beyond the last stitch, mm.
+pub(super) fn turn(across: f64, diameter: f64) -> f64 {
+    (0.45 * across).max(0.7 * diameter)
+}

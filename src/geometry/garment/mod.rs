@@ -1,0 +1,393 @@
+//! Yarns on garments: a mesh whose texture coordinates are its flat panels, and cloth that repeats, laid over them.
+//!
+//! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
+//! divides each panel into stitches, `strain` relaxes the cloth's tile at the stretches that occur, `lay` lays its yarns
+//! from row to row, `edges` ends them, and `body` keeps them outside of who wears them. All lengths are millimetres.
+
+mod body;
+mod edges;
+mod lattice;
+mod lay;
+pub mod mesh;
+mod panels;
+mod strain;
+mod subdivide;
+mod surface;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use self::{
+    body::Body,
+    edges::{Finish, Way, finish, ways},
+    lattice::{Division, Lattice},
+    lay::{lay, turn},
+    panels::Panels,
+    strain::Shapes,
+    surface::{BorderEdge, Surface},
+};
+pub use self::{
+    edges::SeamKind,
+    lay::{LaidYarn, Tension},
+    mesh::{GarmentError, GarmentMesh},
+    panels::{LengthRatio, Panel},
+};
+use super::{
+    mesh::Mesh,
+    pattern::{StrandKind, tile::Tile},
+};
+
+/// More stitches than these are not laid.
+pub const MOST_STITCHES: f64 = 2e7;
+
+/// The cloth of some panels.
+#[derive(Clone, Debug)]
+pub struct Cloth {
+    /// Group or material of the panels, with `*` and `?`; `None` for all that no other cloth takes.
+    pub group: Option<String>,
+    /// What repeats, mm, at the gauge that it is to have.
+    pub tile: Tile,
+    /// Angle by which rows are turned against the panel's u axis, radians.
+    pub grain: f64,
+    /// Control points of a stitch.
+    pub points: usize,
+}
+
+/// What is laid on a garment.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Millimetres per unit of the mesh.
+    pub unit_mm: f64,
+    /// Millimetres per unit of its texture coordinates; found from lengths if absent.
+    pub uv_mm: Option<f64>,
+    /// The first is for panels that no other one names; later ones win.
+    pub cloths: Vec<Cloth>,
+    /// How panels are sewn.
+    pub seam: SeamKind,
+    /// How loops vary.
+    pub tension: Option<Tension>,
+    /// Whether yarns know their stitches.
+    pub coordinates: bool,
+}
+
+/// What is known of a garment before any yarn is laid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Its panels.
+    pub panels: Vec<Panel>,
+    /// Stitches (or crossings) of each panel.
+    pub stitches: Vec<u64>,
+    /// Which cloth each panel has.
+    pub cloth: Vec<usize>,
+    /// Length of the yarns of each cloth, about, without what finishes edges; mm.
+    pub yarn_length: Vec<f64>,
+    /// About as many control points.
+    pub control_points: u64,
+    /// 3-D length over length as cut.
+    pub ratio: LengthRatio,
+    /// Share of the area that is stretched by more than a tenth along u or v.
+    pub stretched: f64,
+    /// Millimetres per unit of the texture coordinates.
+    pub uv_mm: f64,
+    /// What was repaired or found out, one line each.
+    pub notes: Vec<String>,
+    /// The box around the mesh, mm.
+    pub bounds: (DVec3, DVec3),
+}
+
+impl Report {
+    /// Stitches of all panels.
+    pub fn all_stitches(&self) -> u64 {
+        self.stitches.iter().sum()
+    }
+}
+
+/// A garment divided into stitches, ready to be laid in any frame.
+pub struct Garment {
+    panels: Panels,
+    surface: Surface,
+    lattices: Vec<Lattice>,
+    shapes: Vec<Shapes>,
+    ways: Vec<(Way, Finish, usize)>,
+    options: Options,
+    report: Report,
+}
+
+/// The yarns of one frame, for each cloth.
+pub type Laid = Vec<Vec<LaidYarn>>;
+
+impl Garment {
+    /// Divides the panels of a mesh (the first frame of an animation) into stitches.
+    ///
+    /// # Errors
+    /// What is wrong with the mesh, or with what is to be laid on it.
+    pub fn new(mesh: &GarmentMesh, options: Options) -> Result<Self, GarmentError> {
+        let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm)?;
+        let cloth = choose(&panels.panels, &options.cloths)?;
+        panels.turn(&cloth.iter().map(|&c| -options.cloths[c].grain).collect::<Vec<_>>());
+        let too_many: f64 = panels
+            .panels
+            .iter()
+            .zip(&cloth)
+            .map(|(p, &c)| p.area / options.cloths[c].tile.stitch().element_product())
+            .sum();
+        if too_many > MOST_STITCHES {
+            let stitch = options.cloths[0].tile.stitch();
+            let problem = format!(
+                "{too_many:.2e} stitches of {:.4} x {:.4} mm; at most {MOST_STITCHES:.0e} are laid",
+                stitch.x, stitch.y
+            );
+            return Err(GarmentError::new(problem, "a coarser gauge, or another `gauge_per` or `unit`"));
+        }
+        let ranges: Vec<[[f64; 2]; 2]> = (0..options.cloths.len()).map(|_| panels.stretches).collect();
+        let shapes: Vec<Shapes> = options
+            .cloths
+            .iter()
+            .zip(ranges)
+            .map(|(c, range)| Shapes::new(&c.tile, c.points, range))
+            .collect::<Result<_, _>>()?;
+        let points = panels.points(mesh, options.unit_mm);
+        let widest = options.cloths.iter().map(|c| c.tile.stitch().x).fold(0.0, f64::max);
+        let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
+        let borders = surface.borders(panels.panels.len());
+        let lattices: Vec<Lattice> = borders
+            .iter()
+            .enumerate()
+            .map(|(panel, border)| {
+                let (own, shapes) = (&options.cloths[cloth[panel]], &shapes[cloth[panel]]);
+                Lattice::new(&surface, panel as u32, border, &division(own, shapes))
+            })
+            .collect();
+        let mut notes = panels.notes.clone();
+        for (lattice, panel) in lattices.iter().zip(&panels.panels) {
+            if lattice.stitches == 0 {
+                notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
+            }
+            if lattice.doubled * 100 > lattice.stitches as usize {
+                let problem = format!(
+                    "panel `{}` overlaps itself in the texture coordinates: {} of {} stitches have two places",
+                    panel.group, lattice.doubled, lattice.stitches
+                );
+                return Err(GarmentError::at(panel.line, problem, "lay the panel out flat, without overlaps"));
+            }
+        }
+        let ways = edge_ways(&borders, &lattices, &cloth, &options, &shapes);
+        let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let report = Report {
+            stitches: lattices.iter().map(|l| l.stitches).collect(),
+            yarn_length: (0..shapes.len())
+                .map(|own| {
+                    let lattices = lattices.iter().zip(&cloth).filter(|(_, c)| **c == own);
+                    lattices.map(|(l, _)| l.stitches as f64 * shapes[own].length).sum()
+                })
+                .collect(),
+            control_points: lattices
+                .iter()
+                .zip(&cloth)
+                .map(|(l, &c)| l.stitches * options.cloths[c].points as u64 * if shapes[c].has_axis(1) { 2 } else { 1 })
+                .sum(),
+            cloth,
+            ratio: panels.ratio,
+            stretched: panels.stretched,
+            uv_mm: panels.uv_mm,
+            panels: panels.panels.clone(),
+            notes,
+            bounds: (low, high),
+        };
+        Ok(Self { panels, surface, lattices, shapes, ways, options, report })
+    }
+
+    /// What is known of it.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Lays the yarns in some frames, which have the first one's topology: the same yarns with the same points in each.
+    /// Bodies are as many as frames, or none. Notes tell what had to be moved.
+    ///
+    /// # Errors
+    /// A frame of another topology: its place among the frames, and what differs.
+    pub fn lay(
+        &self,
+        first: &GarmentMesh,
+        frames: &[&GarmentMesh],
+        bodies: &[&Mesh],
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Laid>, (usize, String)> {
+        let mut poses = Vec::with_capacity(frames.len());
+        for (i, frame) in frames.iter().enumerate() {
+            first.same_topology(frame).map_err(|problem| (i, problem))?;
+            poses.push(self.surface.pose(&self.panels.points(frame, self.options.unit_mm)));
+        }
+        let clearance = self.shapes.iter().map(|s| 2.2 * s.diameter).fold(0.0, f64::max);
+        let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, 4.0 * clearance)).collect();
+        let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
+        let mut pushed = (0, String::new());
+        for (lattice, &cloth) in self.lattices.iter().zip(&self.report.cloth) {
+            if lattice.stitches == 0 {
+                continue;
+            }
+            let sheets: Vec<_> = poses
+                .iter()
+                .enumerate()
+                .map(|(i, pose)| lattice.sheet(&self.surface, pose, bodies.get(i), clearance))
+                .collect();
+            if sheets[0].pushed > 0 && pushed.0 == 0 {
+                pushed.1 = self.report.panels[lattice.panel as usize].group.clone();
+            }
+            pushed.0 += sheets[0].pushed;
+            let yarns = lay(&sheets, &self.shapes[cloth], self.options.tension, self.options.coordinates);
+            for (frame, yarns) in laid.iter_mut().zip(yarns) {
+                frame[cloth].extend(yarns);
+            }
+        }
+        if pushed.0 > 0 {
+            notes.push(format!(
+                "{} corners of stitches were moved out of the body or off its skin (first in panel `{}`)",
+                pushed.0, pushed.1
+            ));
+        }
+        for cloth in 0..self.options.cloths.len() {
+            let own: Vec<(Way, Finish)> =
+                self.ways.iter().filter(|w| w.2 == cloth).map(|(way, finish, _)| (way.clone(), *finish)).collect();
+            for (frame, mut yarns) in laid.iter_mut().zip(finish(&poses, &own)) {
+                if self.options.coordinates {
+                    for yarn in &mut yarns {
+                        yarn.coordinates = vec![[0.5, 0.5]; yarn.points.len()];
+                    }
+                }
+                frame[cloth].append(&mut yarns);
+            }
+        }
+        Ok(laid)
+    }
+}
+
+/// The cloth of each panel.
+fn choose(panels: &[Panel], cloths: &[Cloth]) -> Result<Vec<usize>, GarmentError> {
+    let chosen: Vec<usize> = panels
+        .iter()
+        .map(|panel| {
+            let takes =
+                |c: &Cloth| c.group.as_ref().is_some_and(|g| matches(g, &panel.group) || matches(g, &panel.material));
+            cloths.iter().rposition(takes).unwrap_or(0)
+        })
+        .collect();
+    for (i, cloth) in cloths.iter().enumerate() {
+        let Some(group) = &cloth.group else { continue };
+        if !panels.iter().any(|p| matches(group, &p.group) || matches(group, &p.material)) {
+            let mut names: Vec<&str> =
+                panels.iter().flat_map(|p| [p.group.as_str(), p.material.as_str()]).filter(|n| !n.is_empty()).collect();
+            names.sort_unstable();
+            names.dedup();
+            names.truncate(24);
+            let hint = if names.is_empty() {
+                "the mesh has neither groups nor materials".to_owned()
+            } else {
+                format!("it has: {}", names.join(", "))
+            };
+            return Err(GarmentError::new(format!("no group or material of the mesh is called \"{group}\""), hint));
+        }
+        debug_assert!(i > 0, "the first cloth is for the rest");
+    }
+    Ok(chosen)
+}
+
+/// Whether a name fits a pattern with `*` (any signs) and `?` (one).
+fn matches(pattern: &str, name: &str) -> bool {
+    let (p, n): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
+    let (mut i, mut j, mut star) = (0, 0, None);
+    while j < n.len() {
+        if i < p.len() && (p[i] == '?' || p[i] == n[j]) && p[i] != '*' {
+            (i, j) = (i + 1, j + 1);
+        } else if i < p.len() && p[i] == '*' {
+            star = Some((i, j));
+            i += 1;
+        } else if let Some((at, from)) = star {
+            (i, j) = (at + 1, from + 1);
+            star = Some((at, from + 1));
+        } else {
+            return false;
+        }
+    }
+    p[i..].iter().all(|c| *c == '*')
+}
+
+/// How a panel is divided for its cloth.
+fn division(cloth: &Cloth, shapes: &Shapes) -> Division {
+    let stitch = cloth.tile.stitch();
+    let d = shapes.diameter;
+    let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
+    let (mut free, mut sewn) = (DVec2::ZERO, DVec2::ZERO);
+    for axis in 0..2 {
+        // Sideways loops reach beyond their line; at its ends lines turn. Half a yarn is left to the border itself, and
+        // under a chain some more.
+        let beyond = shapes.reach[axis] * stitch[axis];
+        let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
+        free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
+        // At a seam rows turn to the wrong side, and loops reach behind those of the other panel.
+        sewn[axis] = 0.5 * d * if knitted && axis == 1 { 0.3 } else { 1.0 };
+    }
+    Division { stitch, repeat: cloth.tile.counts, free, sewn }
+}
+
+/// What runs along the edges of all panels.
+fn edge_ways(
+    borders: &[Vec<BorderEdge>],
+    lattices: &[Lattice],
+    cloth: &[usize],
+    options: &Options,
+    shapes: &[Shapes],
+) -> Vec<(Way, Finish, usize)> {
+    let mut free = Vec::new();
+    let mut sewn = Vec::new();
+    for (panel, border) in borders.iter().enumerate() {
+        for (i, edge) in border.iter().enumerate() {
+            match edge.sewn_to {
+                None => free.push((edge.vertices, panel as u32, None)),
+                // Each seam once; what is knitted in the round has none.
+                Some((other, mate)) => {
+                    let first = (panel as u32, i as u32) < (other, mate);
+                    if first && !(other == panel as u32 && lattices[panel].ring) {
+                        sewn.push((edge.vertices, panel as u32, Some(other)));
+                    }
+                }
+            }
+        }
+    }
+    let mut out = Vec::new();
+    for way in ways(&free) {
+        let own = cloth[way.panel as usize];
+        let (tile, d) = (&options.cloths[own].tile, shapes[own].diameter);
+        let knitted = tile.strands.iter().all(|s| s.kind == StrandKind::Course);
+        let finish = if knitted {
+            Finish::Chain { link: tile.stitch().x.max(2.9 * d), radius: 0.5 * d }
+        } else {
+            Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
+        };
+        out.push((way, finish, own));
+    }
+    if options.seam != SeamKind::None {
+        // Ways of a seam keep to one pair of panels.
+        let mut pairs: Vec<(u32, Option<u32>)> = sewn.iter().map(|s| (s.1, s.2)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        for pair in pairs {
+            let own: Vec<_> = sewn.iter().filter(|s| (s.1, s.2) == pair).copied().collect();
+            for way in ways(&own) {
+                let own = cloth[way.panel as usize];
+                let (stitch, d) = (options.cloths[own].tile.stitch(), shapes[own].diameter);
+                let finish = match options.seam {
+                    SeamKind::Overlock => Finish::Overlock { radius: 0.25 * d, reach: (1.6 * d).max(1.0) },
+                    _ => Finish::Mattress { step: (2.0 * stitch.y).max(4.0 * d), radius: 0.4 * d },
+                };
+                out.push((way, finish, own));
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,421 @@
+//! The panels of a garment: connected charts of its texture coordinates, in millimetres, and what is sewn to what.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+
+use super::mesh::{Counted, Face, GarmentError, GarmentMesh};
+
+/// A connected piece of flat cloth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Its group's name.
+    pub group: String,
+    /// Its material's name; empty without.
+    pub material: String,
+    /// Whether its texture coordinates were mirrored, and have been turned round.
+    pub mirrored: bool,
+    /// Number of its triangles.
+    pub faces: usize,
+    /// Its area as it is cut, mm2.
+    pub area: f64,
+    /// Where its first face is in the file.
+    pub line: usize,
+}
+
+/// 3-D length over length in texture coordinates, by area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthRatio {
+    /// A twentieth of it is below.
+    pub p5: f64,
+    /// The median.
+    pub p50: f64,
+    /// A twentieth is above.
+    pub p95: f64,
+}
+
+/// The flat panels with the garment's positions.
+#[derive(Clone, Debug)]
+pub(super) struct Panels {
+    /// For each welded point the first point of the file that lies there.
+    pub(super) welded: Vec<u32>,
+    /// Triangles over welded points, sewn: neighbours across a seam are neighbours here.
+    pub(super) sewn: Vec<[u32; 3]>,
+    /// The same triangles over corners, cut along seams.
+    pub(super) cut: Vec<[u32; 3]>,
+    /// Texture coordinates of corners, mm, turned so that they are counter-clockwise where positions are.
+    pub(super) uvs: Vec<DVec2>,
+    /// The panel of each triangle; those of a panel follow each other.
+    pub(super) of_face: Vec<u32>,
+    pub(super) panels: Vec<Panel>,
+    pub(super) ratio: LengthRatio,
+    /// The least and the largest stretch, but for a hundredth, along u and along v.
+    pub(super) stretches: [[f64; 2]; 2],
+    /// Share of the area that is stretched by more than a tenth along one of them.
+    pub(super) stretched: f64,
+    /// Millimetres per unit of the texture coordinates.
+    pub(super) uv_mm: f64,
+    pub(super) notes: Vec<String>,
+}
+
+/// Units that panels are drawn in, and their millimetres.
+const UV_UNITS: [(&str, f64); 4] = [("m", 1000.0), ("cm", 10.0), ("mm", 1.0), ("in", 25.4)];
+
+/// Beyond this factor panels and mesh do not belong to each other.
+const WRONG_UNIT: f64 = 2.5;
+
+impl Panels {
+    /// `unit_mm` is the millimetres per unit of positions, `uv_mm` of texture coordinates, if that is known.
+    pub(super) fn new(mesh: &GarmentMesh, unit_mm: f64, uv_mm: Option<f64>) -> Result<Self, GarmentError> {
+        if mesh.uvs.is_empty() {
+            let hint = "the texture coordinates are the flat panels of the garment: export them with the mesh";
+            return Err(GarmentError::at(0, "no texture coordinates", hint));
+        }
+        let mut notes = mesh.notes.clone();
+        let (weld, welded) = weld(&mesh.points);
+        let name = |face: &Face| mesh.parts[face.part as usize].group.as_str();
+        let area = |f: &Face| {
+            let [a, b, c] = f.points.map(|i| mesh.points[i as usize] * unit_mm);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let signed = |f: &Face| {
+            let [a, b, c] = f.uvs.map(|i| mesh.uvs[i as usize]);
+            0.5 * (b - a).perp_dot(c - a)
+        };
+        // Triangles without area say nothing about the cloth.
+        let mut flat = Counted::default();
+        let total: f64 = mesh.faces.iter().map(area).sum();
+        let total_uv: f64 = mesh.faces.iter().map(|f| signed(f).abs()).sum();
+        let count = mesh.faces.len() as f64;
+        let sound = |f: &Face| {
+            let [a, b, c] = f.points.map(|i| weld[i as usize]);
+            area(f) > 1e-6 * total / count && signed(f).abs() > 1e-6 * total_uv / count && a != b && b != c && c != a
+        };
+        if total_uv <= 0.0 || !total_uv.is_finite() || total <= 0.0 {
+            let hint = "the texture coordinates are the flat panels of the garment";
+            return Err(GarmentError::at(0, "the texture coordinates have no area", hint));
+        }
+        let mut faces: Vec<Face> = Vec::with_capacity(mesh.faces.len());
+        for face in &mesh.faces {
+            if sound(face) {
+                faces.push(*face);
+            } else {
+                flat.add(name(face), face.line as usize);
+            }
+        }
+        flat.note("triangles without area were left out", &mut notes);
+
+        // Corners that share place, texture coordinates and part are one.
+        let grain = 1e-7 * (total_uv / count).sqrt();
+        let mut corners: HashMap<(u32, [i64; 2], u32), u32> = HashMap::new();
+        let mut uvs = Vec::new();
+        let mut cut: Vec<[u32; 3]> = faces
+            .iter()
+            .map(|f| {
+                [0, 1, 2].map(|k| {
+                    let uv = mesh.uvs[f.uvs[k] as usize];
+                    let key = (weld[f.points[k] as usize], (uv / grain).round().to_array().map(|v| v as i64), f.part);
+                    *corners.entry(key).or_insert_with(|| {
+                        uvs.push(uv);
+                        uvs.len() as u32 - 1
+                    })
+                })
+            })
+            .collect();
+        let (of_face, order) = charts(&cut, uvs.len(), &faces, mesh)?;
+        let faces: Vec<Face> = order.iter().map(|&i| faces[i]).collect();
+        cut = order.iter().map(|&i| cut[i]).collect();
+
+        let ratios: Vec<(f64, f64)> = faces.iter().map(|f| ((area(f) / signed(f).abs()).sqrt(), area(f))).collect();
+        let found = percentile(&ratios, 0.5);
+        let uv_mm = unit_of(found, uv_mm, &mut notes)?;
+        for uv in &mut uvs {
+            *uv *= uv_mm;
+        }
+
+        // Panels whose texture is seen from behind are turned round: an S twist stays S.
+        let number = of_face.last().map_or(0, |&p| p as usize + 1);
+        let mut turned = vec![0.0; number];
+        for (face, &panel) in faces.iter().zip(&of_face) {
+            turned[panel as usize] += signed(face);
+        }
+        let mut panels: Vec<Panel> = Vec::with_capacity(number);
+        let mut mirrored = Counted::default();
+        let mut flipped = Counted::default();
+        let mut done = vec![false; uvs.len()];
+        for (i, face) in faces.iter().enumerate() {
+            let panel = of_face[i] as usize;
+            let mirror = turned[panel] < 0.0;
+            if panel == panels.len() {
+                let part = &mesh.parts[face.part as usize];
+                if mirror {
+                    mirrored.add(&part.group, face.line as usize);
+                }
+                panels.push(Panel {
+                    group: part.group.clone(),
+                    material: part.material.clone(),
+                    mirrored: mirror,
+                    faces: 0,
+                    area: 0.0,
+                    line: face.line as usize,
+                });
+            }
+            panels[panel].faces += 1;
+            panels[panel].area += signed(face).abs() * uv_mm * uv_mm;
+            if (signed(face) < 0.0) != mirror {
+                flipped.add(name(face), face.line as usize);
+            }
+            for c in cut[i] {
+                if mirror && !std::mem::replace(&mut done[c as usize], true) {
+                    uvs[c as usize].x = -uvs[c as usize].x;
+                }
+            }
+        }
+        mirrored.note("panels are mirrored in their texture coordinates: they were turned round", &mut notes);
+        if flipped.count() * 20 > faces.len() {
+            let problem =
+                format!("{} of {} triangles lie upside down in the texture coordinates", flipped.count(), faces.len());
+            return Err(GarmentError::at(0, problem, "panels must lie flat, without folds over themselves"));
+        }
+        flipped.note("triangles lie upside down in the texture coordinates and hold no stitches", &mut notes);
+
+        let sewn: Vec<[u32; 3]> = faces.iter().map(|f| f.points.map(|i| weld[i as usize])).collect();
+        non_manifold(&sewn, &faces, mesh, &mut notes);
+        let along = along_axes(mesh, &faces, unit_mm, uv_mm);
+        let ratio =
+            LengthRatio { p5: percentile(&along, 0.05), p50: percentile(&along, 0.5), p95: percentile(&along, 0.95) };
+        let of_axis = |axis: usize| along.iter().skip(axis).step_by(2).copied().collect::<Vec<_>>();
+        let stretches = [0, 1].map(|axis| [0.01, 0.99].map(|share| percentile(&of_axis(axis), share)));
+        let (mut long, mut all) = (0.0, 0.0);
+        for pair in along.chunks_exact(2) {
+            all += pair[0].1;
+            long += if pair[0].0.max(pair[1].0) > 1.1 { pair[0].1 } else { 0.0 };
+        }
+        let stretched = long / all;
+        Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretches, stretched, uv_mm, notes })
+    }
+
+    /// Turns the texture coordinates of each panel by an angle, radians.
+    pub(super) fn turn(&mut self, angles: &[f64]) {
+        let mut done = vec![false; self.uvs.len()];
+        for (face, &panel) in self.cut.iter().zip(&self.of_face) {
+            let turn = DVec2::from_angle(angles[panel as usize]);
+            for &c in face {
+                if !std::mem::replace(&mut done[c as usize], true) {
+                    self.uvs[c as usize] = turn.rotate(self.uvs[c as usize]);
+                }
+            }
+        }
+    }
+
+    /// Welded points of a frame, mm.
+    pub(super) fn points(&self, mesh: &GarmentMesh, unit_mm: f64) -> Vec<DVec3> {
+        self.welded.iter().map(|&i| mesh.points[i as usize] * unit_mm).collect()
+    }
+}
+
+/// The welded point of each point, and the first point of each welded one: what coincides is one.
+fn weld(points: &[DVec3]) -> (Vec<u32>, Vec<u32>) {
+    let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let grain = (1e-6 * (high - low).length()).max(1e-300);
+    let mut cells: HashMap<[i64; 3], u32> = HashMap::with_capacity(points.len());
+    let mut first = Vec::new();
+    let weld = points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let scaled = (*p - low) / grain;
+            let key = |q: DVec3| q.floor().to_array().map(|v| v as i64);
+            // Within half a cell of a border, the neighbour's cell may hold it.
+            let near = [-0.25, 0.25];
+            let around = near.iter().flat_map(|&x| near.iter().flat_map(move |&y| near.map(|z| DVec3::new(x, y, z))));
+            if let Some(&found) = around.map(|d| key(scaled + d)).find_map(|k| cells.get(&k)) {
+                return found;
+            }
+            first.push(i as u32);
+            *cells.entry(key(scaled)).or_insert(first.len() as u32 - 1)
+        })
+        .collect();
+    (weld, first)
+}
+
+/// Connected pieces of faces that share edges: the piece of each face in a new order, and that order.
+fn charts(
+    cut: &[[u32; 3]],
+    corners: usize,
+    faces: &[Face],
+    mesh: &GarmentMesh,
+) -> Result<(Vec<u32>, Vec<usize>), GarmentError> {
+    let mut parent: Vec<u32> = (0..cut.len() as u32).collect();
+    fn root(parent: &mut [u32], mut i: u32) -> u32 {
+        while parent[i as usize] != i {
+            parent[i as usize] = parent[parent[i as usize] as usize];
+            i = parent[i as usize];
+        }
+        i
+    }
+    let mut edges: HashMap<[u32; 2], (u32, u8)> = HashMap::with_capacity(cut.len() * 3 / 2);
+    debug_assert!(corners > 0);
+    for (i, f) in cut.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (f[k], f[(k + 1) % 3]);
+            let entry = edges.entry([a.min(b), a.max(b)]).or_insert((i as u32, 0));
+            entry.1 = entry.1.saturating_add(1);
+            if entry.1 > 2 {
+                let name = &mesh.parts[faces[i].part as usize].group;
+                let problem = format!("panel `{name}`: an edge with more than two faces in the flat panel");
+                return Err(GarmentError::at(faces[i].line as usize, problem, "remove doubled or inner faces"));
+            }
+            let (x, y) = (root(&mut parent, entry.0), root(&mut parent, i as u32));
+            // The earlier one is the root, so that panels are in the file's order.
+            parent[x.max(y) as usize] = x.min(y);
+        }
+    }
+    let roots: Vec<u32> = (0..cut.len() as u32).map(|i| root(&mut parent, i)).collect();
+    let mut order: Vec<usize> = (0..cut.len()).collect();
+    order.sort_by_key(|&i| (roots[i], i));
+    let mut number = 0;
+    let of_face = (0..order.len())
+        .map(|k| {
+            number += u32::from(k > 0 && roots[order[k]] != roots[order[k - 1]]);
+            number
+        })
+        .collect();
+    Ok((of_face, order))
+}
+
+/// Edges at which more than two panels meet are sewn as they are found.
+fn non_manifold(sewn: &[[u32; 3]], faces: &[Face], mesh: &GarmentMesh, notes: &mut Vec<String>) {
+    let mut edges: HashMap<[u32; 2], u8> = HashMap::with_capacity(sewn.len() * 3 / 2);
+    let mut many = Counted::default();
+    for (f, face) in sewn.iter().zip(faces) {
+        for k in 0..3 {
+            let (a, b) = (f[k], f[(k + 1) % 3]);
+            let count = edges.entry([a.min(b), a.max(b)]).or_insert(0);
+            *count = count.saturating_add(1);
+            if *count == 3 {
+                many.add(&mesh.parts[face.part as usize].group, face.line as usize);
+            }
+        }
+    }
+    many.note("edges have more than two faces: panels end there instead of being sewn", notes);
+}
+
+/// 3-D lengths over flat lengths along both axes of each face, with its area.
+fn along_axes(mesh: &GarmentMesh, faces: &[Face], unit_mm: f64, uv_mm: f64) -> Vec<(f64, f64)> {
+    faces
+        .iter()
+        .flat_map(|f| {
+            let [p, q, r] = f.points.map(|i| mesh.points[i as usize] * unit_mm);
+            let [a, b, c] = f.uvs.map(|i| mesh.uvs[i as usize] * uv_mm);
+            let (d1, d2) = (b - a, c - a);
+            let det = d1.perp_dot(d2);
+            let across = ((q - p) * d2.y - (r - p) * d1.y) / det;
+            let up = ((r - p) * d1.x - (q - p) * d2.x) / det;
+            let area = (q - p).cross(r - p).length();
+            [(across.length(), area), (up.length(), area)]
+        })
+        .collect()
+}
+
+/// The value below which a share of the weight lies.
+fn percentile(values: &[(f64, f64)], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = sorted.iter().map(|v| v.1).sum();
+    let mut sum = 0.0;
+    for (value, weight) in &sorted {
+        sum += weight;
+        if sum >= share * total {
+            return *value;
+        }
+    }
+    sorted.last().map_or(1.0, |v| v.0)
+}
+
+/// Millimetres per unit of texture coordinates, from what is said or from the ratio of lengths.
+fn unit_of(found: f64, said: Option<f64>, notes: &mut Vec<String>) -> Result<f64, GarmentError> {
+    if let Some(said) = said {
+        let ratio = found / said;
+        if !(1.0 / WRONG_UNIT..=WRONG_UNIT).contains(&ratio) {
+            let problem = format!(
+                "the garment is {ratio:.3} times as long as its panels: a unit of the texture coordinates is about {found:.4} mm"
+            );
+            let hint = "set `uv_unit` (or leave it out), or `unit` of the positions";
+            return Err(GarmentError::at(0, problem, hint));
+        }
+        return Ok(said);
+    }
+    let near = UV_UNITS.iter().find(|(_, mm)| (found / mm).ln().abs() < 0.2);
+    Ok(match near {
+        Some((name, mm)) => {
+            notes.push(format!("texture coordinates are in {name}, by the lengths of the mesh"));
+            *mm
+        }
+        None => {
+            notes.push(format!("a unit of the texture coordinates is {found:.4} mm, by the lengths of the mesh"));
+            found
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two squares of 100 mm sewn along one side, `second` as the texture coordinates of the right one.
+    fn two(second: &str) -> String {
+        format!(
+            "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nv 20 0 0\nv 20 10 0\nvt 0 0\nvt 10 0\nvt 10 10\nvt 0 10\n{second}\
+             g left\nf 1/1 2/2 3/3 4/4\ng right\nf 2/5 5/6 6/7 3/8\n"
+        )
+    }
+
+    const PLAIN: &str = "vt 30 0\nvt 40 0\nvt 40 10\nvt 30 10\n";
+
+    fn panels(text: &str) -> Result<Panels, GarmentError> {
+        Panels::new(&GarmentMesh::parse(text).unwrap(), 10.0, None)
+    }
+
+    #[test]
+    fn charts_become_panels_and_seams_are_sewn() {
+        let panels = panels(&two(PLAIN)).unwrap();
+        assert_eq!(panels.panels.iter().map(|p| p.group.as_str()).collect::<Vec<_>>(), ["left", "right"]);
+        assert_eq!(panels.of_face, [0, 0, 1, 1]);
+        assert_eq!((panels.welded.len(), panels.uvs.len()), (6, 8));
+        assert_eq!(panels.uv_mm, 10.0);
+        assert!((panels.ratio.p50 - 1.0).abs() < 1e-12 && (panels.panels[0].area - 1e4).abs() < 1e-6);
+    }
+
+    #[test]
+    fn mirrored_panels_are_turned_round() {
+        let panels = panels(&two("vt 40 0\nvt 30 0\nvt 30 10\nvt 40 10\n")).unwrap();
+        assert!(!panels.panels[0].mirrored && panels.panels[1].mirrored);
+        assert!(panels.notes.iter().any(|n| n.contains("mirrored") && n.contains("`right`")), "{:?}", panels.notes);
+        for face in &panels.cut {
+            let [a, b, c] = face.map(|i| panels.uvs[i as usize]);
+            assert!((b - a).perp_dot(c - a) > 0.0);
+        }
+    }
+
+    #[test]
+    fn units_are_found_and_checked() {
+        let text = two(PLAIN);
+        let mesh = GarmentMesh::parse(&text).unwrap();
+        assert!(Panels::new(&mesh, 10.0, Some(1000.0)).unwrap_err().problem.contains("10.0000 mm"));
+        assert_eq!(Panels::new(&mesh, 1.0, None).unwrap().uv_mm, 1.0);
+        let odd = Panels::new(&mesh, 3.0, None).unwrap();
+        assert!((odd.uv_mm - 3.0).abs() < 1e-9 && odd.notes[0].contains("3.0000 mm"), "{:?}", odd.notes);
+    }
+
+    #[test]
+    fn bad_faces_are_told() {
+        let flat = panels(&(two(PLAIN) + "f 1/1 1/1 2/2\n")).unwrap();
+        assert!(flat.notes.iter().any(|n| n.contains("without area")), "{:?}", flat.notes);
+        let doubled = panels(&(two(PLAIN) + "g left\nf 1/1 2/2 3/3\nf 1/1 2/2 4/4\n")).unwrap_err();
+        assert!(doubled.problem.contains("`left`") && doubled.line > 0, "{doubled:?}");
+        let none = panels("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 0 0\nvt 0 0\nf 1/1 2/2 3/3\n").unwrap_err();
+        assert!(none.problem.contains("no area"));
+    }
+}

@@ -1,0 +1,175 @@
+//! A tile at several stretches, relaxed at each, to be looked up where cloth is laid.
+//!
+//! Yarn is not elastic to speak of: cloth that is stretched opens its loops and turns them, while the yarn keeps its
+//! length and thickness. So a tile is relaxed anew at a few periods, and in between what is known is mixed (as Sperl,
+//! Narain and Wojtan do with simulated patterns in "Mechanics-Aware Deformation of Yarn Pattern Geometry", 2021). Shear
+//! turns loops with the cloth.
+
+use glam::{DVec2, Vec3};
+use rayon::prelude::*;
+
+use crate::geometry::pattern::{
+    StrandKind,
+    tile::{Tile, TileStrand},
+};
+
+use super::mesh::GarmentError;
+
+/// A tile as it is laid: control points of B-splines at some stretches.
+pub(super) struct Shapes {
+    /// Stitches and rows that repeat.
+    pub(super) counts: [usize; 2],
+    pub(super) strands: Vec<Shape>,
+    /// Stretches across and up at which it is known, rising.
+    nodes: [Vec<f32>; 2],
+    /// How far yarns reach beyond their stitches, across and up, in stitches; and over and under the cloth, mm.
+    pub(super) reach: DVec2,
+    /// Length of yarn of a stitch, mm.
+    pub(super) length: f64,
+    /// The thickest yarn's diameter, mm.
+    pub(super) diameter: f64,
+}
+
+/// One yarn of [`Shapes`].
+pub(super) struct Shape {
+    pub(super) kind: StrandKind,
+    /// Which row, column or pick of the tile.
+    pub(super) index: usize,
+    pub(super) radius: f64,
+    /// Control points of a stitch.
+    pub(super) per_stitch: usize,
+    /// Control points of a tile.
+    count: usize,
+    /// For each pair of stretches all control points: stitches across and rows up from the tile's corner, mm out.
+    control: Vec<Vec3>,
+}
+
+impl Shape {
+    /// Along which axis of the panel it goes.
+    pub(super) fn axis(&self) -> usize {
+        usize::from(self.kind == StrandKind::Warp)
+    }
+}
+
+/// Rounds in which a pulled tile settles.
+const ROUNDS: usize = 120;
+
+impl Shapes {
+    /// Relaxes `tile` (mm) between the stretches of the cloth, `per_stitch` control points for each stitch.
+    ///
+    /// # Errors
+    /// A tile whose yarns go slantwise or in rings.
+    pub(super) fn new(tile: &Tile, per_stitch: usize, range: [[f64; 2]; 2]) -> Result<Self, GarmentError> {
+        if tile.strands.iter().any(|s| s.step != [1, 0] && s.step != [0, 1]) {
+            let problem = "this cloth has yarns that go slantwise or in rings; only rows and warps can be laid";
+            return Err(GarmentError::new(problem, "a knit, a weave, or a file of one of them"));
+        }
+        let nodes = range.map(|[low, high]| {
+            let mut nodes = vec![1.0];
+            if low < 0.985 {
+                nodes.insert(0, low.max(0.8));
+            }
+            if high > 1.015 {
+                nodes.push(high.min(1.6));
+            }
+            nodes
+        });
+        let stretches: Vec<DVec2> =
+            nodes[0].iter().flat_map(|&x| nodes[1].iter().map(move |&y| DVec2::new(x, y))).collect();
+        let pulled: Vec<Tile> = stretches
+            .par_iter()
+            .map(|&s| if s == DVec2::ONE { tile.clone() } else { tile.pulled(tile.period * s, ROUNDS) })
+            .collect();
+        let counts = tile.counts.map(|n| n as usize);
+        let strands: Vec<Shape> = tile
+            .strands
+            .iter()
+            .enumerate()
+            .map(|(i, strand)| {
+                let axis = usize::from(strand.step[1] != 0);
+                let count = per_stitch * counts[axis];
+                let places = places(strand, count, tile.period);
+                let control = pulled
+                    .iter()
+                    .flat_map(|t| {
+                        let stitch = t.stitch();
+                        let own = &t.strands[i];
+                        let to = move |p: glam::DVec3| {
+                            Vec3::new((p.x / stitch.x) as f32, (p.y / stitch.y) as f32, p.z as f32)
+                        };
+                        own.spline(&places, t.period).into_iter().map(to).collect::<Vec<_>>()
+                    })
+                    .collect();
+                let index = strand.index as usize;
+                Shape { kind: strand.kind, index, radius: strand.radius, per_stitch, count, control }
+            })
+            .collect();
+        let mut reach = DVec2::ZERO;
+        for shape in &strands {
+            let across = 1 - shape.axis();
+            let own = |p: &Vec3| f64::from(p[across]) - shape.index as f64;
+            let beyond = shape.control.iter().map(|p| (own(p) - 1.0).max(-own(p))).fold(0.0, f64::max);
+            reach[across] = reach[across].max(beyond);
+        }
+        Ok(Self {
+            counts,
+            strands,
+            nodes: nodes.map(|n| n.iter().map(|&v| v as f32).collect()),
+            reach,
+            length: tile.length() / (counts[0] * counts[1]) as f64,
+            diameter: tile.diameter(),
+        })
+    }
+
+    /// The yarn of a line of an axis.
+    pub(super) fn of_line(&self, axis: usize, line: usize) -> Option<&Shape> {
+        let index = line % self.counts[1 - axis];
+        self.strands.iter().find(|s| s.axis() == axis && s.index == index)
+    }
+
+    /// Whether yarns go along an axis.
+    pub(super) fn has_axis(&self, axis: usize) -> bool {
+        self.strands.iter().any(|s| s.axis() == axis)
+    }
+
+    /// Control point k of the tile's yarn where the cloth is stretched so.
+    #[inline]
+    pub(super) fn control(&self, shape: &Shape, k: usize, stretch: [f32; 2]) -> Vec3 {
+        let ((x, u), (y, v)) = (between(&self.nodes[0], stretch[0]), between(&self.nodes[1], stretch[1]));
+        let rows = self.nodes[1].len();
+        let at = |i: usize, j: usize| {
+            shape.control[(i.min(self.nodes[0].len() - 1) * rows + j.min(rows - 1)) * shape.count + k]
+        };
+        at(x, y).lerp(at(x + 1, y), u).lerp(at(x, y + 1).lerp(at(x + 1, y + 1), u), v)
+    }
+}
+
+/// Places of control points: as many in each stitch, evenly.
+fn places(strand: &TileStrand, count: usize, period: DVec2) -> Vec<f64> {
+    strand.evenly(count, period)
+}
+
+/// The node before a value, and how far it is to the next; held at both ends.
+#[inline]
+fn between(nodes: &[f32], value: f32) -> (usize, f32) {
+    if nodes.len() < 2 {
+        return (0, 0.0);
+    }
+    let i = nodes.partition_point(|&n| n <= value).clamp(1, nodes.len() - 1) - 1;
+    (i, ((value - nodes[i]) / (nodes[i + 1] - nodes[i])).clamp(0.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_lie_between_their_nodes() {
+        let nodes = [0.9, 1.0, 1.3];
+        assert_eq!(between(&nodes, 0.5), (0, 0.0));
+        assert_eq!(between(&nodes, 2.0), (1, 1.0));
+        let (i, u) = between(&nodes, 1.15);
+        assert!(i == 1 && (u - 0.5).abs() < 1e-5);
+        assert_eq!(between(&[1.0], 1.2), (0, 0.0));
+    }
+}

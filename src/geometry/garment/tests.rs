@@ -1,0 +1,287 @@
+use std::fmt::Write;
+
+use super::*;
+use crate::geometry::{
+    curve::{Basis, Curve},
+    pattern::{
+        chart::Chart,
+        draft::Draft,
+        knit::{Form, Knit},
+        overlap::overlap,
+        weave::{self, Weave},
+    },
+};
+
+/// A stockinette of 4 x 3 mm stitches.
+fn knitted() -> Tile {
+    let knit = Knit {
+        chart: Chart::named("stockinette").unwrap(),
+        stitches: 1,
+        rows: 1,
+        form: Form::Flat,
+        stitch_width: Some(4.0 / 1.2),
+        row_height: Some(3.0 / 1.2),
+        yarn_per_stitch: 13.9,
+        points: 24,
+    };
+    Tile::of_knit(&knit, 1.2).unwrap()
+}
+
+fn woven() -> Tile {
+    let weave = Weave {
+        draft: Draft::named("plain").unwrap(),
+        warps: 1,
+        wefts: 1,
+        warp_radius: 0.5,
+        weft_radius: 0.5,
+        warp_spacing: Some(2.5),
+        weft_spacing: Some(2.5),
+        crimp: 0.5,
+        points: weave::POINTS,
+    };
+    Tile::of_weave(&weave).unwrap()
+}
+
+fn options(tile: Tile) -> Options {
+    Options {
+        unit_mm: 1.0,
+        uv_mm: None,
+        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12 }],
+        seam: SeamKind::Mattress,
+        tension: None,
+        coordinates: true,
+    }
+}
+
+/// A grid of quads over texture coordinates of `n` x `m` cells of `size` mm from (left, 0), placed in space by `at`.
+fn sheet(text: &mut String, group: &str, n: usize, m: usize, size: f64, left: f64, at: &dyn Fn(f64, f64) -> DVec3) {
+    let first = text.lines().filter(|l| l.starts_with("v ")).count() + 1;
+    for j in 0..=m {
+        for i in 0..=n {
+            let (u, v) = (i as f64 * size, j as f64 * size);
+            let p = at(u, v);
+            writeln!(text, "v {} {} {}\nvt {} {v}", p.x, p.y, p.z, left + u).unwrap();
+        }
+    }
+    writeln!(text, "g {group}").unwrap();
+    for j in 0..m {
+        for i in 0..n {
+            let a = first + j * (n + 1) + i;
+            let [b, c, d] = [a + 1, a + n + 2, a + n + 1];
+            writeln!(text, "f {a}/{a} {b}/{b} {c}/{c} {d}/{d}").unwrap();
+        }
+    }
+}
+
+fn square() -> GarmentMesh {
+    let mut text = String::new();
+    sheet(&mut text, "square", 10, 10, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    GarmentMesh::parse(&text).unwrap()
+}
+
+fn laid(mesh: &GarmentMesh, options: Options) -> (Report, Vec<LaidYarn>) {
+    let garment = Garment::new(mesh, options).unwrap();
+    let yarns = garment.lay(mesh, &[mesh], &[], &mut Vec::new()).unwrap();
+    (garment.report().clone(), yarns.into_iter().flatten().flatten().collect())
+}
+
+fn overlapping(yarns: &[LaidYarn]) -> f64 {
+    let curves: Vec<(Curve, Vec<f64>)> = yarns
+        .iter()
+        .map(|y| {
+            let points = y.points.clone();
+            let radii = vec![y.radius; points.len()];
+            (Curve { basis: Basis::BSpline, closed: y.closed, points, radii: None, flattening: None }, radii)
+        })
+        .collect();
+    let found = overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap();
+    eprintln!("{found:?}");
+    found.share
+}
+
+#[test]
+fn a_flat_square_holds_its_stitches_within_its_border() {
+    for (tile, most) in [(knitted(), 0.12), (woven(), 0.12)] {
+        let stitch = tile.stitch();
+        let (report, yarns) = laid(&square(), options(tile));
+        let wanted = 100.0 * 100.0 / stitch.element_product();
+        let found = report.all_stitches() as f64;
+        assert!(found < wanted && found > 0.85 * wanted, "{found} of {wanted}");
+        for yarn in &yarns {
+            assert_eq!(yarn.coordinates.len(), yarn.points.len());
+            for p in &yarn.points {
+                let out = (DVec2::splat(50.0) - p.truncate()).abs().max_element() - 50.0 + yarn.radius;
+                assert!(out < 0.8 * yarn.radius, "{p} is {out} out");
+                assert!(p.z.abs() < 6.0, "{p}");
+            }
+        }
+        assert!(overlapping(&yarns) < most);
+        assert!((report.uv_mm - 1.0).abs() < 1e-9 && (report.ratio.p50 - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn rows_are_few_yarns_and_long() {
+    let (report, yarns) = laid(&square(), options(knitted()));
+    // One yarn to and fro, and the chain around.
+    assert!(yarns.len() <= 3, "{}", yarns.len());
+    let longest = yarns.iter().map(|y| y.points.len()).max().unwrap();
+    assert!(longest as u64 >= 12 * report.all_stitches());
+}
+
+#[test]
+fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
+    let mut text = String::new();
+    let radius = 240.0 / std::f64::consts::TAU;
+    let at = |u: f64, v: f64| {
+        let (sin, cos) = (u.rem_euclid(240.0) / radius).sin_cos();
+        DVec3::new(radius * sin, v, radius * cos)
+    };
+    sheet(&mut text, "tube", 24, 6, 10.0, 0.0, &at);
+    let mesh = GarmentMesh::parse(&text).unwrap();
+    let (report, yarns) = laid(&mesh, options(knitted()));
+    let rounds: Vec<&LaidYarn> = yarns.iter().filter(|y| y.closed).collect();
+    assert!(rounds.len() > 15, "{} of {}", rounds.len(), yarns.len());
+    assert_eq!(report.all_stitches() % 60, 0, "{}", report.all_stitches());
+    // On the round surface, not on its chords.
+    for yarn in &rounds {
+        for p in &yarn.points {
+            let off = (p.x.hypot(p.z) - radius).abs();
+            assert!(off < 2.2, "{p}: {off}");
+        }
+    }
+    assert!(overlapping(&yarns) < 0.12);
+}
+
+#[test]
+fn panels_meet_at_seams_within_a_yarn() {
+    let mut text = String::new();
+    sheet(&mut text, "left", 8, 8, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    sheet(&mut text, "right", 8, 8, 10.0, 200.0, &|u, v| DVec3::new(80.0 + u, v, 0.0));
+    let mesh = GarmentMesh::parse(&text).unwrap();
+    let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(knitted()) }).unwrap();
+    let all: Vec<LaidYarn> =
+        garment.lay(&mesh, &[&mesh], &[], &mut Vec::new()).unwrap().into_iter().flatten().flatten().collect();
+    let middle = |p: &&DVec3| (15.0..65.0).contains(&p.y);
+    let points = || all.iter().flat_map(|y| &y.points).filter(middle);
+    let left = points().filter(|p| p.x < 80.0).map(|p| p.x).fold(f64::MIN, f64::max);
+    let right = points().filter(|p| p.x > 80.0).map(|p| p.x).fold(f64::MAX, f64::min);
+    assert!(right - left < 2.0 * 1.2 && right > left, "{left} {right}");
+}
+
+#[test]
+fn frames_keep_their_yarns_and_errors_name_what_differs() {
+    let still = square();
+    let mut moved = still.clone();
+    for p in &mut moved.points {
+        *p = DVec3::new(p.x, p.y, p.z + 0.002 * p.x * p.x);
+    }
+    let garment = Garment::new(&still, options(knitted())).unwrap();
+    let frames = garment.lay(&still, &[&still, &moved], &[], &mut Vec::new()).unwrap();
+    for (a, b) in frames[0].iter().flatten().zip(frames[1].iter().flatten()) {
+        assert_eq!((a.points.len(), a.closed), (b.points.len(), b.closed));
+        for (p, q) in a.points.iter().zip(&b.points) {
+            // Loops follow the cloth: a point of a yarn stays over its place of the panel.
+            assert!((q.z - p.z - 0.002 * p.x * p.x).abs() < 4.0, "{p} {q}");
+        }
+    }
+    let mut other = still.clone();
+    other.faces.pop();
+    let (frame, problem) = garment.lay(&still, &[&still, &other], &[], &mut Vec::new()).unwrap_err();
+    assert!(frame == 1 && problem.contains("triangles"), "{problem}");
+}
+
+#[test]
+fn yarns_are_the_same_on_any_number_of_threads() {
+    let lay = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let tension = Some(Tension { seed: 7, spread: 0.05 });
+            laid(&square(), Options { tension, ..options(knitted()) }).1
+        })
+    };
+    let (one, three) = (lay(1), lay(3));
+    assert_eq!(one.len(), three.len());
+    for (a, b) in one.iter().zip(&three) {
+        assert_eq!(a.points, b.points);
+    }
+}
+
+#[test]
+fn a_body_keeps_yarns_out() {
+    let body = Mesh::sphere(60.0, 64);
+    let mut text = String::new();
+    // A cap that dips into the ball.
+    let at = |u: f64, v: f64| {
+        DVec3::new(u - 30.0, v - 30.0, (60.0_f64.powi(2) - (u - 30.0).powi(2) - (v - 30.0).powi(2)).sqrt() - 1.0)
+    };
+    sheet(&mut text, "cap", 12, 12, 5.0, 0.0, &at);
+    let mesh = GarmentMesh::parse(&text).unwrap();
+    let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(knitted()) }).unwrap();
+    let mut notes = Vec::new();
+    let yarns = garment.lay(&mesh, &[&mesh], &[&body], &mut notes).unwrap();
+    assert!(notes.iter().any(|n| n.contains("out of the body")), "{notes:?}");
+    for yarn in yarns.iter().flatten().flatten() {
+        for p in &yarn.points {
+            assert!(p.length() > 60.0 + 0.3 * yarn.radius, "{p}: {}", p.length() - 60.0);
+        }
+    }
+}
+
+#[test]
+fn patterns_choose_names() {
+    for (pattern, name, fits) in [
+        ("rib_*", "rib_neck", true),
+        ("rib_*", "ribs", false),
+        ("*", "", true),
+        ("?ib*k", "rib_neck", true),
+        ("front", "front", true),
+        ("front", "front2", false),
+        ("*a*b", "xaxbxb", true),
+    ] {
+        assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
+    }
+    let cloths = vec![
+        options(knitted()).cloths.remove(0),
+        Cloth { group: Some("nobody".into()), ..options(knitted()).cloths.remove(0) },
+    ];
+    let error = Garment::new(&square(), Options { cloths, ..options(knitted()) }).err().unwrap();
+    assert!(error.problem.contains("nobody") && error.hint.contains("square"), "{error:?}");
+}
+
+#[test]
+fn what_cannot_be_laid_is_said() {
+    let fine = options(knitted().scaled(1e-3));
+    let error = Garment::new(&square(), fine).err().unwrap();
+    assert!(error.problem.contains("stitches of"), "{error:?}");
+    let mut text = String::new();
+    sheet(&mut text, "once", 10, 10, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    // A panel that is folded over itself in its texture coordinates: a strip that winds on.
+    let mut wound = String::new();
+    let n = 120;
+    for i in 0..=n {
+        let angle = 1.5 * std::f64::consts::TAU * f64::from(i) / f64::from(n);
+        for radius in [40.0, 80.0] {
+            let (sin, cos) = angle.sin_cos();
+            writeln!(
+                wound,
+                "v {} {} {}\nvt {} {}",
+                radius * cos,
+                radius * sin,
+                3.0 * angle,
+                radius * cos,
+                radius * sin
+            )
+            .unwrap();
+        }
+    }
+    wound.push_str("g spiral\n");
+    for i in 0..n {
+        let a = 2 * i + 1;
+        writeln!(wound, "f {a}/{a} {1}/{1} {2}/{2} {0}/{0}", a + 2, a + 1, a + 3).unwrap();
+    }
+    let mesh = GarmentMesh::parse(&wound).unwrap();
+    let error = Garment::new(&mesh, options(knitted())).err().unwrap();
+    assert!(error.problem.contains("`spiral` overlaps itself") && error.line > 0, "{error:?}");
+    assert!(Garment::new(&GarmentMesh::parse(&text).unwrap(), options(knitted())).is_ok());
+}

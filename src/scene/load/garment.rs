@@ -1,0 +1,600 @@
+//! `source = { type = "garment" }`: cloth laid on a mesh with its panels as texture coordinates.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec2, DVec3};
+
+use super::{
+    super::{
+        FabricMotion, GarmentFacts,
+        animation::{first_number, numbered},
+    },
+    Context, Range, Reader, UNITS,
+    cloth::{Detail, Yarns},
+    color::{self, ColorPlan, FabricCoordinates},
+    pattern,
+    yarns::Library,
+};
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        curve_file,
+        garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, SeamKind, Tension},
+        mesh::Mesh,
+        obj,
+        pattern::{
+            chart::Chart,
+            draft::Draft,
+            knit::{self, Form, Knit},
+            tile::Tile,
+            weave::{self, Weave},
+        },
+    },
+    input::diagnostic::{Span, unknown_name},
+};
+
+/// Control points of a stitch unless asked otherwise.
+const POINTS: u64 = 12;
+/// Stitches per area times the square of their yarn's length, of relaxed plain knit (after Munden, "The Geometry and
+/// Dimensional Properties of Plain-Knit Fabrics", 1959).
+const MUNDEN: f64 = 23.1;
+/// Below so many diameters of yarn in a stitch loops jam; above so many they are a net.
+const TIGHTEST: f64 = 10.5;
+const LOOSEST: f64 = 30.0;
+
+/// What repeats, as it is written.
+#[derive(Clone)]
+enum Pattern {
+    Knit { chart: Chart, yarn_per_stitch: Option<f64> },
+    Weave { draft: Draft, crimp: f64 },
+    File(PathBuf),
+}
+
+#[derive(Clone)]
+struct ClothPlan {
+    pattern: Pattern,
+    name: String,
+    points: usize,
+    span: Span,
+}
+
+/// A panel's own cloth, or the fabric's.
+struct Rule {
+    group: Option<String>,
+    cloth: ClothPlan,
+    /// Width and height of a stitch, mm.
+    stitch: Option<DVec2>,
+    grain: f64,
+    /// Its yarn, if it is not the fabric's.
+    yarn: Option<String>,
+    /// Its colours, if they are not the fabric's.
+    color: Option<ColorPlan>,
+}
+
+/// A garment whose text is sound and whose mesh is not read yet.
+pub(super) struct GarmentPlan {
+    path: PathBuf,
+    span: Span,
+    unit: f64,
+    uv_unit: Option<f64>,
+    seam: SeamKind,
+    body: Option<(PathBuf, Span)>,
+    rules: Vec<Rule>,
+}
+
+/// Reads a garment: its source and the fabric's `gauge`, `grain` and `[[fabric.panel]]`.
+pub(super) fn garment(
+    source: &Reader<'_>,
+    fabric: &Reader<'_>,
+    context: &Context<'_>,
+    yarns: &Yarns<'_>,
+) -> Option<GarmentPlan> {
+    let path =
+        source.required_string("path").map(|p| context.resolve(p, source.span("path").unwrap_or(source.header())));
+    let span = source.span("path").unwrap_or(source.header());
+    let unit = source.one_of("unit", &UNITS).unwrap_or(context.unit);
+    let uv_unit = source.one_of("uv_unit", &UNITS);
+    let seams = [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
+    let seam = source.one_of("seam", &seams);
+    let body = source.string("body").map(|p| {
+        let span = source.span("body").unwrap_or(source.header());
+        (context.resolve(p, span), span)
+    });
+    let own = match source.table("cloth") {
+        Some(table) => cloth(table, context),
+        None => {
+            source.error(
+                "missing table `cloth`: what is laid on the garment",
+                Some("cloth = { type = \"knit\", pattern = \"stockinette\" }"),
+            );
+            None
+        }
+    };
+    let (gauge, per) = (stitch(fabric, None), per(fabric));
+    let grain = grain(fabric);
+    let first = own.clone().map(|cloth| Rule { group: None, cloth, stitch: gauge, grain, yarn: None, color: None });
+    let panels: Vec<Option<Rule>> = fabric
+        .tables("panel")
+        .into_iter()
+        .map(|table| {
+            if !table.has("group") {
+                table.error("missing key `group`: which panels these are", Some("group = \"rib_*\""));
+            }
+            let group = table.string("group").map(str::to_owned);
+            let own_cloth = table.table("cloth").map(|t| cloth(t, context));
+            let yarn = table.string("yarn").map(str::to_owned);
+            if let Some(name) = &yarn
+                && !yarns.library.yarn_names.contains(name)
+            {
+                let (message, hint) = unknown_name("yarn", name, yarns.library.yarn_names.iter().map(String::as_str));
+                table.error_at("yarn", message, Some(&hint));
+            }
+            let colored = ["rows", "columns", "motif", "tint", "vary"].iter().any(|k| table.has(k));
+            let color = color::plan(&table, context, yarns.library);
+            let rule = Rule {
+                group: Some(group?),
+                stitch: stitch(&table, Some(per)).or(gauge),
+                grain: if table.has("grain") { self::grain(&table) } else { grain },
+                cloth: match own_cloth {
+                    Some(cloth) => cloth?,
+                    None => own.clone()?,
+                },
+                yarn,
+                color: colored.then_some(color),
+            };
+            table.finish();
+            Some(rule)
+        })
+        .collect();
+    let knitted = own.as_ref().is_none_or(|c| !matches!(c.pattern, Pattern::Weave { .. }));
+    let seam = seam.unwrap_or(if knitted { SeamKind::Mattress } else { SeamKind::Overlock });
+    let mut rules = vec![first?];
+    for panel in panels {
+        rules.push(panel?);
+    }
+    Some(GarmentPlan { path: path?, span, unit, uv_unit, seam, body, rules })
+}
+
+fn grain(table: &Reader<'_>) -> f64 {
+    super::radians(table.f64_or("grain", 0.0, Range::between(-360.0, 360.0)))
+}
+
+/// Millimetres in which the numbers of `gauge` are counted.
+fn per(table: &Reader<'_>) -> f64 {
+    let units = [("10 cm", 100.0), ("cm", 10.0), ("inch", 25.4), ("in", 25.4)];
+    table.one_of_or("gauge_per", 100.0, &units)
+}
+
+/// Width and height of a stitch from `gauge`, mm.
+fn stitch(table: &Reader<'_>, outer: Option<f64>) -> Option<DVec2> {
+    let own = if table.has("gauge_per") || outer.is_none() { per(table) } else { outer.unwrap_or(100.0) };
+    let gauge = table.vec2("gauge", Range::between(1e-3, 1e6))?;
+    Some(own / DVec2::from(gauge))
+}
+
+/// Reads `cloth = { .. }`.
+fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
+    let span = table.header();
+    let points = table.u64_or("points", POINTS, 6..=200) as usize;
+    let kind = table.kind("type", &[("knit", 0), ("weave", 1), ("file", 2), ("stockinette", 3)]);
+    let made = match kind {
+        Some(0) => {
+            let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+            let (name, chart, _) = pattern::chart(&table, context);
+            chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch }))
+        }
+        Some(1) => {
+            let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
+            let (name, draft) = pattern::draft(&table);
+            draft.map(|draft| (name, Pattern::Weave { draft, crimp }))
+        }
+        Some(2) => {
+            let path = table.required_string("path");
+            path.map(|p| {
+                let path = context.resolve(p, table.span("path").unwrap_or(span));
+                (path.display().to_string(), Pattern::File(path))
+            })
+        }
+        Some(_) => Chart::named("stockinette")
+            .map(|chart| ("stockinette".to_owned(), Pattern::Knit { chart, yarn_per_stitch: None })),
+        None => None,
+    };
+    table.finish();
+    let (name, pattern) = made?;
+    Some(ClothPlan { pattern, name, points, span })
+}
+
+impl ClothPlan {
+    /// What repeats, mm, of yarn of a radius.
+    fn tile(
+        &self,
+        stitch: Option<DVec2>,
+        radius: f64,
+        context: &Context<'_>,
+        warnings: &mut Vec<String>,
+    ) -> Option<Tile> {
+        let d = 2.0 * radius;
+        let tell = |problem: String, hint: &str| {
+            context.error(self.span, problem, Some(hint.to_owned()));
+            None
+        };
+        match &self.pattern {
+            Pattern::Knit { chart, yarn_per_stitch } => {
+                let length = yarn_per_stitch
+                    .or(stitch.map(|s| (MUNDEN * s.element_product()).sqrt() / d))
+                    .unwrap_or(knit::YARN_PER_STITCH);
+                if let Some(s) = stitch {
+                    let about = format!(
+                        "a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, {length:.1} diameters of {d:.3} mm",
+                        s.x,
+                        s.y,
+                        length * d
+                    );
+                    if length < TIGHTEST || s.x < 2.0 * d || s.y < d {
+                        let problem = format!("the yarn is too thick for this gauge: {about}");
+                        let least = (MUNDEN * s.element_product()).sqrt() / 13.0 / 2.0;
+                        return tell(problem, &format!("thinner yarn (radius about {least:.3} mm), or fewer stitches"));
+                    }
+                    if length > LOOSEST {
+                        warnings.push(format!("the yarn is thin for this gauge: {about}; the cloth will be a net"));
+                    }
+                }
+                let knit = Knit {
+                    chart: chart.clone(),
+                    stitches: 1,
+                    rows: 1,
+                    form: Form::Flat,
+                    stitch_width: stitch.map(|s| s.x / d),
+                    row_height: stitch.map(|s| s.y / d),
+                    yarn_per_stitch: length.clamp(6.0, 60.0),
+                    points: knit::POINTS,
+                };
+                match Tile::of_knit(&knit, d) {
+                    Ok(tile) => Some(tile),
+                    Err(error) => tell(error.problem, &error.hint),
+                }
+            }
+            Pattern::Weave { draft, crimp } => {
+                let weave = Weave {
+                    draft: draft.clone(),
+                    warps: 1,
+                    wefts: 1,
+                    warp_radius: radius,
+                    weft_radius: radius,
+                    warp_spacing: stitch.map(|s| s.x),
+                    weft_spacing: stitch.map(|s| s.y),
+                    crimp: *crimp,
+                    points: weave::POINTS,
+                };
+                match Tile::of_weave(&weave) {
+                    Ok(tile) => Some(tile),
+                    Err(tight) => {
+                        let which = if tight.warp { "warp" } else { "weft" };
+                        let problem = format!(
+                            "the yarn is too thick for this gauge: {which} threads of {d:.3} mm need {:.4} mm each",
+                            tight.least
+                        );
+                        tell(problem, "thinner yarn, fewer threads, or another `crimp`")
+                    }
+                }
+            }
+            Pattern::File(path) => match curve_file::read_tile(path) {
+                Err(error) => tell(error.to_string(), "a periodic curve file (.pyp)"),
+                Ok(tile) => Some(match stitch {
+                    None => tile,
+                    Some(s) => {
+                        let own = tile.stitch();
+                        let scale = (s.element_product() / own.element_product()).sqrt();
+                        let period = s * DVec2::new(f64::from(tile.counts[0]), f64::from(tile.counts[1]));
+                        tile.scaled(scale).pulled(period, 200)
+                    }
+                }),
+            },
+        }
+    }
+}
+
+/// What a rule has become: curves of one kind of yarn.
+pub(super) struct MadePanels {
+    pub(super) origin: String,
+    /// The yarn's name, if it is not the fabric's.
+    pub(super) yarn: Option<String>,
+    pub(super) color: Option<ColorPlan>,
+    pub(super) curves: Vec<(Curve, Vec<f64>)>,
+    pub(super) coordinates: FabricCoordinates,
+    pub(super) motion: FabricMotion,
+}
+
+impl GarmentPlan {
+    /// Reads the mesh and lays the yarns, unless only facts are wanted.
+    #[expect(clippy::too_many_arguments, reason = "each is needed once, by name")]
+    pub(super) fn make(
+        self,
+        (yarn, radius): (&str, f64),
+        tension: Option<Tension>,
+        colored: bool,
+        context: &Context<'_>,
+        library: &Library,
+        detail: &Detail,
+        warnings: &mut Vec<String>,
+    ) -> Option<(Vec<MadePanels>, GarmentFacts)> {
+        let radius_of =
+            |rule: &Rule| rule.yarn.as_ref().and_then(|name| library.yarns.get(name)).map_or(radius, |y| y.radius);
+        let tex_of = |rule: &Rule| {
+            let own = rule.yarn.as_deref().or(Some(yarn)).and_then(|name| library.yarns.get(name));
+            own.and_then(|yarn| yarn.tex)
+        };
+        let cloths: Option<Vec<Cloth>> = self
+            .rules
+            .iter()
+            .map(|rule| {
+                let tile = rule.cloth.tile(rule.stitch, radius_of(rule), context, warnings)?;
+                Some(Cloth { group: rule.group.clone(), tile, grain: rule.grain, points: rule.cloth.points })
+            })
+            .collect();
+        let tell = |error: GarmentError| {
+            let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
+            let error = if error.line > 0 && error.path.is_none() {
+                GarmentError { path: Some(self.path.clone()), ..error }
+            } else {
+                error
+            };
+            context.error(self.span, error.to_string(), hint);
+        };
+        let frames = Frames::find(&self.path, detail);
+        let mut read: BTreeMap<PathBuf, GarmentMesh> = BTreeMap::new();
+        for path in frames.files() {
+            match GarmentMesh::read(path) {
+                Ok(mesh) => {
+                    read.insert(path.clone(), mesh);
+                }
+                Err(error) => {
+                    tell(error);
+                    return None;
+                }
+            }
+        }
+        let rest = &read[&frames.rest];
+        let cloths = cloths?;
+        let overlap = cloths.iter().filter_map(|c| c.tile.overlap()).max_by(|a, b| a.share.total_cmp(&b.share));
+        let options = Options {
+            unit_mm: self.unit,
+            uv_mm: self.uv_unit,
+            cloths,
+            seam: self.seam,
+            tension,
+            coordinates: colored || self.rules.iter().any(|r| r.color.is_some()),
+        };
+        let garment = match Garment::new(rest, options) {
+            Ok(garment) => garment,
+            Err(error) => {
+                tell(error);
+                return None;
+            }
+        };
+        let mut notes = garment.report().notes.clone();
+        let report = garment.report();
+        let tex: Vec<Option<f64>> = self.rules.iter().map(tex_of).collect();
+        // Tex is grams in a kilometre. Nothing is said of yarns of which one is not known.
+        let weight = |lengths: &[f64]| -> Option<f64> {
+            let all = lengths.iter().zip(&tex).filter(|(length, _)| **length > 0.0);
+            all.map(|(length, tex)| Some(length * 1e-6 * (*tex)?)).sum()
+        };
+        let mut facts = GarmentFacts {
+            path: self.path.display().to_string(),
+            cloth: self.rules[0].cloth.name.clone(),
+            panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
+            stitches: report.all_stitches(),
+            yarn_length: report.yarn_length.iter().sum(),
+            weight: weight(&report.yarn_length),
+            overlap: overlap.map(|o| [o.share, o.deepest]),
+            control_points: report.control_points,
+            uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
+            stretched: report.stretched,
+            uv_mm: report.uv_mm,
+            bounds: report.bounds,
+            repairs: Vec::new(),
+        };
+        if detail.survey {
+            facts.repairs.clone_from(&notes);
+            return Some((Vec::new(), facts));
+        }
+
+        let mut meshes = Vec::new();
+        for pose in &frames.poses {
+            let (a, b) = (&read[&pose.before], &read[&pose.after]);
+            for (mesh, path) in [(a, &pose.before), (b, &pose.after)] {
+                if let Err(problem) = rest.same_topology(mesh) {
+                    let message = format!("{}: {problem}", path.display());
+                    context.error(self.span, message, Some("all frames have the same faces".to_owned()));
+                    return None;
+                }
+            }
+            meshes.push(between(a, b, pose.share));
+        }
+        let still = meshes.iter().all(|m| m.points == meshes[0].points);
+        if still {
+            meshes.truncate(1);
+        }
+        if meshes.len() > 1 && !detail.can_move {
+            let message = "yarns that move while the shutter is open need mode = \"yarn\"";
+            context.error(self.span, message, Some("shutter = [0, 0] shows them at the frame's own time".to_owned()));
+            return None;
+        }
+        // Plies wind by lengths in the first frame, so that they keep their places from frame to frame.
+        let with_rest = frames.animated && (meshes.len() > 1 || meshes[0].points != rest.points);
+        let times = meshes.len();
+        if with_rest {
+            meshes.push(rest.clone());
+        }
+        let bodies = self.bodies(&frames, meshes.len(), with_rest, detail, context)?;
+        let all: Vec<&GarmentMesh> = meshes.iter().collect();
+        let body: Vec<&Mesh> = bodies.iter().collect();
+        let mut laid = match garment.lay(rest, &all, &body, &mut notes) {
+            Ok(laid) => laid,
+            Err((_, problem)) => {
+                context.error(self.span, problem, None);
+                return None;
+            }
+        };
+        drop(garment);
+        let at_rest = if with_rest { laid.pop() } else { None };
+        debug_assert_eq!(laid.len(), times);
+        let later = laid.split_off(1);
+        let first = laid.pop()?;
+        let lengths: Vec<f64> = first.iter().map(|yarns| length(yarns)).collect();
+        facts.yarn_length = lengths.iter().sum();
+        facts.weight = weight(&lengths);
+        facts.repairs = notes;
+        Some((self.made(first, later, at_rest), facts))
+    }
+
+    /// Yarns as curves, for each rule that has any.
+    fn made(self, first: Laid, later: Vec<Laid>, rest: Option<Laid>) -> Vec<MadePanels> {
+        let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
+            std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
+        };
+        let (mut later, mut rest) = (later, rest);
+        let mut out = Vec::new();
+        for (i, (yarns, rule)) in first.into_iter().zip(self.rules).enumerate() {
+            if yarns.is_empty() {
+                continue;
+            }
+            let motion = FabricMotion {
+                later: later.iter_mut().map(|laid| points(laid, i)).collect(),
+                rest: rest.as_mut().map(|laid| points(laid, i)),
+            };
+            let mut kinds = Vec::with_capacity(yarns.len());
+            let mut places = Vec::with_capacity(yarns.len());
+            let curves = yarns
+                .into_iter()
+                .map(|LaidYarn { points, closed, radius, kind, coordinates }| {
+                    kinds.push(kind);
+                    places.push(coordinates);
+                    let radii = vec![radius; points.len()];
+                    (Curve { basis: Basis::BSpline, closed, points, radii: None, flattening: None }, radii)
+                })
+                .collect();
+            let group = rule.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
+            out.push(MadePanels {
+                origin: format!("{}{group}, {}", self.path.display(), rule.cloth.name),
+                yarn: rule.yarn,
+                color: rule.color,
+                curves,
+                coordinates: FabricCoordinates::laid(places, kinds),
+                motion,
+            });
+        }
+        out
+    }
+
+    /// The body in every pose.
+    fn bodies(
+        &self,
+        frames: &Frames,
+        count: usize,
+        with_rest: bool,
+        detail: &Detail,
+        context: &Context<'_>,
+    ) -> Option<Vec<Mesh>> {
+        let Some((path, span)) = &self.body else { return Some(Vec::new()) };
+        let own = Frames::find(path, detail);
+        let mut read: BTreeMap<PathBuf, Mesh> = BTreeMap::new();
+        for file in own.files() {
+            match obj::read(file) {
+                Ok(mut mesh) => {
+                    mesh.transform(&glam::DAffine3::from_scale(DVec3::splat(self.unit)));
+                    read.insert(file.clone(), mesh);
+                }
+                Err(error) => {
+                    context.error(*span, error.to_string(), None);
+                    return None;
+                }
+            }
+        }
+        let posed = |pose: &Pose| {
+            let (a, b) = (&read[&pose.before], &read[&pose.after]);
+            let mut mesh = a.clone();
+            if a.points.len() == b.points.len() {
+                mesh.points = a.points.iter().zip(&b.points).map(|(a, b)| a.lerp(*b, pose.share)).collect();
+            }
+            mesh
+        };
+        let last = own.poses.len() - 1;
+        let still = count - usize::from(with_rest);
+        let mut out: Vec<Mesh> = (0..still).map(|i| posed(&own.poses[i.min(last)])).collect();
+        if with_rest {
+            out.push(read[&own.rest].clone());
+        }
+        debug_assert!(frames.poses.len() >= still);
+        Some(out)
+    }
+}
+
+/// Length of yarns, mm: between the places where segments of their B-splines join.
+fn length(yarns: &[LaidYarn]) -> f64 {
+    let of = |yarn: &LaidYarn| {
+        let knot = |w: &[DVec3]| (w[0] + 4.0 * w[1] + w[2]) / 6.0;
+        yarn.points.windows(4).map(|w| knot(&w[..3]).distance(knot(&w[1..]))).sum::<f64>()
+    };
+    // Chords are a little shorter than what they span: by two percent for loops of twelve points.
+    yarns.iter().map(of).sum()
+}
+
+/// A mesh between two frames.
+fn between(a: &GarmentMesh, b: &GarmentMesh, share: f64) -> GarmentMesh {
+    let mut mesh = a.clone();
+    if share > 0.0 {
+        for (p, q) in mesh.points.iter_mut().zip(&b.points) {
+            *p = p.lerp(*q, share);
+        }
+    }
+    mesh
+}
+
+/// A time between two files.
+struct Pose {
+    before: PathBuf,
+    after: PathBuf,
+    share: f64,
+}
+
+/// The files of a frame and of the first one.
+struct Frames {
+    rest: PathBuf,
+    poses: Vec<Pose>,
+    animated: bool,
+}
+
+impl Frames {
+    fn find(path: &Path, detail: &Detail) -> Self {
+        let own = numbered(path, detail.frame).filter(|_| !path.exists());
+        let Some(own) = own else {
+            let pose = Pose { before: path.to_owned(), after: path.to_owned(), share: 0.0 };
+            return Self { rest: path.to_owned(), poses: vec![pose], animated: false };
+        };
+        // Before the first file and after the last all stand still.
+        let there = |number: f64| {
+            let path = numbered(path, number.max(0.0) as u32)?;
+            path.exists().then_some(path)
+        };
+        let needed = |number: f64| there(number).unwrap_or_else(|| own.clone());
+        let poses = super::sequence::times(detail.frame, detail.shutter)
+            .into_iter()
+            .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
+            .collect();
+        let rest = first_number(path).and_then(|n| numbered(path, n)).unwrap_or_else(|| own.clone());
+        Self { rest, poses, animated: true }
+    }
+
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let mut all: Vec<&PathBuf> = self.poses.iter().flat_map(|p| [&p.before, &p.after]).collect();
+        all.push(&self.rest);
+        all.sort();
+        all.dedup();
+        all.into_iter()
+    }
+}
