@@ -3,6 +3,7 @@
 
 pub mod compare;
 pub mod convergence;
+pub mod fidelity;
 pub mod machine;
 pub mod page;
 pub mod plot;

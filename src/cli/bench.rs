@@ -9,13 +9,15 @@ use crate::{
     experiment::{
         LOBES, converge,
         converged::{Converged, key},
-        suite::{ConvergePlan, Suite},
+        fidelity,
+        suite::{ConvergePlan, Measure, Suite},
         table3::{self, BenchError, Processes},
     },
     report::{
+        fidelity::Table as FidelityTable,
         page::Picture,
         table3::{
-            Row, Table,
+            Missing, Row, Table,
             html::{Plot, RowPictures, page},
         },
     },
@@ -26,6 +28,7 @@ const EXAMPLES: &str = "Examples:
   yarnray bench scenes/table3.toml               the whole table, in out/table3/: up to 40 minutes on 2 cores
   yarnray bench scenes/table3.toml --quick       smaller pictures, a looser target, fewer rows: minutes
   yarnray bench scenes/table3.toml --row silk    only rows whose name contains this
+  yarnray bench scenes/fidelity.toml             how far pictures are from those of explicit fibres, on many fabrics
 
 Writes table.md, table.csv, table.json and report.html (a page that needs nothing else), anew after every row. Begun again, it goes on
 after the last row that was finished; converged pictures are kept in the directory `cache` within. Each render is a process of its own.";
@@ -74,12 +77,10 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
         }
     };
     let mut processes = Processes { threads, scratch: &out, interrupt: &interrupt };
-    let saved = |table: &Table| {
-        write(&out, table, &[]).map_err(|failure| match failure {
-            Failure::Input(message) | Failure::Check(message) => BenchError::Suite(message),
-            Failure::Interrupted | Failure::Closed => BenchError::Interrupted,
-        })
-    };
+    if suite.measure == Measure::Fidelity {
+        return run_fidelity(&suite, &mut processes, &out, say);
+    }
+    let saved = |table: &Table| write(&out, table, &[]).map_err(as_bench_error);
     let table = table3::run(&suite, &mut processes, &out, threads, say, saved)?;
     let mut plots = Vec::new();
     for name in suite.converge.iter().flat_map(|plan| &plan.cases) {
@@ -94,13 +95,42 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
         log::say(&format!("wrote {}", out.join("report.html").display()));
     }
     print(&table.to_markdown())?;
-    let failed: Vec<String> = table
-        .missing
+    not_measured(&suite, &table.missing)
+}
+
+/// Measures how far pictures are from the reference's, and writes the table.
+fn run_fidelity(
+    suite: &Suite,
+    processes: &mut Processes<'_>,
+    out: &Path,
+    say: impl FnMut(&str),
+) -> Result<(), Failure> {
+    let write = |table: &FidelityTable| {
+        write_text(&out.join("table.md"), &table.to_markdown())?;
+        write_text(&out.join("table.json"), &table.to_json())
+    };
+    let saved = |table: &FidelityTable| write(table).map_err(as_bench_error);
+    let table = fidelity::run(suite, processes, out, say, saved)?;
+    write(&table)?;
+    print(&table.to_markdown())?;
+    not_measured(suite, &table.missing)
+}
+
+/// An error if a row is missing that the suite did not already know to be.
+fn not_measured(suite: &Suite, missing: &[Missing]) -> Result<(), Failure> {
+    let failed: Vec<String> = missing
         .iter()
         .filter(|missing| !suite.missing.iter().any(|(name, _)| *name == missing.name))
         .map(|missing| format!("{} was not measured: {}", missing.name, missing.reason))
         .collect();
     if failed.is_empty() { Ok(()) } else { Err(Failure::Check(failed.join("\n"))) }
+}
+
+fn as_bench_error(failure: Failure) -> BenchError {
+    match failure {
+        Failure::Input(message) | Failure::Check(message) => BenchError::Suite(message),
+        Failure::Interrupted | Failure::Closed => BenchError::Interrupted,
+    }
 }
 
 /// Writes the table in all its forms, and the page.

@@ -1,10 +1,12 @@
 //! Experiments on the renderer's own parts: what they say, held against what is true.
 //!
 //! [`goniometer`] measures how a fibre, ply or yarn scatters; [`stress`] runs stiff and extreme cases. [`converge`] measures
-//! error against run time; [`table3`] what explicit fibres and aggregated yarns cost at equal quality, as a [`suite`] says.
+//! error against run time; [`table3`] what explicit fibres and aggregated yarns cost at equal quality, [`fidelity`] how far
+//! apart their pictures are, as a [`suite`] says.
 
 pub mod converge;
 pub mod converged;
+pub mod fidelity;
 pub mod goniometer;
 pub mod method;
 pub mod stress;

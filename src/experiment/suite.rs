@@ -13,6 +13,15 @@ use crate::{
     scene::load::{LoadError, LoadOptions, read_text},
 };
 
+/// What a suite measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Time, memory and error at equal quality: [`super::table3`].
+    Cost,
+    /// How far pictures are from the reference: [`super::fidelity`].
+    Fidelity,
+}
+
 /// A checked suite.
 #[derive(Clone, Debug)]
 pub struct Suite {
@@ -20,6 +29,8 @@ pub struct Suite {
     pub path: String,
     /// What it calls itself.
     pub title: String,
+    /// What is measured.
+    pub measure: Measure,
     /// Explicit fibres, or what stands in their place.
     pub reference: Method,
     /// What is compared with it.
@@ -70,6 +81,10 @@ pub struct Case {
     pub set: Vec<String>,
     /// The paper's figures.
     pub paper: Option<Paper>,
+    /// Whether the row was kept out of development.
+    pub held_out: bool,
+    /// How far the light's means may be off, as a share.
+    pub within: f64,
 }
 
 /// Which cases are measured against time.
@@ -152,12 +167,14 @@ struct Row {
     set: Vec<String>,
     lights: Vec<String>,
     paper: Option<Paper>,
+    held_out: bool,
     missing: Option<String>,
 }
 
 fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let title = root.string_or("title", "Explicit fibres and aggregated yarns at equal quality").to_owned();
+    let measure = root.one_of_or("measure", Measure::Cost, &[("cost", Measure::Cost), ("fidelity", Measure::Fidelity)]);
     let reference = method(&root, "reference", "fiber");
     let tested = method(&root, "tested", "yarn:aggregated");
     let quality = Quality::read(&root);
@@ -179,6 +196,7 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
     Some(Suite {
         path: name.to_owned(),
         title,
+        measure,
         reference: reference?,
         tested: tested?,
         others,
@@ -218,15 +236,19 @@ fn rows(root: &Reader<'_>, folder: &Path, lights: &Lightings) -> Vec<Row> {
     rows
 }
 
+/// How far the light's means may be off where a suite does not say.
+const WITHIN: f64 = 0.05;
+
 /// The tables `[lighting.NAME]`: what each sets over a row's scene.
-struct Lightings(Vec<(String, Vec<String>)>);
+struct Lightings(Vec<(String, Vec<String>, f64)>);
 
 impl Lightings {
     fn read(root: &Reader<'_>) -> Self {
         let lighting = |(name, table): (&str, Reader<'_>)| {
             let set = strings(&table, "set");
+            let within = table.f64_or("within", WITHIN, Range::between(0.0, 1.0));
             table.finish();
-            (name.to_owned(), set)
+            (name.to_owned(), set, within)
         };
         Self(root.named_tables("lighting").into_iter().map(lighting).collect())
     }
@@ -235,8 +257,8 @@ impl Lightings {
     fn names(&self, table: &Reader<'_>, key: &str) -> Vec<String> {
         let names: Vec<String> = strings(table, key);
         for name in &names {
-            if !self.0.iter().any(|(known, _)| known == name) {
-                let (message, hint) = unknown_name("lighting", name, self.0.iter().map(|(known, _)| known.as_str()));
+            if !self.0.iter().any(|(known, ..)| known == name) {
+                let (message, hint) = unknown_name("lighting", name, self.0.iter().map(|(known, ..)| known.as_str()));
                 table.error_at(key, message, Some(&hint));
             }
         }
@@ -251,18 +273,20 @@ impl Lightings {
                 missing.push((row.name, reason));
                 continue;
             }
-            let case = |name: String, light: &[String]| Case {
+            let case = |name: String, light: &[String], within: f64| Case {
                 name,
                 scene: row.scene.clone(),
                 curves: row.curves.clone(),
                 set: row.set.iter().chain(light).cloned().collect(),
                 paper: row.paper,
+                held_out: row.held_out,
+                within,
             };
             if self.0.is_empty() {
-                cases.push(case(row.name.clone(), &[]));
+                cases.push(case(row.name.clone(), &[], WITHIN));
             }
-            for (light, set) in self.0.iter().filter(|(light, _)| row.lights.contains(light)) {
-                cases.push(case(format!("{}, {light}", row.name), set));
+            for (light, set, within) in self.0.iter().filter(|(light, ..)| row.lights.contains(light)) {
+                cases.push(case(format!("{}, {light}", row.name), set, *within));
             }
         }
         (cases, missing)
@@ -374,6 +398,7 @@ fn row(table: Reader<'_>, folder: &Path, lights: &Lightings) -> Row {
     let fallback = table.string("fallback").map(|path| folder.join(path));
     let set = strings(&table, "set");
     let lights = lights.names(&table, "lights");
+    let held_out = table.bool_or("held_out", false);
     let pair = |table: &Reader<'_>, key: &str| table.vec2(key, Range::POSITIVE);
     let paper = table.table("paper").and_then(|paper| {
         let figures = [pair(&paper, "seconds"), pair(&paper, "megabytes"), pair(&paper, "bounces")];
@@ -390,11 +415,13 @@ fn row(table: Reader<'_>, folder: &Path, lights: &Lightings) -> Row {
     // A curve file that is not there is no mistake: it may be one that must not be passed on.
     let absent = curves.as_ref().filter(|path| !path.exists()).cloned();
     match (absent, fallback) {
-        (None, _) => Row { name, scene, curves, set, lights, paper, missing: None },
-        (Some(_), Some(scene)) => Row { name, scene, curves: None, set: Vec::new(), lights, paper, missing: None },
+        (None, _) => Row { name, scene, curves, set, lights, paper, held_out, missing: None },
+        (Some(_), Some(scene)) => {
+            Row { name, scene, curves: None, set: Vec::new(), lights, paper, held_out, missing: None }
+        }
         (Some(path), None) => {
             let missing = Some(format!("{} is not there", path.display()));
-            Row { name, scene, curves, set, lights, paper, missing }
+            Row { name, scene, curves, set, lights, paper, held_out, missing }
         }
     }
 }

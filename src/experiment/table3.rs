@@ -295,6 +295,8 @@ fn measure(
         converge(
             suite,
             &Job { case, method, set, spp: suite.max_spp, noise: None, seed: 0, lobes },
+            // The mean of two halves has half of the noise of one.
+            Some(2.0 * suite.target / suite.converged),
             renderer,
             directory,
             say,
@@ -399,17 +401,18 @@ fn summary(timed: &[(Figures, f64)], method: Method, truth: &Converged, target: 
 }
 
 /// A converged picture from the cache, or rendered and put there; and its file, from the directory of the table.
-fn converge(
+/// The picture that a job converges to, in two halves, and its file: as many samples as the job says, or fewer once the relMSE
+/// of a half is estimated to be below `limit`.
+pub(super) fn converge(
     suite: &Suite,
     job: &Job<'_>,
+    limit: Option<f64>,
     renderer: &mut impl Renderer,
     directory: &Path,
     say: &mut impl FnMut(&str),
 ) -> Result<(Converged, String), BenchError> {
-    // The mean of two halves has half of the noise of one.
-    let limit = 2.0 * suite.target / suite.converged;
     let fingerprint = renderer.fingerprint(suite, job.case, job.method, job.set)?;
-    let settings = format!("{limit} {} {}", suite.max_spp, job.lobes);
+    let settings = format!("{limit:?} {} {}", job.spp, job.lobes);
     let path = converged::path(&directory.join("cache"), &[&fingerprint, &settings]);
     let name =
         format!("cache/{}", path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()));
@@ -424,7 +427,7 @@ fn converge(
         let figures = Figures::of(&done.stats)?;
         Ok(Half { image: done.image, spp: figures.spp, seconds: figures.seconds })
     };
-    let first = half(1, job.spp, Some(limit))?;
+    let first = half(1, job.spp, limit)?;
     let second = half(2, first.spp.round() as u32, None)?;
     let converged =
         Converged::new(&first, &second).ok_or_else(|| BenchError::Case("a picture without colours".to_owned()))?;
@@ -437,7 +440,7 @@ fn colors(image: &Image) -> Result<Vec<[f32; 3]>, BenchError> {
 }
 
 /// How far one converged picture is from another, on the cloth.
-fn model_error(test: &Halves, reference: &Halves) -> Result<ModelError, BenchError> {
+pub(super) fn model_error(test: &Halves, reference: &Halves) -> Result<ModelError, BenchError> {
     let cloth: Vec<bool> = reference.alpha.iter().map(|alpha| *alpha >= 0.5).collect();
     let picture = |colors: Vec<[f32; 3]>| {
         let mut image = Image::new(reference.width, cloth.len() / reference.width.max(1));

@@ -3,6 +3,7 @@
 mod chain;
 pub mod curve;
 pub mod curve_file;
+pub mod density;
 pub mod fiber;
 pub mod garment;
 pub mod mesh;

@@ -12,7 +12,10 @@ use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3A};
 use wide::f32x4;
 
-use super::yarn::{MAX_PLIES, PlyShape, YarnShape, fiber_tangent};
+use super::{
+    density::ChordFibers,
+    yarn::{MAX_PLIES, PlyShape, YarnShape, fiber_tangent},
+};
 use crate::math::{frame::sin_cos, special::GAUSS_LEGENDRE_4};
 
 /// Slope along the yarn beyond which a ray counts as no steeper.
@@ -143,6 +146,10 @@ pub struct PlyCrossing {
     pub enter: f32,
     /// x at which it leaves the core, below `enter`.
     pub exit: f32,
+    /// The fibres on the chord if they were not tilted, and where they lie.
+    pub chord: ChordFibers,
+    /// x of the point of the chord nearest to the ply's axis.
+    pub foot: f32,
     /// Expected number of fibres on the chord.
     pub fibers: f32,
 }
@@ -166,15 +173,17 @@ impl PlyCrossing {
 /// The plies a ray crosses, nearest first.
 pub type Crossings = ArrayVec<PlyCrossing, MAX_PLIES>;
 
-/// Which circle of a ply is meant: that of all its fibres, or that of their centres.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlyParts {
-    /// All of each ply.
-    Whole,
-    /// Of each ply the core, which holds the fibres' centres.
-    Cores,
-    /// Of one ply the core, of the others all.
-    CoreOf(usize),
+/// A ply on a way through the yarn.
+#[derive(Clone, Copy, Debug)]
+pub struct PlyAhead {
+    /// Index of the ply in the yarn's shape.
+    pub ply: usize,
+    /// Signed distance of the way from the ply's axis, in the circle of the ply's radius.
+    pub offset: f32,
+    /// Distance in the section from the start to the way's point nearest to the ply's axis; negative behind the start.
+    pub foot: f32,
+    /// Length in the circle of one unit of the way.
+    pub length: f32,
 }
 
 /// A ply where a ray passes it, in the round section.
@@ -402,30 +411,22 @@ impl Section {
             }
             let half = (ply.core_radius * ply.core_radius - offset * offset).max(0.0).sqrt() / length;
             let (enter, exit) = (at.x + foot + half, at.x + foot - half);
-            let fibers = ply.fibers_on_chord(offset) / length * self.tilt_factor(shape, index, &at, enter, exit);
-            let crossing = PlyCrossing { ply: index, centre: at.centre, axis: at.axis, offset, enter, exit, fibers };
+            let chord = ply.chord(offset, length);
+            let fibers = chord.total() * self.tilt_factor(shape, index, &at, enter, exit);
+            let (Passage { centre, axis, .. }, foot) = (at, 0.5 * (enter + exit));
+            let crossing = PlyCrossing { ply: index, centre, axis, offset, enter, exit, chord, foot, fibers };
             let place = out.iter().position(|c| c.enter < enter).unwrap_or(out.len());
             out.insert(place, crossing);
         }
     }
 
-    /// The stretches of plies that lie ahead of a point inside the yarn, in a direction `w` of this frame.
+    /// The plies that lie ahead of a point inside the yarn, in a direction `w` of this frame.
     ///
     /// `start` is a point of this (not the round) section that is `travel` farther along the yarn than the frame's
-    /// origin. `visit` is called with a ply's index, the distances (in the section) at which the way enters and leaves
-    /// it, and its signed distance from the ply's axis, in the circle of the ply's radius. Of a pressed section fibres
-    /// are closer to each other than of the round one by [`Self::squeeze`]. As for rays, each ply is placed where the way
-    /// passes nearest to it, and moves on from there.
+    /// origin. Of a pressed section fibres are closer to each other than of the round one by [`Self::squeeze`]. As for
+    /// rays, each ply is placed where the way passes nearest to it, and moves on from there.
     #[inline]
-    pub fn chords_ahead(
-        &self,
-        shape: &YarnShape,
-        start: Vec2,
-        travel: f32,
-        w: Vec3A,
-        parts: PlyParts,
-        mut visit: impl FnMut(usize, f32, f32, f32),
-    ) {
+    pub fn plies_ahead(&self, shape: &YarnShape, start: Vec2, travel: f32, w: Vec3A, mut visit: impl FnMut(PlyAhead)) {
         let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
         let ahead = Vec2::new(w.x, w.y) / cos;
         // As far along the yarn as is needed to cross it once and a bit.
@@ -444,11 +445,6 @@ impl Section {
                 }
                 centre = self.ply_centre(ply, axis, travel + further);
             }
-            let radius = match parts {
-                PlyParts::Cores => ply.core_radius,
-                PlyParts::CoreOf(own) if own == index => ply.core_radius,
-                _ => ply.radius,
-            };
             // The centre moves on while the way goes past it.
             let drift = if further.abs() < MAX_LIGHT_TRAVEL {
                 let turning = shape.ply_rate * ply.distance * axis.perp();
@@ -464,14 +460,11 @@ impl Section {
                 (to_circle(from), to_circle(way))
             };
             let square = way.length_squared().max(1e-6);
-            let b = from.dot(way) / square;
-            let reach = b * b - (from.length_squared() - radius * radius) / square;
-            if reach > 0.0 {
-                let half = reach.sqrt();
-                let leave = half - b;
-                if leave > 0.0 {
-                    visit(index, (-b - half).max(0.0), leave, way.perp_dot(from) / square.sqrt());
-                }
+            let foot = -from.dot(way) / square;
+            let reach = foot * foot - (from.length_squared() - ply.radius * ply.radius) / square;
+            if reach > 0.0 && foot + reach.sqrt() > 0.0 {
+                let length = square.sqrt();
+                visit(PlyAhead { ply: index, offset: way.perp_dot(from) / length, foot, length });
             }
         }
     }

@@ -6,6 +6,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3A};
 
+use super::density::PlyPacking;
+
 /// The most plies a yarn can have.
 pub const MAX_PLIES: usize = 64;
 
@@ -69,41 +71,10 @@ pub struct PlyShape {
     /// By how much its fibres are closer to each other than `radius` says, in the mean along a yarn that is pressed flat:
     /// area of the round section over that of the pressed one.
     pub squeeze: f32,
-}
-
-impl PlyShape {
-    /// The expected number of fibres on an untwisted chord whose signed distance from the ply's axis is `offset`
-    /// (yarn radii, in the circle of [`Self::radius`]).
-    ///
-    /// Centres are taken as even over the core. The paper's Eq. 2, d l sqrt(n / pi), lacks a factor
-    /// 1.128 / sqrt(d) against counted fibres; this form is exact to the counting noise.
-    #[inline]
-    pub fn fibers_on_chord(&self, offset: f32) -> f32 {
-        let inv = 1.0 / self.core_radius;
-        let upper = segment_area((offset + self.fiber_radius) * inv);
-        let lower = segment_area((offset - self.fiber_radius) * inv);
-        (self.fibers * std::f32::consts::FRAC_1_PI * (upper - lower)).max(0.0)
-    }
-}
-
-/// u sqrt(1 - u^2) + asin(u), with u clamped to [-1, 1]: area of the unit disc on one side of a chord, less pi / 2.
-#[inline]
-fn segment_area(u: f32) -> f32 {
-    let a = u.abs().min(1.0);
-    // asin(a) = pi/2 - sqrt(1 - a) poly(a), |error| < 2e-8 (Abramowitz and Stegun 4.4.46).
-    const C: [f32; 8] = [
-        -0.001_262_491_1,
-        0.006_670_09,
-        -0.017_088_126,
-        0.030_891_88,
-        -0.050_174_303,
-        0.088_978_99,
-        -0.214_598_8,
-        std::f32::consts::FRAC_PI_2,
-    ];
-    let poly = C[1..].iter().fold(C[0], |p, &c| p * a + c);
-    let asin = std::f32::consts::FRAC_PI_2 - (1.0 - a).sqrt() * poly;
-    (a * (1.0 - a * a).sqrt() + asin).copysign(u)
+    /// How much fibres crowd at the wall, or with a minus sign at the axis: see [`super::density`].
+    pub crowding: f32,
+    /// Whether fibres keep out of each other.
+    pub exclusive: bool,
 }
 
 /// The cross-section of a yarn and how it turns along it.
@@ -148,6 +119,8 @@ impl YarnShape {
                     fibers: p.fibers as f32,
                     fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
                     squeeze: 1.0,
+                    crowding: 0.0,
+                    exclusive: true,
                 }
             })
             .collect();
@@ -164,6 +137,19 @@ impl YarnShape {
             ply_rate: ply_rate as f32,
             tilted,
         }
+    }
+
+    /// The same with the fibres of each ply packed as they are measured to be; without it they are even.
+    ///
+    /// # Panics
+    /// If there is not one packing for each ply.
+    pub fn packed(mut self, packings: &[PlyPacking]) -> Self {
+        assert_eq!(self.plies.len(), packings.len(), "one packing for each ply");
+        for (ply, packing) in self.plies.iter_mut().zip(packings) {
+            ply.crowding = packing.crowding as f32;
+            ply.exclusive = packing.exclusive;
+        }
+        self
     }
 }
 
@@ -233,31 +219,6 @@ pub(crate) mod tests {
             let (radius, distance) = touching_plies(n);
             assert!((radius + distance - 1.0).abs() < 1e-12);
             assert!((distance * (PI / f64::from(n)).sin() - radius).abs() < 1e-12, "neighbours of {n} plies touch");
-        }
-    }
-
-    #[test]
-    fn the_count_of_fibers_integrates_to_all_of_them() {
-        // Each fibre covers a width of 2 r_f of all offsets: int n(y) dy = 2 r_f n.
-        for (fibers, density) in [(25, 0.1), (100, 0.5), (400, 0.7)] {
-            let shape = touching_yarn(1, fibers, density, 0.0, 0.0);
-            let ply = &shape.plies[0];
-            let n = 20_000;
-            let sum: f64 = (0..n)
-                .map(|i| f64::from(ply.fibers_on_chord(-1.0 + 2.0 * (i as f32 + 0.5) / n as f32)) * 2.0 / f64::from(n))
-                .sum();
-            let want = 2.0 * f64::from(ply.fiber_radius) * f64::from(fibers);
-            assert!((sum / want - 1.0).abs() < 1e-4, "{sum} {want}");
-            assert_eq!(ply.fibers_on_chord(1.5), 0.0);
-        }
-    }
-
-    #[test]
-    fn the_segment_area_is_exact_to_single_precision() {
-        for i in 0..=2000 {
-            let u = -1.0 + f64::from(i) * 1e-3;
-            let want = u * (1.0 - u * u).max(0.0).sqrt() + u.clamp(-1.0, 1.0).asin();
-            assert!((f64::from(segment_area(u as f32)) - want).abs() < 4e-7, "u = {u}");
         }
     }
 

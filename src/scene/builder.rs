@@ -308,6 +308,7 @@ impl Yarn {
             ply_twist: twists[0],
             fibers: vec![fiber; plies as usize],
             placement: Placement::Regular,
+            crowding: None,
             flyaways: None,
             tex: None,
             tilted: defaults::TILTED,

@@ -193,13 +193,14 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
 }
 
 fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
-    let Yarn { name, radius, plies, ply_twist, fibers, placement, flyaways, tex: _, tilted } = yarn;
+    let Yarn { name, radius, plies, ply_twist, fibers, placement, crowding, flyaways, tex: _, tilted } = yarn;
     let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("yarn.{name}.{key}"), value);
     key("radius", radius);
     key("ply", plies);
     key("ply_twist", ply_twist);
     key("fiber", &fibers.iter().map(|(name, _)| name).collect::<Vec<_>>());
     key("packing", placement);
+    key("crowding", crowding);
     key("flyaways", flyaways);
     key("ply_intersection", &if *tilted { "tilted" } else { "perpendicular" });
     let mut different: Vec<_> = fibers.iter().collect();

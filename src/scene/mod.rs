@@ -26,6 +26,7 @@ pub use camera::Camera;
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        density::PlyPacking,
         fiber::{Placement, flyaway::Flyaways},
         mesh::Mesh,
         yarn::{PlyParameters, YarnShape},
@@ -257,6 +258,8 @@ pub struct Yarn {
     pub fibers: Vec<(String, FiberMaterial)>,
     /// Where explicit fibres lie.
     pub placement: Placement,
+    /// How much fibres crowd, where it is known and not to be measured from `placement`: see [`PlyPacking`].
+    pub crowding: Option<f64>,
     /// Fibres that leave the plies.
     pub flyaways: Option<Flyaways>,
     /// Grams in a kilometre, if known.
@@ -284,6 +287,25 @@ impl Yarn {
     /// The cross-section, ready for rays.
     pub fn shape(&self) -> YarnShape {
         YarnShape::new(&self.plies, self.ply_twist, self.tilted)
+    }
+
+    /// How the fibres of each ply lie. Measured from fibres placed for it: some milliseconds.
+    pub fn packings(&self) -> Vec<PlyPacking> {
+        let mut packings: Vec<PlyPacking> = Vec::with_capacity(self.plies.len());
+        for (k, ply) in self.plies.iter().enumerate() {
+            let alike = |p: &PlyParameters| {
+                [p.radius, p.fiber_radius, f64::from(p.fibers)] == [ply.radius, ply.fiber_radius, f64::from(ply.fibers)]
+            };
+            let packing = match (self.plies[..k].iter().position(alike), self.crowding) {
+                (Some(same), _) => packings[same],
+                (None, Some(crowding)) => {
+                    PlyPacking { crowding, exclusive: matches!(self.placement, Placement::Regular) }
+                }
+                (None, None) => self.placement.packing_of(ply),
+            };
+            packings.push(packing);
+        }
+        packings
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, f64::consts::TAU, fmt, iter::Sum};
 
-use super::{CurveGeometry, FiberGeometry, YarnGeometry, yarn_of_shape, yarn_scatterer};
+use super::{CurveGeometry, FiberGeometry, YarnGeometry, scatterer_in, shape_for, yarn_scatterer};
 use crate::{
     ffi::embree::EmbreeError,
     geometry::{
@@ -13,7 +13,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     scattering::fiber::FiberBcsdf,
-    scene::{CurveKind, Fabric, Mode, Scene, Yarn},
+    scene::{CurveKind, Fabric, Mode, Model, Scene, Yarn},
 };
 
 /// Bytes of Embree's BVH for a cubic segment: compact and fast, measured on fibres and on yarns.
@@ -267,7 +267,11 @@ impl<'a> Preparation<'a> {
                     match mode {
                         Mode::Yarn => {}
                         Mode::Ply => all.extend(slots.clone().map(|ply| {
-                            let (mut strands, shape) = ply_strands(&plies, &yarn.plies[ply], &shape, ply);
+                            let (mut strands, alone) = ply_strands(&plies, &yarn.plies[ply], &shape, ply);
+                            let shape = match model {
+                                Model::Aggregated => alone.packed(&yarn.packings()[ply..=ply]),
+                                _ => alone,
+                            };
                             strands.set_material_indices(plies.material_indices_along(1));
                             let scatterer = |of: &Yarn| yarn_scatterer(shape.clone(), &[&of.fibers[ply].1], model);
                             let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
@@ -294,7 +298,12 @@ impl<'a> Preparation<'a> {
                     }
                     if mode == Mode::Yarn {
                         let flattening = strands.mean_flattening();
-                        let scatterer = |of: &Yarn| yarn_of_shape(of, of.shape().pressed(flattening), model);
+                        let pressed = |of: &Yarn| shape_for(of, model).pressed(flattening);
+                        let shape = pressed(yarn);
+                        let scatterer = |of: &Yarn| {
+                            let alike = of.plies == yarn.plies && of.placement == yarn.placement;
+                            scatterer_in(if alike { shape.clone() } else { pressed(of) }, of, model)
+                        };
                         let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
                         all.push(CurveGeometry::Yarns(YarnGeometry {
                             fabric: index,

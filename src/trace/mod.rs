@@ -405,10 +405,18 @@ pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
 
 /// A yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
-    yarn_of_shape(yarn, yarn.shape(), model)
+    scatterer_in(shape_for(yarn, model), yarn, model)
 }
 
-fn yarn_of_shape(yarn: &Yarn, shape: YarnShape, model: Model) -> YarnScatterer {
+/// A yarn's shape with all that a model asks of it: only the aggregated one looks at how fibres lie.
+fn shape_for(yarn: &Yarn, model: Model) -> YarnShape {
+    match model {
+        Model::Aggregated => yarn.shape().packed(&yarn.packings()),
+        _ => yarn.shape(),
+    }
+}
+
+fn scatterer_in(shape: YarnShape, yarn: &Yarn, model: Model) -> YarnScatterer {
     let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
     yarn_scatterer(shape, &materials, model)
 }

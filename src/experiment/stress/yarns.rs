@@ -101,6 +101,7 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
         fibers: (0..plies).map(|_| ("stress".to_owned(), material.clone())).collect(),
         tilted: true,
         placement: Placement::Regular,
+        crowding: None,
         flyaways: None,
         tex: None,
     }

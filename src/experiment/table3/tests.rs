@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::*;
+use crate::experiment::suite::Measure;
 use crate::image::Channel;
 
 const SIZE: usize = 48;
@@ -77,10 +78,13 @@ fn suite(cases: &[&str]) -> Suite {
         curves: None,
         set: Vec::new(),
         paper: None,
+        held_out: false,
+        within: 0.05,
     };
     Suite {
         path: "suite.toml".to_owned(),
         title: "test".to_owned(),
+        measure: Measure::Cost,
         reference: Method::parse("yarn").unwrap(),
         tested: Method::parse("yarn:aggregated").unwrap(),
         others: Vec::new(),

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::{
     curve::{Basis, Curve},
+    density::PlyPacking,
     section::YarnFrame,
     strand::Strands,
     tube::{Tubes, spline_through},
@@ -317,7 +318,39 @@ fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
     (short.normalize_or(a.cross(tangent).normalize_or(DVec3::X)) * ratio, long.length())
 }
 
+impl Placement {
+    /// How the fibres that are placed in a ply lie, from some that are: a number to 0.005 or so.
+    pub fn packing_of(self, ply: &PlyParameters) -> PlyPacking {
+        let core = ply.radius - ply.fiber_radius;
+        if ply.fibers == 0 || core <= 0.0 {
+            return PlyPacking { crowding: 0.0, exclusive: true };
+        }
+        match self {
+            Self::Regular => {
+                let crowding = packing::crowding(ply.fibers, ply.fiber_radius / core);
+                PlyPacking { crowding, exclusive: true }
+            }
+            Self::Measured(distribution) => {
+                PlyPacking { crowding: distribution.crowding(ply.fiber_radius / core), exclusive: false }
+            }
+        }
+    }
+}
+
 impl Distribution {
+    /// 2 <r^2> - 1 of the fibres' distances from the axis, in core radii; `fiber_radius` in those too.
+    fn crowding(&self, fiber_radius: f64) -> f64 {
+        const FIBERS: u32 = 1000;
+        const PLACES: u32 = 8;
+        let mut stream = Stream::new(0);
+        let mut sum = 0.0;
+        for _ in 0..FIBERS {
+            let wander = self.wanderer(1.0, fiber_radius, 1.0, &mut stream);
+            sum += (0..PLACES).map(|k| wander(5.0 * f64::from(k)).length_squared()).sum::<f64>();
+        }
+        2.0 * sum / f64::from(FIBERS * PLACES) - 1.0
+    }
+
     /// A fibre drawn from the distribution: where it is in the ply's circle (yarn radii) after so many yarn radii, before
     /// the ply's own turning. `core` is the radius within which its centre stays.
     fn wanderer(&self, core: f64, fiber_radius: f64, rate: f64, stream: &mut Stream) -> Box<dyn Fn(f64) -> DVec2> {

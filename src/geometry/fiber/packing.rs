@@ -23,6 +23,32 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
     })
 }
 
+/// 2 <r^2> - 1 of the centres' distances r from the middle, over some of the packings that [`hard_discs`] makes; 0 where
+/// they are even over the core. `radius` is in core radii.
+///
+/// Of more than [`MOST_MEASURED`] discs some are packed as densely in their stead: the crowding is at the wall only, so it
+/// falls with a disc's radius.
+pub fn crowding(count: u32, radius: f64) -> f64 {
+    let packed = count.min(MOST_MEASURED);
+    let fewer = (f64::from(packed) / f64::from(count.max(1))).sqrt();
+    // The same area fraction of the ply, whose radius is 1 + radius.
+    let share = radius / (1.0 + radius) / fewer;
+    if packed == 0 || share >= 1.0 {
+        return 0.0;
+    }
+    let discs = (0..MEASURED.div_ceil(packed)).flat_map(|seed| {
+        let mut stream = Stream::new(seed);
+        hard_discs(packed, share / (1.0 - share), &mut stream)
+    });
+    let (sum, n) = discs.fold((0.0, 0.0), |(sum, n), at| (sum + at.length_squared(), n + 1.0));
+    (2.0 * sum / n - 1.0) * fewer
+}
+
+/// The most discs of a packing whose crowding is measured.
+const MOST_MEASURED: u32 = 150;
+/// About how many discs are looked at.
+const MEASURED: u32 = 600;
+
 /// A point of the unit disc.
 fn anywhere(stream: &mut Stream) -> DVec2 {
     f64::from(stream.next()).sqrt() * DVec2::from_angle(TAU * f64::from(stream.next()))
@@ -153,6 +179,28 @@ mod tests {
             assert_eq!(discs.len(), count as usize);
             assert!(discs.iter().all(|d| d.is_finite() && d.length() <= 1.0 + 1e-12));
         }
+    }
+
+    #[test]
+    fn crowding_is_that_of_many_packings_and_falls_with_the_discs() {
+        let of = |count: u32, density: f64| {
+            let fiber = (density / f64::from(count)).sqrt();
+            (count, fiber / (1.0 - fiber))
+        };
+        for (count, radius) in [of(33, 0.25), of(70, 0.5)] {
+            let many: Vec<f64> = (1000..1060)
+                .flat_map(|seed| hard_discs(count, radius, &mut Stream::new(seed)))
+                .map(|at| at.length_squared())
+                .collect();
+            let want = 2.0 * many.iter().sum::<f64>() / many.len() as f64 - 1.0;
+            let got = crowding(count, radius);
+            assert!((got - want).abs() < 0.03, "{count}: {got}, not {want}");
+        }
+        let (few, radius) = of(100, 0.5);
+        let (many, smaller) = of(10_000, 0.5);
+        assert!(crowding(many, smaller).abs() < 0.5 * crowding(few, radius).abs() + 0.01);
+        assert_eq!(crowding(0, 0.1), 0.0);
+        assert!(crowding(1, 1.0).is_finite() && crowding(u32::MAX, 1e-9).is_finite());
     }
 
     #[test]

@@ -1,12 +1,19 @@
 //! The vertex against a slow evaluation of the same model: all nodes, all channels, all azimuths.
 
-use std::f64::consts::TAU as TAU64;
+use std::{
+    f32::consts::{PI, TAU},
+    f64::consts::TAU as TAU64,
+};
 
-use super::*;
+use super::{backward::Lobe, *};
 use crate::geometry::yarn::{PlyParameters, touching_plies};
 use crate::{
-    math::special::GAUSS_LEGENDRE_4,
-    scattering::testing::{SILK, lossless, material, section, silk, sphere},
+    math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
+    scattering::{
+        kernel::{kappa_of_variance, kernel},
+        lobe::LobeFrame,
+        testing::{SILK, lossless, material, section, silk, sphere},
+    },
 };
 
 fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64, m: &FiberMaterial) -> AggregatedYarn {
@@ -15,27 +22,16 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
     AggregatedYarn::new(shape, &vec![m; count])
 }
 
-/// What the model says without any drawing: (F, single scattering, B) for each direction, and T0.
+/// Single scattering and B in their plain form, without any drawing: (single scattering, B) for each direction.
 ///
-/// Four nodes per ply and channel; the share that escapes is a mean over 32 directions across the yarn, as the
+/// Nodes per ply and channel as given; the share that escapes is a mean over 32 directions across the yarn, as the
 /// specification has it.
-fn quadrature(yarn: &AggregatedYarn, section: &Section, directions: &[Vec3A]) -> (Vec<[Rgb; 3]>, f32) {
-    quadrature_with(&GAUSS_LEGENDRE_4, yarn, section, directions)
-}
-
-fn quadrature_with(
-    nodes: &[(f64, f64)],
-    yarn: &AggregatedYarn,
-    section: &Section,
-    directions: &[Vec3A],
-) -> (Vec<[Rgb; 3]>, f32) {
+fn quadrature(nodes: &[(f64, f64)], yarn: &AggregatedYarn, section: &Section, directions: &[Vec3A]) -> Vec<[Rgb; 2]> {
     let mut crossings = Crossings::new();
     section.crossings(yarn.shape(), &mut crossings);
-    let unscattered = yarn.transparency(&crossings);
-    let mut out = vec![[Rgb::ZERO; 3]; directions.len()];
-    let mut vertex = Vertex::new(yarn, section, &Crossings::new(), 0.0, Rgb::ONE, [0.5; 4], &mut Stream::new(0));
+    let view = View::new(yarn, section);
+    let mut out = vec![[Rgb::ZERO; 2]; directions.len()];
     let mut reaching = Rgb::ONE;
-    let mut chain = Rgb::ZERO;
     for c in &crossings {
         let optics = &yarn.plies[c.ply];
         let depth = optics.rho * c.fibers;
@@ -49,15 +45,14 @@ fn quadrature_with(
                 let (d, e) = (depth.to_array()[channel], ended.to_array()[channel]);
                 let x = if d > 1e-6 { -(-(u as f32) * e).ln_1p() / d } else { u as f32 };
                 let amplitude = reaching * ended * (weight as f32);
-                let node = vertex.place_node(c, x, amplitude, Rgb::ONE);
+                let node = Node::at(&view, c, x, amplitude, Rgb::ONE);
                 for (w, out) in directions.iter().zip(&mut out) {
-                    let v = vertex.node_value(&node, *w);
-                    out[1] += (v.r + v.tt + v.d) * only;
+                    out[0] += node.toward(&view, *w).lobes().0 * only;
                 }
                 let mean = (0..32)
                     .map(|i| {
                         let (s, c) = ((i as f32 + 0.5) / 32.0 * TAU).sin_cos();
-                        vertex.node_value(&node, Vec3A::new(c, s, 0.0)).clear
+                        node.toward(&view, Vec3A::new(c, s, 0.0)).clear
                     })
                     .fold(Rgb::ZERO, |a, b| a + b)
                     / 32.0;
@@ -65,35 +60,39 @@ fn quadrature_with(
             }
         }
         let energy = reaching * ended * optics.albedo * optics.leaves_yarn * (Rgb::ONE - clear_share);
-        let backward = vertex.backward_of(c, energy, 1.0);
+        let backward = Lobe::new(&view, c, energy, 1.0);
         for (w, out) in directions.iter().zip(&mut out) {
-            out[2] += vertex.backward_value(&backward, c.ply, *w).0;
+            out[1] += backward.value(&view, c.ply, *w).0;
         }
         reaching *= (-depth).exp();
-        chain += optics.chain * c.fibers;
     }
-    vertex.forward =
-        Forward::new(yarn, section, &crossings, vertex.camera, reaching, chain, unscattered, Rgb::ONE, 1.0);
-    if let Some(forward) = &vertex.forward {
-        for (w, out) in directions.iter().zip(&mut out) {
-            out[0] = vertex.forward_value(forward, *w).0;
-        }
-    }
-    (out, unscattered)
+    out
 }
 
-/// The model's energy in each component, per channel, and T0.
-fn energies(yarn: &AggregatedYarn, section: &Section) -> ([Rgb; 3], f32) {
-    let grid: Vec<(Vec3A, f64)> = sphere(240, 128).collect();
-    let directions: Vec<Vec3A> = grid.iter().map(|g| g.0).collect();
-    let (values, t0) = quadrature(yarn, section, &directions);
-    let mut sums = [Rgb::ZERO; 3];
-    for (value, (_, dw)) in values.iter().zip(&grid) {
-        for k in 0..3 {
-            sums[k] += value[k] * *dw as f32;
-        }
-    }
-    (sums, t0)
+/// F of the plain form, and T0: the camera's chord alone says how much passes, and the mean number of TT events how far it
+/// is spread. The program has a better F; the chain's rate, the kernel and the wrapped normal are the same.
+fn plain_forward(yarn: &AggregatedYarn, section: &Section, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
+    let mut crossings = Crossings::new();
+    section.crossings(yarn.shape(), &mut crossings);
+    let view = View::new(yarn, section);
+    let sum = |of: &dyn Fn(&PlyOptics) -> Rgb| {
+        crossings.iter().map(|c| of(&yarn.plies[c.ply]) * c.fibers).fold(Rgb::ZERO, |a, b| a + b)
+    };
+    let passed = (-sum(&|p| p.rho)).exp();
+    let unscattered = (-sum(&|p| Rgb::splat(p.rho_unscattered))).exp().mean();
+    let Some(front) = crossings.first() else { return (vec![Rgb::ZERO; directions.len()], unscattered) };
+    let optics = &yarn.plies[front.ply];
+    let chain = sum(&|p| p.chain);
+    let events = chain.select_below(1e-6, Rgb::ONE, chain / chain.one_minus_exp_neg().max(Rgb::splat(1e-30)));
+    let frame = LobeFrame::of_ply(yarn.shape(), section, front, view.camera);
+    let value = |w: &Vec3A| {
+        let (at, cos) = frame.latitudes(*w);
+        let off = w.dot(frame.y).atan2(w.dot(frame.x)) - PI;
+        let around = Rgb::from((events.sqrt() * optics.beta_n).to_array().map(|s| wrapped_normal(off, s)));
+        let m = kernel(kappa_of_variance(events * optics.beta_tt_squared), at);
+        (passed - unscattered).max(Rgb::ZERO) * m * around * cos
+    };
+    (directions.iter().map(value).collect(), unscattered)
 }
 
 /// The configurations of the sampling tests: plies, fibres, density, ply and fibre twist, h, theta, phase.
@@ -110,7 +109,12 @@ const CASES: [Case; 7] = [
 
 fn build(case: Case, m: &FiberMaterial) -> (AggregatedYarn, Section) {
     let (plies, fibers, density, ply_twist, fiber_twist, h, theta, phase) = case;
-    (yarn(plies, fibers, density, ply_twist, fiber_twist, m), section(theta, h, phase))
+    let mut yarn = yarn(plies, fibers, density, ply_twist, fiber_twist, m);
+    // Crowded as fibres that keep out of each other are.
+    for ply in &mut yarn.shape.plies {
+        ply.crowding = 0.06;
+    }
+    (yarn, section(theta, h, phase))
 }
 
 #[test]
@@ -155,10 +159,12 @@ fn values_agree_with_the_reference_vectors() {
                 Vec3A::new(w[0] as f32, w[1] as f32, w[2] as f32)
             })
             .collect();
-        let (values, t0) = quadrature(&yarn, &section, &directions);
+        let values = quadrature(&GAUSS_LEGENDRE_4, &yarn, &section, &directions);
+        let (forward, t0) = plain_forward(&yarn, &section, &directions);
         let want = v["T0"].as_f64().unwrap();
         assert!((f64::from(t0) - want).abs() < 1e-4 * want + 1e-5, "vector {index}: T0 {t0}, not {want}");
         for (d, value) in values.iter().enumerate() {
+            let value = [forward[d], value[0], value[1]];
             for (lobe, name) in ["V_F", "V_I1", "V_I2"].iter().enumerate() {
                 let want = triple(&v[*name][d]);
                 for (c, &want) in want.iter().enumerate() {
@@ -174,60 +180,37 @@ fn values_agree_with_the_reference_vectors() {
     assert!(compared > 2000);
 }
 
-#[test]
-fn white_fibers_keep_all_light() {
-    for case in CASES {
-        let (yarn, section) = build(case, &lossless());
-        let ([f, s, b], t0) = energies(&yarn, &section);
-        let total = f64::from(t0 + (f + s + b).mean());
-        // The share that escapes is taken across the yarn only, which is off by some percent for twisted fibres.
-        assert!(
-            (total - 1.0).abs() < if case.4 == 0.0 { 0.02 } else { 0.05 },
-            "{case:?}: {total} = {t0} + {f:?} + {s:?} + {b:?}"
-        );
-    }
+/// White fibres whose colours take different ways through them.
+fn white_by_different_ways() -> FiberMaterial {
+    material(([0.1, 0.2, 0.0], [0.9, 0.3, 0.0], [0.0, 0.5, 1.0]), [0.15, 0.12, 0.35])
 }
 
 #[test]
-fn drawn_vertices_average_to_the_quadrature() {
-    // Mean of Vertex::evaluate over its own random node against quadrature, in a few directions.
-    for (index, case) in CASES.into_iter().enumerate() {
-        let (yarn, section) = build(case, &silk());
-        let mut crossings = Crossings::new();
-        section.crossings(yarn.shape(), &mut crossings);
-        let t0 = yarn.transparency(&crossings);
-        let directions: Vec<Vec3A> = sphere(3, 4).map(|d| d.0).collect();
-        let many: Vec<(f64, f64)> = (0..64).map(|i| ((f64::from(i) + 0.5) / 64.0, 1.0 / 64.0)).collect();
-        let (want, _) = quadrature_with(&many, &yarn, &section, &directions);
-        let mut stream = Stream::new(index as u32);
-        let n = 8000;
-        let mut mean = vec![[0f64; 3]; directions.len()];
-        let mut square = vec![[0f64; 3]; directions.len()];
-        for _ in 0..n {
-            let u = [0; 4].map(|_| stream.next());
-            let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::new(1.0, 0.5, 2.0), u, &mut stream);
-            for (i, w) in directions.iter().enumerate() {
-                let l = vertex.evaluate(*w, f32::INFINITY).lobes;
-                for (k, lobe) in [l.f, l.r + l.tt + l.d, l.b].into_iter().enumerate() {
-                    let value = f64::from(lobe.mean()) * f64::from(1.0 - t0);
-                    mean[i][k] += value / f64::from(n);
-                    square[i][k] += value * value / f64::from(n);
+fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
+    for case in CASES {
+        for (m, slack) in [(lossless(), 0.003), (white_by_different_ways(), 0.01)] {
+            let (yarn, section) = build(case, &m);
+            let mut crossings = Crossings::new();
+            section.crossings(yarn.shape(), &mut crossings);
+            let t0 = yarn.transparency(&crossings);
+            let mut stream = Stream::new(9);
+            let (mut sum, mut square) = ([0f64; 3], [0f64; 3]);
+            let n = 30_000;
+            for _ in 0..n {
+                let u = [0; 4].map(|_| stream.next());
+                let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
+                let u = [0; 3].map(|_| stream.next());
+                let weight = vertex.sample(u, &mut stream).map_or(Rgb::ZERO, |c| c.weight);
+                for (c, w) in weight.to_array().into_iter().enumerate() {
+                    sum[c] += f64::from(w) / f64::from(n);
+                    square[c] += f64::from(w).powi(2) / f64::from(n);
                 }
             }
-        }
-        for (i, want) in want.iter().enumerate() {
-            // In a yarn of several plies B is followed past the other plies, which the quadrature does not do.
-            for k in 0..if case.0 == 1 { 3 } else { 2 } {
-                let se = ((square[i][k] - mean[i][k] * mean[i][k]).max(0.0) / f64::from(n)).sqrt();
-                let want = f64::from(want[k].mean());
-                // B takes its share from the node's lobes, the specification from directions across the yarn: they
-                // differ by design.
-                let slack = [1e-3, 0.01, 0.15][k] * want + 5.0 * se + 1e-5;
-                assert!(
-                    (mean[i][k] - want).abs() < slack,
-                    "{case:?} direction {i} lobe {k}: {} +- {se}, not {want}",
-                    mean[i][k]
-                );
+            for c in 0..3 {
+                let se = ((square[c] - sum[c] * sum[c]).max(0.0) / f64::from(n)).sqrt();
+                eprintln!("{case:?} channel {c}: {:.5} +- {se:.5}", sum[c]);
+                // The node's lobes are as wide as the light's way makes them, those that decide what stays as sampled.
+                assert!((sum[c] - 1.0).abs() < 4.5 * se + slack, "{case:?} channel {c}: {} +- {se}", sum[c]);
             }
         }
     }
@@ -271,7 +254,7 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
                 (sum - both).abs() < 4.5 * (se + both_se) + 1e-4,
                 "{case:?}: {sum} +- {se}, with light {both} +- {both_se}"
             );
-            assert!(largest < 6.0, "{case:?}: a weight of {largest}");
+            assert!(largest < 8.0, "{case:?}: a weight of {largest}");
             if white {
                 let off = f64::from(1.0 - t0) * (sum - 1.0);
                 assert!(off.abs() < 0.02 + 4.0 * se, "{case:?}: white fibres return {sum} +- {se} beside T0 {t0}");
@@ -299,24 +282,25 @@ fn sample_densities_match_where_samples_fall() {
     let mut stream = Stream::new(77);
     let mut counts = [[0f64; 96]; 2];
     for _ in 0..n {
+        // The directions of F and of the node are fixed in a vertex; B is drawn anew.
+        let forward = vertex.forward.as_ref().unwrap().draw_direction(&vertex.view, &mut stream);
+        if stream.next() < forward.chance {
+            counts[0][cell(forward.direction)] += 1.0;
+        }
         let u = [0; 3].map(|_| stream.next());
-        if let Some(c) = vertex.sample(u, &mut stream) {
-            // The node's own direction is fixed here; F and B are drawn anew.
-            if !c.shares.f.is_zero() {
-                counts[0][cell(c.direction)] += 1.0;
-            } else if !c.shares.b.is_zero() {
-                counts[1][cell(c.direction)] += 1.0;
-            }
+        if let Some(c) = vertex.sample(u, &mut stream)
+            && !c.shares.b.is_zero()
+        {
+            counts[1][cell(c.direction)] += 1.0;
         }
     }
     let mut expected = [[0f64; 96]; 2];
-    let backward = vertex.backward(vertex.node.as_ref().unwrap());
+    let (view, node) = (&vertex.view, vertex.node.as_ref().unwrap());
+    let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
-        let f = vertex.forward_value(vertex.forward.as_ref().unwrap(), w).1 * vertex.forward_chance;
-        let b = vertex.backward_value(backward, vertex.node.unwrap().ply, w).1
-            * (1.0 - vertex.forward_chance)
-            * backward.chance;
-        expected[0][cell(w)] += f64::from(f) * dw * f64::from(n);
+        let f = vertex.forward.as_ref().unwrap().toward(view, w);
+        let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
+        expected[0][cell(w)] += f64::from(f.pdf * f.chance) * dw * f64::from(n);
         expected[1][cell(w)] += f64::from(b) * dw * f64::from(n);
     }
     for k in 0..2 {
@@ -343,9 +327,8 @@ fn the_far_field_of_an_untwisted_ply_is_reciprocal() {
         (0..n)
             .map(|i| {
                 let h = -1.0 + 2.0 * (i as f32 + 0.5) / n as f32;
-                let (values, _) = quadrature(&yarn, &section(theta_o, h, 0.0), &[w]);
                 // B leans by the camera's offset and is left out, as is the light's own way in F.
-                (values[0][1]).mean() / n as f32
+                quadrature(&GAUSS_LEGENDRE_4, &yarn, &section(theta_o, h, 0.0), &[w])[0][0].mean() / n as f32
             })
             .sum::<f32>()
             / theta_i.cos()

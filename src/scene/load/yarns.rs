@@ -115,8 +115,8 @@ impl PlyKeys {
     }
 }
 
-/// `[yarn.NAME.packing]`: where explicit fibres lie.
-fn packing(table: Reader<'_>) -> Placement {
+/// `[yarn.NAME.packing]`: where explicit fibres lie, and how much they crowd where that is stated.
+fn packing(table: Reader<'_>) -> (Placement, Option<f64>) {
     let measured = table.one_of_or("type", false, &[("regular", false), ("measured", true)]);
     let distribution = Distribution {
         epsilon: table.f64_or("epsilon", 0.0, Range::between(0.0, 0.5)),
@@ -141,8 +141,9 @@ fn packing(table: Reader<'_>) -> Placement {
             }
         }
     }
+    let crowding = table.f64("crowding", Range::between(-1.0, 1.0));
     table.finish();
-    if measured { Placement::Measured(distribution) } else { Placement::Regular }
+    (if measured { Placement::Measured(distribution) } else { Placement::Regular }, crowding)
 }
 
 /// `[yarn.NAME.flyaways]`: lengths in the scene's unit, as the yarn's radius; counts for each ply and unit of length.
@@ -312,7 +313,7 @@ fn yarn(
     let shared = PlyKeys::read(&table, None, context.sources);
     let ply_tables = table.tables("ply");
     let count = ply_count(&table, ply_tables.len(), name)?;
-    let placement = table.table("packing").map_or(Placement::Regular, packing);
+    let (placement, crowding) = table.table("packing").map_or((Placement::Regular, None), packing);
     let flyaways = table.table("flyaways").map(|t| flyaways(t, radius.unwrap_or(1.0)));
     let Some(radius) = radius else {
         if !table.has("radius") {
@@ -347,6 +348,7 @@ fn yarn(
         ply_twist: radians(ply_twist),
         fibers: materials,
         placement,
+        crowding,
         flyaways,
         tex,
         tilted,

@@ -1,0 +1,210 @@
+//! How many fibres of a ply a line meets, and where along it (docs/model.md, section 2).
+//!
+//! A ply's fibres do not lie evenly: discs that must not overlap line up at the wall, and loosely spun fibres gather at
+//! the axis. One number says how much, the *crowding* q = 2 <r^2> / R_c^2 - 1 of the distances r of the fibres' centres
+//! from the ply's axis, where R_c is the radius within which they lie. It is 0 where they are even. For q > 0 a share q
+//! of the fibres is taken to lie on the circle r = R_c and the rest even; for q < 0 their density falls as
+//! 1 - 3 q (1 - 2 r^2 / R_c^2). Both have the second moment that was measured.
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::yarn::PlyShape;
+
+/// How the fibres of a ply lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlyPacking {
+    /// q, above -1 and at most 1; below -1/3 it counts as -1/3, where no fibre is left at the wall.
+    pub crowding: f64,
+    /// Whether fibres keep out of each other, so that what a line meets is more regular than chance.
+    pub exclusive: bool,
+}
+
+/// The fibres a line through a ply meets. Lengths are in yarn radii along the line, from the point nearest to the ply's
+/// axis; a coordinate grows the way the light travels out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ChordFibers {
+    /// Expected fibres of those that lie evenly along the chord.
+    pub even: f32,
+    /// Expected fibres of those at the wall, half of them at each end.
+    pub ring: f32,
+    /// Half length of the chord on which the centres lie.
+    pub half: f32,
+    /// How far from each end of the chord the fibres at the wall reach, at most `half`.
+    pub zone: f32,
+}
+
+impl PlyShape {
+    /// The expected fibres on an untwisted chord whose signed distance from the ply's axis is `offset` (yarn radii, in
+    /// the circle of [`Self::radius`]); `length` is how much of that circle a unit of the line passes, 1 for round plies.
+    ///
+    /// Exact for the density above: the number of centres within a fibre's radius of the line. (The paper's Eq. 2,
+    /// d l sqrt(n / pi), lacks a factor of 1.128 / sqrt(d) against counted fibres.)
+    #[inline]
+    pub fn chord(&self, offset: f32, length: f32) -> ChordFibers {
+        let inverse = 1.0 / self.core_radius;
+        let upper = Segment::new((offset + self.fiber_radius) * inverse);
+        let lower = Segment::new((offset - self.fiber_radius) * inverse);
+        let count = self.fibers * FRAC_1_PI / length;
+        let mut even = upper.area() - lower.area();
+        let mut ring = 0.0;
+        if self.crowding > 0.0 {
+            even *= 1.0 - self.crowding;
+            ring = self.crowding * (upper.angle - lower.angle);
+        } else if self.crowding < 0.0 {
+            even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper.cubic() - lower.cubic());
+        }
+        // The line meets a fibre whose centre lies up to a fibre's radius beside it: half of that on the mean.
+        let beside = (offset.abs() - 0.5 * self.fiber_radius).max(0.0);
+        let half = (self.core_radius * self.core_radius - beside * beside).max(0.0).sqrt().max(0.5 * self.fiber_radius);
+        let half = half / length;
+        let zone = (2.0 * self.fiber_radius).min(half);
+        ChordFibers { even: (count * even).max(0.0), ring: (count * ring).max(0.0), half, zone }
+    }
+}
+
+impl ChordFibers {
+    /// All fibres on the chord.
+    #[inline]
+    pub fn total(&self) -> f32 {
+        self.even + self.ring
+    }
+
+    /// The fibres that lie ahead of the coordinate `t`.
+    #[inline]
+    pub fn ahead(&self, t: f32) -> f32 {
+        let even = ((self.half - t) / (2.0 * self.half)).clamp(0.0, 1.0);
+        let far = ((self.half - t) / self.zone).clamp(0.0, 1.0);
+        let near = ((-self.half - t) / self.zone + 1.0).clamp(0.0, 1.0);
+        self.even * even + 0.5 * self.ring * (far + near)
+    }
+
+    /// The coordinate behind which the share `x` of the fibres lies, seen from the end of the chord: `ahead(t) = x total`.
+    #[inline]
+    pub fn place(&self, x: f32) -> f32 {
+        // From the end inwards: dense where the wall's fibres lie, even between, dense again.
+        let even = self.even / (2.0 * self.half);
+        let wall = even + 0.5 * self.ring / self.zone;
+        let in_zone = wall * self.zone;
+        let wanted = x * self.total();
+        let beyond = self.total() - in_zone;
+        let depth = if wanted < in_zone {
+            wanted / wall
+        } else if wanted < beyond && even > 0.0 {
+            self.zone + (wanted - in_zone) / even
+        } else {
+            2.0 * self.half - (self.total() - wanted) / wall.max(1e-30)
+        };
+        self.half - depth.clamp(0.0, 2.0 * self.half)
+    }
+}
+
+/// What lies on one side of a chord of the unit circle at distance u, clamped to [-1, 1], from its centre.
+struct Segment {
+    u: f32,
+    /// sqrt(1 - u^2)
+    cos: f32,
+    /// asin(u)
+    angle: f32,
+}
+
+impl Segment {
+    #[inline]
+    fn new(u: f32) -> Self {
+        let a = u.abs().min(1.0);
+        // asin(a) = pi/2 - sqrt(1 - a) poly(a), |error| < 2e-8 (Abramowitz and Stegun 4.4.46).
+        const C: [f32; 8] = [
+            -0.001_262_491_1,
+            0.006_670_09,
+            -0.017_088_126,
+            0.030_891_88,
+            -0.050_174_303,
+            0.088_978_99,
+            -0.214_598_8,
+            std::f32::consts::FRAC_PI_2,
+        ];
+        let poly = C[1..].iter().fold(C[0], |p, &c| p * a + c);
+        let asin = std::f32::consts::FRAC_PI_2 - (1.0 - a).sqrt() * poly;
+        Self { u: a.copysign(u), cos: (1.0 - a * a).sqrt(), angle: asin.copysign(u) }
+    }
+
+    /// Area of the disc below the chord, less pi / 2.
+    #[inline]
+    fn area(&self) -> f32 {
+        self.u * self.cos + self.angle
+    }
+
+    /// u (1 - u^2)^(3/2): the integral of (1 - 4 u^2) sqrt(1 - u^2).
+    #[inline]
+    fn cubic(&self) -> f32 {
+        self.u * self.cos * self.cos * self.cos
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::yarn::tests::touching_yarn;
+
+    fn ply(fibers: u32, density: f64, crowding: f32) -> PlyShape {
+        let mut ply = touching_yarn(1, fibers, density, 0.0, 0.0).plies[0].clone();
+        ply.crowding = crowding;
+        ply
+    }
+
+    #[test]
+    fn the_count_of_fibers_integrates_to_all_of_them_and_has_its_moment() {
+        // Each fibre covers a width of 2 r_f of all offsets: int n(y) dy = 2 r_f n. The second moment of n(y) is that
+        // of one coordinate of the centres, <r^2> / 2 = (1 + q) R_c^2 / 4, and of the fibre's width, r_f^2 / 3.
+        for (fibers, density) in [(25, 0.1), (100, 0.5), (400, 0.7)] {
+            for crowding in [-1.0f32 / 3.0, -0.1, 0.0, 0.05, 0.3, 1.0] {
+                let ply = ply(fibers, density, crowding);
+                let n = 40_000;
+                let (mut sum, mut moment) = (0.0, 0.0);
+                for i in 0..n {
+                    let y = -1.0 + 2.0 * (i as f32 + 0.5) / n as f32;
+                    let count = f64::from(ply.chord(y, 1.0).total()) * 2.0 / f64::from(n);
+                    sum += count;
+                    moment += count * f64::from(y * y);
+                }
+                let want = 2.0 * f64::from(ply.fiber_radius) * f64::from(fibers);
+                assert!((sum / want - 1.0).abs() < 1e-3, "{sum} {want}");
+                let (core, fiber) = (f64::from(ply.core_radius), f64::from(ply.fiber_radius));
+                let want = (1.0 + f64::from(crowding)) * core * core / 4.0 + fiber * fiber / 3.0;
+                assert!((moment / sum / want - 1.0).abs() < 2e-3, "{fibers} {crowding}: {} {want}", moment / sum);
+                assert_eq!(ply.chord(1.5, 1.0).total(), 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn places_along_a_chord_hold_the_share_that_lies_ahead_of_them() {
+        for crowding in [-0.2, 0.0, 0.1, 1.0] {
+            for (fibers, density) in [(1, 0.5), (25, 0.1), (70, 0.5)] {
+                let ply = ply(fibers, density, crowding);
+                for i in 0..=40 {
+                    let chord = ply.chord(0.025 * i as f32 * ply.radius, 1.3);
+                    if chord.total() < 1e-6 {
+                        continue;
+                    }
+                    assert!((chord.ahead(-2.0) - chord.total()).abs() < 1e-5 && chord.ahead(2.0) == 0.0);
+                    for k in 0..=20 {
+                        let x = k as f32 / 20.0;
+                        let t = chord.place(x);
+                        assert!(t.abs() <= chord.half * 1.000_001);
+                        let ahead = chord.ahead(t) / chord.total();
+                        assert!((ahead - x).abs() < 2e-3, "q {crowding}, {fibers} fibres, {chord:?}: {ahead}, not {x}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_segment_area_is_exact_to_single_precision() {
+        for i in 0..=2000 {
+            let u = -1.0 + f64::from(i) * 1e-3;
+            let want = u * (1.0 - u * u).max(0.0).sqrt() + u.clamp(-1.0, 1.0).asin();
+            assert!((f64::from(Segment::new(u as f32).area()) - want).abs() < 4e-7, "u = {u}");
+        }
+    }
+}

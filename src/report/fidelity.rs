@@ -1,0 +1,194 @@
+//! How faithful pictures are to explicit fibres: the table of a suite, as Markdown and JSON.
+
+use std::fmt::Write as _;
+
+use serde::{Deserialize, Serialize};
+
+use super::table3::{Missing, ModelError};
+
+/// A channel counts where it holds more than this share of the light.
+const SHARE_THAT_COUNTS: f64 = 0.02;
+/// No mean should be off by more.
+const FARTHEST: f64 = 0.10;
+
+/// One way to render a case, against the reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Way {
+    /// Mode and model, or what the suite calls it.
+    pub name: String,
+    /// Means and distances, on the cloth.
+    pub error: ModelError,
+    /// Mean relative error of blocks of 8 x 8 pixels; absent where the cloth fills none.
+    pub blocks: Option<f64>,
+}
+
+/// A fabric under a light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Fabric and light.
+    pub name: String,
+    /// Whether the fabric was kept out of development.
+    pub held_out: bool,
+    /// How far means may be off.
+    pub within: f64,
+    /// Samples per pixel of the reference.
+    pub spp: f64,
+    /// The reference's mean on the cloth, and its error: half of the difference between two pictures with half of the samples.
+    pub mean: [f64; 3],
+    /// As above.
+    pub mean_error: [f64; 3],
+    /// What the reference's own noise is in the error of blocks.
+    pub block_noise: Option<f64>,
+    /// What is tested, first, and others.
+    pub ways: Vec<Way>,
+}
+
+/// All of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// What the suite calls itself.
+    pub title: String,
+    /// The suite file.
+    pub suite: String,
+    /// The program.
+    pub commit: String,
+    /// Mode of the reference.
+    pub reference: String,
+    /// What was measured.
+    pub rows: Vec<Row>,
+    /// What was not.
+    pub missing: Vec<Missing>,
+}
+
+impl Row {
+    /// The largest distance of a mean's ratio from 1, over the channels that count.
+    fn off(&self, way: &Way) -> f64 {
+        let total: f64 = self.mean.iter().sum();
+        (0..3)
+            .filter(|k| self.mean[*k] > SHARE_THAT_COUNTS * total)
+            .map(|k| (way.error.mean_ratio[k] - 1.0).abs())
+            .fold(0.0, f64::max)
+    }
+}
+
+impl Table {
+    /// The table as Markdown: how many cases meet the goal, then every case.
+    pub fn to_markdown(&self) -> String {
+        let mut out = format!("# {}\n\n", self.title);
+        let _ = writeln!(
+            out,
+            "`yarnray bench {}`, program {}. Reference: mode {}, every fibre a curve.\n\n\
+             *ratio*: mean over the cloth's pixels over that of the reference, red, green, blue. *blocks*: mean of |error| / (reference + 0.05 mean) after \
+             averaging 8 x 8 pixels; behind it what the reference's own noise makes of it. *relMSE*: of the same blocks, without noise. *FLIP*: mean HDR-FLIP, with \
+             noise. *error of the mean*: of the reference, from two halves of its samples. A mean is *within* its goal if every channel with more than {:.0} % of the light is.\n",
+            self.suite,
+            self.commit,
+            self.reference,
+            100.0 * SHARE_THAT_COUNTS
+        );
+        let _ = writeln!(
+            out,
+            "| fabrics | way | cases | within the goal | off by over {:.0} % | mean error of blocks |",
+            100.0 * FARTHEST
+        );
+        let _ = writeln!(out, "|{}", " --- |".repeat(6));
+        let names: Vec<&str> = self.rows.first().iter().flat_map(|r| &r.ways).map(|w| w.name.as_str()).collect();
+        for (held_out, label) in [(false, "seen in development"), (true, "held out")] {
+            for (k, name) in names.iter().enumerate() {
+                let rows: Vec<&Row> = self.rows.iter().filter(|r| r.held_out == held_out && r.ways.len() > k).collect();
+                if rows.is_empty() {
+                    continue;
+                }
+                let count = |f: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| f(r)).count();
+                let blocks: Vec<f64> = rows.iter().filter_map(|r| r.ways[k].blocks).collect();
+                let _ = writeln!(
+                    out,
+                    "| {label} | {name} | {} | {} | {} | {:.3} |",
+                    rows.len(),
+                    count(&|r| r.off(&r.ways[k]) <= r.within),
+                    count(&|r| r.off(&r.ways[k]) > FARTHEST),
+                    blocks.iter().sum::<f64>() / blocks.len().max(1) as f64
+                );
+            }
+        }
+        for (held_out, label) in [(false, "Seen in development"), (true, "Held out")] {
+            if !self.rows.iter().any(|r| r.held_out == held_out) {
+                continue;
+            }
+            let _ = writeln!(out, "\n## {label}\n");
+            let _ = writeln!(
+                out,
+                "| fabric and light | way | ratio | blocks, noise | relMSE 8x8 | FLIP | error of the mean |"
+            );
+            let _ = writeln!(out, "|{}", " --- |".repeat(7));
+            for row in self.rows.iter().filter(|r| r.held_out == held_out) {
+                for (k, way) in row.ways.iter().enumerate() {
+                    let worst = (0..3).map(|c| row.mean_error[c] / row.mean[c].max(1e-12)).fold(0.0, f64::max);
+                    let number =
+                        |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
+                    let _ = writeln!(
+                        out,
+                        "| {} | {} | {} | {}, {} | {} | {:.3} | {} |",
+                        if k == 0 { row.name.as_str() } else { "" },
+                        way.name,
+                        way.error.mean_ratio.map(|v| format!("{v:.3}")).join(" "),
+                        number(way.blocks, 3),
+                        number(row.block_noise, 3),
+                        number(way.error.relmse_8, 4),
+                        way.error.flip,
+                        if k == 0 { format!("{:.1} %", 100.0 * worst) } else { String::new() },
+                    );
+                }
+            }
+        }
+        for missing in &self.missing {
+            let _ = writeln!(out, "\nMissing: {}: {}", missing.name, missing.reason);
+        }
+        out
+    }
+
+    /// The table as JSON.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(name: &str, held_out: bool, ratio: [f64; 3], mean: [f64; 3]) -> Row {
+        let error = ModelError { mean_ratio: ratio, relmse: 0.1, relmse_8: Some(0.01), flip: 0.2 };
+        Row {
+            name: name.to_owned(),
+            held_out,
+            within: 0.05,
+            spp: 64.0,
+            mean,
+            mean_error: mean.map(|m| 0.01 * m),
+            block_noise: Some(0.02),
+            ways: vec![Way { name: "yarn".to_owned(), error, blocks: Some(0.1) }],
+        }
+    }
+
+    #[test]
+    fn only_channels_with_light_decide_and_both_halves_are_told_apart() {
+        let table = Table {
+            title: "T".to_owned(),
+            suite: "s.toml".to_owned(),
+            commit: "c".to_owned(),
+            reference: "fiber".to_owned(),
+            rows: vec![
+                row("a", false, [1.04, 0.96, 1.5], [1.0, 1.0, 0.01]),
+                row("b", true, [1.04, 0.96, 1.5], [1.0, 1.0, 0.5]),
+            ],
+            missing: vec![Missing { name: "m".to_owned(), reason: "gone".to_owned() }],
+        };
+        let text = table.to_markdown();
+        assert!(text.contains("| seen in development | yarn | 1 | 1 | 0 | 0.100 |"), "{text}");
+        assert!(text.contains("| held out | yarn | 1 | 0 | 1 | 0.100 |"), "{text}");
+        assert!(text.contains("| b | yarn | 1.040 0.960 1.500 | 0.100, 0.020 | 0.0100 | 0.200 | 1.0 % |"), "{text}");
+        assert!(text.contains("Missing: m: gone"));
+        assert_eq!(serde_json::from_str::<Table>(&table.to_json()).unwrap(), table);
+    }
+}

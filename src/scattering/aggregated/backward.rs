@@ -1,0 +1,217 @@
+//! Lobe B: light that was scattered more than once (docs/model.md, section 7).
+
+use std::{
+    cell::OnceCell,
+    f32::consts::{FRAC_1_PI, PI, TAU},
+};
+
+use glam::Vec3A;
+
+use super::{
+    super::{
+        kernel::{DIFFUSE, MIN_VARIANCE, kernel_scalar, sample_sine, sample_sine_diffuse},
+        lobe::LobeFrame,
+        mis_weight,
+    },
+    View,
+    single::Node,
+};
+use crate::{
+    geometry::section::PlyCrossing,
+    math::{Rgb, frame::sin_cos, sampler::Stream},
+};
+
+/// How strongly multiply scattered light moves sideways with the camera's offset.
+const LEAN_SIDEWAYS: f32 = 1.2;
+
+/// Multiply scattered light of a vertex, made when first asked for: a path that goes on from the node may never do.
+#[derive(Clone, Debug)]
+pub(super) struct Backward {
+    lobe: OnceCell<Lobe>,
+    /// What is random about it.
+    stream: Stream,
+}
+
+/// Multiply scattered light of the node's ply.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lobe {
+    frame: LobeFrame,
+    /// cos and sin of the azimuth towards which it leans.
+    lean_to: (f32, f32),
+    /// Energy that leaves the node's ply, given the direction drawn.
+    energy: Rgb,
+    /// Chance that the node's drawn direction does not escape.
+    pub(super) chance: f32,
+    /// In a yarn of several plies: light that leaves the ply and meets another one.
+    again: Option<Again>,
+    /// Channel means of the ply's shares, for sampling.
+    mirrored: f32,
+    lean: f32,
+    kappa: f32,
+}
+
+/// Light that left the node's ply in a direction drawn from its lobe, as far as other plies took it up.
+#[derive(Clone, Copy, Debug)]
+struct Again {
+    /// The direction, B's value over density there, and its density.
+    direction: Vec3A,
+    weight: Rgb,
+    pdf: f32,
+    /// Chance that it goes on in this direction.
+    open: f32,
+    /// Energy that other plies took up and give off evenly.
+    energy: Rgb,
+}
+
+impl Backward {
+    /// Nothing yet; takes a stream of its own for later.
+    #[inline]
+    pub(super) fn later(stream: &mut Stream) -> Self {
+        Self { lobe: OnceCell::new(), stream: stream.fork() }
+    }
+
+    /// The lobe of a node, always the same one.
+    #[inline]
+    pub(super) fn of(&self, view: &View<'_>, node: &Node) -> &Lobe {
+        self.lobe.get_or_init(|| Lobe::of_node(view, node, &mut self.stream.clone()))
+    }
+}
+
+impl Lobe {
+    fn of_node(view: &View<'_>, node: &Node, stream: &mut Stream) -> Self {
+        let optics = &view.yarn.plies[node.spot.ply];
+        let energy = node.amplitude * optics.albedo * optics.leaves_ply * (Rgb::ONE - node.drawn.value.clear);
+        let mut lobe = Self::new(view, &node.crossing, energy, 1.0 - node.drawn.escape);
+        if view.yarn.shape.plies.len() > 1 && lobe.chance > 0.0 {
+            let w = lobe.draw(stream);
+            let (value, pdf) = lobe.value(view, node.spot.ply, w);
+            if pdf > 0.0 {
+                let open = (-node.optical_depth(view, w).1).exp();
+                let weight = value / pdf;
+                let energy = weight * (Rgb::ONE - open) * optics.leaves_yarn;
+                let chance = open_chance(view, node, open);
+                lobe.again = Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy });
+            }
+        }
+        lobe
+    }
+
+    /// Lobe B of a ply, for a given energy and chance of sampling.
+    #[inline]
+    pub(super) fn new(view: &View<'_>, crossing: &PlyCrossing, energy: Rgb, chance: f32) -> Self {
+        let shape = &view.yarn.shape;
+        let optics = &view.yarn.plies[crossing.ply];
+        let relative = if shape.plies.len() == 1 { crossing.offset / shape.plies[0].radius } else { view.section.h };
+        let (lean_sin, lean_cos) = sin_cos(LEAN_SIDEWAYS * relative.clamp(-1.0, 1.0).asin());
+        Self {
+            frame: LobeFrame::of_ply(shape, view.section, crossing, view.camera),
+            lean_to: (lean_cos, lean_sin),
+            energy,
+            chance,
+            again: None,
+            mirrored: optics.mirrored.mean(),
+            lean: optics.lean.mean(),
+            kappa: 0.125 / optics.beta_r_squared.max(MIN_VARIANCE),
+        }
+    }
+
+    /// Value (with the cosine) and density, 1/steradian, of light that leaves the ply towards `w`, whatever lies there.
+    #[inline]
+    pub(super) fn value(&self, view: &View<'_>, ply: usize, w: Vec3A) -> (Rgb, f32) {
+        let optics = &view.yarn.plies[ply];
+        let (at, cos) = self.frame.latitudes(w);
+        let across = (w.dot(self.frame.x), w.dot(self.frame.y));
+        let length = (across.0 * across.0 + across.1 * across.1).sqrt().max(1e-12);
+        let lean = (across.0 * self.lean_to.0 + across.1 * self.lean_to.1) / length;
+        let m = if self.mirrored > 0.0 { kernel_scalar(self.kappa, at) } else { 0.0 };
+        let even = cos * (0.5 * FRAC_1_PI);
+        let latitude = optics.mirrored * (m - DIFFUSE) + DIFFUSE;
+        let value = self.energy * latitude * (optics.lean * lean + 1.0) * even;
+        let pdf = (self.mirrored * (m - DIFFUSE) + DIFFUSE) * (self.lean * lean + 1.0) * even;
+        (value, pdf)
+    }
+
+    /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
+    /// the chance that the path goes on from the node.
+    #[inline]
+    pub(super) fn evaluate(
+        &self,
+        view: &View<'_>,
+        node: &Node,
+        w: Vec3A,
+        open: Rgb,
+        at_node: f32,
+        light_pdf: f32,
+    ) -> Rgb {
+        let (first, pdf) = self.value(view, node.spot.ply, w);
+        let chance = at_node * self.chance;
+        match &self.again {
+            None => first * mis_weight(light_pdf, chance * pdf),
+            Some(again) => {
+                let goes_on = open_chance(view, node, open);
+                let even = even_over_fibers(self.frame.latitudes(w).1);
+                first * open * mis_weight(light_pdf, chance * goes_on * pdf)
+                    + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even)
+            }
+        }
+    }
+
+    /// Draws a direction: with its value, and its density with the chance of B.
+    #[inline]
+    pub(super) fn sample(&self, view: &View<'_>, node: &Node, u: [f32; 2], stream: &mut Stream) -> (Vec3A, Rgb, f32) {
+        let (direction, value, pdf) = match &self.again {
+            None => {
+                let w = self.draw(stream);
+                let (value, pdf) = self.value(view, node.spot.ply, w);
+                (w, value, pdf)
+            }
+            Some(again) if stream.next() < again.open => {
+                (again.direction, again.weight * again.pdf, again.pdf * again.open)
+            }
+            Some(again) => {
+                let sin = sample_sine_diffuse([u[0], stream.next()]);
+                let w = self.frame.direction(sin, TAU * u[1]);
+                let even = even_over_fibers((1.0 - sin * sin).max(0.0).sqrt());
+                (w, again.energy * even, even * (1.0 - again.open))
+            }
+        };
+        (direction, value, pdf * self.chance)
+    }
+
+    /// Draws a direction from the lobe.
+    #[inline]
+    fn draw(&self, stream: &mut Stream) -> Vec3A {
+        let frame = &self.frame;
+        let lat = [stream.next(), stream.next()];
+        let sin = if stream.next() < self.mirrored {
+            sample_sine(self.kappa, frame.sin, frame.cos, lat, stream)
+        } else {
+            sample_sine_diffuse(lat)
+        };
+        // Azimuth with density (1 + lean cos(phi - phi0)) / 2 pi: uniform, then folded towards the front.
+        let mut phi = TAU * stream.next();
+        if stream.next() < self.lean && stream.next() > 0.5 * (1.0 + sin_cos(phi).1) {
+            phi = PI - phi;
+        }
+        // Turned by phi0.
+        let (s, c) = sin_cos(phi);
+        let (c0, s0) = self.lean_to;
+        let cos = (1.0 - sin * sin).max(0.0).sqrt();
+        cos * ((c * c0 - s * s0) * frame.x + (s * c0 + c * s0) * frame.y) + sin * frame.z
+    }
+}
+
+/// The chance, given how open a direction is, that multiply scattered light goes on in it.
+#[inline]
+fn open_chance(view: &View<'_>, node: &Node, open: Rgb) -> f32 {
+    let leaves = view.yarn.plies[node.spot.ply].leaves_yarn;
+    let out = open.weighted_mean(node.weight);
+    let stay = ((Rgb::ONE - open) * leaves).weighted_mean(node.weight);
+    if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
+}
+
+/// Density per steradian of the diffuse lobe about an axis, by the cosine of the latitude: (2/pi) cos / 2 pi.
+#[inline]
+fn even_over_fibers(cos: f32) -> f32 {
+    DIFFUSE * cos * (0.5 * FRAC_1_PI)
+}

@@ -1,0 +1,254 @@
+//! The aggregated yarn: one answer for the hundreds of fibres behind a point of a yarn. docs/model.md derives it.
+//!
+//! Light on its way along the camera's chord through the plies
+//! * meets no fibre at all (the unscattered share T0, a delta, [`AggregatedYarn::transparency`]),
+//! * or meets a first fibre. From there it passes on forward as TT through that one and all it meets on its own way out
+//!   (lobe F, [`forward`]),
+//! * or ends its chain of TT at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
+//!   light ([`single`]). On the way there it is dimmed by the plies ahead; what stays scatters on and leaves in the
+//!   end as lobe B ([`backward`]).
+//!
+//! F takes the place of the paper's forward lobes (Eqs. 8 to 11, 15), B of its backward lobes without the single
+//! scattering that R and D already hold (Eqs. 12 to 14); the paper counts that twice and can double the energy.
+//!
+//! # Estimation
+//! A [`Vertex`] draws a first fibre and one direction of F from it, a node, and one direction from that. The share of F
+//! in its direction decides between F and the node, and is what the node's light is less; whether the node's direction
+//! escapes decides between R/D/TT and B, as it would for a photon: with white fibres weights are near 1, and 1 on the mean. The directions
+//! also serve as one-sample estimates of the shares that stay, so that no table of them is needed, in memory or in
+//! set-up time. Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light
+//! sampling and direction sampling (balance heuristic), all given the places and the directions drawn.
+
+use glam::{Vec2, Vec3A};
+
+use super::{Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
+use crate::{
+    geometry::{
+        section::{Crossings, PlyCrossing, Section},
+        yarn::YarnShape,
+    },
+    math::{Rgb, sampler::Stream},
+};
+use backward::Backward;
+use chain::ChainEnd;
+use forward::Forward;
+use single::Node;
+
+mod backward;
+mod chain;
+mod forward;
+mod single;
+
+/// A yarn's shape and the optics of its plies.
+#[derive(Clone, Debug)]
+pub struct AggregatedYarn {
+    shape: YarnShape,
+    plies: Vec<PlyOptics>,
+    /// Expected energy of a node in each ply, for choosing between plies.
+    node_gain: Vec<Rgb>,
+    /// The model's plain form, as first specified for straight yarns: even fibres, neighbouring plies by their cores. Only
+    /// for comparison with reference values of that form.
+    plain: bool,
+}
+
+impl AggregatedYarn {
+    /// One material for each ply of the shape.
+    ///
+    /// # Panics
+    /// If their numbers differ.
+    pub fn new(shape: YarnShape, materials: &[&FiberMaterial]) -> Self {
+        assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
+        let count = shape.plies.len();
+        let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
+        let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
+        Self { shape, plies, node_gain, plain: false }
+    }
+
+    /// The yarn's geometry.
+    pub fn shape(&self) -> &YarnShape {
+        &self.shape
+    }
+
+    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
+    #[inline]
+    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
+        crossings.iter().map(|c| self.plies[c.ply].unscattered(c.fibers)).product()
+    }
+}
+
+/// A yarn as one camera ray meets it.
+#[derive(Clone, Copy, Debug)]
+struct View<'a> {
+    yarn: &'a AggregatedYarn,
+    section: &'a Section,
+    /// Towards the camera, in the section's frame.
+    camera: Vec3A,
+}
+
+/// A place on the camera's chord where light meets a fibre.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    /// The ply.
+    ply: usize,
+    /// Where, in the section.
+    point: Vec2,
+    /// How far along the yarn.
+    travel: f32,
+    /// Unit tangent of the fibre there.
+    tangent: Vec3A,
+    /// 1 / z of `tangent`.
+    stretch: f32,
+}
+
+impl<'a> View<'a> {
+    fn new(yarn: &'a AggregatedYarn, section: &'a Section) -> Self {
+        let camera = Vec3A::new((1.0 - section.sin * section.sin).max(0.0).sqrt(), 0.0, section.sin);
+        Self { yarn, section, camera }
+    }
+
+    /// The place in a ply before which the share `x` of the fibres on the chord lies.
+    #[inline]
+    fn spot(&self, crossing: &PlyCrossing, x: f32) -> Spot {
+        let Self { yarn, section, .. } = self;
+        let ply = &yarn.shape.plies[crossing.ply];
+        let depth = if yarn.plain {
+            crossing.enter + (crossing.exit - crossing.enter) * x
+        } else {
+            crossing.foot + crossing.chord.place(x)
+        };
+        let point = Vec2::new(depth, section.h);
+        let travel = section.travel(point.x);
+        let (axis, centre) = if section.slope == 0.0 {
+            (crossing.axis, crossing.centre)
+        } else {
+            let axis = section.ply_axis(ply, Section::turn(&yarn.shape, travel));
+            (axis, section.ply_centre(ply, axis, travel))
+        };
+        let straight = section.fiber_tangent(&yarn.shape, crossing.ply, centre, axis, point);
+        let tangent = straight + section.bent(travel);
+        let stretch = tangent.length();
+        Spot { ply: crossing.ply, point, travel, tangent: tangent / stretch, stretch }
+    }
+}
+
+impl Spot {
+    /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the
+    /// section, times the fibres' width as seen along it, and how much closer they are where the yarn is pressed flat.
+    #[inline]
+    fn tilt(&self, section: &Section, w: Vec3A) -> f32 {
+        let along = w.dot(self.tangent);
+        section.squeeze() * ((1.0 - along * along).max(1e-9) / (1.0 - w.z * w.z).max(1e-12)).sqrt() * self.stretch
+    }
+}
+
+/// One place of scattering, for one camera direction: see the module's notes.
+#[derive(Clone, Debug)]
+pub struct Vertex<'a> {
+    view: View<'a>,
+    forward: Option<Forward>,
+    node: Option<Node>,
+    backward: Backward,
+}
+
+impl<'a> Vertex<'a> {
+    /// Draws the first fibre and the node. `throughput` is the path's weight so far; `unscattered` is
+    /// [`AggregatedYarn::transparency`] of `crossings`, which the caller has already decided against: all values here are
+    /// over 1 - `unscattered`.
+    #[inline]
+    pub fn new(
+        yarn: &'a AggregatedYarn,
+        section: &'a Section,
+        crossings: &Crossings,
+        unscattered: f32,
+        throughput: Rgb,
+        u: [f32; 4],
+        stream: &mut Stream,
+    ) -> Self {
+        let view = View::new(yarn, section);
+        let weight = throughput.max(Rgb::splat(1e-20));
+        let end = ChainEnd::draw(yarn, crossings, weight, u[0], u[1]);
+        let gain = end.as_ref().map_or(Rgb::ZERO, |end| end.gain);
+        let forward = Forward::draw(&view, crossings, unscattered, gain, weight, stream);
+        let kept = forward.as_ref().map_or(Rgb::ONE, |f| Rgb::ONE - f.drawn.share);
+        let node = end.and_then(|end| Node::draw(&view, &end, kept, weight, [u[2], u[3]], stream));
+        Self { view, forward, node, backward: Backward::later(stream) }
+    }
+
+    /// The chance that a path goes on as F.
+    #[inline]
+    fn forward_chance(&self) -> f32 {
+        self.forward.as_ref().map_or(0.0, |f| f.drawn.chance)
+    }
+
+    /// The value of the lobes for light from `w` (section frame), in 1/steradian, with the cosine, over 1 - T0; each
+    /// component weighted against direction sampling, where `light_pdf` is the density (1/steradian) of drawing `w`,
+    /// or infinite for light that no sampled direction can meet.
+    #[inline]
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+        let mut lobes = LobeValues::default();
+        let mut forward_part = 0.0;
+        if let Some(forward) = &self.forward {
+            let found = forward.toward(&self.view, w);
+            lobes.f = found.value * mis_weight(light_pdf, found.chance * found.pdf);
+            forward_part = lobes.f.mean();
+        }
+        if let Some(node) = &self.node {
+            let at_node = 1.0 - self.forward_chance();
+            let value = node.toward(&self.view, w);
+            let weight = mis_weight(light_pdf, at_node * node.escape_chance(&self.view, value.clear) * value.pdf);
+            lobes.r = value.r * weight;
+            lobes.tt = value.tt * weight;
+            lobes.d = value.d * weight;
+            lobes.b = self.backward.of(&self.view, node).evaluate(&self.view, node, w, value.open, at_node, light_pdf);
+        }
+        let total = lobes.sum().mean();
+        Direct { lobes, forward_share: if total > 0.0 { forward_part / total } else { 0.0 } }
+    }
+
+    /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of B.
+    #[inline]
+    pub fn sample(&self, u: [f32; 3], stream: &mut Stream) -> Option<Continuation> {
+        let forward_chance = self.forward_chance();
+        if let Some(forward) = &self.forward
+            && u[0] < forward_chance
+        {
+            let drawn = &forward.drawn;
+            return Some(Continuation {
+                direction: drawn.direction,
+                weight: drawn.share / forward_chance,
+                pdf: drawn.pdf * forward_chance,
+                shares: LobeValues { f: Rgb::ONE, ..LobeValues::default() },
+                start: self.forward_start(),
+            });
+        }
+        let node = self.node.as_ref()?;
+        let at_node = 1.0 - forward_chance;
+        let again = (u[0] - forward_chance) / at_node;
+        let start = self.node_start();
+        if again < node.drawn.escape {
+            let (sum, shares) = node.drawn.value.lobes();
+            let pdf = node.drawn.value.pdf * at_node * node.drawn.escape;
+            let direction = node.drawn.direction;
+            return (pdf > 0.0).then(|| Continuation { direction, weight: sum / pdf, pdf, shares, start });
+        }
+        let (direction, value, pdf) = self.backward.of(&self.view, node).sample(&self.view, node, [u[1], u[2]], stream);
+        let pdf = pdf * at_node;
+        let shares = LobeValues { b: Rgb::ONE, ..LobeValues::default() };
+        (pdf > 0.0).then(|| Continuation { direction, weight: value / pdf, pdf, shares, start })
+    }
+
+    /// Depth (x of the section) from which light of the node's lobes and of B leaves.
+    #[inline]
+    pub fn node_start(&self) -> f32 {
+        self.node.as_ref().map_or(self.view.section.enter, |n| n.spot.point.x)
+    }
+
+    /// Depth from which light of F leaves: that of the first fibre.
+    #[inline]
+    pub fn forward_start(&self) -> f32 {
+        self.forward.as_ref().map_or(self.view.section.enter, |f| f.spot.point.x)
+    }
+}
+
+#[cfg(test)]
+mod tests;

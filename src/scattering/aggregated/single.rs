@@ -1,0 +1,260 @@
+//! Lobes R, TT and D: light that ends its chain at a node and leaves from there (docs/model.md, section 6).
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Vec2, Vec3A};
+
+use super::{
+    super::{
+        LobeValues,
+        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
+        lobe::{LobeFrame, choose, normalised},
+    },
+    Spot, View,
+    chain::ChainEnd,
+};
+use crate::{
+    geometry::section::{PlyAhead, PlyCrossing},
+    math::{Rgb, sampler::Stream},
+};
+
+/// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
+/// light's side, unknown then, does not make the true lobe wider than the sampled one.
+const SAMPLING_WIDENING: f32 = 0.7;
+
+/// A place inside a ply where light ends its chain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub(super) spot: Spot,
+    /// The camera's ray in the ply.
+    pub(super) crossing: PlyCrossing,
+    /// Sine and cosine of the camera's latitude against the fibre.
+    sin: f32,
+    cos: f32,
+    /// Expected fibres between the camera and the node.
+    before: f32,
+    /// Weight of an event here, before any albedo.
+    pub(super) amplitude: Rgb,
+    /// Widths for sampling the lobes.
+    kappa_r: f32,
+    kappa_tt: f32,
+    /// Chances of R, TT and D.
+    chance: [f32; 3],
+    /// Throughput times amplitude and albedo: what decides between escape and B.
+    pub(super) weight: Rgb,
+    /// A direction drawn from the lobes.
+    pub(super) drawn: Drawn,
+}
+
+/// A direction of the node's lobes, their value there (with the way out), and the chance to escape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawn {
+    pub(super) direction: Vec3A,
+    pub(super) value: NodeValue,
+    pub(super) escape: f32,
+}
+
+/// The node's lobes in one direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NodeValue {
+    pub(super) r: Rgb,
+    pub(super) tt: Rgb,
+    pub(super) d: Rgb,
+    /// Density of sampling, without the chance to escape.
+    pub(super) pdf: f32,
+    /// e^-optical depth.
+    pub(super) clear: Rgb,
+    /// e^-optical depth of the other plies alone.
+    pub(super) open: Rgb,
+}
+
+impl NodeValue {
+    const NOTHING: Self = Self { r: Rgb::ZERO, tt: Rgb::ZERO, d: Rgb::ZERO, pdf: 0.0, clear: Rgb::ONE, open: Rgb::ONE };
+
+    /// The lobes together, and the share of each.
+    #[inline]
+    pub(super) fn lobes(&self) -> (Rgb, LobeValues) {
+        let sum = self.r + self.tt + self.d;
+        let inverse = Rgb::ONE / sum.max(Rgb::splat(1e-30));
+        let shares =
+            LobeValues { r: self.r * inverse, tt: self.tt * inverse, d: self.d * inverse, ..Default::default() };
+        (sum, shares)
+    }
+}
+
+impl Node {
+    /// The node at a chain's end, with a direction drawn from its lobes. `kept` is the share of light that ends its chain at
+    /// all. `None` if its fibres are black.
+    #[inline]
+    pub(super) fn draw(
+        view: &View<'_>,
+        end: &ChainEnd,
+        kept: Rgb,
+        weight: Rgb,
+        u: [f32; 2],
+        stream: &mut Stream,
+    ) -> Option<Self> {
+        let mut node = Self::at(view, &end.crossing, end.x, end.weight * kept, weight);
+        if node.chance.iter().sum::<f32>() <= 0.0 {
+            return None;
+        }
+        // Before rejection sampling takes an unknown number of them: a stream's first numbers may be the even ones, and
+        // what lies in the way of the azimuth makes most of the noise under a wide light.
+        let [u_azimuth, u_lobe] = [stream.next(), stream.next()];
+        let sin = match choose(node.chance, u_lobe) {
+            0 => sample_sine(node.kappa_r, node.sin, node.cos, u, stream),
+            1 => sample_sine(node.kappa_tt, node.sin, node.cos, u, stream),
+            _ => sample_sine_diffuse(u),
+        };
+        let frame = LobeFrame::new(node.spot.tangent, view.camera);
+        let direction = frame.direction(sin, TAU * u_azimuth);
+        let value = node.toward(view, direction);
+        node.drawn = Drawn { direction, value, escape: node.escape_chance(view, value.clear) };
+        Some(node)
+    }
+
+    /// The node at the share `x` of the fibres on a ply's chord, without a direction.
+    #[inline]
+    pub(super) fn at(view: &View<'_>, crossing: &PlyCrossing, x: f32, amplitude: Rgb, throughput: Rgb) -> Self {
+        let optics = &view.yarn.plies[crossing.ply];
+        let spot = view.spot(crossing, x);
+        let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
+        let before = crossing.fibers * x;
+        let widened = optics.chain.max_channel() * (before + SAMPLING_WIDENING);
+        let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
+        let weight = throughput * amplitude;
+        let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
+        Self {
+            spot,
+            crossing: *crossing,
+            sin,
+            cos: (1.0 - sin * sin).sqrt(),
+            before,
+            amplitude,
+            kappa_r: kappa(optics.beta_r_squared + widened * optics.beta_tt_squared),
+            kappa_tt: kappa((1.0 + widened) * optics.beta_tt_squared),
+            chance: normalised(lobes),
+            weight: weight * optics.albedo,
+            drawn: Drawn { direction: Vec3A::ZERO, value: NodeValue::NOTHING, escape: 0.0 },
+        }
+    }
+
+    /// The node's lobes towards `w`, dimmed by the way out.
+    #[inline]
+    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> NodeValue {
+        let optics = &view.yarn.plies[self.spot.ply];
+        let (depth, others) = self.optical_depth(view, w);
+        let clear = (-depth).exp();
+        let sin = w.dot(self.spot.tangent).clamp(-1.0, 1.0);
+        let cos = (1.0 - sin * sin).sqrt();
+        let at = Latitudes::new(self.sin, self.cos, sin, cos);
+        // Chains of TT on both sides widen the lobes.
+        let passed = optics.chain * (depth / optics.rho + self.before);
+        let beta_tt = Rgb::splat(optics.beta_tt_squared);
+        let even = cos * (0.5 * FRAC_1_PI);
+        let scale = self.amplitude * clear * even;
+        let [p_r, p_tt, p_d] = self.chance;
+        let mut value = NodeValue {
+            r: Rgb::ZERO,
+            tt: Rgb::ZERO,
+            d: optics.single_d * scale * DIFFUSE,
+            pdf: p_d * DIFFUSE,
+            clear,
+            open: (-others).exp(),
+        };
+        if p_r > 0.0 {
+            let m = kernel(kappa_of_variance(passed * beta_tt + optics.beta_r_squared), at);
+            value.r = optics.single_r * scale * m;
+            value.pdf += p_r * kernel_scalar(self.kappa_r, at);
+        }
+        if p_tt > 0.0 {
+            let m = kernel(kappa_of_variance((passed + 1.0) * beta_tt), at);
+            value.tt = optics.single_tt * scale * m;
+            value.pdf += p_tt * kernel_scalar(self.kappa_tt, at);
+        }
+        value.pdf *= even;
+        value
+    }
+
+    /// The chance, given the clearness of a direction, that light sent there counts as escaped and not as B.
+    #[inline]
+    pub(super) fn escape_chance(&self, view: &View<'_>, clear: Rgb) -> f32 {
+        let leaves = view.yarn.plies[self.spot.ply].leaves_yarn;
+        let out = clear.weighted_mean(self.weight);
+        let stay = ((Rgb::ONE - clear) * leaves).weighted_mean(self.weight);
+        if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
+    }
+
+    /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
+    /// plies, and of all but the node's own.
+    ///
+    /// Near its own fibre the way is clearer than the mean medium: the camera's ray has already swept a strip as wide
+    /// as a fibre (the "hot spot"), and the light starts at the fibre's surface, not at its centre.
+    #[inline]
+    pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
+        let (yarn, spot) = (view.yarn, &self.spot);
+        let shape = &yarn.shape;
+        let optics = &yarn.plies[spot.ply];
+        let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
+        let start = spot.point + optics.shift * (Vec2::X + ahead);
+        let strip = ClearedStrip::new(2.0 * shape.plies[spot.ply].fiber_radius, ahead);
+        // Light that goes on is inside its own fibre first; light that turns back is not.
+        let hole = optics.fiber_chord * 0.5 * (1.0 - ahead.x);
+        let mut own = Rgb::ZERO;
+        let mut others = Rgb::ZERO;
+        view.section.plies_ahead(shape, start, spot.travel, w, |way| {
+            let (ply, passed) = (&shape.plies[way.ply], &yarn.plies[way.ply]);
+            if yarn.plain {
+                let depth = passed.rho * plain_fibers(ply, &way, &strip, optics.lead);
+                if way.ply == spot.ply {
+                    own += depth
+                } else {
+                    others += depth
+                }
+                return;
+            }
+            let chord = ply.chord(way.offset, way.length);
+            if way.ply == spot.ply {
+                let (from, to) = ((way.foot - chord.half).max(0.0), way.foot + chord.half);
+                if to > 0.0 {
+                    let even = strip.length(from + optics.lead, to + optics.lead) / (2.0 * chord.half);
+                    let ring = ((to - hole) / chord.zone).clamp(0.0, 1.0);
+                    own += passed.rho * (chord.even * even + 0.5 * chord.ring * ring);
+                }
+            } else {
+                others += passed.rho * chord.ahead(-way.foot);
+            }
+        });
+        let tilt = spot.tilt(view.section, w);
+        others *= tilt;
+        (own * tilt + others, others)
+    }
+}
+
+/// The strip as wide as a fibre that the camera's ray has swept on its way to the node, as the light's way leaves it.
+struct ClearedStrip {
+    /// The length after which the way has left the strip.
+    cleared: f32,
+}
+
+impl ClearedStrip {
+    #[inline]
+    fn new(width: f32, ahead: Vec2) -> Self {
+        Self { cleared: if ahead.x > 0.0 { width / ahead.y.abs().max(1e-6) } else { width } }
+    }
+
+    /// The length between two distances along the way, less what lies in the strip.
+    #[inline]
+    fn length(&self, from: f32, to: f32) -> f32 {
+        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
+        outside(to) - outside(from)
+    }
+}
+
+/// The fibres ahead in a ply in the plain form: even over the core, which alone is passed.
+fn plain_fibers(ply: &crate::geometry::yarn::PlyShape, way: &PlyAhead, strip: &ClearedStrip, lead: f32) -> f32 {
+    let sigma = 2.0 * ply.fiber_radius * ply.fibers * FRAC_1_PI / (ply.core_radius * ply.core_radius);
+    let half = (ply.core_radius * ply.core_radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
+    let (from, to) = ((way.foot - half).max(0.0), (way.foot + half).max(0.0));
+    if half > 0.0 { sigma * strip.length(from + lead, to + lead) } else { 0.0 }
+}
