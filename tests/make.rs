@@ -53,7 +53,7 @@ fn what_cannot_be_made_is_refused() {
         (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
         (
             &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
-            "error: more than 2^26 control points",
+            "error: more than 2^27 control points",
         ),
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),

@@ -164,7 +164,7 @@ pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
 }
 
 fn too_many<T>(what: &str) -> Result<T, Failure> {
-    Err(Failure::Input(format!("error: more than 2^26 control points; fewer {what} or points")))
+    Err(Failure::Input(format!("error: more than 2^27 control points; fewer {what} or points")))
 }
 
 fn knit(args: &KnitArgs) -> Result<(), Failure> {

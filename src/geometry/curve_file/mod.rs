@@ -43,9 +43,9 @@ pub struct ReadOptions {
 }
 
 impl Default for ReadOptions {
-    /// One cell, at most 2^26 points (1.6 GB of coordinates).
+    /// One cell, at most 2^27 points (3.2 GB of coordinates).
     fn default() -> Self {
-        Self { basis: None, tile: [1, 1], max_points: 1 << 26 }
+        Self { basis: None, tile: [1, 1], max_points: 1 << 27 }
     }
 }
 

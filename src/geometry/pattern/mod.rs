@@ -22,7 +22,7 @@ use super::{
 };
 
 /// The most control points that a generator makes, as many as a curve file may hold.
-pub const MAX_POINTS: u64 = 1 << 26;
+pub const MAX_POINTS: u64 = 1 << 27;
 
 /// What a strand is in its cloth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

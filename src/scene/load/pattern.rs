@@ -130,7 +130,7 @@ fn counted(
     let (chart, form) = (chart?, form?);
     let knit = Knit { chart, stitches, rows, form, stitch_width, row_height, yarn_per_stitch, points };
     if knit.control_points() > MAX_POINTS {
-        table.error_at("stitches", "more than 2^26 control points", Some("fewer stitches, rows or points"));
+        table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
     }
     if knit.form != Form::Flat && knit.stitches < 3 {
         table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
@@ -217,7 +217,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let draft = draft?;
     let weave = Weave { draft, warps, wefts, warp_radius, weft_radius, warp_spacing, weft_spacing, crimp, points };
     if weave.control_points() > MAX_POINTS {
-        table.error_at("warps", "more than 2^26 control points", Some("fewer warps, wefts or points"));
+        table.error_at("warps", "more than 2^27 control points", Some("fewer warps, wefts or points"));
         return None;
     }
     Some(WeavePlan { weave, weft_yarn: weft_yarn.map(str::to_owned), name, header: table.header() })
