@@ -1,6 +1,17 @@
-//! Helpers of the tests: data that lies beside the project and is not part of it.
+//! Helpers of the tests: data of the project, and data that lies beside it and is not part of it.
 
-use std::path::PathBuf;
+use std::{io::Write as _, path::PathBuf};
+
+/// The text of a file of `tests/data`.
+pub(crate) fn data(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Says what is not tested, past the harness, which would show it for failed tests only.
+pub(crate) fn skipped(what: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped: {what}");
+}
 
 /// Where a file of the shared data would be: `YARNRAY_SHARED`, or `../shared` beside the project.
 pub(crate) fn shared_path(name: &str) -> PathBuf {
@@ -14,7 +25,7 @@ pub(crate) fn shared(name: &str) -> Option<String> {
     let path = shared_path(name);
     let text = std::fs::read_to_string(&path).ok();
     if text.is_none() {
-        eprintln!("skipped: {name} is not beside the project");
+        skipped(&format!("{name} is not beside the project"));
     }
     text
 }

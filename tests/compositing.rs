@@ -205,7 +205,7 @@ fn a_denoised_picture_is_a_layer_or_a_file_of_its_own() {
     let png = std::fs::read(path.join("a.png")).unwrap();
     let run = yarnray(path, &[&args[..], &["--denoise"]].concat());
     if run.status == Some(2) && run.stderr.contains("cannot be loaded") {
-        eprintln!("skipped: Open Image Denoise is not installed");
+        crate::support::skipped("Open Image Denoise is not installed");
         return;
     }
     run.good();

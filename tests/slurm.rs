@@ -147,7 +147,7 @@ fn a_requeued_array_of_shards_makes_the_frame_of_one_machine() {
     let slurm = match Slurm::start(d) {
         Ok(slurm) => slurm,
         Err(problem) => {
-            eprintln!("skipped: Slurm cannot start here: {problem}");
+            crate::support::skipped(&format!("Slurm cannot start here: {problem}"));
             return;
         }
     };

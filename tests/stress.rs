@@ -36,7 +36,7 @@ fn stress_refuses_cases_that_it_does_not_have() {
 fn the_program_is_not_linked_with_what_only_some_scenes_need() {
     // OpenImageIO and Open Image Denoise are loaded when a scene asks for them, if at all.
     let Ok(listed) = std::process::Command::new("ldd").arg(env!("CARGO_BIN_EXE_yarnray")).output() else {
-        eprintln!("skipped: no ldd");
+        crate::support::skipped("there is no ldd");
         return;
     };
     let text = String::from_utf8_lossy(&listed.stdout).to_lowercase();

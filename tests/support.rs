@@ -2,6 +2,7 @@
 
 use std::{
     ffi::OsStr,
+    io::Write as _,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
@@ -136,6 +137,11 @@ pub(crate) fn project(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
+/// Says what is not tested, past the harness, which would show it for failed tests only.
+pub(crate) fn skipped(what: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped: {what}");
+}
+
 /// A file of the shared data; `None`, with a word on standard error, where it is absent.
 pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     let base = std::env::var_os("YARNRAY_SHARED").map_or_else(|| project("../shared"), PathBuf::from);
@@ -143,7 +149,7 @@ pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    eprintln!("skipped: {name} is not beside the project");
+    skipped(&format!("{name} is not beside the project"));
     None
 }
 

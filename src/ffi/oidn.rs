@@ -262,7 +262,7 @@ mod tests {
             Err(error) => {
                 assert!(matches!(error, OidnError::Missing(_)), "{error}");
                 assert!(error.to_string().contains("OIDN_DIR"), "{error}");
-                eprintln!("skipped: {error}");
+                crate::testing::skipped(&error.to_string());
                 return;
             }
         };

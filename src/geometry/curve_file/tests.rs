@@ -71,7 +71,7 @@ fn shared(file: &str) -> Option<PathBuf> {
     let folders = [Some(beside), env::var_os("YARNRAY_SHARED").map(PathBuf::from)];
     let found = folders.into_iter().flatten().map(|folder| folder.join("data").join(file)).find(|path| path.exists());
     if found.is_none() {
-        eprintln!("skipped: {file} is not there");
+        crate::testing::skipped(&format!("{file} is not beside the project"));
     }
     found
 }

@@ -119,7 +119,7 @@ fn build(case: Case, m: &FiberMaterial) -> (AggregatedYarn, Section) {
 
 #[test]
 fn values_agree_with_the_reference_vectors() {
-    let Some(text) = crate::testing::shared("oracle/model_vectors.json") else { return };
+    let text = crate::testing::data("model_vectors.json");
     let vectors: serde_json::Value = serde_json::from_str(&text).unwrap();
     let numbers =
         |v: &serde_json::Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
