@@ -398,14 +398,14 @@ impl Film {
         let [x0, y0, x1, y1] = crop;
         let (width, height) = (x1 - x0, y1 - y0);
         let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
-        let count = rows * columns;
+        let count = rows as usize * columns as usize;
         let mut tiles = Vec::new();
-        tiles.try_reserve_exact(count as usize)?;
-        for i in 0..count {
+        tiles.try_reserve_exact(count)?;
+        for i in 0..rows * columns {
             let (x, y) = (x0 + i % columns * TILE, y0 + i / columns * TILE);
             tiles.push(Tile::new(x, y, TILE.min(x1 - x), TILE.min(y1 - y), layers, light_scale)?);
         }
-        let mut order: Vec<u32> = zeros(count as usize)?;
+        let mut order: Vec<u32> = zeros(count)?;
         order.iter_mut().zip(0..).for_each(|(place, i)| *place = i);
         order.sort_unstable_by_key(|i| morton(i % columns, i / columns));
         Ok(Self { origin: [x0, y0], width, height, tiles, columns, order })
