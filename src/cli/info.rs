@@ -12,6 +12,7 @@ use crate::{
         curve::{Basis, Curve, CurveSet},
         curve_file::{self, ReadOptions},
         pattern::overlap::{Overlap, TOLERATED, overlap},
+        proposal::{self, Proposal},
     },
     plan::{Memory, Plan},
     render::film_file,
@@ -94,6 +95,17 @@ fn list(v: DVec3) -> Value {
     json!([v.x, v.y, v.z])
 }
 
+/// A number with so many significant digits as the format's precision says.
+struct Figure(f64);
+
+impl std::fmt::Display for Figure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(3) as i32;
+        let size = if self.0 == 0.0 { 0 } else { self.0.abs().log10().floor() as i32 };
+        write!(f, "{:.*}", (digits - 1 - size).max(0) as usize, self.0)
+    }
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
 }
@@ -132,8 +144,16 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     };
     let radii = set.curves.iter().any(|c| c.radii.is_some());
     let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
+    // What the file does not say, and nobody has.
+    let proposal = if radii || radius.is_some() { None } else { Proposal::new(set) };
+    let sizes = proposal::sizes(set);
     let report = json!({
         "file": path.display().to_string(),
+        "proposal": proposal.map(|p| json!({
+            "radius": p.radius, "unit": p.unit.0, "overlap": overlap_json(Some(p.overlap)),
+            "bend_radius": {"p1": p.bends[0], "p50": p.bends[1]},
+        })),
+        "size_cm": sizes.iter().map(|(unit, size)| ((*unit).to_owned(), list(*size))).collect::<serde_json::Map<_, Value>>(),
         "curves": set.curves.len(), "closed": closed, "open": open,
         "points": points, "basis": basis, "radii": radii, "up": up,
         "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found),
@@ -147,6 +167,24 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         set.unit_mm.map_or("not stated".to_owned(), |u| format!("{u} mm")),
     );
     text += &overlap_line(found);
+    if let Some(p) = proposal {
+        text += &format!(
+            "  proposal  radius {:.3}: at it {:.1} % of the length overlaps; one bend in a hundred is tighter than {:.3}, \
+             half are tighter than {:.3}\n            unit \"{}\": the yarn would be {:.2} mm thick\n",
+            Figure(p.radius),
+            100.0 * p.overlap.share,
+            Figure(p.bends[0]),
+            Figure(p.bends[1]),
+            p.unit.0,
+            2.0 * p.radius * p.unit.1
+        );
+    }
+    if set.unit_mm.is_none() {
+        let size = |(unit, v): &(&str, DVec3)| {
+            format!("{unit}: {:.3} x {:.3} x {:.3} cm", Figure(v.x), Figure(v.y), Figure(v.z))
+        };
+        text += &format!("  size      if it is in {}\n", sizes.iter().map(size).collect::<Vec<_>>().join("; in "));
+    }
     for note in &set.notes {
         text += &format!("  note      {note}\n");
     }

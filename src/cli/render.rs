@@ -435,7 +435,11 @@ fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
             worst.yarn,
             worst.segment,
             worst.fold,
-            if args.log.verbose > 0 { "" } else { " (-v shows all)" }
+            match (2 * bends().count() > fabric.curves.len(), args.log.verbose > 0) {
+                (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
+                (false, false) => " (-v shows all)",
+                (false, true) => "",
+            }
         );
         for bend in bends() {
             tracing::debug!("yarn {} folds at segment {} by {:.2} of its radius", bend.yarn, bend.segment, bend.fold);

@@ -9,6 +9,7 @@ pub mod garment;
 pub mod mesh;
 pub mod obj;
 pub mod pattern;
+pub mod proposal;
 pub mod ray;
 pub mod section;
 mod spline;

@@ -173,6 +173,8 @@ impl SceneBuilder {
         for name in scene.render.force.clone() {
             force::force(&mut scene, &name).map_err(SceneError)?;
         }
+        warn_about_nothing(&mut scene);
+        warn_about_size(&mut scene);
         warn_about_precision(&mut scene);
         warn_about_density(&mut scene);
         warn_about_standing_hairs(&mut scene);
@@ -389,6 +391,27 @@ fn warn_about_standing_hairs(scene: &mut Scene) {
     let still = scene.fabrics.iter().filter(|f| !f.motion.later.is_empty() && hairy(f.kind));
     let warnings = still.map(|f| format!("the fly-aways of `{}` stand still while the shutter is open", f.name));
     scene.warnings.extend(warnings.collect::<Vec<_>>());
+}
+
+/// A picture of nothing is no mistake, but seldom what was meant.
+fn warn_about_nothing(scene: &mut Scene) {
+    if scene.fabrics.is_empty() && scene.objects.is_empty() {
+        let what = "there is nothing to see: the scene has no [[fabric]] and no [[mesh]]";
+        scene.warnings.push(what.to_owned());
+    }
+}
+
+/// A glove of ten metres, or of a tenth of a millimetre, is in another unit than was thought.
+fn warn_about_size(scene: &mut Scene) {
+    let Some((low, high)) = bounds(&scene.fabrics) else { return };
+    let size = (high - low).max_element();
+    if !(0.5..=5000.0).contains(&size) {
+        let shown = if size > 1.0 { format!("{:.1} m", size / 1000.0) } else { format!("{:.1} um", size * 1000.0) };
+        scene.warnings.push(format!(
+            "the cloth is {shown} wide: is the unit of its curves right? `unit` of a source gives it; `yarnray info` of a \
+             curve file proposes one"
+        ));
+    }
 }
 
 /// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.

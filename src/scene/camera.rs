@@ -104,6 +104,30 @@ impl Camera {
         }
     }
 
+    /// A camera that sees flat cloth from its face, if this one looks at its edge: flat is what is four times as wide as
+    /// it is thick, and an edge is seen from within 20 degrees of the cloth's plane.
+    pub fn facing<'a>(&self, points: impl Iterator<Item = &'a DVec3>) -> Self {
+        let Some((low, high)) = points.fold(None, |box_: Option<(DVec3, DVec3)>, p| {
+            Some(box_.map_or((*p, *p), |(low, high)| (low.min(*p), high.max(*p))))
+        }) else {
+            return *self;
+        };
+        let size = (high - low).to_array();
+        let thin = (0..3).min_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(2);
+        let narrowest = (0..3).filter(|&k| k != thin).map(|k| size[k]).fold(f64::MAX, f64::min);
+        let normal = DVec3::AXES[thin];
+        if size[thin] > 0.25 * narrowest || self.back.dot(normal).abs() > 20f64.to_radians().sin() {
+            return *self;
+        }
+        // What lies flat is seen from above with its far end up, what stands from the side.
+        let up = if thin == 1 { DVec3::NEG_Z } else { DVec3::Y };
+        Self::looking_at(self.position + normal, self.position, up, self.projection).map_or(*self, |camera| Self {
+            position: self.position,
+            lens: self.lens,
+            ..camera
+        })
+    }
+
     /// The camera after a turn about an axis through `pivot`, in radians.
     pub fn turned(&self, axis: DVec3, pivot: DVec3, angle: f64) -> Self {
         let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::Y), angle);
@@ -220,6 +244,35 @@ mod tests {
                 assert!(widest < 0.91 && widest > 0.75, "{projection:?} {aspect}: {widest}");
             }
         }
+    }
+
+    #[test]
+    fn flat_cloth_is_seen_from_its_face() {
+        let projection = Projection::Perspective(0.5);
+        let from = |direction| Camera::looking_at(direction, DVec3::ZERO, DVec3::Y, projection).unwrap();
+        let sheet = |thin: usize| -> Vec<DVec3> {
+            (0..100)
+                .map(|i| {
+                    let mut p = [f64::from(i % 10), f64::from(i / 10), f64::from(i % 3)];
+                    p[2] *= 0.3;
+                    p.swap(2, thin);
+                    DVec3::from(p)
+                })
+                .collect()
+        };
+        for (thin, direction, back) in [
+            (2, DVec3::Z, DVec3::Z),
+            (2, DVec3::X, DVec3::Z),
+            (1, DVec3::Z, DVec3::Y),
+            (0, DVec3::Z, DVec3::X),
+            // From 45 degrees its face is seen already.
+            (1, DVec3::new(0.0, 1.0, 1.0), DVec3::new(0.0, 1.0, 1.0).normalize()),
+        ] {
+            let camera = from(direction).facing(sheet(thin).iter());
+            assert!((camera.back - back).length() < 1e-12, "{thin} {direction}: {}", camera.back);
+        }
+        let ball = cloud();
+        assert_eq!(from(DVec3::X).facing(ball.iter()), from(DVec3::X));
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub struct CameraSetup {
     pub up: DVec3,
     /// How it moves.
     pub motion: CameraMotion,
+    /// Whether it goes to the face of flat cloth that it would see from the edge.
+    pub faces_cloth: bool,
 }
 
 /// A lens before it is known where the cloth is.
@@ -61,14 +63,15 @@ impl CameraSetup {
     pub fn framing(direction: DVec3, up: DVec3, projection: Projection) -> Option<Self> {
         let camera = Camera::looking_at(direction, DVec3::ZERO, up, projection)?;
         let margin = Some(defaults::MARGIN);
-        Some(Self { camera, margin, lens: None, aim: None, up, motion: CameraMotion::default() })
+        let motion = CameraMotion::default();
+        Some(Self { camera, margin, lens: None, aim: None, up, motion, faces_cloth: false })
     }
 
     /// One that stands and looks where it is told; `None` if these places fall together or the view is along `up`.
     pub fn aimed(aim: Aim, projection: Projection) -> Option<Self> {
         let camera = Camera::looking_at(aim.position, aim.target, aim.up, projection)?;
         let motion = CameraMotion::default();
-        Some(Self { camera, margin: None, lens: None, aim: Some(aim), up: aim.up, motion })
+        Some(Self { camera, margin: None, lens: None, aim: Some(aim), up: aim.up, motion, faces_cloth: false })
     }
 
     /// The camera at a frame for cloth that lies about `middle`, and its path while the shutter is open, if it moves.
@@ -82,12 +85,16 @@ impl CameraSetup {
         frame: f64,
     ) -> (Camera, Vec<Camera>) {
         let frame_all = |margin, clouds: &[Cloud<'_>]| -> Camera {
+            let camera = match self.faces_cloth {
+                true => self.camera.facing(clouds.iter().flat_map(Cloud::points).map(|(p, _)| p)),
+                false => self.camera,
+            };
             if !self.motion.turns() {
-                return self.camera.framing(clouds.par_iter().flat_map_iter(Cloud::points), aspect, margin);
+                return camera.framing(clouds.par_iter().flat_map_iter(Cloud::points), aspect, margin);
             }
             // From every side, so that the camera keeps its distance.
             let outline = motion::revolved(clouds.iter().flat_map(Cloud::points), self.up);
-            self.camera.framing(outline.par_iter().map(|p| (p, 0.0)), aspect, margin)
+            camera.framing(outline.par_iter().map(|p| (p, 0.0)), aspect, margin)
         };
         let still = match self.margin {
             None => Camera { position: self.camera.position - middle, ..self.camera },

@@ -76,7 +76,7 @@ pub(super) struct CurveFile {
     /// Curves at rest, if they are not those of the first frame.
     pub(super) rest: Option<PathBuf>,
     pub(super) span: Span,
-    /// Millimetres, if the file does not know.
+    /// Millimetres, for a file that does not know its own.
     unit: Option<f64>,
     options: ReadOptions,
     up: Up,
@@ -443,7 +443,14 @@ impl CurveFile {
             return None;
         }
         warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
-        let scale = self.unit.or(set.unit_mm).unwrap_or(context.unit);
+        // What a file knows of itself is so, whatever the scene says, which may have been written for another file.
+        if let (Some(own), Some(asked)) = (set.unit_mm, self.unit)
+            && own != asked
+        {
+            let path = path.display();
+            warnings.push(format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"));
+        }
+        let scale = set.unit_mm.or(self.unit).unwrap_or(context.unit);
         set.curves.par_iter_mut().for_each(|c| c.points.iter_mut().for_each(|p| *p *= scale));
         Some((set, scale))
     }

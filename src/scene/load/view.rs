@@ -24,8 +24,13 @@ use crate::{
     math::{Rgb, frame::orthonormal_basis},
 };
 
-/// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth.
+/// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth. With `frame` asked for, it goes to
+/// the face of flat cloth that it would see from the edge.
 pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraSetup> {
+    read_camera(root, context, frame).map(|setup| CameraSetup { faces_cloth: frame, ..setup })
+}
+
+fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraSetup> {
     let Some(node) = root.node("camera") else { return Some(CameraSetup::default()) };
     if let Value::String(word) = &node.value {
         if word != "frame" {
