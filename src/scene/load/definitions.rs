@@ -2,11 +2,11 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns};
+use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns, yarns::Library};
 use crate::{
     input::{
         diagnostic::{Diagnostics, Sources, unknown_name},
-        document::Document,
+        document::{Document, Node, Value},
         reader::Reader,
     },
     scattering::fiber::FiberMaterial,
@@ -49,6 +49,42 @@ fn find<'a, T>(all: &'a BTreeMap<String, T>, kind: &str, name: &str) -> Result<&
         let (message, hint) = unknown_name(kind, name, all.keys().map(String::as_str));
         LoadError(format!("error: {message}\n  = help: {hint}\n"))
     })
+}
+
+/// Adds yarns and fibres of the library inside the program that fabrics name and that nothing else defines. `fabrics` is
+/// what stands under `fabric`.
+pub(super) fn add_built_in(library: &mut Library, fabrics: Option<&Node>, tilted: bool) {
+    let mut named = Vec::new();
+    texts(fabrics, &mut named);
+    let unknown = |names: &[String], name: &str| !names.iter().any(|n| n == name);
+    named.retain(|name| unknown(&library.yarn_names, name) || unknown(&library.fiber_names, name));
+    let defines =
+        |name: &&&str| BUILT_IN.contains(&format!("[yarn.{name}]")) || BUILT_IN.contains(&format!("[fiber.{name}]"));
+    // Nothing is read that no fabric names.
+    if !named.iter().any(|name| defines(&name)) {
+        return;
+    }
+    let Ok(built_in) = load_definitions(None, &LoadOptions::default()) else { return };
+    for name in named {
+        if let Some(yarn) = built_in.yarns.get(name).filter(|_| unknown(&library.yarn_names, name)) {
+            library.yarns.insert(name.to_owned(), Yarn { tilted, ..yarn.clone() });
+            library.yarn_names.push(name.to_owned());
+        }
+        if let Some(fiber) = built_in.fibers.get(name).filter(|_| unknown(&library.fiber_names, name)) {
+            library.fibers.insert(name.to_owned(), fiber.clone());
+            library.fiber_names.push(name.to_owned());
+        }
+    }
+}
+
+/// All texts in a value.
+fn texts<'a>(node: Option<&'a Node>, out: &mut Vec<&'a str>) {
+    match node.map(|node| &node.value) {
+        Some(Value::String(text)) => out.push(text),
+        Some(Value::Array(elements)) => elements.iter().for_each(|element| texts(Some(element), out)),
+        Some(Value::Table(table)) => table.entries().for_each(|entry| texts(Some(&entry.node), out)),
+        _ => {}
+    }
 }
 
 /// Reads the fibres and yarns of a scene or library file, or of the library inside the program if there is no `path`.

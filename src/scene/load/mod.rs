@@ -292,7 +292,8 @@ impl Plans {
         if let Some(table) = table {
             table.finish();
         }
-        let library = yarns::read(root, context, tilted);
+        let mut library = yarns::read(root, context, tilted);
+        definitions::add_built_in(&mut library, root.node("fabric"), tilted);
         let tables = root.tables("fabric");
         if tables.is_empty() && options.curves.is_some() {
             root.error("`--curves` needs a [[fabric]] whose curves it replaces", None);
