@@ -312,7 +312,7 @@ fn run_one(args: &ScatterArgs) -> Result<(), Failure> {
     let (mut attempts, mut written) = (Attempts::default(), Vec::new());
     for path in &args.out {
         let is_written = if extension_is(path, "png") {
-            attempts.note(picture::write_map(path, &shown.iter().map(|(_, m)| *m).collect::<Vec<_>>()))
+            attempts.note(picture::write_map(path, &format!("{}, theta {}", found.title, args.theta), &shown))
         } else if extension_is(path, "csv") {
             attempts.note(write_text(path, &picture::distribution_csv(&shown)))
         } else if extension_is(path, "svg") {

@@ -143,6 +143,20 @@ pub fn log_log(title: &str, axes: [&str; 2], series: &[Series], level: Option<f6
     svg + "</svg>\n"
 }
 
+/// Round values from `low` to `high`, four to nine of them, each with the digits that tell it from its neighbours.
+pub fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+    let span = high - low;
+    if !(span > 0.0 && span.is_finite()) {
+        return vec![(low, format!("{low}"))];
+    }
+    let decade = 10f64.powf((span / 8.0).log10().floor());
+    let step = [1.0, 2.0, 2.5, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| span / s <= 8.0).unwrap_or(span);
+    let digits = (0..12).find(|d| (step * 10f64.powi(*d)).fract().abs() < 1e-6).unwrap_or(12) as usize;
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last).map(|i| i as f64 * step).map(|v| (v, format!("{v:.digits$}"))).collect()
+}
+
 fn number(v: f64) -> String {
     if (1e-3..1e4).contains(&v) { format!("{}", (v * 1e6).round() / 1e6) } else { format!("{v:.0e}") }
 }
@@ -155,6 +169,22 @@ pub fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_are_round_and_told_apart() {
+        let labels = |low, high| -> Vec<String> { ticks(low, high).into_iter().map(|(_, label)| label).collect() };
+        assert_eq!(labels(0.0, 0.525), ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
+        assert_eq!(labels(0.1, 0.7), ["0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]);
+        assert_eq!(labels(0.0, 60.0), ["0", "10", "20", "30", "40", "50", "60"]);
+        assert_eq!(labels(3.0, 3.0), ["3"]);
+        for (low, high) in [(-1.0, 1.0), (0.0, 0.13), (1e-5, 9e-5), (0.0, 1234.0)] {
+            let all = labels(low, high);
+            assert!((4..=9).contains(&all.len()), "{all:?}");
+            let mut different = all.clone();
+            different.dedup();
+            assert_eq!(all, different);
+        }
+    }
 
     #[test]
     fn plots_hold_what_can_be_shown() {

@@ -5,7 +5,7 @@ use std::{f64::consts::TAU, fmt::Write as _, path::Path};
 use super::{COLUMNS, Distribution, Mean, Measurement, ROWS};
 use crate::{
     image::{ImageError, png, png::Display},
-    report::plot::escaped,
+    report::plot::{self, escaped},
 };
 
 /// Edge of a cell in the map, pixels.
@@ -13,28 +13,95 @@ const CELL: usize = 8;
 /// Colours of the channels in plots.
 const CHANNELS: [&str; 3] = ["#c22", "#181", "#24c"];
 
-/// The distribution as a picture: azimuth to the right (-180 to 180 degrees, 0 back towards the camera), latitude
-/// upwards, the brightest cell white. A second measurement stands to the right of the first, on the same scale.
+/// Free space around a map for its axes, pixels: left and right, above, below.
+const MARGIN: [usize; 3] = [52, 44, 44];
+
+/// The distribution as a picture with axes: azimuth to the right (-180 to 180 degrees, 0 back towards the camera), latitude
+/// upwards, the brightest cell of all white. Each measurement stands to the right of the one before, on the same scale.
 ///
 /// # Errors
 /// What writing a file can say.
-pub fn write_map(path: &Path, all: &[&Measurement]) -> Result<(), ImageError> {
+pub fn write_map(path: &Path, title: &str, all: &[(&str, &Measurement)]) -> Result<(), ImageError> {
     let largest = all
         .iter()
-        .flat_map(|m| (0..ROWS).flat_map(move |r| (0..COLUMNS).map(move |c| m.distribution.value(r, c))))
+        .flat_map(|(_, m)| (0..ROWS).flat_map(move |r| (0..COLUMNS).map(move |c| m.distribution.value(r, c))))
         .flatten()
         .fold(1e-30, f64::max);
-    let width = all.len() * COLUMNS * CELL + (all.len() - 1) * CELL;
-    png::write(path, width, ROWS * CELL, &Display::default(), |y, line| {
-        let row = ROWS - 1 - y / CELL;
-        for (i, m) in all.iter().enumerate() {
-            let start = i * (COLUMNS + 1) * CELL;
-            for (x, pixel) in line[start..start + COLUMNS * CELL].iter_mut().enumerate() {
-                let [r, g, b] = m.distribution.value(row, x / CELL).map(|v| (v / largest) as f32);
-                *pixel = [r, g, b, 1.0];
+    let [side, top, bottom] = MARGIN;
+    let (map_width, map_height) = (COLUMNS * CELL, ROWS * CELL);
+    let step = map_width + side;
+    let mut plot = Pixels::new(all.len() * step + side, map_height + top + bottom);
+    plot.text(side, 8, &format!("{title}; white is {} per steradian", short(largest)));
+    for (i, (name, m)) in all.iter().enumerate() {
+        let left = side + i * step;
+        plot.text(left, top - 14, name);
+        for (y, x) in (0..map_height).flat_map(|y| (0..map_width).map(move |x| (y, x))) {
+            let [r, g, b] = m.distribution.value(ROWS - 1 - y / CELL, x / CELL).map(|v| (v / largest) as f32);
+            plot.set(left + x, top + y, [r, g, b]);
+        }
+        for phi in (-180..=180).step_by(60) {
+            let x = left + ((phi + 180) as usize * map_width / 360).min(map_width - 1);
+            (0..5).for_each(|k| plot.set(x, top + map_height + k, [0.0; 3]));
+            plot.centred(x, top + map_height + 8, &phi.to_string());
+        }
+        plot.centred(left + map_width / 2, top + map_height + 24, "azimuth phi, degrees; 0 is the camera's side");
+        for theta in (-90..=90).step_by(30) {
+            let y = top + ((90 - theta) as usize * map_height / 180).min(map_height - 1);
+            (0..5).for_each(|k| plot.set(left - 1 - k, y, [0.0; 3]));
+            let label = theta.to_string();
+            plot.text(left - 8 - Pixels::GLYPH * label.len(), y - 3, &label);
+        }
+        plot.text(left - side + 2, top - 14, "theta");
+    }
+    plot.write(path)
+}
+
+/// A white sheet to plot on, linear colours.
+struct Pixels {
+    width: usize,
+    colors: Vec<[f32; 3]>,
+}
+
+impl Pixels {
+    /// Width and height of a letter.
+    const GLYPH: usize = 8;
+
+    fn new(width: usize, height: usize) -> Self {
+        Self { width, colors: vec![[1.0; 3]; width * height] }
+    }
+
+    fn set(&mut self, x: usize, y: usize, color: [f32; 3]) {
+        if x < self.width
+            && let Some(pixel) = self.colors.get_mut(y * self.width + x)
+        {
+            *pixel = color;
+        }
+    }
+
+    /// Text from its upper left corner; what is not ASCII is left blank.
+    fn text(&mut self, x: usize, y: usize, text: &str) {
+        for (i, c) in text.chars().enumerate() {
+            let glyph = font8x8::legacy::BASIC_LEGACY.get(c as usize).copied().unwrap_or_default();
+            for (row, bits) in glyph.into_iter().enumerate() {
+                // The lowest bit is the leftmost pixel.
+                for column in (0..Self::GLYPH).filter(|k| bits >> k & 1 == 1) {
+                    self.set(x + i * Self::GLYPH + column, y + row, [0.0; 3]);
+                }
             }
         }
-    })
+    }
+
+    fn centred(&mut self, x: usize, y: usize, text: &str) {
+        self.text(x.saturating_sub(Self::GLYPH * text.chars().count() / 2), y, text);
+    }
+
+    fn write(&self, path: &Path) -> Result<(), ImageError> {
+        let height = self.colors.len() / self.width;
+        png::write(path, self.width, height, &Display::default(), |y, line| {
+            let row = &self.colors[y * self.width..][..self.width];
+            line.iter_mut().zip(row).for_each(|(pixel, [r, g, b])| *pixel = [*r, *g, *b, 1.0]);
+        })
+    }
 }
 
 /// The distribution as a table: theta and phi of the middle of a cell in degrees, and for each measurement the values
@@ -78,18 +145,19 @@ pub fn polar_svg(title: &str, all: &[(&str, &Measurement)]) -> String {
     const RADIUS: f64 = 220.0;
     let largest = all.iter().flat_map(|(_, m)| (0..COLUMNS).flat_map(|c| around(m, c))).fold(1e-30, f64::max);
     let middle = SIZE / 2.0;
-    let mut svg = header(SIZE, SIZE + 20.0 * all.len() as f64, title);
-    for ring in 1..=4 {
-        let r = RADIUS * f64::from(ring) / 4.0;
-        let _ = writeln!(svg, r##"<circle cx="{middle}" cy="{middle}" r="{r}" fill="none" stroke="#ddd"/>"##);
-        let _ = writeln!(
-            svg,
-            r##"<text x="{:.1}" y="{:.1}" fill="#888">{:.3}</text>"##,
-            middle + 3.0,
-            middle - r - 2.0,
-            largest * f64::from(ring) / 4.0
-        );
+    let mut svg = header(SIZE, SIZE + 20.0 * (1 + all.len()) as f64, title);
+    let rings = plot::ticks(0.0, largest);
+    let radius = |v: f64| RADIUS * v / largest;
+    for (v, _) in rings.iter().filter(|(v, _)| *v > 0.0) {
+        let r = radius(*v);
+        let _ = writeln!(svg, r##"<circle cx="{middle}" cy="{middle}" r="{r:.1}" fill="none" stroke="#ddd"/>"##);
     }
+    let _ = writeln!(
+        svg,
+        r##"<path d="M{0} {middle}H{1}M{middle} {0}V{1}" stroke="#ddd"/>"##,
+        middle - RADIUS,
+        middle + RADIUS
+    );
     for (angle, word) in [(0.0, "camera 0"), (90.0, "90"), (180.0, "180"), (270.0, "-90")] {
         let (s, c) = f64::to_radians(angle).sin_cos();
         let anchor = if c > 0.5 {
@@ -124,7 +192,31 @@ pub fn polar_svg(title: &str, all: &[(&str, &Measurement)]) -> String {
         }
         legend(&mut svg, 20.0, SIZE + 20.0 * index as f64, index, name);
     }
+    // Above the curves, along a direction that no other label stands in.
+    let (s, c) = f64::to_radians(62.0).sin_cos();
+    for (v, label) in rings.iter().filter(|(v, _)| *v > 0.0) {
+        let _ = writeln!(
+            svg,
+            r##"<text x="{:.1}" y="{:.1}" fill="#555" stroke="#fff" stroke-width="3" paint-order="stroke">{label}</text>"##,
+            middle + c * radius(*v),
+            middle - s * radius(*v)
+        );
+    }
+    channels(&mut svg, 20.0, SIZE + 20.0 * all.len() as f64);
     svg + "</svg>\n"
+}
+
+/// Which colour is which channel.
+fn channels(svg: &mut String, x: f64, y: f64) {
+    for (i, (color, name)) in CHANNELS.iter().zip(["red", "green", "blue"]).enumerate() {
+        let x = x + 90.0 * i as f64;
+        let _ = writeln!(
+            svg,
+            r##"<path d="M{x} {0}h24" stroke="{color}" stroke-width="2"/><text x="{1}" y="{y}">{name}</text>"##,
+            y - 4.0,
+            x + 30.0
+        );
+    }
 }
 
 /// One row of a sweep: the parameter, and reflected and transmitted shares by each measurement.
@@ -166,7 +258,7 @@ pub fn sweep_svg(title: &str, key: &str, names: &[&str], rows: &[SweepRow]) -> S
     const HEIGHT: f64 = 280.0;
     let (left, top) = (56.0, 48.0);
     let total = 2.0 * (WIDTH + left) + 20.0;
-    let mut svg = header(total, top + HEIGHT + 50.0 + 20.0 * names.len() as f64, title);
+    let mut svg = header(total, top + HEIGHT + 50.0 + 20.0 * (1 + names.len()) as f64, title);
     let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), |(l, h), r| (l.min(r.at), h.max(r.at)));
     let span = if high > low { high - low } else { 1.0 };
     for (panel, part) in ["reflected", "transmitted"].into_iter().enumerate() {
@@ -183,16 +275,21 @@ pub fn sweep_svg(title: &str, key: &str, names: &[&str], rows: &[SweepRow]) -> S
             x0 + WIDTH / 2.0,
             top - 8.0
         );
-        for tick in 0..=4 {
-            let (v, at) = (largest * f64::from(tick) / 4.0, low + span * f64::from(tick) / 4.0);
+        for (v, label) in plot::ticks(0.0, largest) {
             let _ = writeln!(
                 svg,
-                r##"<text x="{:.1}" y="{:.1}" text-anchor="end" fill="#444">{v:.2}</text><text x="{:.1}" y="{:.1}" text-anchor="middle" fill="#444">{}</text>"##,
+                r##"<path d="M{x0} {1:.1}h{WIDTH}" stroke="#eee"/><text x="{0:.1}" y="{2:.1}" text-anchor="end" fill="#444">{label}</text>"##,
                 x0 - 4.0,
+                y(v),
                 y(v) + 4.0,
+            );
+        }
+        for (at, label) in plot::ticks(low, low + span) {
+            let _ = writeln!(
+                svg,
+                r##"<path d="M{0:.1} {top}v{HEIGHT}" stroke="#eee"/><text x="{0:.1}" y="{1:.1}" text-anchor="middle" fill="#444">{label}</text>"##,
                 x(at),
                 top + HEIGHT + 16.0,
-                short(at)
             );
         }
         let _ = writeln!(
@@ -241,6 +338,7 @@ pub fn sweep_svg(title: &str, key: &str, names: &[&str], rows: &[SweepRow]) -> S
             legend(&mut svg, left, y, m, name);
         }
     }
+    channels(&mut svg, left, top + HEIGHT + 50.0 + 20.0 * names.len() as f64);
     svg + "</svg>\n"
 }
 
