@@ -10,9 +10,7 @@ use std::{
 use serde_json::Value;
 use yarnray::image::{self, Attribute};
 
-use crate::support::{
-    SWATCH, bcc, directory, listing, program, project, read_json, render, weave_text, write, yarnray,
-};
+use crate::support::{SWATCH, bcc, directory, listing, program, read_json, render, weave_text, write, yarnray};
 
 #[test]
 fn help_carries_examples() {
@@ -42,30 +40,6 @@ fn help_carries_examples() {
 }
 
 #[test]
-fn examples_of_the_help_are_accepted() {
-    // Every example that names a scene of the project runs as far as loading it.
-    let help = yarnray(&project(""), &["render", "--help"]).good().stdout;
-    let mut seen = 0;
-    for line in help.lines().filter(|l| l.starts_with("  yarnray render scenes/")) {
-        let example = line.trim().split("  ").next().unwrap();
-        let words: Vec<&str> = example.split_whitespace().skip(2).collect();
-        if words.contains(&"--curves") {
-            continue;
-        }
-        let directory = directory();
-        let mut args = vec!["render"];
-        let scene = project(words[0]).display().to_string();
-        args.push(&scene);
-        args.extend(&words[1..]);
-        // A few samples will do: what counts is that the options are understood.
-        args.extend(["-q", "--set", "render.spp=1"]);
-        yarnray(directory.path(), &args).good();
-        seen += 1;
-    }
-    assert!(seen >= 3, "{help}");
-}
-
-#[test]
 fn info_tells_of_scenes() {
     let directory = directory();
     write(directory.path(), "s.toml", SWATCH);
@@ -78,7 +52,7 @@ fn info_tells_of_scenes() {
     assert_eq!(json["image"]["spp"], 3);
     assert_eq!(json["fabrics"][0]["yarn"], "wool3");
     assert!(json["memory"]["bvh_bytes"].as_u64().unwrap() > 1000);
-    assert_eq!(json["fingerprint"].as_str().unwrap().len(), 16);
+    assert_eq!(json["fingerprint"].as_str().unwrap().len(), 32);
     for list in ["used", "left_out"] {
         assert!(json[list].as_array().unwrap().iter().all(|f| f["name"].is_string() && f["reason"] != ""), "{json}");
     }
@@ -239,6 +213,9 @@ fn fingerprints_change_with_the_picture_only() {
         &["--set", "light.0.radiance=0.3"],
         &["--set", "camera.fov=26"],
         &["--set", "render.ply_intersection=perpendicular"],
+        &["--set", "render.force=[\"distant_light\"]"],
+        &["--set", "render.force=[\"all_lobes\"]"],
+        &["--set", "render.bvh=fast"],
         &["--set", "fabric.0.source.rows=7"],
     ] {
         assert_ne!(of(other), first, "{other:?}");
@@ -359,4 +336,42 @@ fn an_empty_scene_is_a_black_picture_and_a_warning() {
     let picture = image::read(&directory.path().join("o.exr")).expect("it was written");
     let [r, _, _] = picture.rgb().expect("it has colours");
     assert!(r.iter().all(|v| *v == 0.0));
+}
+
+#[test]
+fn numbers_below_zero_are_answered_by_the_option() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    for (args, message) in [
+        ("--spp -1", "invalid value '-1' for '--spp <N>'"),
+        ("--crop -1,0,4,4", "invalid value '-1,0,4,4' for '--crop <X0,Y0,X1,Y1>': expected four whole numbers"),
+        ("--frames -5..5", "invalid value '-5..5' for '--frames <A..B>': expected one frame or the first and the last"),
+        ("--time -1", "`time` must be above 0, found -1"),
+        ("--exposure nan", "expected a number of stops from -100 to 100"),
+        ("--exposure inf", "expected a number of stops from -100 to 100"),
+    ] {
+        let all: Vec<&str> = ["render", "s.toml", "-o", "x.png"].into_iter().chain(args.split(' ')).collect();
+        let run = yarnray(directory.path(), &all);
+        assert_eq!(run.status, Some(2), "{args}");
+        assert!(run.stderr.contains(message), "{args}: {}", run.stderr);
+    }
+    yarnray(directory.path(), &["render", "s.toml", "-q", "--spp", "1", "--exposure", "-1.5", "-o", "x.png"]).good();
+}
+
+#[test]
+fn a_curve_file_is_no_scene() {
+    let directory = directory();
+    write(directory.path(), "g.bcc", bcc(&[(false, vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])]));
+    write(directory.path(), "t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write(directory.path(), "s.toml", SWATCH);
+    for command in ["render", "converge"] {
+        let run = yarnray(directory.path(), &[command, "g.bcc"]);
+        assert_eq!(run.status, Some(2));
+        assert!(run.stderr.contains("g.bcc: error: a curve file is no scene\n"), "{}", run.stderr);
+        assert!(run.stderr.contains("--curves g.bcc"), "{}", run.stderr);
+    }
+    let run = yarnray(directory.path(), &["render", "s.toml", "--curves", "t.obj", "-o", "x.png"]);
+    assert_eq!(run.status, Some(2));
+    assert!(run.stderr.contains("it holds no curve that can be drawn"), "{}", run.stderr);
+    assert!(run.stderr.contains("triangles go into a [[mesh]]"), "{}", run.stderr);
 }

@@ -402,3 +402,28 @@ fn logs_are_lines_of_json() {
     assert_eq!((run.status, &event["level"]), (Some(2), &Value::from("ERROR")));
     assert!(event["message"].as_str().unwrap().contains("none.toml"));
 }
+
+#[test]
+fn forced_features_are_part_of_what_a_checkpoint_is_of() {
+    let d = swatch();
+    let d = d.path();
+    render(d, "--spp 2 --set render.force=point_light --checkpoint c.film -o a.exr").good();
+    let run = render(d, "--spp 4 --checkpoint c.film --resume -o b.exr");
+    assert_eq!(run.status, Some(2));
+    assert!(run.stderr.contains("render.force: [point_light] there, [] here"), "{}", run.stderr);
+    assert!(run.stderr.contains("light.2: point {"), "{}", run.stderr);
+    render(d, "--spp 4 --set render.force=point_light --checkpoint c.film --resume -o b.exr").good();
+    // No form of Rust's own in what people read.
+    let info = yarnray(d, &["info", "c.film"]).good().stdout;
+    for word in ["Some(", "None", "Vec3", "Gaussian(", "\""] {
+        assert!(!info.contains(word), "{word}: {info}");
+    }
+    // Damage anywhere is seen by `info` as well.
+    let mut bytes = std::fs::read(d.join("c.film")).unwrap();
+    let place = bytes.len() - 100;
+    bytes[place] ^= 1;
+    write(d, "c.film", bytes);
+    let run = yarnray(d, &["info", "c.film"]);
+    assert_eq!(run.status, Some(2), "{}", run.stdout);
+    assert!(run.stderr.contains("is damaged"), "{}", run.stderr);
+}

@@ -31,6 +31,8 @@ mod furnace;
 mod fuzz;
 // Yarns, plies or fibres as curves: the same cloth, its memory told beforehand.
 mod modes;
+// Every command that help and documents print.
+mod documented;
 // Checkpoints, shards and merging: the same picture, whatever happens on the way.
 mod farm;
 // What must not change a picture: units, places, seams, and the way plies are intersected where it cannot matter.

@@ -29,11 +29,11 @@ use crate::{
 };
 
 const EXAMPLES: &str = "Examples:
-  yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.bcc
-  yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --form tube -o shaped.hair
+  yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.hair
+  yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --rows 10 --form tube -o shaped.hair
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
-  yarnray render scenes/glove.toml --curves rib.bcc --set fabric.0.source.unit=mm -o rib.png
+  yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
 The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it).
 Lengths have no unit in these files; what reads them gives one.";

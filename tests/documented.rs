@@ -1,0 +1,239 @@
+//! Every command that the program or its documents print, run in a cheap form: few samples, small pictures.
+//!
+//! Commands are collected by themselves: the examples of each `--help`, and whatever begins with `yarnray` in code of the
+//! README and of docs. Files that a command reads and nobody has written before it are made up.
+
+use std::{collections::BTreeSet, path::Path, process::Command, sync::LazyLock};
+
+use crate::support::{SWATCH, directory, program, project, write, yarnray};
+
+/// Options whose value is written, not read.
+const OUTPUTS: [&str; 6] = ["-o", "--out", "--stats", "--checkpoint", "--cache", "--display"];
+
+/// Whether there is a denoiser on this machine.
+static DENOISER: LazyLock<bool> = LazyLock::new(|| {
+    let d = directory();
+    write(d.path(), "s.toml", SWATCH);
+    yarnray(d.path(), &["render", "s.toml", "-q", "--spp", "1", "--denoise", "-o", "s.png"]).status == Some(0)
+});
+
+/// The commands of a command's help, and of those within it.
+fn examples_of_help(command: &[&str], out: &mut Vec<(String, Vec<String>)>) {
+    let d = directory();
+    let help = yarnray(d.path(), &[command, &["--help"]].concat()).good().stdout;
+    let within = |title: &str| -> Vec<String> {
+        let lines = help.lines().skip_while(|l| l.trim() != title).skip(1);
+        lines.map_while(|l| l.strip_prefix("  ").map(str::to_owned)).collect()
+    };
+    let examples = within("Examples:").iter().filter(|l| l.starts_with("yarnray ")).map(|l| alone(l)).collect();
+    out.push((format!("yarnray {} --help", command.join(" ")), examples));
+    for line in within("Commands:") {
+        let name = line.split_whitespace().next().unwrap_or_default();
+        if !name.is_empty() && name != "help" && !line.starts_with(' ') {
+            examples_of_help(&[command, &[name]].concat(), out);
+        }
+    }
+}
+
+/// A command without the words about it, which two spaces set apart.
+fn alone(line: &str) -> String {
+    line.trim().split("  ").next().unwrap_or_default().to_owned()
+}
+
+/// The commands of a document: lines of code, and code within lines. Those with placeholders in capitals are passed over.
+fn examples_of_document(text: &str) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut fenced = false;
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+            continue;
+        }
+        let code = fenced || line.starts_with("    ");
+        let command = line.trim().trim_start_matches("target/release/");
+        if code && command.starts_with("yarnray ") {
+            let mut command = alone(command);
+            while let Some(start) = command.strip_suffix('\\') {
+                command = format!("{start}{}", lines.next().unwrap_or_default().trim());
+            }
+            out.push(alone(&command));
+        } else if !code {
+            out.extend(line.split('`').skip(1).step_by(2).filter(|c| c.starts_with("yarnray ")).map(str::to_owned));
+        }
+    }
+    let capitals = |c: &String| c.as_bytes().windows(3).any(|w| w.iter().all(u8::is_ascii_uppercase));
+    out.retain(|c| !capitals(c) && !c.contains("...") && c.split_whitespace().count() > 2);
+    out
+}
+
+/// The words of a command as a shell makes them.
+fn words(directory: &Path, command: &str) -> Vec<String> {
+    let script = format!("printf '%s\\0' {command}");
+    let output = Command::new("bash").args(["-c", &script]).current_dir(directory).output().expect("bash");
+    assert!(output.status.success(), "{command}");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    text.split_terminator('\0').map(str::to_owned).collect()
+}
+
+/// Removes an option with its value.
+fn without(words: &mut Vec<String>, option: &str) -> bool {
+    let Some(i) = words.iter().position(|w| w == option) else { return false };
+    words.drain(i..(i + 2).min(words.len()));
+    true
+}
+
+fn with(words: &mut Vec<String>, more: &str) {
+    words.extend(more.split_whitespace().map(str::to_owned));
+}
+
+/// The same command with little work, without the program's name.
+fn cheap(mut words: Vec<String>) -> Vec<String> {
+    words.remove(0);
+    match words[0].as_str() {
+        "render" => {
+            let shard = words.iter().any(|w| w == "--shard");
+            ["--spp", "--time", "--noise", "--display", "--max-bounces"]
+                .iter()
+                .for_each(|o| _ = without(&mut words, o));
+            if without(&mut words, "--frames") {
+                with(&mut words, "--frames 1..2");
+            }
+            if !words.iter().any(|w| w == "--crop") {
+                ["--width", "--height"].iter().for_each(|o| _ = without(&mut words, o));
+                with(&mut words, "--width 24 --height 18");
+            }
+            if !*DENOISER {
+                words.retain(|w| w != "--denoise");
+            }
+            with(&mut words, if shard { "--spp 3" } else { "--spp 1" });
+            with(&mut words, "--max-bounces 4 -q");
+        }
+        "scatter" => {
+            if without(&mut words, "--truth") {
+                with(&mut words, "--truth 50");
+            }
+            for word in &mut words {
+                if let Some((range, _)) = word.clone().rsplit_once(':').filter(|(range, _)| range.contains("..")) {
+                    *word = format!("{range}:2");
+                }
+            }
+            without(&mut words, "--samples");
+            with(&mut words, "--samples 100");
+        }
+        "converge" => {
+            for option in ["--width", "--height", "--spp", "--seeds", "--converged-spp"] {
+                without(&mut words, option);
+            }
+            words[1] = "tiny.toml".to_owned();
+            with(&mut words, "--width 8 --height 6 --spp 2 --seeds 2 --converged-spp 2 --max-bounces 4 -q");
+        }
+        // Arguments and suite are read, then no row is found.
+        "bench" => {
+            without(&mut words, "--row");
+            words.extend(["--row".to_owned(), "no row has this name".to_owned()]);
+        }
+        "stress" => with(&mut words, "--list"),
+        "make" if words[1] == "fibers" => {
+            without(&mut words, "-o");
+            words.retain(|w| w != "--estimate");
+            with(&mut words, "--estimate");
+        }
+        _ => {}
+    }
+    words
+}
+
+/// Makes the files that a command reads and that are not there.
+fn provide(directory: &Path, words: &[String]) {
+    let place = |name: &str| directory.join(name);
+    for (i, word) in words.iter().enumerate() {
+        if word.starts_with('-') || (i > 0 && OUTPUTS.contains(&words[i - 1].as_str())) || place(word).exists() {
+            continue;
+        }
+        let quiet = |args: &str| {
+            yarnray(directory, &args.split_whitespace().collect::<Vec<_>>()).good();
+        };
+        match Path::new(word).extension().and_then(|e| e.to_str()) {
+            Some("toml") if !word.contains('=') => _ = write(directory, word, SWATCH),
+            Some("bcc" | "hair" | "txt" | "obj") => {
+                quiet(&format!("make knit --stitches 4 --rows 4 --radius 0.05 --quiet -o {word}"));
+            }
+            Some("exr") => quiet(&format!("render tiny.toml -q --spp 2 -o {word}")),
+            _ => {}
+        }
+    }
+}
+
+/// A directory in which examples can run.
+fn place() -> tempfile::TempDir {
+    let d = directory();
+    for name in ["scenes", "tools"] {
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(project(name), d.path().join(name)).expect("a link");
+    }
+    write(d.path(), "tiny.toml", SWATCH);
+    let render = |args: &str| {
+        let args = format!("render tiny.toml -q --spp 3 {args}");
+        yarnray(d.path(), &args.split_whitespace().collect::<Vec<_>>()).good();
+    };
+    // What `merge` and `info` are shown with.
+    (1..=3).for_each(|i| render(&format!("--shard {i}/3 -o part{i}.film")));
+    render("-o frame.film");
+    render("--crop 0,0,20,36 -o left.film");
+    render("--crop 20,0,48,36 -o right.film");
+    d
+}
+
+/// Runs commands one after the other in one directory; gives what went wrong.
+fn run_all(title: &str, commands: &[String], seen: &mut BTreeSet<Vec<String>>) -> Vec<String> {
+    let mut problems = Vec::new();
+    let d = place();
+    for command in commands {
+        let words = cheap(words(d.path(), command));
+        if !seen.insert(words.clone()) {
+            continue;
+        }
+        provide(d.path(), &words);
+        let output = program(d.path()).args(&words).output().expect("the program starts");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let good = match words[0].as_str() {
+            "bench" => output.status.code() == Some(2) && stderr.contains("no row of"),
+            // A threshold may be broken.
+            "compare" => matches!(output.status.code(), Some(0 | 1)),
+            _ => output.status.code() == Some(0),
+        };
+        if !good {
+            problems.push(format!("{title}: {command}\n  run as: {}\n  {}", words.join(" "), stderr.trim()));
+        }
+    }
+    problems
+}
+
+#[test]
+fn every_printed_command_runs() {
+    let mut all = Vec::new();
+    examples_of_help(&[], &mut all);
+    let mut documents = vec![project("README.md")];
+    let entries = std::fs::read_dir(project("docs")).expect("docs").map(|e| e.expect("an entry").path());
+    documents.extend(entries.filter(|p| p.extension().is_some_and(|e| e == "md")));
+    documents.sort();
+    for path in &documents {
+        let text = std::fs::read_to_string(path).expect("a document");
+        all.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), examples_of_document(&text)));
+    }
+    let mut seen = BTreeSet::new();
+    let problems: Vec<String> = all.iter().flat_map(|(title, commands)| run_all(title, commands, &mut seen)).collect();
+    eprintln!("{} commands of {} texts", seen.len(), all.iter().filter(|(_, c)| !c.is_empty()).count());
+    assert!(seen.len() >= 60, "only {} commands were found", seen.len());
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+#[test]
+fn commands_are_found_in_documents() {
+    let text = "Run `yarnray info a.toml` or `yarnray render NAME.toml`.\n\n    yarnray merge 1.film \\\n        -o a.exr   on one machine\n\n```\ntarget/release/yarnray info b.toml\ncargo build\n```\n    and yarnray\n";
+    assert_eq!(
+        examples_of_document(text),
+        ["yarnray info a.toml", "yarnray merge 1.film -o a.exr", "yarnray info b.toml"]
+    );
+}
