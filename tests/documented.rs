@@ -20,7 +20,11 @@ static DENOISER: LazyLock<bool> = LazyLock::new(|| {
 /// The commands of a command's help, and of those within it.
 fn examples_of_help(command: &[&str], out: &mut Vec<(String, Vec<String>)>) {
     let d = directory();
-    let help = yarnray(d.path(), &[command, &["--help"]].concat()).good().stdout;
+    // Wide enough for every line: help is wrapped.
+    let output =
+        program(d.path()).args(command).arg("--help").env("COLUMNS", "400").output().expect("the program starts");
+    assert!(output.status.success(), "{command:?}");
+    let help = String::from_utf8(output.stdout).expect("UTF-8");
     let within = |title: &str| -> Vec<String> {
         let lines = help.lines().skip_while(|l| l.trim() != title).skip(1);
         lines.map_while(|l| l.strip_prefix("  ").map(str::to_owned)).collect()
@@ -63,7 +67,9 @@ fn examples_of_document(text: &str) -> Vec<String> {
         }
     }
     let capitals = |c: &String| c.as_bytes().windows(3).any(|w| w.iter().all(u8::is_ascii_uppercase));
-    out.retain(|c| !capitals(c) && !c.contains("...") && c.split_whitespace().count() > 2);
+    // What is named only, such as `yarnray make knit`, has neither option nor file.
+    let whole = |c: &String| c.split_whitespace().skip(2).any(|w| w.starts_with('-') || w.contains('.'));
+    out.retain(|c| !capitals(c) && !c.contains("...") && whole(c));
     out
 }
 

@@ -204,7 +204,7 @@ fn wrong_options_are_refused() {
         (&["--mode", "cloth"][..], &["invalid value 'cloth' for '--mode", "yarn"][..]),
         (&["--model", "magic"], &["invalid value 'magic' for '--model", "aggregated", "two-stream"]),
         (&["--spp", "many"], &["invalid value 'many' for '--spp"]),
-        (&["--spp", "-1"], &["unexpected argument '-1' found"]),
+        (&["--spp", "-1"], &["invalid value '-1' for '--spp <N>'"]),
         (&["--spp", "0"], &["--spp 0: error: `spp` must be from 1 to 4294967295, found 0"]),
         (&["--time", "0"], &["error: `time` must be above 0, found 0"]),
         (&["--time", "nan"], &["error: `time` must be "]),

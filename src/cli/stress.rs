@@ -8,10 +8,10 @@ use super::{Failure, files::Files, terminal::print, write_text};
 use crate::experiment::stress::{self, Bound, Outcome, Scale, figure};
 
 const EXAMPLES: &str = "Examples:
-  yarnray stress                             every case, in minutes
-  yarnray stress --quick                     every case, smaller, in seconds
-  yarnray stress --case radii --case twist   some of them
-  yarnray stress -o stress.md -o stress.json the report in two formats";
+  yarnray stress                              every case, in minutes
+  yarnray stress --quick                      every case, smaller, in seconds
+  yarnray stress --case radii --case twist    some of them
+  yarnray stress -o stress.md -o stress.json  the report in two formats";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]

@@ -34,29 +34,27 @@ impl Proposal {
     /// Looks at the curves around the middle of a file. `None` if they are too few to tell, or never come near each other.
     pub fn new(set: &CurveSet) -> Option<Self> {
         let curves = around_the_middle(set);
-        let points = || curves.iter().flat_map(|c| &c.points);
-        let length: f64 = curves.iter().map(Curve::polygon_length).sum();
-        let size = points().copied().reduce(DVec3::max)? - points().copied().reduce(DVec3::min)?;
-        // Yarn that fills the whole box, or all of its largest side: thicker it cannot be.
-        let mut radius = 0.5 * (size.max_element() * size.max_element() / length).min(size.max_element());
-        if !(radius.is_finite() && radius > 0.0) {
-            return None;
-        }
+        // Points are seldom farther apart than a few radii, or nearer than a tenth of one.
+        let mut steps: Vec<f64> =
+            curves.iter().flat_map(|c| c.points.windows(2)).map(|p| p[0].distance(p[1])).filter(|d| *d > 0.0).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        let mut radius = 0.1 * steps.get(steps.len() / 2)?;
         let at = |radius: f64| {
             let radii: Vec<Vec<f64>> = curves.iter().map(|c| vec![radius; c.points.len()]).collect();
             overlap(curves.iter().zip(&radii).map(|(c, r)| (c, r.as_slice())))
         };
-        let mut touched = false;
-        // Down from there in steps of a tenth; what is a thousandth of it is no yarn.
-        for _ in 0..66 {
+        let mut last = None;
+        // Up from there in steps of a tenth, as far as 30 points apart, until yarns run into each other.
+        for _ in 0..60 {
             let found = at(radius)?;
-            touched |= found.share > OVERLAP;
-            if touched && found.share <= OVERLAP {
+            if found.share > OVERLAP {
+                let (radius, overlap): (f64, Overlap) = last?;
                 let log = |millimetres: f64| (radius * millimetres / COMMON_RADIUS).ln().abs();
                 let unit = UNITS.into_iter().min_by(|a, b| log(a.1).total_cmp(&log(b.1)))?;
-                return Some(Self { radius, overlap: found, bends: bends(&curves), unit });
+                return Some(Self { radius, overlap, bends: bends(&curves), unit });
             }
-            radius *= 0.9;
+            last = Some((radius, found));
+            radius *= 1.1;
         }
         None
     }
