@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, make::write_curves};
+use super::{Failure, SceneArgs, log, make::write_curves};
 use crate::geometry::{
     curve::{Curve, CurveSet},
     curve_file,
@@ -60,13 +60,13 @@ pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
     }
     if !args.quiet {
         for path in &args.out {
-            eprintln!("wrote {}", path.display());
+            log::say(&format!("wrote {}", path.display()));
         }
         let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
         let stitches: u64 = facts.iter().map(|f| f.stitches).sum();
-        eprintln!("{stitches} stitches, {} yarns, {points} control points", set.curves.len());
+        log::say(&format!("{stitches} stitches, {} yarns, {points} control points", set.curves.len()));
         for note in facts.iter().flat_map(|f| &f.repairs) {
-            eprintln!("note: {note}");
+            log::say(&format!("note: {note}"));
         }
     }
     Ok(())
