@@ -102,7 +102,7 @@ fn a_motif_in_knitted_stitches_stands_upright_and_unmirrored() {
     let scene = format!(
         "render = {{ width = 64, height = 80, spp = 16, max_bounces = 8 }}\n\
          camera = {{ type = \"frame\", projection = \"orthographic\", margin = 0.0 }}\n{YARNS}\
-         [[fabric]]\nyarn = \"white\"\nsource = {{ type = \"stockinette\", stitches = 8, rows = 15 }}\n\
+         [[fabric]]\nyarn = \"white\"\nsource = {{ type = \"stockinette\", stitches = 8, rows = 15, edges = \"live\" }}\n\
          motif = {{ rows = [{}], yarns = {{ \".\" = \"white\", \"#\" = \"red\" }} }}\n",
         rows.join(", ")
     );

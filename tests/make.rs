@@ -40,7 +40,7 @@ fn the_same_knit_is_the_same_file_and_keeps_its_yarns_apart() {
     assert_eq!(std::fs::read(d.join("a.bcc")).unwrap(), std::fs::read(d.join("b.bcc")).unwrap());
     let run = yarnray(d, &["info", "a.bcc", "--radius", "0.5", "--json"]);
     let info: serde_json::Value = serde_json::from_str(&run.good().stdout).unwrap();
-    assert_eq!((info["curves"].as_u64(), info["closed"].as_u64()), (Some(6), Some(6)));
+    assert_eq!((info["curves"].as_u64(), info["closed"].as_u64()), (Some(1), Some(0)));
     assert!(info["overlap"]["share"].as_f64().unwrap() <= 0.02, "{}", info["overlap"]);
 }
 

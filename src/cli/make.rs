@@ -20,7 +20,7 @@ use crate::{
             MAX_POINTS, PatternStrand, StrandKind,
             chart::{Chart, PATTERNS},
             draft::Draft,
-            knit::{self, Form, Knit},
+            knit::{self, Edges, Form, Knit},
             overlap::overlap,
             weave::{self, Weave},
         },
@@ -100,6 +100,12 @@ struct KnitArgs {
     /// Distance between rows in yarn diameters.
     #[arg(long, value_name = "D", value_parser = positive)]
     row_height: Option<f64>,
+    /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2, if not given.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    yarn_per_stitch: Option<f64>,
+    /// Cast on and bound off, or with open loops.
+    #[arg(long, default_value = "finished", value_parser = ["finished", "live"])]
+    edges: String,
     /// Control points of a stitch.
     #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
     points: u32,
@@ -198,7 +204,8 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         form,
         stitch_width: args.stitch_width,
         row_height: args.row_height,
-        yarn_per_stitch: knit::YARN_PER_STITCH,
+        edges: if args.edges == "live" { Edges::Live } else { Edges::Finished },
+        yarn_per_stitch: args.yarn_per_stitch,
         points: args.points,
     };
     if piece.control_points() > MAX_POINTS {

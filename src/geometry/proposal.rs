@@ -122,7 +122,8 @@ mod tests {
             form: knit::Form::Flat,
             stitch_width: None,
             row_height: None,
-            yarn_per_stitch: knit::YARN_PER_STITCH,
+            edges: knit::Edges::Live,
+            yarn_per_stitch: None,
             points: knit::POINTS,
         };
         let mut curves: Vec<Curve> = piece.strands(1.0).unwrap().into_iter().map(|s| s.curve).collect();

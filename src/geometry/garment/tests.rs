@@ -6,7 +6,7 @@ use crate::geometry::{
     pattern::{
         chart::Chart,
         draft::Draft,
-        knit::{Form, Knit},
+        knit::{Edges, Form, Knit},
         overlap::overlap,
         weave::{self, Weave},
     },
@@ -21,7 +21,8 @@ fn knitted() -> Tile {
         form: Form::Flat,
         stitch_width: Some(4.0 / 1.2),
         row_height: Some(3.0 / 1.2),
-        yarn_per_stitch: 13.9,
+        yarn_per_stitch: Some(13.9),
+        edges: Edges::Live,
         points: 24,
     };
     Tile::of_knit(&knit, 1.2).unwrap()

@@ -4,39 +4,79 @@
 //!
 //! | step | what it makes |
 //! |---|---|
-//! | `k`, `k4` | knit stitches |
-//! | `p`, `p2` | purl stitches |
-//! | `k2tog`, `ssk` | one stitch of two; the left one of the two on top (leans right), or the right one (leans left) |
-//! | `kfb` | two stitches of one |
+//! | `k`, `k4`, `p`, `p2` | knit and purl stitches |
+//! | `ktbl`, `ptbl` | the same through the back of the loop, which twists it |
+//! | `k2tog`, `ssk`, `p2tog`, `ssp` | one stitch of two; the left one of the two on top (leans right), or the right one (leans left) |
+//! | `k3tog`, `sssk`, `p3tog`, `cdd` | one stitch of three; the left, the right or the middle one on top |
 //! | `yo` | a stitch of none: an eyelet |
-//! | `c4f`, `c4b` | a cable: two stitches cross two; those that move to the left pass in front, or at the back. Any even number up to 12 |
+//! | `m1l`, `m1r` | a stitch out of the strand between two stitches of the row below, twisted to the left or the right |
+//! | `kfb` | two stitches of one |
+//! | `sl`, `sl2`, `slwyif`, `miss` | a stitch that is slipped: the yarn passes behind it, or in front (`slwyif`) |
+//! | `tuck` | a stitch that is slipped with a yarn over, to be worked together with it: brioche is made of these |
+//! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
+//! | `t3f`, `t3b` | the same with purl stitches behind |
+//! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
 //!
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
 
 use std::fmt;
 
+/// Which of several stitches worked together is on top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Top {
+    /// The left one: it leans to the right.
+    Left,
+    /// The right one.
+    Right,
+    /// The middle one, and it stands upright.
+    Middle,
+}
+
 /// One step of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// A knit stitch: the new loop comes to the front.
-    Knit,
-    /// A purl stitch: the new loop goes to the back.
-    Purl,
-    /// Two stitches become one; on top is the left of them (`k2tog`) or the right (`ssk`).
+    /// A stitch drawn through one of the row below.
+    Plain {
+        /// Whether the new loop goes to the back.
+        purl: bool,
+        /// Whether it is worked through the back of the loop below, which twists that.
+        twisted: bool,
+    },
+    /// Several stitches become one.
     Together {
-        /// Whether the left one is on top.
-        left_on_top: bool,
+        /// How many, 2 or 3.
+        take: u8,
+        /// As in [`Step::Plain`].
+        purl: bool,
+        /// Which is on top.
+        top: Top,
     },
     /// One stitch becomes two.
     FrontBack,
     /// A stitch out of nothing.
     YarnOver,
-    /// So many stitches change sides in two halves.
+    /// A stitch out of the strand between two of the row below, twisted.
+    MakeOne {
+        /// Whether its left leg is on top: it leans to the left.
+        left: bool,
+    },
+    /// A stitch that is not worked.
+    Slip {
+        /// Whether the yarn passes in front of it.
+        front: bool,
+    },
+    /// A stitch that is not worked, with a yarn over.
+    Tuck,
+    /// Stitches that change places with others.
     Cable {
-        /// How many; even.
-        size: u8,
-        /// Whether those that move to the left pass in front.
-        left_in_front: bool,
+        /// How many pass in front.
+        front: u8,
+        /// How many pass behind.
+        back: u8,
+        /// Whether those in front move to the left.
+        left: bool,
+        /// Whether those behind are purled.
+        purl: bool,
     },
 }
 
@@ -44,28 +84,53 @@ impl Step {
     /// Stitches of the row below that it takes, and stitches that it makes.
     pub fn takes_and_makes(self) -> (u32, u32) {
         match self {
-            Self::Knit | Self::Purl => (1, 1),
-            Self::Together { .. } => (2, 1),
+            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck => (1, 1),
+            Self::Together { take, .. } => (take.into(), 1),
             Self::FrontBack => (1, 2),
-            Self::YarnOver => (0, 1),
-            Self::Cable { size, .. } => (size.into(), size.into()),
+            Self::YarnOver | Self::MakeOne { .. } => (0, 1),
+            Self::Cable { front, back, .. } => (u32::from(front) + u32::from(back), u32::from(front) + u32::from(back)),
         }
     }
 }
 
-/// A stitch: which loops of the row below it was pulled through, and how.
+/// What the yarn does at a stitch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Act {
+    /// A loop is drawn through those below.
+    Draw,
+    /// A loop is laid over the needle.
+    Over,
+    /// The stitch below stays as it is; the yarn passes in front or behind.
+    Pass {
+        /// Whether in front.
+        front: bool,
+    },
+    /// The stitch below stays, and a loop is laid over the needle beside it.
+    Tuck,
+    /// A loop is drawn through the strand below, which is lifted and twisted.
+    Lift {
+        /// Whether the left leg of the twisted strand is on top.
+        left: bool,
+    },
+}
+
+/// A stitch: what it is made of in the row below, and how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stitch {
-    /// Whether it goes to the back.
+    /// What the yarn does.
+    pub act: Act,
+    /// Whether the loop goes to the back.
     pub purl: bool,
-    /// The first stitch of the row below that it holds.
+    /// Whether it twists what it is drawn through.
+    pub twisted: bool,
+    /// The first stitch of the row below that it takes; of a yarn over or a lifted strand the stitch to its right.
     pub first_parent: u32,
-    /// How many it holds: 0 for a yarn over and in the first row.
+    /// How many it takes: 0 of a yarn over or a lifted strand.
     pub parents: u8,
-    /// Where two pass each other, 1 for those in front and -1 for those behind; else 0.
+    /// Of several, which is on top.
+    pub top: Top,
+    /// Where stitches pass each other, 1 for those in front and -1 for those behind; else 0.
     pub layer: i8,
-    /// Of two stitches worked together, whether the left is on top.
-    pub left_on_top: bool,
 }
 
 /// Rows of a knit, from the cast-on edge.
@@ -107,21 +172,36 @@ impl ChartError {
 }
 
 /// Patterns with a name, and their rows.
-pub const PATTERNS: [(&str, &[&str]); 8] = [
+pub const PATTERNS: [(&str, &[&str]); 20] = [
     ("stockinette", &["k"]),
     ("reverse-stockinette", &["p"]),
+    ("twisted-stockinette", &["ktbl"]),
     ("garter", &["k", "p"]),
     ("rib1x1", &["k p"]),
     ("rib2x2", &["k2 p2"]),
     ("seed", &["k p", "p k"]),
+    ("moss", &["2: k p", "2: p k"]),
+    ("double-moss", &["2: k2 p2", "2: p2 k2"]),
+    ("basketweave", &["4: k4 p4", "4: p4 k4"]),
+    ("brioche", &["k tuck", "tuck p"]),
+    ("half-cardigan", &["k tuck", "k p"]),
+    ("slip-stitch", &["k sl", "k", "sl k", "k"]),
     ("cable", &["3: p2 k4 p2", "p2 c4f p2", "2: p2 k4 p2"]),
+    ("braid", &["p2 c4f k2 p2", "p2 k6 p2", "p2 k2 c4b p2", "p2 k6 p2"]),
+    ("honeycomb", &["3: k8", "c4b c4f", "3: k8", "c4f c4b"]),
+    ("basket-cable", &["3: k12", "k2 c4f c4f k2", "3: k12", "c4b c4b c4b"]),
     ("eyelet", &["3: k6", "k2 k2tog yo k2", "2: k6"]),
+    ("lace", &["k6", "yo ssk k k2tog yo k", "k6", "k yo cdd yo k2"]),
+    ("feather-and-fan", &["k", "k2tog k2tog k2tog yo k yo k yo k yo k yo k yo k k2tog k2tog k2tog", "k", "p"]),
 ];
 
 /// Most rows and most steps of a row that a chart may have.
 const MOST_ROWS: usize = 20_000;
 const MOST_STEPS: usize = 20_000;
-const STEPS: &str = "steps are k, p, k4, p2, k2tog, ssk, kfb, yo, c4f, c4b, with spaces between them";
+/// Most stitches in a cable.
+const WIDEST_CABLE: u8 = 24;
+const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
+                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, with spaces between them";
 
 impl Chart {
     /// A pattern by its name.
@@ -205,7 +285,7 @@ impl Chart {
                 let problem = format!("more than {most} stitches by row {}", r + 1);
                 return Err(ChartError::new(Some(row.line), problem, "fewer stitches, rows or increases"));
             }
-            let stitches = row.work(found, made as usize, r == 0);
+            let stitches = row.work(found, made as usize);
             found = stitches.len() as u32;
             out.push(stitches);
         }
@@ -222,12 +302,12 @@ impl Row {
         self.steps.iter().map(|s| s.takes_and_makes()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
     }
 
-    /// Knit and purl alone: may be cut anywhere.
+    /// Each stitch on its own: may be cut anywhere.
     fn is_plain(&self) -> bool {
-        self.steps.iter().all(|s| matches!(s, Step::Knit | Step::Purl))
+        self.steps.iter().all(|s| s.takes_and_makes() == (1, 1))
     }
 
-    fn work(&self, found: u32, made: usize, first_row: bool) -> Vec<Stitch> {
+    fn work(&self, found: u32, made: usize) -> Vec<Stitch> {
         let mut out = Vec::with_capacity(made);
         let mut at = 0_u32;
         for step in self.steps.iter().cycle() {
@@ -235,27 +315,38 @@ impl Row {
             if out.len() >= made && at >= found {
                 break;
             }
-            let plain = Stitch { purl: false, first_parent: at, parents: 1, layer: 0, left_on_top: false };
+            let plain = Stitch {
+                act: Act::Draw,
+                purl: false,
+                twisted: false,
+                first_parent: at,
+                parents: 1,
+                top: Top::Left,
+                layer: 0,
+            };
             match *step {
-                Step::Knit => out.push(plain),
-                Step::Purl => out.push(Stitch { purl: true, ..plain }),
-                Step::Together { left_on_top } => out.push(Stitch { parents: 2, left_on_top, ..plain }),
+                Step::Plain { purl, twisted } => out.push(Stitch { purl, twisted, ..plain }),
+                Step::Together { take, purl, top } => out.push(Stitch { purl, parents: take, top, ..plain }),
                 Step::FrontBack => out.extend([plain, plain]),
-                Step::YarnOver => out.push(Stitch { parents: 0, ..plain }),
-                Step::Cable { size, left_in_front } => {
-                    let half = u32::from(size) / 2;
-                    let layer = if left_in_front { 1 } else { -1 };
-                    out.extend((0..half).map(|i| Stitch { first_parent: at + half + i, layer, ..plain }));
-                    out.extend((0..half).map(|i| Stitch { first_parent: at + i, layer: -layer, ..plain }));
+                Step::YarnOver => out.push(Stitch { act: Act::Over, parents: 0, ..plain }),
+                Step::MakeOne { left } => out.push(Stitch { act: Act::Lift { left }, parents: 0, ..plain }),
+                Step::Slip { front } => out.push(Stitch { act: Act::Pass { front }, ..plain }),
+                Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
+                Step::Cable { front, back, left, purl } => {
+                    let (front, back) = (u32::from(front), u32::from(back));
+                    let ahead = |i| Stitch { first_parent: at + if left { back } else { 0 } + i, layer: 1, ..plain };
+                    let behind =
+                        |i| Stitch { purl, first_parent: at + if left { 0 } else { front } + i, layer: -1, ..plain };
+                    if left {
+                        out.extend((0..front).map(ahead));
+                        out.extend((0..back).map(behind));
+                    } else {
+                        out.extend((0..back).map(behind));
+                        out.extend((0..front).map(ahead));
+                    }
                 }
             }
             at += takes;
-        }
-        if first_row {
-            // There is nothing below to hold or to cross.
-            for s in &mut out {
-                (s.parents, s.layer) = (0, 0);
-            }
         }
         out
     }
@@ -280,26 +371,66 @@ fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartError> {
 }
 
 fn parse_step(token: &str) -> Option<(usize, Step)> {
-    match token {
-        "k2tog" => return Some((1, Step::Together { left_on_top: true })),
-        "ssk" => return Some((1, Step::Together { left_on_top: false })),
-        "kfb" => return Some((1, Step::FrontBack)),
-        "yo" => return Some((1, Step::YarnOver)),
-        _ => {}
-    }
-    let number = |digits: &str| digits.parse::<usize>().ok().filter(|n| (1..=MOST_STEPS).contains(n));
-    if let Some(rest) = token.strip_prefix('c') {
-        let left_in_front = rest.ends_with('f');
-        let size = number(rest.strip_suffix(['f', 'b'])?)?;
-        let fits = size % 2 == 0 && size <= 12;
-        return fits.then_some((1, Step::Cable { size: size as u8, left_in_front }));
-    }
-    let (step, rest) = match token.split_at_checked(1)? {
-        ("k", rest) => (Step::Knit, rest),
-        ("p", rest) => (Step::Purl, rest),
+    let plain = |purl, twisted| Step::Plain { purl, twisted };
+    let together = |take, purl, top| Step::Together { take, purl, top };
+    let named = match token {
+        "k2tog" => together(2, false, Top::Left),
+        "ssk" | "skp" => together(2, false, Top::Right),
+        "p2tog" => together(2, true, Top::Left),
+        "ssp" => together(2, true, Top::Right),
+        "k3tog" => together(3, false, Top::Left),
+        "sssk" | "sk2p" => together(3, false, Top::Right),
+        "p3tog" => together(3, true, Top::Left),
+        "cdd" | "s2kp" => together(3, false, Top::Middle),
+        "kfb" => Step::FrontBack,
+        "yo" => Step::YarnOver,
+        "m1l" | "m1" => Step::MakeOne { left: true },
+        "m1r" => Step::MakeOne { left: false },
+        _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
+    };
+    Some((1, named))
+}
+
+/// Steps that may be counted: `k4`, `sl2`, `ktbl3`.
+fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usize, Step)> {
+    let word = token.trim_end_matches(|c: char| c.is_ascii_digit());
+    let step = match word {
+        "k" | "brk" => plain(false, false),
+        "p" | "brp" => plain(true, false),
+        "ktbl" => plain(false, true),
+        "ptbl" => plain(true, true),
+        "sl" | "slwyib" | "miss" => Step::Slip { front: false },
+        "slwyif" => Step::Slip { front: true },
+        "tuck" | "sl1yo" => Step::Tuck,
         _ => return None,
     };
-    Some((if rest.is_empty() { 1 } else { number(rest)? }, step))
+    let digits = &token[word.len()..];
+    let count = if digits.is_empty() { 1 } else { digits.parse().ok().filter(|n| (1..=MOST_STEPS).contains(n))? };
+    Some((count, step))
+}
+
+/// `c4f`, `t3b`, `2/1lc`, `2/2rpc`.
+fn parse_cable(token: &str) -> Option<Step> {
+    let cable = |front: u8, back: u8, left, purl| {
+        let fits = front > 0 && back > 0 && front.checked_add(back)? <= WIDEST_CABLE;
+        fits.then_some(Step::Cable { front, back, left, purl })
+    };
+    if let Some((front, rest)) = token.split_once('/') {
+        let word = rest.trim_start_matches(|c: char| c.is_ascii_digit());
+        let back = rest[..rest.len() - word.len()].parse().ok()?;
+        let (left, purl) = match word {
+            "lc" => (true, false),
+            "rc" => (false, false),
+            "lpc" => (true, true),
+            "rpc" => (false, true),
+            _ => return None,
+        };
+        return cable(front.parse().ok()?, back, left, purl);
+    }
+    let purl = token.starts_with('t');
+    let left = token.ends_with('f');
+    let size: u8 = token.strip_prefix(['c', 't'])?.strip_suffix(['f', 'b'])?.parse().ok()?;
+    cable(size.div_ceil(2), size / 2, left, purl)
 }
 
 #[cfg(test)]
@@ -366,8 +497,9 @@ mod tests {
     fn mistakes_are_explained() {
         for (rows, problem) in [
             (&["k2 q"][..], "unknown step \"q\""),
-            (&["c5f"], "unknown step \"c5f\""),
-            (&["c14f"], "unknown step \"c14f\""),
+            (&["c1f"], "unknown step \"c1f\""),
+            (&["c26f"], "unknown step \"c26f\""),
+            (&["2/0lc"], "unknown step \"2/0lc\""),
             (&["k0"], "unknown step \"k0\""),
             (&["k99999999999999999999"], "unknown step \"k9999999999999999999\""),
             (&["yo"], "a row that takes no stitch of the row below"),

@@ -1,7 +1,8 @@
 //! Cloth without files: weaving drafts and knitting charts become yarn curves.
 //!
 //! [`draft`] and [`weave`] make woven cloth, [`chart`] and [`knit`] knitted cloth, flat, as a tube or on a surface of
-//! [`revolution`], or as a [`tile`] that is laid elsewhere; `relax` lets yarns push each other apart until they touch, and [`overlap`] measures what is left.
+//! [`revolution`], or as a [`tile`] that is laid elsewhere; `rods` relaxes yarns as elastic rods, `relax` lets those of a
+//! tile push each other apart until they touch, and [`overlap`] measures what is left.
 //! Nothing here draws a random number: the same description gives the same curves to the bit.
 
 pub mod chart;
@@ -11,6 +12,7 @@ pub mod knit;
 pub mod overlap;
 mod relax;
 pub mod revolution;
+mod rods;
 pub mod tile;
 pub mod weave;
 

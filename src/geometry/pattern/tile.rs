@@ -3,8 +3,6 @@
 //! Every maker of cloth can give one: a [`Knit`], a [`Weave`], a periodic curve file. A tile knows its stitches and its
 //! yarns and nothing of where they came from.
 
-use std::f64::consts::TAU;
-
 use glam::{DVec2, DVec3};
 
 use super::{
@@ -55,7 +53,8 @@ pub struct TileStrand {
 pub(super) struct RelaxedRows {
     pub(super) period: DVec2,
     pub(super) counts: [u32; 2],
-    pub(super) rows: Vec<Vec<DVec3>>,
+    /// The points of each row, with wale and course.
+    pub(super) rows: Vec<Vec<(DVec3, [f32; 2])>>,
 }
 
 impl Tile {
@@ -67,26 +66,16 @@ impl Tile {
         Ok(Self::of_rows(knit.relaxed_rows()?, diameter))
     }
 
-    /// A tile of rows in units of the yarn's diameter, each evenly divided among its stitches.
+    /// A tile of rows in units of the yarn's diameter.
     fn of_rows(cell: RelaxedRows, diameter: f64) -> Self {
-        let [wide, _] = cell.counts;
-        let strand = |(row, points): (usize, Vec<DVec3>)| {
-            let per_stitch = points.len() as f64 / f64::from(wide);
-            let place = |i: usize| {
-                let wale = i as f64 / per_stitch;
-                // A loop reaches from the middle of the row below to the middle of the row above.
-                let head = 0.5 - 0.5 * (TAU * wale).cos();
-                [wale as f32, (row as f64 + head) as f32]
-            };
-            TileStrand {
-                kind: StrandKind::Course,
-                index: row as u32,
-                coordinates: (0..points.len()).map(place).collect(),
-                points: points.into_iter().map(|p| p * diameter).collect(),
-                step: [1, 0],
-                radius: 0.5 * diameter,
-                flattening: Vec::new(),
-            }
+        let strand = |(row, points): (usize, Vec<(DVec3, [f32; 2])>)| TileStrand {
+            kind: StrandKind::Course,
+            index: row as u32,
+            points: points.iter().map(|(p, _)| *p * diameter).collect(),
+            step: [1, 0],
+            radius: 0.5 * diameter,
+            flattening: Vec::new(),
+            coordinates: points.into_iter().map(|(_, at)| at).collect(),
         };
         let strands = cell.rows.into_iter().enumerate().map(strand).collect();
         Self { period: cell.period * diameter, counts: cell.counts, strands }
@@ -427,7 +416,7 @@ mod tests {
     use crate::geometry::pattern::{
         chart::Chart,
         draft::Draft,
-        knit::{Form, POINTS, ROW_HEIGHT, STITCH_WIDTH, YARN_PER_STITCH},
+        knit::{Edges, Form, POINTS, ROW_HEIGHT, STITCH_WIDTH, YARN_PER_STITCH},
         weave,
     };
 
@@ -439,7 +428,8 @@ mod tests {
             form: Form::Flat,
             stitch_width: Some(STITCH_WIDTH),
             row_height: Some(ROW_HEIGHT),
-            yarn_per_stitch: YARN_PER_STITCH,
+            yarn_per_stitch: Some(YARN_PER_STITCH),
+            edges: Edges::Live,
             points: POINTS,
         };
         Tile::of_knit(&knit, 0.5).unwrap()

@@ -341,8 +341,8 @@ impl FabricPlan {
                     .collect::<Option<Vec<Made>>>()?
             }
             Source::Knit(plan) => {
-                let (curves, coordinates) = plan.curves(2.0 * radius, context)?;
-                vec![Made::new(plan.origin(), kind, with_radius(curves, radius), Some(coordinates))]
+                let (curves, coordinates, origin) = plan.curves(2.0 * radius, context)?;
+                vec![Made::new(origin, kind, with_radius(curves, radius), Some(coordinates))]
             }
             Source::Weave(plan) => {
                 let [(warps, mut coordinates), (wefts, weft_coordinates)] = plan.curves(context)?;

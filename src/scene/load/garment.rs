@@ -28,7 +28,7 @@ use crate::{
         pattern::{
             chart::Chart,
             draft::Draft,
-            knit::{self, Form, Knit},
+            knit::{self, Edges, Form, Knit},
             tile::Tile,
             weave::{self, Weave},
         },
@@ -249,7 +249,8 @@ impl ClothPlan {
                     form: Form::Flat,
                     stitch_width: stitch.map(|s| s.x / d),
                     row_height: stitch.map(|s| s.y / d),
-                    yarn_per_stitch: length.clamp(6.0, 60.0),
+                    yarn_per_stitch: Some(length.clamp(6.0, 60.0)),
+                    edges: Edges::Live,
                     points: knit::POINTS,
                 };
                 match Tile::of_knit(&knit, d) {

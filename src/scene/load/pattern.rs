@@ -10,7 +10,7 @@ use crate::{
             MAX_POINTS, PatternStrand, StrandKind,
             chart::{Chart, PATTERNS},
             draft::{Draft, DraftError},
-            knit::{self, Form, Knit},
+            knit::{self, Edges, Form, Knit},
             weave::{self, Weave},
         },
     },
@@ -30,14 +30,23 @@ pub(super) struct KnitPlan {
 }
 
 impl KnitPlan {
-    pub(super) fn origin(&self) -> String {
-        format!("{}, {} x {}", self.name, self.knit.stitches, self.knit.rows)
+    /// What it is, with its gauge as knitters give it: stitches and rows in 10 cm.
+    fn origin(&self, gauge: [f64; 2]) -> String {
+        let [across, up] = gauge.map(|mm| 100.0 / mm);
+        format!("{}, {} x {}, gauge {across:.1} x {up:.1} in 10 cm", self.name, self.knit.stitches, self.knit.rows)
     }
 
-    /// The courses with their places; what is wrong with the chart is told.
-    pub(super) fn curves(&self, diameter: f64, context: &Context<'_>) -> Option<(Vec<Curve>, FabricCoordinates)> {
-        match self.knit.strands(diameter) {
-            Ok(strands) => Some(FabricCoordinates::of(strands, [self.knit.stitches, self.knit.rows])),
+    /// The yarns with their places; what is wrong with the chart is told.
+    pub(super) fn curves(
+        &self,
+        diameter: f64,
+        context: &Context<'_>,
+    ) -> Option<(Vec<Curve>, FabricCoordinates, String)> {
+        match self.knit.knitted(diameter) {
+            Ok(made) => {
+                let (curves, coordinates) = FabricCoordinates::of(made.strands, [self.knit.stitches, self.knit.rows]);
+                Some((curves, coordinates, self.origin(made.gauge)))
+            }
             Err(error) => {
                 let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
                 context.error(*span, error.problem, Some(error.hint));
@@ -125,10 +134,11 @@ fn counted(
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
     let stitch_width = table.f64("stitch_width", Range::between(1.0, 20.0));
     let row_height = table.f64("row_height", Range::between(0.5, 20.0));
-    let yarn_per_stitch = table.f64_or("yarn_per_stitch", knit::YARN_PER_STITCH, Range::between(6.0, 60.0));
+    let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+    let edges = table.one_of_or("edges", Edges::Finished, &[("finished", Edges::Finished), ("live", Edges::Live)]);
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
     let (chart, form) = (chart?, form?);
-    let knit = Knit { chart, stitches, rows, form, stitch_width, row_height, yarn_per_stitch, points };
+    let knit = Knit { chart, stitches, rows, form, edges, stitch_width, row_height, yarn_per_stitch, points };
     if knit.control_points() > MAX_POINTS {
         table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
     }

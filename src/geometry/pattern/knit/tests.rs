@@ -1,5 +1,13 @@
-use super::super::overlap::{Overlap, overlap};
-use super::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{
+    super::{
+        chart::PATTERNS,
+        overlap::{Overlap, overlap},
+    },
+    loops::Visit,
+    *,
+};
 
 fn knit(pattern: &str, stitches: u32, rows: u32) -> Knit {
     Knit {
@@ -7,9 +15,10 @@ fn knit(pattern: &str, stitches: u32, rows: u32) -> Knit {
         stitches,
         rows,
         form: Form::Flat,
+        edges: Edges::Finished,
         stitch_width: None,
         row_height: None,
-        yarn_per_stitch: YARN_PER_STITCH,
+        yarn_per_stitch: None,
         points: POINTS,
     }
 }
@@ -20,96 +29,208 @@ fn measured(strands: &[PatternStrand]) -> Overlap {
     overlap(strands.iter().zip(&radii).map(|(s, r)| (&s.curve, r.as_slice()))).unwrap()
 }
 
+/// How often a line passes the surface that a loop spans, towards the front less towards the back: the triangles from
+/// the loop's middle to its sides and to the line between its feet.
+fn passes(ring: &[DVec3], line: &[DVec3]) -> i32 {
+    let middle = ring.iter().sum::<DVec3>() / ring.len() as f64;
+    let mut sum = 0;
+    for i in 0..ring.len() {
+        let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+        let normal = (a - middle).cross(b - middle);
+        for w in line.windows(2) {
+            let (from, way) = (w[0] - middle, w[1] - w[0]);
+            let (start, end) = (from.dot(normal), (w[1] - middle).dot(normal));
+            if (start > 0.0) == (end > 0.0) {
+                continue;
+            }
+            let at = w[0] + way * (start / (start - end));
+            let inside = |p: DVec3, q: DVec3| (q - p).cross(at - p).dot(normal) >= 0.0;
+            if inside(middle, a) && inside(a, b) && inside(b, middle) {
+                // The ring runs clockwise as seen from the front: its normal points to the back.
+                sum += if end > start { -1 } else { 1 };
+            }
+        }
+    }
+    sum
+}
+
+/// How often the yarn passes a loop, net, on its way from the head of one loop to that of the next in its row: by the loop
+/// passed, the course and the visit that the way leads to.
+type Passes = BTreeMap<(u32, usize, usize), i32>;
+
+/// The loops of a course, as their visits.
+fn visits_of(loops: &Loops, course: usize) -> Vec<(usize, u32)> {
+    let visits = loops.courses[course].visits.iter().enumerate();
+    visits.filter_map(|(k, (_, v))| if let Visit::Loop(i) = v { Some((k, *i)) } else { None }).collect()
+}
+
+/// Measured on a relaxed cell.
+fn passes_of(cell: &Cell, loops: &Loops, trim: usize) -> Passes {
+    let mut found = Passes::new();
+    let visit = |c: usize, k: usize| cell.visit(c, k).map(|(p, _)| p).collect::<Vec<DVec3>>();
+    for (c, _) in loops.courses.iter().enumerate() {
+        for (k, i) in visits_of(loops, c) {
+            // Its neighbours begin where it ends: without its ends it does not meet them there.
+            let points = visit(c, k);
+            let ring = &points[trim..points.len() + 1 - trim.max(1)];
+            for (d, _) in loops.courses.iter().enumerate() {
+                let row = visits_of(loops, d);
+                for (n, &(to, _)) in row.iter().enumerate() {
+                    let count = loops.courses[d].visits.len();
+                    let (from, end) = if n > 0 { (row[n - 1].0, to) } else { (row[row.len() - 1].0, to + count) };
+                    // From head to head.
+                    let mut way: Vec<DVec3> = Vec::new();
+                    for k in from..=end {
+                        let points = visit(d, k);
+                        let half = points.len() / 2;
+                        way.extend(match k {
+                            k if k == from && k == end => &points[..],
+                            k if k == from => &points[half..],
+                            k if k == end => &points[..=half],
+                            _ => &points[..],
+                        });
+                    }
+                    let mut sum = 0;
+                    for image in 0..25 {
+                        let by = DVec3::new(f64::from(image % 5 - 2), f64::from(image / 5 - 2), 0.0);
+                        let by = by * cell.period.extend(0.0);
+                        // Beside a loop its own yarn begins and ends on its rim.
+                        let beside = |at: usize| {
+                            let x = at as f64 + (by.x / cell.period.x) * count as f64 - k as f64;
+                            c == d && by.y == 0.0 && x.abs() <= 2.0
+                        };
+                        if beside(from) || beside(end) {
+                            continue;
+                        }
+                        let moved: Vec<DVec3> = way.iter().map(|p| *p + by).collect();
+                        sum += passes(ring, &moved);
+                    }
+                    if sum != 0 {
+                        found.insert((i, d, to), sum);
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// What the chart says: a loop is passed towards the front on the way to a knit stitch, towards the back on the way from it;
+/// the other way round for purl; and a twisted loop turns its back.
+fn expected(loops: &Loops) -> Passes {
+    let mut sums = Passes::new();
+    for (parent, child) in loops.links() {
+        let (p, c) = (&loops.loops[parent as usize], &loops.loops[child as usize]);
+        let sign = c.sign as i32 * if p.twist == 0.0 { 1 } else { -1 };
+        let course = loops.courses.iter().position(|course| course.row == c.row).unwrap();
+        let row = visits_of(loops, course);
+        let n = row.iter().position(|(_, i)| *i == child).unwrap();
+        *sums.entry((parent, course, row[n].0)).or_default() += sign;
+        *sums.entry((parent, course, row[(n + 1) % row.len()].0)).or_default() -= sign;
+    }
+    sums.retain(|_, sum| *sum != 0);
+    sums
+}
+
+/// A relaxed cell of a chart and its loops.
+fn relaxed(chart: &Chart) -> (Cell, Loops) {
+    let wide = chart.even_width(100).unwrap();
+    let rows = chart.work(wide, chart.rows(), 10_000).unwrap();
+    let cell = Cell::of_rows(&rows, YARN_PER_STITCH, POINTS, [None; 2]);
+    (cell, Loops::new(&rows, wide as usize, Border::cell(wide as usize)))
+}
+
+#[track_caller]
+fn holds(name: &str, chart: &Chart) {
+    let (cell, loops) = relaxed(chart);
+    let expected = expected(&loops);
+    // The surface that a loop spans may end at its feet or a little above them: where yarns bulge, one of them cuts
+    // what is not drawn through it.
+    let found = [0, 1, 2].map(|trim| passes_of(&cell, &loops, trim));
+    assert!(!expected.is_empty() || loops.courses[0].visits.len() == 1, "{name}");
+    let keys: BTreeSet<_> = expected.keys().chain(found.iter().flat_map(|f| f.keys())).collect();
+    let differ: Vec<_> = keys.into_iter().filter(|k| found.iter().all(|f| f.get(k) != expected.get(k))).collect();
+    for key in &differ {
+        eprintln!("{name}: {key:?} is {:?}, not {:?}", found[1].get(key), expected.get(key));
+    }
+    assert!(differ.is_empty(), "{name}: {} of {} differ", differ.len(), expected.len());
+}
+
+#[test]
+fn every_stitch_is_drawn_through_what_the_chart_says() {
+    for rows in [
+        &["k2"][..],
+        &["p2"],
+        &["k p"],
+        &["k2", "p2"],
+        &["k p", "p k"],
+        &["ktbl2"],
+        &["k ptbl"],
+        &["k3", "k2tog yo k"],
+        &["k3", "yo ssk k"],
+        &["p3", "p2tog yo p"],
+        &["k sl", "k2"],
+        &["k tuck", "tuck p"],
+    ] {
+        holds(&rows.join(" / "), &Chart::parse(rows).unwrap());
+    }
+}
+
+#[test]
+fn lace_is_drawn_through_what_the_chart_says() {
+    for name in ["lace", "eyelet"] {
+        holds(name, &Chart::named(name).unwrap());
+    }
+}
+
 #[test]
 fn every_pattern_keeps_its_yarns_apart() {
-    for (pattern, _) in super::super::chart::PATTERNS {
+    for (pattern, _) in PATTERNS {
         let width = Chart::named(pattern).unwrap().even_width(100).unwrap();
-        let stitches = width * 12_u32.div_ceil(width);
-        let knit = knit(pattern, stitches, 12);
-        let found = measured(&knit.strands(1.0).unwrap());
-        let per_stitch = found.length / f64::from(stitches * 12);
-        eprintln!("{pattern}: {:?} {found:?}, {per_stitch:.2} per stitch", knit.gauge());
+        let stitches = width * 8_u32.div_ceil(width);
+        let knit = knit(pattern, stitches, 8);
+        let strands = knit.strands(1.0).unwrap();
+        let found = measured(&strands);
+        eprintln!("{pattern}: {found:?}");
+        assert_eq!(strands.len(), 1, "{pattern}");
         assert!(found.share <= 0.02, "{pattern}: {found:?}");
-        assert!((13.0..15.0).contains(&per_stitch), "{pattern}: {per_stitch}");
         // Loops touch: else it would not be cloth.
         assert!(found.nearest < 1.03, "{pattern}: {found:?}");
     }
 }
 
 #[test]
-fn stockinette_has_the_proportions_of_real_knits() {
-    let strands = knit("stockinette", 10, 10).strands(2.0).unwrap();
-    let at = |row: usize, stitch: usize| strands[row].curve.points[stitch * POINTS as usize];
-    assert!((at(4, 5).distance(at(4, 4)) / 2.0 - STITCH_WIDTH).abs() < 1e-9);
-    assert!((at(5, 4).distance(at(4, 4)) / 2.0 - ROW_HEIGHT).abs() < 1e-9);
-    let low = strands.iter().flat_map(|s| &s.curve.points).map(|p| p.z).fold(f64::MAX, f64::min);
-    let high = strands.iter().flat_map(|s| &s.curve.points).map(|p| p.z).fold(f64::MIN, f64::max);
-    // The cloth is two to three yarns thick.
-    assert!((2.0..3.2).contains(&((high - low) / 2.0 + 1.0)), "{low} {high}");
+fn plain_knit_has_the_proportions_of_real_knits() {
+    let [width, height] = knit("stockinette", 10, 10).gauge();
+    let yarn = YARN_PER_STITCH;
+    // Munden's constants of plain knit, dry to fully relaxed: 5.0 to 5.5 and 3.8 to 4.2.
+    eprintln!("Kc {:.2} Kw {:.2}, {:.3}", yarn / height, yarn / width, width / height);
+    assert!((5.0..5.7).contains(&(yarn / height)), "{height}");
+    assert!((3.8..4.2).contains(&(yarn / width)), "{width}");
 }
 
 #[test]
 fn ribs_are_narrower_and_garter_stitch_is_shorter() {
     let gauge = |pattern| knit(pattern, 8, 8).gauge();
-    assert_eq!(gauge("stockinette"), [STITCH_WIDTH, ROW_HEIGHT]);
-    assert_eq!(gauge("seed"), [STITCH_WIDTH, ROW_HEIGHT]);
-    assert!(gauge("rib1x1")[0] < gauge("rib2x2")[0] && gauge("rib2x2")[0] < STITCH_WIDTH);
-    assert!(gauge("garter")[1] < ROW_HEIGHT && gauge("rib1x1")[1] == ROW_HEIGHT);
-}
-
-/// Whether `upper` passes in front, at each place where two courses cross as seen along z, with the place's wale.
-fn crossings(lower: &[DVec3], upper: &[DVec3], points: usize) -> Vec<(f64, bool)> {
-    let mut found = Vec::new();
-    for (i, a) in lower.windows(2).enumerate() {
-        for b in upper.windows(2) {
-            let (d, e, r) = ((a[1] - a[0]).truncate(), (b[1] - b[0]).truncate(), (b[0] - a[0]).truncate());
-            let det = d.perp_dot(e);
-            let (s, t) = (r.perp_dot(e) / det, r.perp_dot(d) / det);
-            if (0.0..1.0).contains(&s) && (0.0..1.0).contains(&t) {
-                let front = b[0].lerp(b[1], t).z > a[0].lerp(a[1], s).z;
-                found.push(((i as f64 + s) / points as f64, front));
-            }
-        }
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found
+    let [plain, rib1, rib2, garter] = ["stockinette", "rib1x1", "rib2x2", "garter"].map(gauge);
+    assert!(rib1[0] < 0.75 * plain[0] && rib2[0] < 0.8 * plain[0], "{plain:?} {rib1:?} {rib2:?}");
+    assert!(garter[1] < 0.9 * plain[1], "{plain:?} {garter:?}");
 }
 
 #[test]
-fn loops_hold_each_other() {
-    for (pattern, front_at_head) in
-        [("stockinette", [true, true]), ("reverse-stockinette", [false, false]), ("rib1x1", [true, false])]
-    {
-        let strands = knit(pattern, 8, 8).strands(1.0).unwrap();
-        let found = crossings(&strands[3].curve.points, &strands[4].curve.points, POINTS as usize);
-        // Inside, away from the ends: in each stitch the new loop is behind both legs of the old one and in front of its
-        // head (and the other way round for purl), twice each.
-        for stitch in 2..6 {
-            let own: Vec<bool> = found
-                .iter()
-                .filter(|(wale, _)| (f64::from(stitch)..f64::from(stitch + 1)).contains(wale))
-                .map(|(_, front)| *front)
-                .collect();
-            let head = front_at_head[stitch as usize % 2];
-            assert_eq!(own, [!head, head, head, !head], "{pattern}, stitch {stitch}");
-        }
-    }
-}
-
-#[test]
-fn a_tube_is_closed_and_its_courses_lie_in_their_wales() {
+fn a_tube_is_one_spiral_and_its_courses_lie_in_their_wales() {
     let knit = Knit { form: Form::Tube, ..knit("rib2x2", 40, 6) };
     let strands = knit.strands(1.5).unwrap();
-    assert_eq!(strands.len(), 6);
-    for s in &strands {
-        assert!(s.curve.closed && s.kind == StrandKind::Course);
-        assert_eq!((s.curve.points.len(), s.coordinates.len()), (40 * POINTS as usize, 40 * POINTS as usize));
-        for (p, [wale, course]) in s.curve.points.iter().zip(&s.coordinates) {
-            let turn = p.x.atan2(p.z) / TAU;
-            let off = turn - f64::from(*wale) / 40.0;
-            assert!((off - off.round()).abs() * 40.0 < 0.6, "{p} {wale}");
-            assert!((f64::from(*course) - f64::from(s.index)) >= 0.0 && f64::from(*course) <= f64::from(s.index) + 1.0);
+    let [s] = strands.as_slice() else { panic!("{} yarns", strands.len()) };
+    assert!(!s.curve.closed && s.kind == StrandKind::Course);
+    assert_eq!(s.curve.points.len(), s.coordinates.len());
+    for (p, [wale, course]) in s.curve.points.iter().zip(&s.coordinates) {
+        if !(1.0..5.0).contains(course) {
+            continue;
         }
+        let turn = p.x.atan2(p.z) / TAU;
+        let off = turn - f64::from(*wale) / 40.0;
+        assert!((off - off.round()).abs() * 40.0 < 1.0, "{p} {wale}");
     }
     assert!(measured(&knit.strands(1.0).unwrap()).share <= 0.02);
 }
@@ -118,8 +239,8 @@ fn a_tube_is_closed_and_its_courses_lie_in_their_wales() {
 fn hat(stitches: u32) -> Knit {
     let chart = ["4: k2 p2", "3: k", "k6 k2tog", "k", "k5 ssk", "k", "k4 k2tog", "k3 k2tog", "k2 k2tog", "k1 k2tog"];
     let chart = Chart::parse(&chart).unwrap();
-    let radius = f64::from(stitches) * 3.6 / TAU;
-    let profile = [(1.0, 0.0), (1.0, 15.0), (0.62, 30.0), (0.27, 35.0)].map(|(r, y)| DVec2::new(r * radius, y));
+    let radius = f64::from(stitches) * 3.9 / TAU;
+    let profile = [(1.0, 0.0), (1.0, 17.0), (0.62, 34.0), (0.27, 40.0)].map(|(r, y)| DVec2::new(r * radius, y));
     Knit { rows: chart.rows(), chart, form: Form::Revolution(profile.into()), ..knit("stockinette", stitches, 1) }
 }
 
@@ -129,8 +250,7 @@ fn a_hat_keeps_its_yarns_apart_and_its_form() {
     let strands = hat.strands(1.0).unwrap();
     let found = measured(&strands);
     eprintln!("hat: {found:?}");
-    assert!(found.share <= 0.02, "{found:?}");
-    assert_eq!(strands.last().unwrap().curve.points.len(), 12 * POINTS as usize);
+    assert!(found.share <= 0.05, "{found:?}");
     let Form::Revolution(profile) = &hat.form else { unreachable!() };
     let widest = strands.iter().flat_map(|s| &s.curve.points).map(|p| p.x.hypot(p.z)).fold(0.0, f64::max);
     assert!((widest - profile[0].x).abs() < 3.0, "{widest} {}", profile[0].x);
@@ -138,7 +258,7 @@ fn a_hat_keeps_its_yarns_apart_and_its_form() {
 
 #[test]
 fn the_same_knit_is_the_same_to_the_bit() {
-    // Large enough that ropes are relaxed side by side.
+    // Large enough that rods are relaxed side by side.
     let once = hat(48).strands(1.3).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let again = pool.install(|| hat(48).strands(1.3).unwrap());
@@ -148,9 +268,31 @@ fn the_same_knit_is_the_same_to_the_bit() {
 }
 
 #[test]
-fn a_chart_that_does_not_fit_is_an_error() {
-    assert!(hat(50).strands(1.0).unwrap_err().problem.starts_with("row 8 repeats over 8 stitches"));
-    let chart = Chart::parse(&["kfb"]).unwrap();
-    let grows = Knit { chart, rows: 200, ..knit("stockinette", 5, 1) };
-    assert!(grows.strands(1.0).unwrap_err().problem.starts_with("more than"));
+fn a_finished_piece_ends_at_its_rim_and_a_live_one_has_open_loops() {
+    let finished = knit("stockinette", 8, 6);
+    let live = Knit { edges: Edges::Live, ..finished.clone() };
+    for piece in [&finished, &live] {
+        let strands = piece.strands(1.0).unwrap();
+        let [one] = strands.as_slice() else { panic!("{} yarns", strands.len()) };
+        let points = &one.curve.points;
+        let (low, high) = points.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
+        let ends = [points[0].y, points[points.len() - 1].y];
+        // The last row of the live one ends at its feet.
+        let row = if piece.edges == Edges::Live { 7.0 } else { 3.0 };
+        assert!(ends[0] < low + 3.0 && ends[1] > high - row, "{low} {high} {ends:?}");
+    }
+    // The cast-on edge and the bind-off are rows of their own.
+    let rows = |piece: &Knit| {
+        let strands = piece.strands(1.0).unwrap();
+        strands[0].coordinates.iter().map(|c| c[1].floor() as i32).collect::<BTreeSet<_>>()
+    };
+    assert_eq!(rows(&finished), (-1..=6).collect());
+    assert_eq!(rows(&live), (0..6).collect());
+}
+
+#[test]
+fn charts_that_do_not_fit_are_refused() {
+    let chart = Chart::parse(&["k", "c4f"]).unwrap();
+    let error = Knit { chart, ..knit("stockinette", 6, 4) }.strands(1.0).unwrap_err();
+    assert_eq!(error.problem, "row 2 repeats over 4 stitches, but finds 6");
 }

@@ -1,0 +1,210 @@
+//! Knitting that repeats, relaxed once: a few stitches with periodic borders that find their own width and height.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::{
+    super::{
+        chart::{Chart, Stitch},
+        rods::{Rods, Run, Strand},
+    },
+    loops::{Border, Loops, Visit},
+    shape::{points_of, spaced},
+};
+
+/// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
+/// up, open a little under it, plain knit hardly.
+const BLOCKING: DVec2 = DVec2::new(0.03, 0.015);
+/// Points of a stitch while a cell finds its form; as many as are asked for after that.
+const COARSE: u32 = 12;
+/// Steps with coarse points, with fine ones, and while contact becomes firm.
+const STEPS: [usize; 3] = [3000, 400, 200];
+
+/// Relaxed cloth with periodic borders; its lower left corner is at the origin and its unit the yarn's diameter.
+#[derive(Clone, Debug)]
+pub(super) struct Cell {
+    /// Stitches of a row, and rows.
+    pub(super) wide: u32,
+    pub(super) high: u32,
+    /// How wide and high it is.
+    pub(super) period: DVec2,
+    pub(super) rods: Rods,
+    /// The first point of each visit of each course, and behind them the end of the course.
+    pub(super) visits: Vec<Vec<usize>>,
+    /// Wale and course of each point.
+    pub(super) grid: Vec<[f32; 2]>,
+}
+
+impl Cell {
+    /// Relaxes one repeat of a chart whose rows all fit `wide` stitches. `size` fixes the width of a stitch and the
+    /// distance of rows; what it leaves open follows from the yarn.
+    pub(super) fn relaxed(chart: &Chart, wide: u32, yarn: f64, points: u32, size: [Option<f64>; 2]) -> Self {
+        let high = chart.rows();
+        let rows = chart.work(wide, high, u64::MAX).unwrap_or_default();
+        Self::of_rows(&rows, yarn, points, size)
+    }
+
+    /// The same of rows that have been worked.
+    pub(super) fn of_rows(rows: &[Vec<Stitch>], yarn: f64, points: u32, size: [Option<f64>; 2]) -> Self {
+        let (wide, high) = (rows[0].len() as u32, rows.len() as u32);
+        let loops = Loops::new(rows, wide as usize, Border::cell(wide as usize));
+        // Rather too large: yarns find room as the cell draws together.
+        let scale = yarn / 13.9;
+        let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale));
+        let period = start * DVec2::new(wide.into(), high.into());
+        let mut cell = Self {
+            wide,
+            high,
+            period,
+            rods: Rods { period: Some(period), ..Rods::default() },
+            visits: Vec::new(),
+            grid: Vec::new(),
+        };
+        for course in loops.pieces() {
+            let first = cell.rods.points.len();
+            let mut visits = Vec::with_capacity(course.len() + 1);
+            for piece in course {
+                visits.push(cell.rods.points.len());
+                let line: Vec<DVec3> =
+                    piece.places.iter().map(|p| DVec3::new(p.at * start.x, p.up * start.y, p.out)).collect();
+                let count = points_of(piece.yarn, COARSE);
+                for (point, k, share) in spaced(&line, count) {
+                    cell.rods.points.push(point);
+                    cell.rods.rest.push(piece.yarn * yarn / count as f64);
+                    let (a, b) = (piece.grid[k], piece.grid[k + 1]);
+                    cell.grid.push([0, 1].map(|c| a[c] + share as f32 * (b[c] - a[c])));
+                }
+            }
+            let count = cell.rods.points.len() - first;
+            visits.push(cell.rods.points.len());
+            cell.rods.strands.push(Strand { start: first, count, jump: Some(DVec3::X * period.x) });
+            cell.visits.push(visits);
+        }
+        let free = size.map(|s| s.is_none());
+        let run =
+            Run { steps: STEPS[0], growing: STEPS[0] / 5, thin: 0.5, free, load: BLOCKING, firm: 1.0, calm: 0.01 };
+        cell.rods.relax(&run);
+        cell.refine(points);
+        let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };
+        cell.rods.relax(&run);
+        cell.rods.relax(&Run { steps: STEPS[2], firm: 4.0, ..run });
+        cell.period = cell.rods.period.unwrap_or(period);
+        cell.mark(&loops);
+        // The middle of its thickness is in the plane.
+        let middle = cell.rods.points.iter().map(|p| p.z).sum::<f64>() / cell.rods.points.len() as f64;
+        cell.rods.points.iter_mut().for_each(|p| p.z -= middle);
+        cell
+    }
+
+    /// Other points on the same curves, so many in a stitch of [`COARSE`].
+    fn refine(&mut self, points: u32) {
+        let old = std::mem::take(&mut self.rods);
+        let (grid, visits) = (std::mem::take(&mut self.grid), std::mem::take(&mut self.visits));
+        self.rods.period = old.period;
+        for (strand, visits) in old.strands.iter().zip(visits) {
+            let jump = strand.jump.unwrap_or_default();
+            let n = strand.count as isize;
+            let at = |i: isize| old.points[strand.start + i.rem_euclid(n) as usize] + jump * i.div_euclid(n) as f64;
+            let first = self.rods.points.len();
+            let mut starts = Vec::with_capacity(visits.len());
+            for w in visits.windows(2) {
+                starts.push(self.rods.points.len());
+                let (from, count) = (w[0] - strand.start, w[1] - w[0]);
+                let fine = ((count as f64 * f64::from(points) / f64::from(COARSE)).round() as usize).max(2);
+                let rest = old.rest[w[0]] * count as f64 / fine as f64;
+                for k in 0..fine {
+                    let along = k as f64 * count as f64 / fine as f64;
+                    let (i, t) = (along.floor() as usize, along.fract());
+                    let i0 = (from + i) as isize;
+                    let [a, b, c, d] = [-1, 0, 1, 2].map(|k| at(i0 + k));
+                    // Catmull-Rom.
+                    let point =
+                        b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+                    self.rods.points.push(point);
+                    self.rods.rest.push(rest);
+                    let (g, h) = (grid[w[0] + i], if i + 1 < count { grid[w[0] + i + 1] } else { grid[w[0] + i] });
+                    self.grid.push([0, 1].map(|c| g[c] + t as f32 * (h[c] - g[c])));
+                }
+            }
+            let count = self.rods.points.len() - first;
+            starts.push(self.rods.points.len());
+            self.rods.strands.push(Strand { start: first, count, jump: Some(jump) });
+            self.visits.push(starts);
+        }
+    }
+
+    /// Yarn slides through its loops as it relaxes: finds which points are whose anew, by the highest point of each loop.
+    fn mark(&mut self, loops: &Loops) {
+        let old = std::mem::take(&mut self.rods);
+        let old_visits = std::mem::take(&mut self.visits);
+        self.grid.clear();
+        self.rods.period = old.period;
+        for ((strand, visits), course) in old.strands.iter().zip(old_visits).zip(&loops.courses) {
+            let jump = strand.jump.unwrap_or_default();
+            let n = strand.count as isize;
+            let at = |i: isize| old.points[strand.start + i.rem_euclid(n) as usize] + jump * i.div_euclid(n) as f64;
+            let counts: Vec<isize> = visits.windows(2).map(|w| (w[1] - w[0]) as isize).collect();
+            let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
+            let middle = |k: usize| (visits[k] - strand.start) as isize + counts[k] / 2;
+            // First by how much all have slid, then each for itself.
+            let height =
+                |s: isize| -> f64 { (0..counts.len()).filter(|&k| is_loop(k)).map(|k| at(middle(k) + s).y).sum() };
+            let most = counts.iter().copied().max().unwrap_or(0) / 2;
+            let slid = (-most..=most).max_by(|&a, &b| height(a).total_cmp(&height(b))).unwrap_or(0);
+            let head = |k: usize| {
+                let (from, reach) = (middle(k) + slid, if is_loop(k) { counts[k] / 4 } else { 0 });
+                let highest = (from - reach..=from + reach).max_by(|&a, &b| at(a).y.total_cmp(&at(b).y));
+                highest.unwrap_or(from)
+            };
+            let heads: Vec<isize> = (0..counts.len()).map(head).collect();
+            let start = |k: usize| {
+                let before = (k + counts.len() - 1) % counts.len();
+                let from = heads[before] - if k == 0 { n } else { 0 };
+                from + (heads[k] - from) * counts[before] / (counts[before] + counts[k])
+            };
+            let mut starts: Vec<isize> = (0..counts.len()).map(start).collect();
+            starts.push(starts[0] + n);
+            let first = self.rods.points.len();
+            let mut marks = Vec::with_capacity(starts.len());
+            for k in 0..counts.len() {
+                marks.push(self.rods.points.len());
+                let count = (starts[k + 1] - starts[k]) as f64;
+                for i in starts[k]..starts[k + 1] {
+                    let share = (i - starts[k]) as f64 / count;
+                    let rise = if is_loop(k) { 0.5 - 0.5 * (TAU * share).cos() } else { 0.0 };
+                    self.rods.points.push(at(i));
+                    self.rods.rest.push(old.rest[strand.start + i.rem_euclid(n) as usize]);
+                    let (column, row) = (f64::from(course.visits[k].0), f64::from(course.row));
+                    self.grid.push([(column + share) as f32, (row + 0.02 + 0.96 * rise) as f32]);
+                }
+            }
+            marks.push(self.rods.points.len());
+            self.rods.strands.push(Strand { start: first, count: strand.count, jump: strand.jump });
+            self.visits.push(marks);
+        }
+    }
+
+    /// Width of a stitch and distance of rows.
+    pub(super) fn gauge(&self) -> [f64; 2] {
+        [self.period.x / f64::from(self.wide), self.period.y / f64::from(self.high)]
+    }
+
+    /// The points of visit `k` of row `row`, counted on beyond the borders; and the first point of the visit after it.
+    pub(super) fn visit(&self, row: usize, k: usize) -> impl Iterator<Item = (DVec3, [f32; 2])> + '_ {
+        let high = self.high as usize;
+        let starts = &self.visits[row % high];
+        let count = starts.len() - 1;
+        let (turn, rise) = ((k / count) as f64, (row / high) as f64);
+        let by = DVec3::new(turn * self.period.x, rise * self.period.y, 0.0);
+        let add = [(turn * f64::from(self.wide)) as f32, (rise * f64::from(self.high)) as f32];
+        let own = starts[k % count]..starts[k % count + 1];
+        own.map(move |i| (self.rods.points[i] + by, [self.grid[i][0] + add[0], self.grid[i][1] + add[1]]))
+    }
+
+    /// Length of a segment at rest in a visit.
+    pub(super) fn rest(&self, row: usize, k: usize) -> f64 {
+        let starts = &self.visits[row % self.high as usize];
+        self.rods.rest[starts[k % (starts.len() - 1)]]
+    }
+}

@@ -1,0 +1,267 @@
+//! The curve that a yarn begins as: every loop through its parents on the right side, with room to spare.
+//!
+//! A loop is a closed form (after Crane, "A Simple Parametric Model of Plain-Knit Yarns", 2023: x = t + a sin 2t,
+//! y = -h cos t, z = -d cos 2t) between its feet, below the line where it is drawn through its parents, and its head, above
+//! the line where its children are drawn through it. The depth takes its sign from the loop itself at its feet and from
+//! its children at its head; where several loops lie over each other, each has a depth of its own.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::loops::{Border, Loop, Loops, Visit};
+
+/// How far across, up and out a point is: stitches or turns, rows, yarn diameters.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Place {
+    pub(in super::super) at: f64,
+    pub(in super::super) up: f64,
+    pub(in super::super) out: f64,
+}
+
+/// The yarn along one visit, from its left end to its right end, finely.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Piece {
+    pub(in super::super) places: Vec<Place>,
+    /// Wale and course of each place.
+    pub(in super::super) grid: Vec<[f32; 2]>,
+    /// Its yarn, in shares of a stitch's.
+    pub(in super::super) yarn: f64,
+}
+
+/// How deep a loop dives, how far feet and heads reach beyond the line where they hold each other (rows 2.28 apart), and how
+/// far legs lean (stitch 4.13 wide): the densest plain stitch of this form whose strands keep apart, found by a search.
+const DEPTH: f64 = 0.763;
+const REACH: f64 = 0.775 / 2.28;
+const LEAN: f64 = 0.982 / 4.13;
+/// Distance of loops that lie over each other, and of cables that pass each other.
+const LAYER: f64 = 0.85;
+const CABLE: f64 = 1.3;
+/// How far yarn lies off the cloth where it passes stitches.
+const FLOAT: f64 = 1.7;
+/// Places of a piece.
+const STEPS: usize = 64;
+
+fn smooth(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// One end of a visit, or its foot.
+#[derive(Clone, Copy)]
+struct Foot {
+    at: f64,
+    up: f64,
+    out: f64,
+    /// 1 where the yarn is behind what it is drawn through, -1 in front, else 0.
+    behind: f64,
+}
+
+impl Loops {
+    /// Width of a stitch in units of `at`, in a row of so many.
+    fn step(&self, count: usize) -> f64 {
+        if self.border.turns { 1.0 / count as f64 } else { 1.0 }
+    }
+
+    fn child_sign(&self, own: &Loop) -> f64 {
+        let sign = own.children.first().map_or(own.sign, |&c| self.loops[c as usize].sign);
+        if sign == 0.0 { 1.0 } else { sign }
+    }
+
+    /// How deep the feet of a loop dive: behind all that it is drawn through.
+    fn foot_depth(&self, own: &Loop) -> f64 {
+        let over = own.parents.iter().any(|&p| self.loops[p as usize].sign == 0.0);
+        DEPTH + LAYER * own.parents.len().saturating_sub(1) as f64 + if over { 0.5 } else { 0.0 }
+    }
+
+    /// Where the feet of a visit are: its middle, and how far up and out.
+    fn foot(&self, row: i32, visit: &Visit) -> Foot {
+        match visit {
+            Visit::Loop(i) => {
+                let l = &self.loops[*i as usize];
+                let stack = l.parents.len().saturating_sub(1) as f64;
+                let (reach, out) = match l.sign {
+                    0.0 => (0.0, 0.0),
+                    sign => (REACH + 0.12 * stack, -sign * self.foot_depth(l)),
+                };
+                Foot { at: l.foot, up: f64::from(row) - reach, out: out + CABLE * l.layer, behind: l.sign }
+            }
+            Visit::Pass { at, front } => {
+                let out = if *front { FLOAT } else { -FLOAT };
+                Foot { at: *at, up: f64::from(row) - 0.5 * REACH, out, behind: 0.0 }
+            }
+        }
+    }
+
+    /// The way of the yarn along each course, in the order of [`Loops::courses`], visit by visit.
+    pub(in super::super) fn pieces(&self) -> Vec<Vec<Piece>> {
+        self.courses
+            .iter()
+            .map(|course| {
+                let count = course.visits.iter().filter(|(_, v)| self.is_stitch(v)).count().max(1);
+                let step = self.step(count);
+                let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course.row, v)).collect();
+                let n = feet.len();
+                // The joint between a visit and the next, as the first one has it.
+                let joint = |k: usize| -> Option<Foot> {
+                    let (a, next) = (feet[k], (k + 1) % n);
+                    if next == 0 && self.border.round.is_none() {
+                        return None;
+                    }
+                    let round = if next == 0 { self.border.round.unwrap_or(0.0) } else { 0.0 };
+                    // Where the rows are a spiral, the next round begins a row higher.
+                    let climb = if next == 0 && self.border.turns { 1.0 } else { 0.0 };
+                    let b = feet[next];
+                    // Between two that are behind, the yarn stays behind both.
+                    let out = match (a.behind, b.behind) {
+                        (1.0, 1.0) => a.out.min(b.out),
+                        (-1.0, -1.0) => a.out.max(b.out),
+                        _ => 0.5 * (a.out + b.out),
+                    };
+                    Some(Foot { at: 0.5 * (a.at + b.at + round), up: 0.5 * (a.up + b.up + climb), out, behind: 0.0 })
+                };
+                let joints: Vec<Option<Foot>> = (0..n).map(joint).collect();
+                (0..n)
+                    .map(|k| {
+                        let own = feet[k];
+                        let end = |side: f64| Foot { at: own.at + side * 0.5 * step, ..own };
+                        let left = match (k, self.border.round) {
+                            (0, None) => None,
+                            (0, Some(round)) => joints[n - 1].map(|j| {
+                                let climb = if self.border.turns { 1.0 } else { 0.0 };
+                                Foot { at: j.at - round, up: j.up - climb, ..j }
+                            }),
+                            _ => joints[k - 1],
+                        };
+                        let ends = [left.unwrap_or(end(-1.0)), joints[k].unwrap_or(end(1.0))];
+                        let (column, visit) = &course.visits[k];
+                        match visit {
+                            Visit::Loop(i) => self.loop_piece(&self.loops[*i as usize], *column, own, ends, step),
+                            Visit::Pass { .. } => pass_piece(*column, course.row, own, ends),
+                        }
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Whether a visit takes a place of its own in its row.
+    fn is_stitch(&self, visit: &Visit) -> bool {
+        match visit {
+            Visit::Loop(i) => {
+                !(self.loops[*i as usize].sign == 0.0 && self.loops[*i as usize].twist != 0.0) || {
+                    // Lifted strands lie between stitches; the loops of a cast-on edge are stitches.
+                    self.border.finished && self.loops[*i as usize].row == -1
+                }
+            }
+            Visit::Pass { .. } => true,
+        }
+    }
+
+    fn loop_piece(&self, own: &Loop, column: u32, foot: Foot, ends: [Foot; 2], step: f64) -> Piece {
+        let over = own.sign == 0.0;
+        let child = self.child_sign(own);
+        let children = || own.children.iter().map(|&c| &self.loops[c as usize]);
+        let count = own.children.len().max(1) as f64;
+        let border = self.border;
+        let mean = |of: &dyn Fn(&Loop) -> f64| children().map(of).sum::<f64>() / count;
+        let head_at =
+            if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
+        let head_layer = CABLE * mean(&|c: &Loop| c.layer);
+        let bound = own.held == Some(own.row);
+        let head_up = f64::from(own.held.unwrap_or(own.row + 1)) + REACH + if bound { 0.5 } else { 0.0 };
+        let rank = f64::from(own.rank);
+        let head_depth = DEPTH + LAYER * rank;
+        let foot_depth = self.foot_depth(own);
+        let spread = 1.0 + 0.8 * (count - 1.0);
+        let foot_layer = CABLE * own.layer;
+        let crossing = if over { 0.35 } else { 0.5 };
+        let piece = |k: usize| {
+            let t = TAU * k as f64 / STEPS as f64;
+            let head = 0.5 - 0.5 * t.cos();
+            let (cos2, sin2) = ((2.0 * t).cos(), (2.0 * t).sin());
+            let upper = smooth((head - 0.3) / 0.4);
+            let mix = |low: f64, high: f64| low + (high - low) * upper;
+            // At its ends a foot goes over into the neighbour's.
+            let inside = smooth(t.min(TAU - t) / (TAU / 6.0));
+            let (side, end) = if k <= STEPS / 2 { (-1.0, ends[0]) } else { (1.0, ends[1]) };
+            let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth((head - crossing) / 0.24 + 0.5) };
+            let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * mix(1.0, spread) * turned;
+            let at = mix(foot.at, head_at) + step * across + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step));
+            let up = foot.up + (head_up - foot.up) * head + (1.0 - inside) * (end.up - foot.up);
+            let mut out = if over {
+                let legs = 0.06;
+                let (low, high) = (smooth(2.0 * head), smooth(2.0 * head - 1.0));
+                -child * (legs * low + (head_depth - legs) * high)
+            } else {
+                let deep = |depth: f64| if cos2 > 0.0 { depth } else { DEPTH };
+                mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
+            };
+            out += foot_layer + (head_layer - foot_layer) * smooth(head);
+            if own.twist != 0.0 {
+                let bump = 1.0 - smooth((head - crossing).abs() / 0.25);
+                out += side * own.twist * 0.55 * bump;
+            }
+            out += (1.0 - inside) * (end.out - foot.out);
+            let place = Place { at, up, out };
+            (place, [column as f32 + (t / TAU) as f32, own.row as f32 + 0.02 + 0.96 * head as f32])
+        };
+        let (places, grid) = (0..=STEPS).map(piece).unzip();
+        Piece { places, grid, yarn: own.yarn }
+    }
+}
+
+/// The yarn passes a stitch.
+fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
+    let piece = |k: usize| {
+        let t = k as f64 / STEPS as f64;
+        let (end, share) = if t < 0.5 { (ends[0], 2.0 * t) } else { (ends[1], 2.0 - 2.0 * t) };
+        let share = smooth(share);
+        let place = Place {
+            at: end.at + (foot.at - end.at) * if t < 0.5 { 2.0 * t } else { 2.0 - 2.0 * t },
+            up: end.up + (foot.up - end.up) * share,
+            out: end.out + (foot.out - end.out) * share,
+        };
+        (place, [column as f32 + t as f32, row as f32 + 0.02])
+    };
+    let (places, grid) = (0..=STEPS).map(piece).unzip();
+    Piece { places, grid, yarn: PASSED }
+}
+
+/// Yarn that passes a stitch, in shares of a stitch's: a little more than its width.
+const PASSED: f64 = 0.26;
+
+/// Cuts a curve into so many pieces of equal length: the first point of each, with its place along `line` (whole steps and
+/// a share).
+pub(in super::super) fn spaced(line: &[DVec3], count: usize) -> Vec<(DVec3, usize, f64)> {
+    let mut lengths = Vec::with_capacity(line.len());
+    let mut sum = 0.0;
+    for (i, p) in line.iter().enumerate() {
+        sum += if i > 0 { p.distance(line[i - 1]) } else { 0.0 };
+        lengths.push(sum);
+    }
+    let mut k = 0;
+    (0..count)
+        .map(|i| {
+            let along = sum * i as f64 / count as f64;
+            while k + 2 < line.len() && lengths[k + 1] <= along {
+                k += 1;
+            }
+            let span = lengths[k + 1] - lengths[k];
+            let share = if span > 0.0 { (along - lengths[k]) / span } else { 0.0 };
+            (line[k].lerp(line[k + 1], share), k, share)
+        })
+        .collect()
+}
+
+/// Points that a visit is given.
+pub(in super::super) fn points_of(yarn: f64, per_stitch: u32) -> usize {
+    (2 * (0.5 * yarn * f64::from(per_stitch)).round() as usize).max(2)
+}
+
+impl Border {
+    /// The borders of a periodic cell so many stitches wide.
+    pub(in super::super) fn cell(wide: usize) -> Self {
+        Self { round: Some(wide as f64), stacked: true, turns: false, finished: false }
+    }
+}

@@ -1,0 +1,487 @@
+//! Yarns as elastic rods: they resist stretching and bending, and do not pass through each other.
+//!
+//! The energy is that of discrete rods (after Bergou et al., "Discrete Elastic Rods", 2008, without twist) and of contact
+//! between segments; it is made least by FIRE (Bitzek et al., "Structural Relaxation Made Simple", 2006), the size of a
+//! periodic cell too, if it is free. No step is longer than a small share of the diameter, so that no yarn passes through
+//! another. The unit of length is the yarn's diameter, that of force its bending stiffness over the diameter's square.
+//! Sums are taken in a fixed order: the result is the same for any number of threads.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::contact::{PointGrid, nearest};
+
+/// One yarn: some of the points, in order.
+#[derive(Clone, Debug)]
+pub(super) struct Strand {
+    pub(super) start: usize,
+    pub(super) count: usize,
+    /// What is added to the first point to make it follow the last: zero for a ring, a period for a yarn that crosses a
+    /// periodic cell.
+    pub(super) jump: Option<DVec3>,
+}
+
+/// Yarns of diameter 1.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rods {
+    pub(super) points: Vec<DVec3>,
+    pub(super) strands: Vec<Strand>,
+    /// Length at rest of the segment that begins at each point.
+    pub(super) rest: Vec<f64>,
+    /// Points that stay where they are; none, or one for each point.
+    pub(super) fixed: Vec<bool>,
+    /// Size of the cell that repeats along x and y.
+    pub(super) period: Option<DVec2>,
+}
+
+/// How long and how to relax.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// Most steps.
+    pub(super) steps: usize,
+    /// Steps during which yarns grow to their thickness, and the share of it at which they begin.
+    pub(super) growing: usize,
+    pub(super) thin: f64,
+    /// Whether the cell may change its width and its height.
+    pub(super) free: [bool; 2],
+    /// Pull on the cloth across and along, force by length.
+    pub(super) load: DVec2,
+    /// How firm contact is, against what a relaxation begins with.
+    pub(super) firm: f64,
+    /// Stops when no force is larger.
+    pub(super) calm: f64,
+}
+
+/// Stiffness against stretching: a yarn under the forces of a loop becomes longer by about a hundredth.
+const STRETCH: f64 = 80.0;
+/// Stiffness of contact, for each pair of segments.
+const CONTACT: f64 = 90.0;
+/// Yarns are kept this far apart: a little more than they need, for what a spline does between points and what forces
+/// press together.
+const APART: f64 = 1.02;
+/// Contacts are looked for this much beyond touching.
+const MARGIN: f64 = 0.4;
+/// If one in so many points has gone half of that, and if any has after so many steps, they are looked for again.
+const MANY: usize = 200;
+const OFTEN: usize = 12;
+/// The longest step of a point.
+const STEP: f64 = 0.06;
+/// The longest step in time.
+const TIME: f64 = 0.07;
+/// Along a yarn, closer than this is not contact but bending.
+const ALONG: f64 = 2.2;
+/// Points that are worked through at once; sums are taken over these, whatever the number of threads.
+const CHUNK: usize = 4096;
+
+/// Another segment that may touch, and by how many periods it must be moved to do so.
+#[derive(Clone, Copy)]
+struct Neighbour {
+    segment: u32,
+    cells: [i8; 2],
+}
+
+/// Pushes of contact on both ends of a segment, and what they do to the size of the cell.
+#[derive(Clone, Copy, Default)]
+struct Push {
+    from: DVec3,
+    to: DVec3,
+    virial: DVec2,
+}
+
+/// Points, their speeds, the forces on them, and where they were before.
+type Moving<'a> = (&'a mut [DVec3], &'a mut [DVec3], &'a [DVec3], &'a [DVec3]);
+
+/// What is worked out anew in each step.
+#[derive(Default)]
+struct Work {
+    edges: Vec<DVec3>,
+    pulls: Vec<DVec3>,
+    pushes: Vec<Push>,
+    forces: Vec<DVec3>,
+    /// Neighbours of segment i are those from `starts[i]` to `starts[i + 1]`.
+    starts: Vec<u32>,
+    neighbours: Vec<Neighbour>,
+}
+
+impl Rods {
+    /// Whether a segment begins at a point.
+    fn has_segment(&self) -> Vec<bool> {
+        let mut has = vec![true; self.points.len()];
+        for s in self.strands.iter().filter(|s| s.jump.is_none()) {
+            has[s.start + s.count - 1] = false;
+        }
+        has
+    }
+
+    fn edges(&self, edges: &mut Vec<DVec3>) {
+        edges.clear();
+        edges.extend(self.points.windows(2).map(|w| w[1] - w[0]));
+        edges.push(DVec3::ZERO);
+        for s in &self.strands {
+            let last = s.start + s.count - 1;
+            edges[last] = s.jump.map_or(DVec3::ZERO, |jump| self.points[s.start] + jump - self.points[last]);
+        }
+    }
+
+    /// Relaxes; gives the steps it took and the largest force that is left.
+    pub(super) fn relax(&mut self, run: &Run) -> (usize, f64) {
+        let n = self.points.len();
+        if n == 0 {
+            return (0, 0.0);
+        }
+        let has = self.has_segment();
+        let mut work = Work::default();
+        let mut speeds = vec![DVec3::ZERO; n];
+        // A cell's size moves as if it weighed as much as what is in it.
+        let weight = (n as f64).sqrt();
+        let mut cell_speed = DVec2::ZERO;
+        let time = TIME / run.firm.max(1.0).sqrt();
+        let (mut dt, mut alpha, mut downhill) = (0.5 * time, 0.1, 0);
+        // Where points were when neighbours were looked for, and how many have gone far since then.
+        let mut before: Vec<DVec3> = Vec::new();
+        let (mut gone, mut since) = (n, 0);
+        let (mut largest, mut strained) = (0.0, 0.0);
+        for step in 0..run.steps {
+            let grown = if run.growing > 0 { (step as f64 / run.growing as f64).min(1.0) } else { 1.0 };
+            let apart = APART * (run.thin + (1.0 - run.thin) * grown);
+            since += 1;
+            // In a large piece a few that still find their way do not hold up all others.
+            if gone > n / MANY || (gone > 0 && since >= OFTEN) {
+                since = 0;
+                self.search(&has, &mut work);
+                before.clone_from(&self.points);
+                strained = 0.0;
+            }
+            let virial = self.forces(&has, apart, CONTACT * run.firm, &mut work);
+            let free = |k: usize| f64::from(u8::from(run.free[k]));
+            let cell_force = match self.period {
+                Some(period) => {
+                    let pull = run.load * period.x * period.y - virial;
+                    DVec2::new(pull.x * free(0), pull.y * free(1)) / weight
+                }
+                None => DVec2::ZERO,
+            };
+            if !self.fixed.is_empty() {
+                for (force, fixed) in work.forces.iter_mut().zip(&self.fixed) {
+                    if *fixed {
+                        *force = DVec3::ZERO;
+                    }
+                }
+            }
+            let [power, force2, speed2, max2] = sums(&work.forces, &speeds);
+            let power = power + cell_force.dot(cell_speed);
+            let force = (force2 + cell_force.length_squared()).sqrt();
+            let speed = (speed2 + cell_speed.length_squared()).sqrt();
+            largest = max2.sqrt();
+            if grown >= 1.0
+                && step > run.growing
+                && largest < run.calm
+                && cell_force.length() < run.calm * weight * 0.02
+            {
+                return (step, largest);
+            }
+            if power > 0.0 {
+                downhill += 1;
+                if downhill > 5 {
+                    dt = (dt * 1.1).min(time);
+                    alpha *= 0.99;
+                }
+            } else {
+                downhill = 0;
+                dt = (0.5 * dt).max(0.02 * time);
+                alpha = 0.1;
+            }
+            let (keep, turn) = match power > 0.0 && force > 0.0 {
+                true => (1.0 - alpha, alpha * speed / force),
+                false => (0.0, 0.0),
+            };
+            let limit = STEP / dt;
+            let far = (0.5 * MARGIN - strained).max(0.0).powi(2);
+            let advance = |(points, speeds, forces, before): Moving<'_>| -> usize {
+                let mut gone = 0;
+                for (((p, v), f), b) in points.iter_mut().zip(speeds).zip(forces).zip(before) {
+                    *v = *v * keep + *f * (turn + dt);
+                    let size2 = v.length_squared();
+                    if size2 > limit * limit {
+                        *v *= limit / size2.sqrt();
+                    }
+                    *p += *v * dt;
+                    gone += usize::from(p.distance_squared(*b) > far);
+                }
+                gone
+            };
+            gone = if n <= CHUNK {
+                advance((&mut self.points, &mut speeds, &work.forces, &before))
+            } else {
+                let parts = self.points.par_chunks_mut(CHUNK).zip(speeds.par_chunks_mut(CHUNK));
+                let parts = parts.zip(work.forces.par_chunks(CHUNK)).zip(before.par_chunks(CHUNK));
+                parts.map(|(((p, v), f), b)| advance((p, v, f, b))).sum()
+            };
+            if let Some(period) = self.period {
+                cell_speed = cell_speed * keep + cell_force * (turn + dt);
+                // In a step the cell's rim moves no farther than a point may.
+                let by = cell_speed * dt / weight;
+                let by = by.clamp(DVec2::splat(-STEP) / period, DVec2::splat(STEP) / period);
+                // Its images move with it.
+                strained += (by * period).abs().max_element();
+                self.scale(DVec2::ONE + by);
+                before.iter_mut().for_each(|p| *p *= (DVec2::ONE + by).extend(1.0));
+            }
+        }
+        (run.steps, largest)
+    }
+
+    /// Makes a periodic cell wider and higher.
+    pub(super) fn scale(&mut self, by: DVec2) {
+        let by = by.extend(1.0);
+        self.points.iter_mut().for_each(|p| *p *= by);
+        for s in &mut self.strands {
+            s.jump = s.jump.map(|j| j * by);
+        }
+        self.period = self.period.map(|p| p * by.truncate());
+    }
+
+    /// Forces on points; gives the derivative of the energy by the logarithms of the cell's width and height.
+    fn forces(&self, has: &[bool], apart: f64, contact: f64, work: &mut Work) -> DVec2 {
+        let n = self.points.len();
+        self.edges(&mut work.edges);
+        let edges = &work.edges;
+        // The bend at each point: difference of the tangents, over the mean length of both segments.
+        let mut bends = std::mem::take(&mut work.forces);
+        bends.clear();
+        bends.resize(n, DVec3::ZERO);
+        let bend = |a: usize, b: usize| {
+            let (la, lb) = (self.rest[a], self.rest[b]);
+            (edges[b] / lb - edges[a] / la) / (0.5 * (la + lb))
+        };
+        for s in &self.strands {
+            let inner = s.start + 1..s.start + s.count - usize::from(s.jump.is_none());
+            inner.for_each(|i| bends[i] = bend(i - 1, i));
+            if s.jump.is_some() {
+                bends[s.start] = bend(s.start + s.count - 1, s.start);
+            }
+        }
+        // The pull along each segment: the derivative of the energy by its vector.
+        let pulls = &mut work.pulls;
+        pulls.clear();
+        pulls.resize(n, DVec3::ZERO);
+        let mut virial = DVec2::ZERO;
+        for s in &self.strands {
+            let end = s.start + s.count;
+            for i in s.start..end {
+                if !has[i] {
+                    continue;
+                }
+                let next = if i + 1 == end { s.start } else { i + 1 };
+                let (e, rest) = (edges[i], self.rest[i]);
+                let length = e.length().max(1e-9);
+                let pull = e * (STRETCH * (1.0 / rest - 1.0 / length)) + (bends[i] - bends[next]) / rest;
+                pulls[i] = pull;
+                virial += (pull * e).truncate();
+            }
+        }
+        // Contact.
+        let pushes = &mut work.pushes;
+        pushes.resize(n, Push::default());
+        let (starts, neighbours) = (&work.starts, &work.neighbours);
+        let period = self.period.unwrap_or_default();
+        let push = |i: usize| -> Push {
+            let mut sum = Push::default();
+            let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
+            for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
+                let j = other.segment as usize;
+                let [x, y] = other.cells.map(f64::from);
+                let q0 = self.points[j] + DVec3::new(x * period.x, y * period.y, 0.0);
+                let near = nearest(p0, p1, q0, q0 + edges[j]);
+                let square = near.between.length_squared();
+                if square >= apart * apart {
+                    continue;
+                }
+                let distance = square.sqrt().max(1e-6);
+                let by = near.between * (contact * (apart - distance) / distance);
+                sum.from -= by * (1.0 - near.s);
+                sum.to -= by * near.s;
+                // Each pair is met from both sides.
+                sum.virial -= 0.5 * (by * near.between).truncate();
+            }
+            sum
+        };
+        let fill = |(c, part): (usize, &mut [Push])| -> DVec2 {
+            let mut virial = DVec2::ZERO;
+            for (k, slot) in part.iter_mut().enumerate() {
+                let i = c * CHUNK + k;
+                *slot = if has[i] { push(i) } else { Push::default() };
+                virial += slot.virial;
+            }
+            virial
+        };
+        virial += if n <= CHUNK {
+            fill((0, pushes))
+        } else {
+            let parts: Vec<DVec2> = pushes.par_chunks_mut(CHUNK).enumerate().map(fill).collect();
+            parts.into_iter().sum::<DVec2>()
+        };
+        // What pulls at a point: the segment after it, and the one before it the other way.
+        let mut forces = bends;
+        for s in &self.strands {
+            let end = s.start + s.count;
+            let mut before = match s.jump {
+                Some(_) => (pulls[end - 1], pushes[end - 1].to),
+                None => (DVec3::ZERO, DVec3::ZERO),
+            };
+            for i in s.start..end {
+                forces[i] = pulls[i] - before.0 + pushes[i].from + before.1;
+                before = (pulls[i], pushes[i].to);
+            }
+        }
+        work.forces = forces;
+        virial
+    }
+
+    /// Finds what may touch in the steps to come.
+    fn search(&self, has: &[bool], work: &mut Work) {
+        let n = self.points.len();
+        self.edges(&mut work.edges);
+        let edges = &work.edges;
+        let halves: Vec<f64> = edges.iter().map(|e| 0.5 * e.length()).collect();
+        // One that is stretched must not make all cells wide.
+        let longest =
+            2.0 * halves.iter().copied().fold(0.05, f64::max).min(1.5 * halves.iter().sum::<f64>() / n as f64);
+        let reach = APART + MARGIN + longest;
+        let mut middles = Vec::with_capacity(n);
+        // The segment, and by how many periods its image is moved.
+        let mut images: Vec<(u32, [i8; 2])> = Vec::with_capacity(n);
+        let mut own_cells = vec![[0_i32; 2]; if self.period.is_some() { n } else { 0 }];
+        for i in 0..n {
+            let mut middle = self.points[i] + 0.5 * edges[i];
+            if let Some(period) = self.period {
+                let cell = (middle.truncate() / period).floor();
+                own_cells[i] = [cell.x as i32, cell.y as i32];
+                middle -= (cell * period).extend(0.0);
+            }
+            middles.push(middle);
+            images.push((i as u32, [0, 0]));
+        }
+        if let Some(period) = self.period {
+            let around = (DVec2::splat(reach) / period).ceil().as_ivec2();
+            for y in -around.y..=around.y {
+                for x in -around.x..=around.x {
+                    if x == 0 && y == 0 {
+                        continue;
+                    }
+                    let by = DVec2::new(f64::from(x), f64::from(y)) * period;
+                    for i in 0..n {
+                        let at = middles[i].truncate() + by;
+                        if at.cmpgt(DVec2::splat(-reach)).all() && at.cmplt(period + reach).all() {
+                            middles.push(middles[i] + by.extend(0.0));
+                            images.push((i as u32, [x as i8, y as i8]));
+                        }
+                    }
+                }
+            }
+        }
+        let grid = PointGrid::new(&middles, reach, None);
+        // How far along its strand each segment is, and the strand's number.
+        let mut along = vec![0.0; n];
+        let mut strand_of = vec![0_u32; n];
+        let mut lengths = Vec::with_capacity(self.strands.len());
+        for (k, s) in self.strands.iter().enumerate() {
+            let mut sum = 0.0;
+            for i in s.start..s.start + s.count {
+                along[i] = sum;
+                strand_of[i] = k as u32;
+                sum += self.rest[i];
+            }
+            lengths.push(sum);
+        }
+        let touch = APART + MARGIN;
+        let of = |i: usize, found: &mut Vec<Neighbour>, walk: &mut super::contact::Walk<'_>| {
+            if !has[i] {
+                return;
+            }
+            let half = halves[i];
+            let most = (touch + half + 0.5 * longest).powi(2);
+            let (p0, p1) = (middles[i] - 0.5 * edges[i], middles[i] + 0.5 * edges[i]);
+            for near in walk.around(i) {
+                // Most of what cells hold is too far away: tell that before anything else is looked at.
+                let distance = near.at.distance_squared(middles[i]);
+                if distance > most {
+                    continue;
+                }
+                let (j, mut cells) = images[near.index as usize];
+                let j = j as usize;
+                let widest = touch + half + halves[j];
+                if distance > widest * widest || !has[j] || near.index as usize == i {
+                    continue;
+                }
+                if strand_of[i] == strand_of[j] {
+                    let length = lengths[strand_of[i] as usize];
+                    let (by, round) = ((along[j] - along[i]).abs(), self.strands[strand_of[i] as usize].jump.is_some());
+                    let by = if round { by.min(length - by) } else { by };
+                    // Near along the yarn and in space: the same piece of it. (A yarn's image next door is near in space
+                    // alone, unless the period is shorter than this.)
+                    let image = near.at - middles[i];
+                    if by < ALONG && image.length() < by + half + halves[j] {
+                        continue;
+                    }
+                }
+                let half_j = 0.5 * edges[j];
+                if nearest(p0, p1, near.at - half_j, near.at + half_j).between.length_squared() > touch * touch {
+                    continue;
+                }
+                if self.period.is_some() {
+                    for k in 0..2 {
+                        cells[k] += (own_cells[i][k] - own_cells[j][k]) as i8;
+                    }
+                }
+                found.push(Neighbour { segment: j as u32, cells });
+            }
+        };
+        let chunks: Vec<(Vec<u32>, Vec<Neighbour>)> = (0..n.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|c| {
+                let mut walk = grid.walk();
+                let mut found = Vec::new();
+                let counts = (c * CHUNK..((c + 1) * CHUNK).min(n))
+                    .map(|i| {
+                        let before = found.len();
+                        of(i, &mut found, &mut walk);
+                        (found.len() - before) as u32
+                    })
+                    .collect();
+                (counts, found)
+            })
+            .collect();
+        work.starts.clear();
+        work.starts.push(0);
+        work.neighbours.clear();
+        let mut sum = 0;
+        for (counts, found) in chunks {
+            for count in counts {
+                sum += count;
+                work.starts.push(sum);
+            }
+            work.neighbours.extend(found);
+        }
+    }
+}
+
+/// Of forces and speeds: their product, both their squares, and the largest square of a force.
+fn sums(forces: &[DVec3], speeds: &[DVec3]) -> [f64; 4] {
+    let part = |(forces, speeds): (&[DVec3], &[DVec3])| {
+        let mut sum = [0.0; 4];
+        for (f, v) in forces.iter().zip(speeds) {
+            let square = f.length_squared();
+            sum[0] += f.dot(*v);
+            sum[1] += square;
+            sum[2] += v.length_squared();
+            sum[3] = f64::max(sum[3], square);
+        }
+        sum
+    };
+    if forces.len() <= CHUNK {
+        return part((forces, speeds));
+    }
+    let parts: Vec<[f64; 4]> = forces.par_chunks(CHUNK).zip(speeds.par_chunks(CHUNK)).map(part).collect();
+    parts.into_iter().fold([0.0; 4], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3].max(b[3])])
+}
