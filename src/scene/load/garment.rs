@@ -95,7 +95,8 @@ pub(super) fn garment(
     let path =
         source.required_string("path").map(|p| context.resolve(p, source.span("path").unwrap_or(source.header())));
     let span = source.span("path").unwrap_or(source.header());
-    let unit = source.one_of("unit", &UNITS).unwrap_or(context.unit);
+    let scale = source.f64_or("scale", 1.0, Range::POSITIVE);
+    let unit = source.one_of("unit", &UNITS).unwrap_or(context.unit) * scale;
     let uv_unit = source.one_of("uv_unit", &UNITS);
     let seams = [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
     let seam = source.one_of("seam", &seams);
@@ -178,7 +179,7 @@ fn stitch(table: &Reader<'_>, outer: Option<f64>) -> Option<DVec2> {
 /// Reads `cloth = { .. }`.
 fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
     let span = table.header();
-    let points = table.u64_or("points", POINTS, 6..=200) as usize;
+    let points = table.u64_or("points", POINTS, 4..=200) as usize;
     let kind = table.kind("type", &[("knit", 0), ("weave", 1), ("file", 2), ("stockinette", 3)]);
     let made = match kind {
         Some(0) => {
