@@ -6,10 +6,7 @@
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
-use super::{
-    body::Body,
-    surface::{Anchor, BorderEdge, Finder, Pose, Surface, single},
-};
+use super::surface::{Anchor, BorderEdge, Finder, Pose, Surface, single};
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
 const PAD: usize = 2;
@@ -250,23 +247,16 @@ impl Lattice {
     }
 
     /// The corners in one frame.
-    pub(super) fn sheet(&self, surface: &Surface, pose: &Pose, body: Option<&Body>, clearance: f64) -> Sheet<'_> {
-        let placed: Vec<(Vec3, Vec3, bool)> = self
-            .anchors
-            .par_iter()
-            .with_min_len(256)
-            .map(|anchor| {
-                if !anchor.is_some() {
-                    return (Vec3::NAN, Vec3::Y, false);
-                }
-                let (at, normal) = surface.at(pose, *anchor);
-                let pushed = body.and_then(|b| b.push_out(at, clearance));
-                (single(pushed.unwrap_or(at)), single(normal), pushed.is_some())
-            })
-            .collect();
-        let pushed = placed.iter().filter(|p| p.2).count();
-        let (points, normals) = placed.into_iter().map(|p| (p.0, p.1)).unzip();
-        let mut sheet = Sheet { lattice: self, points, normals, pushed };
+    pub(super) fn sheet(&self, surface: &Surface, pose: &Pose) -> Sheet<'_> {
+        let place = |anchor: &Anchor| {
+            if !anchor.is_some() {
+                return (Vec3::NAN, Vec3::Y);
+            }
+            let (at, normal) = surface.at(pose, *anchor);
+            (single(at), single(normal))
+        };
+        let (points, normals) = self.anchors.par_iter().with_min_len(256).map(place).unzip();
+        let mut sheet = Sheet { lattice: self, points, normals };
         for _ in 0..PAD {
             sheet.extend();
         }
@@ -344,8 +334,6 @@ pub(super) struct Sheet<'a> {
     pub(super) lattice: &'a Lattice,
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
-    /// How many corners were moved out of the body.
-    pub(super) pushed: usize,
 }
 
 impl Sheet<'_> {

@@ -223,30 +223,21 @@ impl Garment {
         let clearance = self.shapes.iter().map(|s| 2.2 * s.diameter).fold(0.0, f64::max);
         let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, 4.0 * clearance)).collect();
         let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
-        let mut pushed = (0, String::new());
+        for (i, pose) in poses.iter_mut().enumerate() {
+            let pushed = bodies.get(i).map_or(0, |body| pose.push_out(body, clearance));
+            if pushed > 0 && i == 0 {
+                notes.push(format!("{pushed} points of the cloth were moved out of the body or off its skin"));
+            }
+        }
         for (lattice, &cloth) in self.lattices.iter().zip(&self.report.cloth) {
             if lattice.stitches == 0 {
                 continue;
             }
-            let sheets: Vec<_> = poses
-                .iter()
-                .enumerate()
-                .map(|(i, pose)| lattice.sheet(&self.surface, pose, bodies.get(i), clearance))
-                .collect();
-            if sheets[0].pushed > 0 && pushed.0 == 0 {
-                pushed.1 = self.report.panels[lattice.panel as usize].group.clone();
-            }
-            pushed.0 += sheets[0].pushed;
+            let sheets: Vec<_> = poses.iter().map(|pose| lattice.sheet(&self.surface, pose)).collect();
             let yarns = lay(&sheets, &self.shapes[cloth], self.options.tension, self.options.coordinates);
             for (frame, yarns) in laid.iter_mut().zip(yarns) {
                 frame[cloth].extend(yarns);
             }
-        }
-        if pushed.0 > 0 {
-            notes.push(format!(
-                "{} corners of stitches were moved out of the body or off its skin (first in panel `{}`)",
-                pushed.0, pushed.1
-            ));
         }
         for cloth in 0..self.options.cloths.len() {
             let own: Vec<(Way, Finish)> =

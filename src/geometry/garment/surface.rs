@@ -2,8 +2,10 @@
 //! texture coordinates.
 
 use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{
+    body::Body,
     panels::Panels,
     subdivide::{Topology, normals},
 };
@@ -46,6 +48,18 @@ pub(super) struct Pose {
 }
 
 impl Pose {
+    /// Moves points out of a body, so far from its skin; gives their number.
+    pub(super) fn push_out(&mut self, body: &Body, clearance: f64) -> usize {
+        let push = |p: &mut DVec3| match body.push_out(*p, clearance) {
+            Some(out) => {
+                *p = out;
+                1
+            }
+            None => 0,
+        };
+        self.points.par_iter_mut().with_min_len(1024).map(push).sum()
+    }
+
     /// Position and normal of a fine point of the sewn mesh.
     pub(super) fn vertex(&self, v: u32) -> (DVec3, DVec3) {
         (self.points[v as usize], self.normals[v as usize])
