@@ -15,6 +15,8 @@ mod colors;
 mod determinism;
 // Two pictures against each other: metrics, masks, thresholds, maps and pages.
 mod compare;
+// Curve files from one format to another; curves, meshes and cameras of stages in scenes; completions, manuals.
+mod convert;
 // Error against run time: files, slopes, converged pictures that are kept.
 mod converge;
 // Sequences: numbered files, moving cameras and yarns, the shutter.

@@ -35,8 +35,8 @@ const EXAMPLES: &str = "Examples:
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
   yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
-The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it).
-Lengths have no unit in these files; what reads them gives one.";
+The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it),
+.usda and .usdc (BasisCurves with widths, in millimetres). Lengths have no unit in the others; what reads them gives one.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
@@ -60,7 +60,7 @@ enum What {
 /// What all of them share.
 #[derive(Args, Debug)]
 struct Output {
-    /// Where to write; the extension names the format (.bcc, .hair, .obj, .txt). Repeatable.
+    /// Where to write; the extension names the format (.bcc, .hair, .obj, .txt, .usda, .usdc). Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required = true)]
     out: Vec<PathBuf>,
     /// Radius of the yarn.
@@ -256,7 +256,10 @@ fn write(strands: Vec<PatternStrand>, output: &Output, weft_radius: f64) -> Resu
     let set = CurveSet { curves, up_axis: Some(1), ..CurveSet::default() };
     for path in &output.out {
         if !curve_file::can_write(path) {
-            let problem = format!("error: {}: expected a name that ends in .bcc, .hair, .obj or .txt", path.display());
+            let problem = format!(
+                "error: {}: expected a name that ends in .bcc, .hair, .obj, .txt, .usda or .usdc",
+                path.display()
+            );
             return Err(Failure::Input(problem));
         }
     }

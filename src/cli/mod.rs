@@ -6,12 +6,14 @@
 mod bench;
 mod compare;
 mod converge;
+mod convert;
 mod fibers;
 mod files;
 mod garment;
 mod info;
 mod log;
 mod make;
+mod manual;
 mod merge;
 mod render;
 mod scatter;
@@ -69,10 +71,16 @@ enum Command {
     Info(info::InfoArgs),
     /// Make curve files of knitted and woven cloth.
     Make(make::MakeArgs),
+    /// Write a curve file in another format.
+    Convert(convert::ConvertArgs),
     /// Measure how a fibre, ply or yarn scatters light.
     Scatter(scatter::ScatterArgs),
     /// Run stiff and extreme cases, and tell which keep their bounds.
     Stress(stress::StressArgs),
+    /// Print completions for a shell.
+    Completions(manual::CompletionsArgs),
+    /// Write manual pages.
+    Man(manual::ManArgs),
 }
 
 /// What a command ends with besides success.
@@ -205,6 +213,9 @@ pub fn run() -> ExitCode {
         Command::Make(args) => make::run(&args),
         Command::Scatter(args) => scatter::run(&args),
         Command::Stress(args) => stress::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Completions(args) => manual::completions(&args, take_negative_numbers(Cli::command())),
+        Command::Man(args) => manual::man(&args, Cli::command()),
     };
     match result {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,

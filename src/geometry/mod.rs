@@ -13,6 +13,7 @@ pub mod proposal;
 pub mod ray;
 pub mod section;
 mod spline;
+pub mod stage;
 pub mod strand;
 pub mod tube;
 pub mod yarn;

@@ -1,7 +1,7 @@
 //! Curve files: bytes in, a [`CurveSet`] out, and back to bytes.
 //!
-//! Five formats are read: BCC (binary, Yuksel's yarn models), cyHair, PYP (periodic yarn patterns of MADYPG), lines of
-//! Wavefront OBJ, and plain text. All but PYP are written.
+//! Six formats are read: BCC (binary, Yuksel's yarn models), cyHair, PYP (periodic yarn patterns of MADYPG), lines of
+//! Wavefront OBJ, plain text, and stages (USD and Alembic, by [`super::stage`]). All but PYP and Alembic are written.
 //! Files come from strangers, so every number is checked before it is believed, memory stays a small multiple of the
 //! file's size, and small defects are repaired with a note for the user. Radii, units and the direction of up are only
 //! passed on; nothing is smoothed, scaled or sampled here.
@@ -11,6 +11,7 @@ mod hair;
 mod obj_lines;
 mod pyp;
 mod repair;
+mod staged;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -24,6 +25,7 @@ use std::path::{Path, PathBuf};
 use super::{
     curve::{Basis, CurveSet},
     pattern::tile::Tile,
+    stage::{self, PrimPattern, Stage},
 };
 
 pub use bcc::write_bcc;
@@ -32,7 +34,7 @@ pub use obj_lines::write_obj_lines;
 pub use text::write_text;
 
 /// What the file itself cannot say.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
     /// How the points of a text, cyHair or OBJ file are meant; Catmull-Rom if absent. The other formats know their own.
     pub basis: Option<Basis>,
@@ -40,12 +42,16 @@ pub struct ReadOptions {
     pub tile: [u32; 2],
     /// The largest number of control points to accept, counted before repairs and, for PYP, over all cells.
     pub max_points: u64,
+    /// Which objects of a stage (USD, Alembic) are meant; all if absent.
+    pub prim: Option<PrimPattern>,
+    /// The frame of a stage; its earliest time if absent.
+    pub frame: Option<f64>,
 }
 
 impl Default for ReadOptions {
     /// One cell, at most 2^27 points (3.2 GB of coordinates).
     fn default() -> Self {
-        Self { basis: None, tile: [1, 1], max_points: 1 << 27 }
+        Self { basis: None, tile: [1, 1], max_points: 1 << 27, prim: None, frame: None }
     }
 }
 
@@ -139,8 +145,9 @@ impl std::error::Error for CurveFileError {}
 
 /// Reads the curves of a file.
 ///
-/// The content decides first (a BCC file is known by its first three letters, cyHair by four), then the extension:
-/// `.bcc`, `.hair`, `.pyp`, `.obj`, `.txt` or `.curves`. Repairs are listed in [`CurveSet::notes`].
+/// Stages are known by their extension (`.usd`, `.usda`, `.usdc`, `.usdz`, `.abc`). Else the content decides first (a BCC
+/// file is known by its first three letters, cyHair by four), then the extension: `.bcc`, `.hair`, `.pyp`, `.obj`, `.txt`
+/// or `.curves`. Repairs are listed in [`CurveSet::notes`].
 ///
 /// # Errors
 /// The file cannot be read, is of no known format, or breaks the rules of its format.
@@ -174,13 +181,16 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
 }
 
 fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    if stage::is_stage(path) {
+        return staged::read(path, options);
+    }
     let bytes = read_bytes(path)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
         CurveFileError::new(
             FileLocation::File,
             "expected a curve file, found neither the letters BCC or HAIR nor a known extension",
         )
-        .hint("name it .bcc, .hair, .pyp, .obj, .txt or .curves after its content")
+        .hint("name it .bcc, .hair, .pyp, .obj, .txt, .curves, .usda, .usdc, .usdz or .abc after its content")
     })?;
     parse(&bytes, format, options)
 }
@@ -244,22 +254,27 @@ fn written_as(path: &Path) -> Option<Format> {
 
 /// Whether [`write()`] knows a format by this name.
 pub fn can_write(path: &Path) -> bool {
-    written_as(path).is_some()
+    written_as(path).is_some() || staged::can_write(path)
 }
 
-/// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.txt`, `.curves`) to `out`.
+/// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.txt`, `.curves`, `.usda`,
+/// `.usdc`, `.usd`) to `out`.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] if there is no such format or the curves do not fit it; whatever `out` reports.
 pub fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
+    if staged::can_write(path) {
+        return staged::write(path, set, out);
+    }
     match written_as(path) {
         Some(Format::Bcc) => write_bcc(set, out),
         Some(Format::Hair) => write_hair(set, out),
         Some(Format::Obj) => write_obj_lines(set, out),
         Some(Format::Text) => write_text(set, out),
-        Some(Format::Pyp) | None => {
-            Err(io::Error::new(io::ErrorKind::InvalidInput, "a curve file ends in .bcc, .hair, .obj or .txt"))
-        }
+        Some(Format::Pyp) | None => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "a curve file ends in .bcc, .hair, .obj, .txt, .usda or .usdc",
+        )),
     }
 }
 

@@ -265,7 +265,7 @@ fn fuzz(format: Format, seeds: Vec<Vec<u8>>) {
         Err(_) => FUZZ_CASES,
     };
     let options = (prop::sample::select(BASES), [1..5_u32, 1..5_u32], 1..200_u64)
-        .prop_map(|(basis, tile, max_points)| ReadOptions { basis, tile, max_points });
+        .prop_map(|(basis, tile, max_points)| ReadOptions { basis, tile, max_points, ..ReadOptions::default() });
     let strategy = (prop::sample::select(seeds), prop::collection::vec(Damage::strategy(), 0..6), options);
     let config = Config { cases, failure_persistence: None, ..Config::default() };
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));

@@ -9,12 +9,14 @@ pub mod chart;
 mod contact;
 pub mod draft;
 pub mod knit;
+pub mod knitspeak;
 pub mod overlap;
 mod relax;
 pub mod revolution;
 mod rods;
 pub mod tile;
 pub mod weave;
+pub mod wif;
 
 use glam::DVec3;
 

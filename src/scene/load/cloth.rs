@@ -13,6 +13,7 @@ use super::{
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan, FabricCoordinates},
     garment::{self, GarmentPlan},
+    mesh::prim_pattern,
     pattern::{self, KnitPlan, WeavePlan},
     placement, radians, sequence,
     yarns::Library,
@@ -181,6 +182,7 @@ fn file_source(
     if let Some(table) = table {
         let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
         options.basis = table.one_of("basis", &bases);
+        options.prim = prim_pattern(table);
         up = table.one_of_or("up", Up::Auto, &[("auto", Up::Auto), ("y", Up::Y), ("z", Up::Z)]);
         if let Some(tile) = table.numbers("tile", Range::between(1.0, 100_000.0)) {
             match tile.as_slice() {
@@ -367,8 +369,8 @@ impl FabricPlan {
                 vec![Made::new(format!("{count} straight"), kind, curves, None)]
             }
             Source::File(file) => {
-                let mut read = |path: &Path| {
-                    let (set, scale) = file.read(path, context, warnings)?;
+                let mut read = |path: &Path, frame: Option<f64>| {
+                    let (set, scale) = file.read(path, frame, context, warnings)?;
                     let own_radii = |mut curve: Curve| {
                         let given = curve.radii.take().filter(|_| self.radius.is_none());
                         let radii = given.map_or_else(
@@ -427,8 +429,15 @@ impl FabricPlan {
 
 impl CurveFile {
     /// Reads one file; points become millimetres. Gives the scale, by which radii have not been multiplied yet.
-    fn read(&self, path: &Path, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<(CurveSet, f64)> {
-        let mut set = match curve_file::read(path, &self.options) {
+    fn read(
+        &self,
+        path: &Path,
+        frame: Option<f64>,
+        context: &Context<'_>,
+        warnings: &mut Vec<String>,
+    ) -> Option<(CurveSet, f64)> {
+        let options = ReadOptions { frame, ..self.options.clone() };
+        let mut set = match curve_file::read(path, &options) {
             Ok(set) => set,
             Err(error) => {
                 context.error(self.span, error.to_string(), None);
@@ -442,13 +451,19 @@ impl CurveFile {
             context.error(self.span, format!("{}: it holds no curve that can be drawn", path.display()), hint);
             return None;
         }
-        warnings.extend(set.notes.iter().map(|note| format!("{}: {note}", path.display())));
+        let mut note = |text: String| {
+            // Of a stage that is read at several times, once.
+            if !warnings.contains(&text) {
+                warnings.push(text);
+            }
+        };
+        set.notes.iter().for_each(|text| note(format!("{}: {text}", path.display())));
         // What a file knows of itself is so, whatever the scene says, which may have been written for another file.
         if let (Some(own), Some(asked)) = (set.unit_mm, self.unit)
             && own != asked
         {
             let path = path.display();
-            warnings.push(format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"));
+            note(format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"));
         }
         let scale = set.unit_mm.or(self.unit).unwrap_or(context.unit);
         set.curves.par_iter_mut().for_each(|c| c.points.iter_mut().for_each(|p| *p *= scale));

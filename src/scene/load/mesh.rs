@@ -1,6 +1,10 @@
 //! `[[mesh]]` and `[material.NAME]`: what stands beside the cloth or under it.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -9,7 +13,11 @@ use super::{
     Context, Range, Reader, UNITS, placement,
 };
 use crate::{
-    geometry::{mesh::Mesh, obj},
+    geometry::{
+        mesh::Mesh,
+        obj,
+        stage::{self, PrimPattern, Stage},
+    },
     image::texture::Texture,
     input::diagnostic::Span,
     math::Rgb,
@@ -106,8 +114,21 @@ impl MaterialPlan {
 }
 
 enum Source {
-    File { path: PathBuf, span: Span, scale: f64, z_up: bool },
+    File(MeshFile),
     Shape(&'static str, Mesh),
+}
+
+/// A mesh file as it is named.
+struct MeshFile {
+    path: PathBuf,
+    span: Span,
+    /// Millimetres, where the scene says so.
+    unit: Option<f64>,
+    /// Whether z points up, where the scene says so.
+    z_up: Option<bool>,
+    /// Which meshes of a stage.
+    prim: Option<PrimPattern>,
+    frame: u32,
 }
 
 /// A mesh whose text is sound and whose file is not read yet.
@@ -119,11 +140,16 @@ pub(super) struct MeshPlan {
 }
 
 /// Reads every `[[mesh]]`.
-pub(super) fn meshes(root: &Reader<'_>, context: &Context<'_>, materials: &Materials) -> Vec<Option<MeshPlan>> {
-    root.tables("mesh").into_iter().map(|table| mesh(table, context, materials)).collect()
+pub(super) fn meshes(
+    root: &Reader<'_>,
+    context: &Context<'_>,
+    materials: &Materials,
+    frame: u32,
+) -> Vec<Option<MeshPlan>> {
+    root.tables("mesh").into_iter().map(|table| mesh(table, context, materials, frame)).collect()
 }
 
-fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<MeshPlan> {
+fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: u32) -> Option<MeshPlan> {
     let transform = placement(&table, context);
     let material = material_of(&table, context, materials);
     let mut smooth = false;
@@ -135,10 +161,11 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials) -> Opti
         }
         (Some(path), false) => {
             let span = table.span("path").unwrap_or(table.header());
-            let scale = table.one_of("unit", &UNITS).unwrap_or(context.unit);
-            let z_up = table.one_of_or("up", false, &[("y", false), ("z", true)]);
+            let unit = table.one_of("unit", &UNITS);
+            let z_up = table.one_of("up", &[("y", false), ("z", true)]);
+            let prim = prim_pattern(&table);
             smooth = table.bool_or("smooth", false);
-            Some(Source::File { path: context.resolve(path, span), span, scale, z_up })
+            Some(Source::File(MeshFile { path: context.resolve(path, span), span, unit, z_up, prim, frame }))
         }
         (None, true) => shape(&table, context),
         (None, false) => {
@@ -209,19 +236,50 @@ fn profile(table: &Reader<'_>, context: &Context<'_>) -> Option<Vec<DVec2>> {
     None
 }
 
+/// Meshes of a stage as one, millimetres of its unit and the axis that points up.
+fn of_stage(path: &Path, prim: Option<&PrimPattern>, frame: f64) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
+    let stage = Stage::open(path).map_err(|e| e.to_string())?;
+    let mesh = stage.mesh(prim.unwrap_or(&PrimPattern::all()), Some(frame)).map_err(|e| e.to_string())?;
+    if mesh.counts.is_empty() {
+        let known = stage.contents().map_err(|e| e.to_string())?.meshes;
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        return Err(format!("{}: no visible mesh is chosen; meshes here: {known}", path.display()));
+    }
+    Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
+}
+
+/// `prim`: which objects of a stage.
+pub(super) fn prim_pattern(table: &Reader<'_>) -> Option<PrimPattern> {
+    let text = table.string("prim")?;
+    match PrimPattern::parse(text) {
+        Ok(pattern) => Some(pattern),
+        Err(problem) => {
+            table.error_at("prim", problem, Some("prim = \"/Garment/*\""));
+            None
+        }
+    }
+}
+
 impl MeshPlan {
     /// Reads the file, if there is one, and puts the mesh in its place.
     pub(super) fn make(self, context: &Context<'_>, materials: &mut Vec<(MaterialPlan, Material)>) -> Option<Object> {
         let (origin, mut mesh) = match self.source {
             Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
-            Source::File { path, span, scale, z_up } => {
-                let mut mesh = match obj::read(&path) {
-                    Ok(mesh) => mesh,
+            Source::File(MeshFile { path, span, unit, z_up, prim, frame }) => {
+                let read = if stage::is_stage(&path) {
+                    of_stage(&path, prim.as_ref(), f64::from(frame))
+                } else {
+                    obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
+                };
+                let (mut mesh, own_unit, up_axis) = match read {
+                    Ok(read) => read,
                     Err(error) => {
-                        context.error(span, error.to_string(), None);
+                        context.error(span, error, None);
                         return None;
                     }
                 };
+                let scale = unit.or(own_unit).unwrap_or(context.unit);
+                let z_up = z_up.unwrap_or(up_axis == Some(2));
                 let up =
                     if z_up { DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DAffine3::IDENTITY };
                 mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));

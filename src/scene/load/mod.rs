@@ -12,6 +12,7 @@ mod motion;
 mod pattern;
 mod sequence;
 mod settings;
+mod stage_camera;
 mod view;
 mod yarns;
 
@@ -304,8 +305,8 @@ impl Plans {
         };
         let fabrics = tables.into_iter().enumerate().map(fabric).collect();
         let materials = mesh::materials(root, context);
-        let meshes = mesh::meshes(root, context, &materials);
-        let camera = view::camera(root, context, options.frame);
+        let meshes = mesh::meshes(root, context, &materials, detail.frame);
+        let camera = view::camera(root, context, options.frame, detail.frame);
         detail.survey = options.survey;
         detail.shutter = camera.as_ref().and_then(|camera| camera.motion.shutter);
         let lights = view::lights(root, context);

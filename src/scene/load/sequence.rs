@@ -1,5 +1,5 @@
-//! Curve files that are numbered by frame: the curves of one, how they move while the shutter is open, and how they lie
-//! at rest.
+//! Curves that move: files numbered by frame and stages with times. The curves of one frame, how they move while the
+//! shutter is open, and how they lie at rest.
 
 use std::{
     collections::BTreeMap,
@@ -16,18 +16,23 @@ use super::{
     Context,
     cloth::{CurveFile, Detail},
 };
-use crate::geometry::curve::Curve;
+use crate::geometry::{curve::Curve, stage};
 
 /// Curves with their radii, millimetres.
 type Curves = Vec<(Curve, Vec<f64>)>;
 
-/// Reads the curves of a file, or of the file of the frame. Gives the file's name as well.
+/// Reads the curves of a file at a frame, or of the file of the frame. Gives the file's name as well. `read` takes a file
+/// and, of a stage, a frame (`None` for its first).
 pub(super) fn read(
     file: &CurveFile,
     detail: &Detail,
     context: &Context<'_>,
-    read: &mut impl FnMut(&Path) -> Option<Curves>,
+    read: &mut impl FnMut(&Path, Option<f64>) -> Option<Curves>,
 ) -> Option<(PathBuf, Curves, FabricMotion)> {
+    if stage::is_stage(&file.path) && file.path.exists() {
+        return of_stage(file, detail, context, read);
+    }
+    let read = &mut |path: &Path| read(path, None);
     let own = numbered(&file.path, detail.frame).filter(|_| !file.path.exists());
     let rest_of = |curves: &Curves, rest: Curves| same_shape(curves, &rest).map(|()| points_of(rest));
     let tell = |problem: String, other: &Path| {
@@ -78,8 +83,7 @@ pub(super) fn read(
         later.clear();
     }
     if !later.is_empty() && !detail.can_move {
-        let message = "yarns that move while the shutter is open need mode = \"yarn\"";
-        context.error(file.span, message, Some("shutter = [0, 0] shows them at the frame's own time".to_owned()));
+        context.error(file.span, CANNOT_MOVE, Some(CANNOT_MOVE_HINT.to_owned()));
         return None;
     }
     for ((curve, _), points) in curves.iter_mut().zip(first) {
@@ -100,6 +104,45 @@ pub(super) fn read(
     };
     Some((own, curves, FabricMotion { later, rest }))
 }
+
+/// The curves of a stage while the shutter is open; plies wind as in its first frame, or in the file `rest`.
+fn of_stage(
+    file: &CurveFile,
+    detail: &Detail,
+    context: &Context<'_>,
+    read: &mut impl FnMut(&Path, Option<f64>) -> Option<Curves>,
+) -> Option<(PathBuf, Curves, FabricMotion)> {
+    let tell = |problem: String| {
+        let message = format!("{}: {problem}", file.path.display());
+        context.error(file.span, message, Some("yarns keep their points from frame to frame".to_owned()));
+    };
+    let times = times(detail.frame, detail.shutter);
+    let curves = read(&file.path, Some(times[0]))?;
+    let mut later = Vec::with_capacity(times.len() - 1);
+    for &time in &times[1..] {
+        let pose = read(&file.path, Some(time))?;
+        same_shape(&curves, &pose).map_err(tell).ok()?;
+        later.push(points_of(pose));
+    }
+    let first = points_of(curves.clone());
+    if later.iter().all(|points| *points == first) {
+        later.clear();
+    }
+    if !later.is_empty() && !detail.can_move {
+        context.error(file.span, CANNOT_MOVE, Some(CANNOT_MOVE_HINT.to_owned()));
+        return None;
+    }
+    let rest = match &file.rest {
+        Some(path) => read(path, None)?,
+        None => read(&file.path, None)?,
+    };
+    same_shape(&curves, &rest).map_err(tell).ok()?;
+    let rest = Some(points_of(rest)).filter(|rest| *rest != first || !later.is_empty());
+    Some((file.path.clone(), curves, FabricMotion { later, rest }))
+}
+
+const CANNOT_MOVE: &str = "yarns that move while the shutter is open need mode = \"yarn\"";
+const CANNOT_MOVE_HINT: &str = "shutter = [0, 0] shows them at the frame's own time";
 
 /// Times at which to know the curves, evenly spaced from the opening of the shutter to its closing, in frames.
 pub(super) fn times(frame: u32, shutter: Option<[f64; 2]>) -> Vec<f64> {

@@ -15,7 +15,7 @@ use super::{
     },
     Context, Range, Reader,
     mesh::{MaterialPlan, Materials, material_of},
-    motion, radians,
+    motion, radians, stage_camera,
 };
 use crate::{
     image,
@@ -24,13 +24,13 @@ use crate::{
     math::{Rgb, frame::orthonormal_basis},
 };
 
-/// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth. With `frame` asked for, it goes to
-/// the face of flat cloth that it would see from the edge.
-pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraSetup> {
-    read_camera(root, context, frame).map(|setup| CameraSetup { faces_cloth: frame, ..setup })
+/// Reads `camera = "frame"` or `[camera]`; without either the camera frames the cloth. `number` is that of the frame in a
+/// sequence. With `frame` asked for, it goes to the face of flat cloth that it would see from the edge.
+pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u32) -> Option<CameraSetup> {
+    read_camera(root, context, frame, number).map(|setup| CameraSetup { faces_cloth: frame, ..setup })
 }
 
-fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<CameraSetup> {
+fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u32) -> Option<CameraSetup> {
     let Some(node) = root.node("camera") else { return Some(CameraSetup::default()) };
     if let Value::String(word) = &node.value {
         if word != "frame" {
@@ -43,11 +43,16 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool) -> Option<
         return Some(CameraSetup::default());
     }
     let table = root.table("camera")?;
-    let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2)];
+    let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2), ("usd", 3)];
     let Some(kind) = table.kind_or("type", 0, &kinds) else {
         table.finish();
         return None;
     };
+    if kind == 3 {
+        let setup = stage_camera::camera(&table, context, number);
+        table.finish();
+        return setup.map(|s| if frame { CameraSetup { margin: Some(defaults::MARGIN), aim: None, ..s } } else { s });
+    }
     let up = DVec3::from(table.vec3_or("up", defaults::UP, Range::FINITE));
     let fov = |table: &Reader<'_>| {
         Projection::Perspective(radians(table.f64_or(

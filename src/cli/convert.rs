@@ -1,0 +1,170 @@
+//! `yarnray convert`: curve files from one format to another.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{Failure, files::Files, log, make::write_curves};
+use crate::geometry::{
+    curve::{Basis, CurveSet},
+    curve_file::{self, ReadOptions},
+    stage::PrimPattern,
+};
+
+const EXAMPLES: &str = "Examples:
+  yarnray convert glove.bcc glove.usdc --unit cm --radius 0.08     curves for Blender, Houdini and usdview
+  yarnray convert cloth.usdc yarns.bcc --prim '/Garment/*'         some prims of a stage
+  yarnray convert braid.abc braid.hair --frame 12                  one frame of an Alembic archive
+  yarnray convert stockinette.pyp patch.usda --tile 8,12           a periodic pattern, repeated
+
+Read: .bcc .hair .obj .pyp .txt .usd .usda .usdc .usdz .abc. Written: .bcc .hair .obj .txt .usda .usdc .usd.
+What a format cannot hold is said.";
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct ConvertArgs {
+    /// The curve file to read.
+    input: PathBuf,
+    /// Where to write; the extension names the format.
+    output: PathBuf,
+    /// The input's unit, where its format has none; files that have a unit say it themselves.
+    #[arg(long, value_parser = ["um", "mm", "cm", "m", "in"])]
+    unit: Option<String>,
+    /// The unit to write in; that of the input if not given.
+    #[arg(long, value_parser = ["um", "mm", "cm", "m", "in"])]
+    to_unit: Option<String>,
+    /// Which objects of a stage, such as '/Garment/*' or 'material:/Looks/Wool'.
+    #[arg(long, value_name = "PATTERN", value_parser = PrimPattern::parse)]
+    prim: Option<PrimPattern>,
+    /// The frame of a stage; its first if not given.
+    #[arg(long, value_name = "N")]
+    frame: Option<f64>,
+    /// How points are meant where the input does not say.
+    #[arg(long, value_parser = ["catmull-rom", "b-spline"])]
+    basis: Option<String>,
+    /// How often a periodic pattern (.pyp) is repeated, across and up.
+    #[arg(long, value_name = "N,M", value_parser = counts)]
+    tile: Option<[u32; 2]>,
+    /// Radius of curves that have none, in the input's unit.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    radius: Option<f64>,
+    /// Say nothing.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+fn counts(text: &str) -> Result<[u32; 2], String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n| *n > 0)).collect();
+    numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| "expected two whole numbers, as in 8,12".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+/// Millimetres of a unit by its name, which clap has checked.
+fn millimetres(unit: &str) -> f64 {
+    match unit {
+        "um" => 1e-3,
+        "cm" => 10.0,
+        "m" => 1000.0,
+        "in" => 25.4,
+        _ => 1.0,
+    }
+}
+
+/// What a format can say.
+struct Abilities {
+    radii: bool,
+    unit: bool,
+    bases: &'static [Basis],
+}
+
+/// By the extension of a file that can be written.
+fn abilities(path: &Path) -> Abilities {
+    let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    match extension.as_deref() {
+        Some("bcc") => Abilities { radii: false, unit: false, bases: all },
+        Some("hair") => Abilities { radii: true, unit: false, bases: &[Basis::CatmullRom] },
+        Some("obj") => Abilities { radii: false, unit: false, bases: &[] },
+        Some("usd" | "usda" | "usdc") => Abilities { radii: true, unit: true, bases: all },
+        _ => Abilities { radii: true, unit: false, bases: &[] },
+    }
+}
+
+/// What is lost on the way to a file, one line each.
+fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
+    let can = abilities(path);
+    let mut lost = Vec::new();
+    if !can.radii && set.curves.iter().any(|c| c.radii.is_some()) {
+        lost.push("radii are lost: the format has none".to_owned());
+    }
+    if !can.unit && set.unit_mm.is_some_and(|unit| unit != 1.0) {
+        let unit = set.unit_mm.unwrap_or(1.0);
+        lost.push(format!("the unit is lost: lengths are of {unit} mm, which whoever reads them must know"));
+    }
+    if set.curves.iter().any(|c| c.flattening.is_some()) {
+        lost.push("flat sections are lost: yarns are round, as wide as they were".to_owned());
+    }
+    if set.curves.iter().any(|c| !can.bases.contains(&c.basis)) {
+        lost.push("how points are meant is lost: give it as `basis` where the file is read".to_owned());
+    }
+    lost
+}
+
+pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    if !curve_file::can_write(&args.output) {
+        let known = ".bcc, .hair, .obj, .txt, .usda or .usdc";
+        let problem = format!("error: {}: expected a name that ends in {known}", args.output.display());
+        return Err(Failure::Input(problem));
+    }
+    Files::default().reads("input", [&args.input]).writes("output", [&args.output]).check(args.quiet)?;
+    let basis = args.basis.as_deref().map(|b| if b == "b-spline" { Basis::BSpline } else { Basis::CatmullRom });
+    let options = ReadOptions {
+        basis,
+        tile: args.tile.unwrap_or([1, 1]),
+        prim: args.prim.clone(),
+        frame: args.frame,
+        ..ReadOptions::default()
+    };
+    let mut set = curve_file::read(&args.input, &options).map_err(|e| Failure::Input(format!("error: {e}")))?;
+    if set.curves.is_empty() {
+        return Err(Failure::Input(format!("error: {}: there are no curves in it", args.input.display())));
+    }
+    if let (Some(_), Some(given)) = (&args.unit, set.unit_mm) {
+        let message = format!("error: {}: its unit is {given} mm already; leave --unit out", args.input.display());
+        return Err(Failure::Input(message));
+    }
+    set.unit_mm = set.unit_mm.or(args.unit.as_deref().map(millimetres));
+    if let Some(radius) = args.radius {
+        for curve in set.curves.iter_mut().filter(|c| c.radii.is_none()) {
+            curve.radii = Some(vec![radius; curve.points.len()]);
+        }
+    }
+    if let Some(unit) = args.to_unit.as_deref().map(millimetres) {
+        let scale = set.unit_mm.unwrap_or(1.0) / unit;
+        for curve in &mut set.curves {
+            curve.points.iter_mut().for_each(|p| *p *= scale);
+            curve.radii.iter_mut().flatten().for_each(|r| *r *= scale);
+        }
+        set.unit_mm = Some(unit);
+    }
+    if set.up_axis == Some(2) {
+        // Files of this program have y up: a quarter turn about x.
+        for curve in &mut set.curves {
+            let turned = curve.points.iter_mut().chain(curve.flattening.iter_mut().flatten());
+            turned.for_each(|p| *p = glam::DVec3::new(p.x, p.z, -p.y));
+        }
+        set.up_axis = Some(1);
+    }
+    write_curves(&args.output, &set)?;
+    if !args.quiet {
+        for line in set.notes.iter().cloned().chain(losses(&args.output, &set)) {
+            log::say(&format!("{}: {line}", args.output.display()));
+        }
+        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+        log::say(&format!("wrote {}: {} curves, {points} points", args.output.display(), set.curves.len()));
+    }
+    Ok(())
+}

@@ -1,0 +1,56 @@
+//! `yarnray completions` and `yarnray man`: what shells and manual pages know of the command line.
+
+use std::{io::Write as _, path::PathBuf};
+
+use clap::{Args, Command};
+use clap_complete::Shell;
+
+use super::{Failure, log, terminal::print};
+use crate::image::output;
+
+const COMPLETIONS: &str = "Examples:
+  yarnray completions bash > ~/.local/share/bash-completion/completions/yarnray
+  yarnray completions zsh > ~/.zfunc/_yarnray
+  yarnray completions fish > ~/.config/fish/completions/yarnray.fish";
+
+#[derive(Args, Debug)]
+#[command(after_help = COMPLETIONS)]
+pub(super) struct CompletionsArgs {
+    /// Whose completions to print.
+    shell: Shell,
+}
+
+const MAN: &str = "Example:
+  yarnray man ~/.local/share/man/man1      then: man yarnray, man yarnray-render";
+
+#[derive(Args, Debug)]
+#[command(after_help = MAN)]
+pub(super) struct ManArgs {
+    /// The folder for the pages; it is made if it is not there.
+    folder: PathBuf,
+}
+
+pub(super) fn completions(args: &CompletionsArgs, mut command: Command) -> Result<(), Failure> {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut command, "yarnray", &mut text);
+    print(&String::from_utf8_lossy(&text))
+}
+
+/// One page for the program and one for each command.
+pub(super) fn man(args: &ManArgs, mut command: Command) -> Result<(), Failure> {
+    command.build();
+    let mut pages = vec![("yarnray".to_owned(), command.clone())];
+    let own = command.get_subcommands().filter(|c| c.get_name() != "help");
+    pages.extend(own.map(|c| (format!("yarnray-{}", c.get_name()), c.clone())));
+    for (name, page) in pages {
+        let path = args.folder.join(format!("{name}.1"));
+        output::check_target(&path)?;
+        output::write_file(&path, |file| {
+            let mut text = Vec::new();
+            clap_mangen::Man::new(page).title(&name).render(&mut text)?;
+            file.write_all(&text)
+        })?;
+        log::say(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}

@@ -1,0 +1,452 @@
+//! Alembic archives in the Ogawa container: curves and polygon meshes with their transforms.
+//!
+//! The layout was taken from the sources of Alembic 1.8 (lib/Alembic/AbcCoreOgawa and lib/Alembic/Ogawa). Archives have
+//! neither unit nor up axis; times are seconds, which count [`FRAMES_PER_SECOND`] frames here.
+
+mod ogawa;
+mod property;
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+use glam::{DMat4, DVec2, DVec3};
+
+use super::{
+    AddCurves, AddMesh, Contents, MAX_DEPTH, PolygonMesh, PrimPattern, Problem,
+    curves::{Batch, Spread, StageBasis, Wrap},
+    polygons::AtCorners,
+};
+use ogawa::{Bytes, Cursor, Group};
+pub(super) use ogawa::{HDF5_MAGIC, MAGIC};
+use property::Compound;
+
+/// Frames of a second where the archive does not say.
+const FRAMES_PER_SECOND: f64 = 24.0;
+/// Objects that are read at most.
+const MAX_OBJECTS: usize = 1 << 22;
+
+/// When the samples of a property are, in seconds.
+#[derive(Clone, Debug, PartialEq)]
+struct TimeSampling {
+    /// Seconds of a cycle, and the times in it; times without end where it is not cyclic.
+    cycle: f64,
+    times: Vec<f64>,
+}
+
+impl TimeSampling {
+    fn time(&self, i: u32) -> f64 {
+        let n = self.times.len();
+        // A time per cycle beyond all others says that there are no cycles.
+        if self.cycle > 1e100 {
+            return self.times[(i as usize).min(n - 1)];
+        }
+        self.times[i as usize % n] + (i as usize / n) as f64 * self.cycle
+    }
+
+    /// The sample before a time, and how far it is from there to the next.
+    fn around(&self, time: f64, samples: u32) -> (u32, f64) {
+        let last = samples.saturating_sub(1);
+        let (mut low, mut high) = (0, last);
+        while low < high {
+            let middle = low + (high - low).div_ceil(2);
+            // Times that were rounded are meant.
+            if self.time(middle) <= time + 1e-6 { low = middle } else { high = middle - 1 }
+        }
+        if low == last {
+            return (last, 0.0);
+        }
+        let (before, after) = (self.time(low), self.time(low + 1));
+        let share = if after > before { ((time - before) / (after - before)).clamp(0.0, 1.0) } else { 0.0 };
+        (low, if share < 1e-6 { 0.0 } else { share })
+    }
+}
+
+/// An archive in memory.
+pub(super) struct Archive {
+    bytes: Vec<u8>,
+    samplings: Vec<TimeSampling>,
+    /// Words that many headers share.
+    metadata: Vec<String>,
+}
+
+impl fmt::Debug for Archive {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "Archive of {} bytes", self.bytes.len())
+    }
+}
+
+/// An object on the way through an archive.
+struct Object<'a> {
+    path: String,
+    name: &'a str,
+    schema: &'a str,
+    properties: Option<Compound<'a>>,
+    to_stage: DMat4,
+    /// Its children, of which some schemas know more.
+    group: Group<'a>,
+}
+
+type Visit<'v> = dyn FnMut(&Object<'_>, bool) -> Result<(), Problem> + 'v;
+
+impl Archive {
+    pub(super) fn new(bytes: Vec<u8>) -> Result<Self, Problem> {
+        if bytes.starts_with(HDF5_MAGIC) {
+            return Err(Problem::new(
+                "is Alembic in the HDF5 container, which is not supported: convert it with `abcconvert -toOgawa IN OUT`",
+            ));
+        }
+        let mut archive = Self { bytes, samplings: Vec::new(), metadata: vec![String::new()] };
+        let root = Bytes(&archive.bytes).root()?;
+        let mut samplings = Vec::new();
+        let mut cursor = Cursor::new(root.data(4)?);
+        while !cursor.is_empty() {
+            let _samples = cursor.u32()?;
+            let cycle = cursor.f64()?;
+            let count = cursor.u32()? as usize;
+            let times = cursor.take(count.saturating_mul(8))?;
+            let times: Vec<f64> =
+                times.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect();
+            if times.is_empty() || times.iter().chain([&cycle]).any(|t| !t.is_finite()) {
+                return Err(Problem::new("a list of times is empty or not finite"));
+            }
+            samplings.push(TimeSampling { cycle, times });
+        }
+        let mut metadata = vec![String::new()];
+        let mut cursor = Cursor::new(root.data(5)?);
+        while !cursor.is_empty() {
+            let length = cursor.u8()?;
+            metadata.push(cursor.text(length.into())?);
+        }
+        (archive.samplings, archive.metadata) = (samplings, metadata);
+        Ok(archive)
+    }
+
+    /// First and last frame of all that changes.
+    pub(super) fn frames(&self) -> Option<[f64; 2]> {
+        let mut ends: Option<[f64; 2]> = None;
+        let everything = PrimPattern::all();
+        let seen = self.walk(&everything, None, &mut |object, _| {
+            let Some(properties) = &object.properties else { return Ok(()) };
+            for (schema, name) in [(".geom", "P"), (".xform", ".vals")] {
+                let Some(own) = properties.compound(schema, &self.metadata)? else { continue };
+                if let Some((sampling, samples)) = own.times(name, &self.samplings).filter(|(_, n)| *n > 1) {
+                    let [first, last] = [0, samples - 1].map(|i| sampling.time(i) * FRAMES_PER_SECOND);
+                    ends = Some(ends.map_or([first, last], |e| [e[0].min(first), e[1].max(last)]));
+                }
+            }
+            Ok(())
+        });
+        seen.ok().and(ends)
+    }
+
+    pub(super) fn contents(&self) -> Result<Contents, Problem> {
+        let mut contents = Contents::default();
+        self.walk(&PrimPattern::all(), None, &mut |object, _| {
+            let list = match object.schema {
+                CURVES => &mut contents.curves,
+                MESH => &mut contents.meshes,
+                CAMERA => &mut contents.cameras,
+                _ => return Ok(()),
+            };
+            list.push(object.path.clone());
+            Ok(())
+        })?;
+        Ok(contents)
+    }
+
+    /// Hands over all visible curves; gives notes for the user.
+    pub(super) fn curves(
+        &self,
+        pattern: &PrimPattern,
+        frame: Option<f64>,
+        add: &mut AddCurves<'_>,
+    ) -> Result<Vec<String>, Problem> {
+        let time = frame.map(|f| f / FRAMES_PER_SECOND);
+        self.walk(pattern, time, &mut |object, visible| {
+            if object.schema != CURVES || !visible {
+                return Ok(());
+            }
+            let batch = self.batch(object, time).map_err(|p| p.at(&object.path))?;
+            batch.map_or(Ok(()), |batch| add(&object.path, batch, &object.to_stage))
+        })?;
+        Ok(Vec::new())
+    }
+
+    /// Hands over all visible meshes; gives notes for the user.
+    pub(super) fn meshes(
+        &self,
+        pattern: &PrimPattern,
+        frame: Option<f64>,
+        add: &mut AddMesh<'_>,
+    ) -> Result<Vec<String>, Problem> {
+        let time = frame.map(|f| f / FRAMES_PER_SECOND);
+        self.walk(pattern, time, &mut |object, visible| {
+            if object.schema != MESH || !visible {
+                return Ok(());
+            }
+            let mesh = self.mesh(object, time).map_err(|p| p.at(&object.path))?;
+            mesh.map_or(Ok(()), |mesh| add(&object.path, mesh))
+        })?;
+        Ok(Vec::new())
+    }
+
+    /// Visits the objects that are chosen, and whether they are visible.
+    fn walk(&self, pattern: &PrimPattern, time: Option<f64>, visit: &mut Visit<'_>) -> Result<(), Problem> {
+        let top = Bytes(&self.bytes).root()?.group(2)?;
+        let mut walk = Walk { archive: self, pattern, time, left: MAX_OBJECTS };
+        walk.children(top, "", DMat4::IDENTITY, [false, true], 0, visit)
+    }
+
+    fn batch(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<Batch>, Problem> {
+        let Some(geometry) = self.geometry(object)? else { return Ok(None) };
+        let numbers = |name: &str| self.numbers(&geometry, name, time);
+        let points = numbers("P")?.unwrap_or_default();
+        let counts = geometry.at("nVertices", time, &self.samplings)?;
+        let counts = counts.map_or(Ok(Vec::new()), |around| around.before.integers("nVertices"))?;
+        let kind = numbers("curveBasisAndType")?.unwrap_or_default();
+        let code = |i: usize| kind.get(i).map_or(0, |&x| x as i64);
+        let basis = match (code(0), code(2)) {
+            (1, _) => StageBasis::Linear,
+            (0, 1) => StageBasis::Bezier,
+            (0, 2) => StageBasis::BSpline,
+            (0, 3) => StageBasis::CatmullRom,
+            (0, other) => return Err(Problem::new(format!("cubic curves of basis {other} are not read"))),
+            (other, _) => {
+                return Err(Problem::new(format!("curves of type {other} are not read; linear and cubic are")));
+            }
+        };
+        let wrap = if code(1) == 1 { Wrap::Periodic } else { Wrap::NonPeriodic };
+        let widths = self.indexed(&geometry, "width", time)?.map(|widths| {
+            let spread = spread_of(geometry.metadata("width"), Spread::Constant);
+            let values = match widths.indices {
+                Some(indices) => indices.iter().map(|&i| widths.values[i as usize]).collect(),
+                None => widths.values,
+            };
+            (values, spread)
+        });
+        Ok(Some(Batch { basis, wrap, counts, points: vectors(&points, "P")?, widths }))
+    }
+
+    fn mesh(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<PolygonMesh>, Problem> {
+        let Some(geometry) = self.geometry(object)? else { return Ok(None) };
+        let integers = |name: &str| -> Result<Vec<i64>, Problem> {
+            let around = geometry.at(name, time, &self.samplings)?;
+            around.map_or(Ok(Vec::new()), |around| around.before.integers(name))
+        };
+        let points = vectors(&self.numbers(&geometry, "P", time)?.unwrap_or_default(), "P")?;
+        let mut mesh = PolygonMesh::new(points, &integers(".faceCounts")?, &integers(".faceIndices")?)?;
+        if let Some(uv) = self.indexed(&geometry, "uv", time)? {
+            let values = uv.values.chunks_exact(2).map(|p| DVec2::new(p[0], p[1])).collect();
+            let spread = spread_of(geometry.metadata("uv"), Spread::FaceVarying);
+            mesh.set_uvs(at_corners(&mesh, "uv", AtCorners { values, indices: uv.indices }, spread)?)?;
+        }
+        if let Some(n) = self.indexed(&geometry, "N", time)? {
+            let values = vectors(&n.values, "N")?;
+            let spread = spread_of(geometry.metadata("N"), Spread::FaceVarying);
+            let normals = at_corners(&mesh, "N", AtCorners { values, indices: n.indices }, spread)?;
+            mesh.set_normals(&normals);
+        }
+        for (i, (name, schema)) in self.child_headers(object.group)?.iter().enumerate() {
+            if schema == FACE_SET {
+                let properties = self.properties(object.group.group(i + 1)?)?;
+                let own = properties.as_ref().map(|p| p.compound(".faceset", &self.metadata)).transpose()?.flatten();
+                let faces = own.map(|own| own.at(".faces", time, &self.samplings)).transpose()?.flatten();
+                if let Some(faces) = faces {
+                    mesh.add_group(name, &faces.before.integers(".faces")?)?;
+                }
+            }
+        }
+        mesh.group_the_rest(object.name);
+        // Alembic winds its faces clockwise.
+        mesh.place(&object.to_stage, true);
+        Ok(Some(mesh))
+    }
+
+    fn geometry<'a>(&self, object: &Object<'a>) -> Result<Option<Compound<'a>>, Problem> {
+        object.properties.as_ref().map_or(Ok(None), |p| p.compound(".geom", &self.metadata))
+    }
+
+    fn numbers(&self, own: &Compound<'_>, name: &str, time: Option<f64>) -> Result<Option<Vec<f64>>, Problem> {
+        own.at(name, time, &self.samplings)?.map(|around| around.between(name)).transpose()
+    }
+
+    /// A parameter of geometry: an array, or values and indices in a compound.
+    fn indexed(
+        &self,
+        geometry: &Compound<'_>,
+        name: &str,
+        time: Option<f64>,
+    ) -> Result<Option<AtCorners<f64>>, Problem> {
+        let Some(own) = geometry.compound(name, &self.metadata)? else {
+            return Ok(self.numbers(geometry, name, time)?.map(|values| AtCorners { values, indices: None }));
+        };
+        let Some(values) = self.numbers(&own, ".vals", time)? else { return Ok(None) };
+        let indices = own.at(".indices", time, &self.samplings)?;
+        let indices = indices.map(|around| around.before.integers(".indices")).transpose()?;
+        let known = |&i: &i64| {
+            let index = usize::try_from(i).ok().filter(|&i| i < values.len()).map(|i| i as u32);
+            index.ok_or_else(|| Problem::new(format!("`{name}` has index {i} of {} values", values.len())))
+        };
+        let indices = indices.map(|own| own.iter().map(known).collect::<Result<Vec<u32>, Problem>>()).transpose()?;
+        Ok(Some(AtCorners { values, indices }))
+    }
+
+    fn properties<'a>(&self, object: Group<'a>) -> Result<Option<Compound<'a>>, Problem> {
+        if object.len() == 0 || !object.is_group(0) {
+            return Ok(None);
+        }
+        Compound::new(object.group(0)?, &self.metadata).map(Some)
+    }
+
+    /// Name and schema of each child.
+    fn child_headers(&self, object: Group<'_>) -> Result<Vec<(String, String)>, Problem> {
+        let Some(last) = object.len().checked_sub(1).filter(|&i| !object.is_group(i)) else { return Ok(Vec::new()) };
+        let data = object.data(last)?;
+        // Hashes of all properties and children end the list.
+        let mut cursor = Cursor::new(data.get(..data.len().saturating_sub(32)).unwrap_or_default());
+        let mut out = Vec::new();
+        while !cursor.is_empty() {
+            let length = cursor.u32()?;
+            let name = cursor.text(length)?;
+            let metadata = match cursor.u8()? {
+                0xff => {
+                    let length = cursor.u32()?;
+                    cursor.text(length)?
+                }
+                i => self.metadata.get(usize::from(i)).cloned().unwrap_or_default(),
+            };
+            out.push((name, word(&metadata, "schema").unwrap_or_default().to_owned()));
+        }
+        Ok(out)
+    }
+
+    /// From the object's space to its parent's, and whether the parent's counts.
+    fn transform(&self, properties: &Compound<'_>, time: Option<f64>) -> Result<(DMat4, bool), Problem> {
+        let Some(own) = properties.compound(".xform", &self.metadata)? else { return Ok((DMat4::IDENTITY, true)) };
+        let inherits = self.numbers(&own, ".inherits", time)?.is_none_or(|v| v.first().is_none_or(|&x| x != 0.0));
+        let operations = own.at(".ops", time, &self.samplings)?;
+        let operations = operations.map_or(Ok(Vec::new()), |around| around.before.integers(".ops"))?;
+        let values = self.numbers(&own, ".vals", time)?.unwrap_or_default();
+        let mut rest = values.as_slice();
+        let mut take = |count: usize| {
+            let (own, left) = rest.split_at_checked(count).ok_or_else(|| Problem::new("a transform lacks values"))?;
+            rest = left;
+            Ok::<_, Problem>(own)
+        };
+        let mut matrix = DMat4::IDENTITY;
+        for operation in operations {
+            matrix *= match operation >> 4 {
+                0 => DMat4::from_scale(DVec3::from_slice(take(3)?)),
+                1 => DMat4::from_translation(DVec3::from_slice(take(3)?)),
+                2 => {
+                    let v = take(4)?;
+                    let axis = DVec3::from_slice(v).normalize_or(DVec3::Y);
+                    DMat4::from_axis_angle(axis, v[3].to_radians())
+                }
+                // Rows there are columns here.
+                3 => DMat4::from_cols_slice(take(16)?),
+                4 => DMat4::from_rotation_x(take(1)?[0].to_radians()),
+                5 => DMat4::from_rotation_y(take(1)?[0].to_radians()),
+                6 => DMat4::from_rotation_z(take(1)?[0].to_radians()),
+                other => return Err(Problem::new(format!("a transform has the unknown operation {other}"))),
+            };
+        }
+        if !matrix.is_finite() {
+            return Err(Problem::new("a transform is not finite"));
+        }
+        Ok((matrix, inherits))
+    }
+}
+
+const CURVES: &str = "AbcGeom_Curve_v2";
+const MESH: &str = "AbcGeom_PolyMesh_v1";
+const CAMERA: &str = "AbcGeom_Camera_v1";
+const FACE_SET: &str = "AbcGeom_FaceSet_v1";
+
+struct Walk<'a> {
+    archive: &'a Archive,
+    pattern: &'a PrimPattern,
+    time: Option<f64>,
+    left: usize,
+}
+
+impl<'a> Walk<'a> {
+    /// The children of an object; what is known of it are whether it is chosen and whether it is visible.
+    fn children(
+        &mut self,
+        parent: Group<'a>,
+        path: &str,
+        to_stage: DMat4,
+        [chosen, visible]: [bool; 2],
+        depth: usize,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), Problem> {
+        if depth > MAX_DEPTH {
+            return Err(Problem::new(format!("objects lie more than {MAX_DEPTH} deep")).at(path));
+        }
+        for (i, (name, schema)) in self.archive.child_headers(parent)?.iter().enumerate() {
+            self.left =
+                self.left.checked_sub(1).ok_or_else(|| Problem::new(format!("more than {MAX_OBJECTS} objects")))?;
+            let path = format!("{path}/{name}");
+            let group = parent.group(i + 1).map_err(|p| p.at(&path))?;
+            let properties = self.archive.properties(group).map_err(|p| p.at(&path))?;
+            let (mut own, mut seen) = (to_stage, visible);
+            if let Some(properties) = &properties {
+                let (local, inherits) = self.archive.transform(properties, self.time).map_err(|p| p.at(&path))?;
+                own = if inherits { to_stage * local } else { local };
+                let shown = self.archive.numbers(properties, "visible", self.time)?;
+                seen &= shown.is_none_or(|v| v.first().is_none_or(|&x| x != 0.0));
+            }
+            let chosen = chosen || self.pattern.matches(&path);
+            let object = Object { path, name, schema, properties, to_stage: own, group };
+            if chosen {
+                visit(&object, seen)?;
+            }
+            self.children(group, &object.path, own, [chosen, seen], depth + 1, visit)?;
+        }
+        Ok(())
+    }
+}
+
+/// A word of metadata such as `schema=...;geoScope=vtx`.
+fn word<'a>(metadata: &'a str, key: &str) -> Option<&'a str> {
+    metadata.split(';').find_map(|pair| pair.strip_prefix(key)?.strip_prefix('='))
+}
+
+fn spread_of(metadata: &str, otherwise: Spread) -> Spread {
+    match word(metadata, "geoScope") {
+        Some("con") => Spread::Constant,
+        Some("uni") => Spread::Uniform,
+        Some("var") => Spread::Varying,
+        Some("vtx") => Spread::Vertex,
+        Some("fvr") => Spread::FaceVarying,
+        _ => otherwise,
+    }
+}
+
+fn vectors(numbers: &[f64], name: &str) -> Result<Vec<DVec3>, Problem> {
+    if !numbers.len().is_multiple_of(3) {
+        return Err(Problem::new(format!("`{name}` has {} numbers, which is no multiple of 3", numbers.len())));
+    }
+    Ok(numbers.chunks_exact(3).map(DVec3::from_slice).collect())
+}
+
+/// Values of points as values of corners.
+fn at_corners<T>(mesh: &PolygonMesh, name: &str, given: AtCorners<T>, spread: Spread) -> Result<AtCorners<T>, Problem> {
+    let found = given.indices.as_ref().map_or(given.values.len(), Vec::len);
+    let expected = match spread {
+        Spread::FaceVarying => mesh.corners.len(),
+        Spread::Vertex | Spread::Varying => mesh.points.len(),
+        _ => return Err(Problem::new(format!("`{name}` is {}, expected of corners or points", spread.name()))),
+    };
+    if found != expected {
+        return Err(Problem::new(format!("`{name}` should have {expected} values, found {found}")));
+    }
+    if spread == Spread::FaceVarying {
+        return Ok(given);
+    }
+    let index = |&c: &u32| given.indices.as_ref().map_or(c, |own| own[c as usize]);
+    let indices = Some(mesh.corners.iter().map(index).collect());
+    Ok(AtCorners { values: given.values, indices })
+}

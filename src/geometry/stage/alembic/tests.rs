@@ -1,0 +1,104 @@
+//! A file made by alembic3d (`tests/data/stages/make_abc.py`) against values worked out by hand.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::super::{PrimPattern, Stage};
+use crate::geometry::curve::Basis;
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/stages/scene.abc")
+}
+
+fn point(i: usize) -> DVec3 {
+    DVec3::new(i as f64, ((i * i) % 5) as f64, ((3 * i) % 4) as f64)
+}
+
+#[test]
+fn curves_are_placed_and_timed() {
+    let stage = Stage::open(&data()).unwrap();
+    assert_eq!((stage.unit_mm(), stage.frames()), (None, Some([0.0, 2.0])));
+    for frame in [0.0, 1.0, 1.5] {
+        let (set, objects) = stage.curves(&PrimPattern::parse("/place").unwrap(), Some(frame)).unwrap();
+        let names: Vec<&str> = objects.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(
+            names,
+            ["/place/linear_open", "/place/bspline_open", "/place/bspline_closed", "/place/catmull_open"]
+        );
+        let curve = &set.curves[0];
+        assert_eq!((curve.basis, curve.points.len()), (Basis::Linear, 5));
+        for (i, p) in curve.points.iter().enumerate() {
+            // Twice as large, a quarter turn about z, moved along x.
+            let q = 2.0 * point(i);
+            let want = DVec3::new(10.0 * frame - q.y, q.x, q.z);
+            assert!(p.distance(want) < 1e-5, "{frame} {i}: {p} {want}");
+        }
+        let radii = curve.radii.as_ref().unwrap();
+        assert!((radii[3] - 0.5).abs() < 1e-6, "half of the width, twice as large: {}", radii[3]);
+        assert_eq!((set.curves[1].points.len(), set.curves[2].basis), (4, Basis::BSpline));
+        assert!(set.curves[4].closed && !set.curves[3].closed);
+    }
+}
+
+#[test]
+fn points_move_and_hidden_ones_are_not_there() {
+    let stage = Stage::open(&data()).unwrap();
+    let height = |frame| {
+        let (set, _) = stage.curves(&PrimPattern::parse("/moving").unwrap(), frame).unwrap();
+        set.curves[0].points[0].z
+    };
+    assert_eq!(
+        [None, Some(0.0), Some(1.0), Some(1.5), Some(9.0)].map(height).map(|z| (z * 1e4).round() / 1e4),
+        [0.0, 0.0, 1.0, 1.5, 2.0]
+    );
+    let all = stage.curves(&PrimPattern::all(), None).unwrap().1;
+    assert!(all.iter().all(|(name, _)| name != "/hidden"));
+    assert!(stage.contents().unwrap().curves.contains(&"/hidden".to_owned()));
+}
+
+#[test]
+fn meshes_have_sides_groups_and_coordinates() {
+    let stage = Stage::open(&data()).unwrap();
+    let mesh = stage.mesh(&PrimPattern::all(), None).unwrap();
+    assert_eq!((mesh.points.len(), mesh.counts.as_slice()), (5, [4, 3].as_slice()));
+    // Alembic winds its faces the other way.
+    assert_eq!(mesh.corners, [3, 2, 1, 0, 2, 4, 1]);
+    assert_eq!(mesh.uv_corners, [3, 2, 1, 0, 2, 0, 1]);
+    let groups: Vec<(&str, &[u32])> = mesh.groups.iter().map(|g| (g.name.as_str(), g.faces.as_slice())).collect();
+    assert_eq!(groups, [("collar", [1].as_slice()), ("panels", [0].as_slice())]);
+}
+
+#[test]
+fn damaged_files_are_errors() {
+    let whole = std::fs::read(data()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.abc");
+    let read = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let stage = Stage::open(&path)?;
+        stage.curves(&PrimPattern::all(), Some(1.0))?;
+        stage.mesh(&PrimPattern::all(), Some(1.0))?;
+        stage.contents()
+    };
+    assert!(read(&whole).is_ok());
+    let mut random = crate::math::sampler::Stream::new(3);
+    for round in 0..400 {
+        let mut bytes = whole.clone();
+        if round < 100 {
+            bytes.truncate(bytes.len() * round / 100);
+            assert!(read(&bytes).is_err(), "{round}");
+            continue;
+        }
+        for _ in 0..1 + round % 9 {
+            let at = (f64::from(random.next()) * bytes.len() as f64) as usize;
+            bytes[at.min(whole.len() - 1)] = (f64::from(random.next()) * 256.0) as u8;
+        }
+        let _ = read(&bytes);
+    }
+    let old = [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 64]].concat();
+    assert!(read(&old).unwrap_err().to_string().contains("HDF5"));
+    let mut open = whole.clone();
+    open[5] = 0;
+    assert!(read(&open).unwrap_err().to_string().contains("not closed"));
+}

@@ -1,0 +1,271 @@
+//! Stages of other programs: curves, meshes and cameras out of USD (`.usd`, `.usda`, `.usdc`, `.usdz`) and Alembic (`.abc`).
+//!
+//! A stage is a tree of objects with transforms, some of which change in time. Here it becomes plain values in the space
+//! of the stage: transforms, visibility and instances are applied, a time is chosen. Lengths stay in the stage's unit.
+//! [`curves`] and [`polygons`] say what curves and meshes of both formats have in common, [`select`] which objects are
+//! meant. Files come from strangers: memory is bounded by the file's size, and damage is an error that says where.
+
+mod alembic;
+mod curves;
+mod polygons;
+mod select;
+mod usd;
+
+use std::{
+    fmt,
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use glam::DMat4;
+
+pub use polygons::{FaceGroup, PolygonMesh};
+pub use select::PrimPattern;
+pub use usd::write::{CurvesOut, Interpolated, write};
+
+use super::curve::CurveSet;
+
+/// Why a stage could not be read. Displays as one line: file, object, problem.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StageError {
+    /// The file as the caller named it.
+    pub file: PathBuf,
+    /// The object at fault, if one is.
+    pub object: Option<String>,
+    /// What was expected and what was found.
+    pub problem: String,
+}
+
+impl fmt::Display for StageError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}: ", self.file.display())?;
+        if let Some(object) = &self.object {
+            write!(out, "{object}: ")?;
+        }
+        out.write_str(&self.problem)
+    }
+}
+
+impl std::error::Error for StageError {}
+
+/// What is wrong, before the file is known.
+#[derive(Debug)]
+struct Problem {
+    object: Option<String>,
+    text: String,
+}
+
+impl Problem {
+    fn new(text: impl Into<String>) -> Self {
+        Self { object: None, text: text.into() }
+    }
+
+    fn at(mut self, object: &str) -> Self {
+        self.object.get_or_insert_with(|| object.to_owned());
+        self
+    }
+
+    fn in_file(self, path: &Path) -> StageError {
+        StageError { file: path.into(), object: self.object, problem: self.text }
+    }
+}
+
+/// The largest file that is read, and the most control points or corners of it.
+const MAX_BYTES: u64 = 1 << 32;
+const MAX_POINTS: usize = 1 << 28;
+/// How deep objects may lie in one another.
+const MAX_DEPTH: usize = 128;
+
+/// A camera at one time, in the space of the stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageCamera {
+    /// From the camera's space (looking along -z, y up) to the stage's, without scale.
+    pub to_stage: DMat4,
+    /// Width and height of the film: of the picture itself, in stage units, for orthographic cameras, else of the film
+    /// behind the lens, in the unit of `focal_length`.
+    pub aperture: [f64; 2],
+    /// Focal length; `None` for orthographic cameras.
+    pub focal_length: Option<f64>,
+    /// Length of a unit of `aperture` and `focal_length` in stage units.
+    pub film_unit: f64,
+    /// Lens opening as f-number; 0 for a pinhole.
+    pub f_stop: f64,
+    /// Distance in focus, stage units; 0 where none is given.
+    pub focus_distance: f64,
+}
+
+/// What a stage holds, by path.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Contents {
+    /// Curve objects.
+    pub curves: Vec<String>,
+    /// Meshes.
+    pub meshes: Vec<String>,
+    /// Cameras.
+    pub cameras: Vec<String>,
+}
+
+/// A stage that is open.
+#[derive(Debug)]
+pub struct Stage {
+    path: PathBuf,
+    format: Format,
+}
+
+#[derive(Debug)]
+enum Format {
+    Usd(Box<usd::UsdStage>),
+    Alembic(alembic::Archive),
+}
+
+/// Whether a file's name says that it is a stage.
+pub fn is_stage(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    matches!(extension.as_deref(), Some("usd" | "usda" | "usdc" | "usdz" | "abc"))
+}
+
+impl Stage {
+    /// Opens a file, with all that it refers to.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is neither USD nor Alembic. What a USD file refers to and is not there becomes a note
+    /// of what is read.
+    pub fn open(path: &Path) -> Result<Self, StageError> {
+        let open = || {
+            let bytes = readable(path)?;
+            if bytes.starts_with(alembic::MAGIC) || bytes.starts_with(alembic::HDF5_MAGIC) {
+                Ok(Format::Alembic(alembic::Archive::new(bytes)?))
+            } else {
+                usd::check::look_over(&bytes)?;
+                drop(bytes);
+                Ok(Format::Usd(Box::new(usd::UsdStage::open(path)?)))
+            }
+        };
+        let format = open().map_err(|p: Problem| p.in_file(path))?;
+        Ok(Self { path: path.into(), format })
+    }
+
+    /// Millimetres per unit, where the stage says so: USD does (a centimetre if it is silent), Alembic does not.
+    pub fn unit_mm(&self) -> Option<f64> {
+        match &self.format {
+            Format::Usd(stage) => Some(stage.unit_mm()),
+            Format::Alembic(_) => None,
+        }
+    }
+
+    /// Which axis points up: 1 for y, 2 for z; `None` where the stage does not say.
+    pub fn up_axis(&self) -> Option<u8> {
+        match &self.format {
+            Format::Usd(stage) => Some(stage.up_axis()),
+            Format::Alembic(_) => None,
+        }
+    }
+
+    /// First and last time that something is known of, in frames.
+    pub fn frames(&self) -> Option<[f64; 2]> {
+        match &self.format {
+            Format::Usd(stage) => stage.time_range(),
+            Format::Alembic(archive) => archive.frames(),
+        }
+    }
+
+    /// What the stage holds, visible or not.
+    ///
+    /// # Errors
+    /// The stage is damaged.
+    pub fn contents(&self) -> Result<Contents, StageError> {
+        match &self.format {
+            Format::Usd(stage) => stage.contents(),
+            Format::Alembic(archive) => archive.contents(),
+        }
+        .map_err(|p| p.in_file(&self.path))
+    }
+
+    /// All visible curves of the objects that `pattern` chooses, at a frame (at the earliest if `None`), in the order of
+    /// the stage. Beside them which object each of them is of, as ranges in that order.
+    ///
+    /// # Errors
+    /// An object breaks the rules of its format, or there are more than 2^28 points.
+    pub fn curves(
+        &self,
+        pattern: &PrimPattern,
+        frame: Option<f64>,
+    ) -> Result<(CurveSet, Vec<(String, usize)>), StageError> {
+        let mut set = CurveSet { unit_mm: self.unit_mm(), up_axis: self.up_axis(), ..CurveSet::default() };
+        let mut objects = Vec::new();
+        let mut add = |path: &str, batch: curves::Batch, to_stage: &DMat4| {
+            let before = set.curves.len();
+            batch.add_to(&mut set, to_stage).map_err(|p| p.at(path))?;
+            objects.push((path.to_owned(), set.curves.len() - before));
+            if set.curves.iter().map(|c| c.points.len()).sum::<usize>() > MAX_POINTS {
+                return Err(Problem::new(format!("more than {MAX_POINTS} points")).at(path));
+            }
+            Ok(())
+        };
+        let notes = match &self.format {
+            Format::Usd(stage) => stage.curves(pattern, frame, &mut add),
+            Format::Alembic(archive) => archive.curves(pattern, frame, &mut add),
+        };
+        set.notes.extend(notes.map_err(|p| p.in_file(&self.path))?);
+        Ok((set, objects))
+    }
+
+    /// All visible meshes that `pattern` chooses, as one, at a frame (at the earliest if `None`); faces of an object
+    /// without subsets are a group of its name.
+    ///
+    /// # Errors
+    /// As [`Self::curves`].
+    pub fn mesh(&self, pattern: &PrimPattern, frame: Option<f64>) -> Result<PolygonMesh, StageError> {
+        let mut all = PolygonMesh::default();
+        let mut add = |path: &str, mesh: PolygonMesh| {
+            all.append(mesh);
+            if all.points.len() > MAX_POINTS || all.corners.len() > MAX_POINTS {
+                return Err(Problem::new(format!("more than {MAX_POINTS} points")).at(path));
+            }
+            Ok(())
+        };
+        let notes = match &self.format {
+            Format::Usd(stage) => stage.meshes(pattern, frame, &mut add),
+            Format::Alembic(archive) => archive.meshes(pattern, frame, &mut add),
+        };
+        all.notes.extend(notes.map_err(|p| p.in_file(&self.path))?);
+        Ok(all)
+    }
+
+    /// The camera of this path at a frame (at the earliest if `None`).
+    ///
+    /// # Errors
+    /// There is no such camera.
+    pub fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, StageError> {
+        match &self.format {
+            Format::Usd(stage) => stage.camera(path, frame),
+            Format::Alembic(_) => Err(Problem::new("cameras are read from USD, not from Alembic")),
+        }
+        .map_err(|p| p.in_file(&self.path))
+    }
+}
+
+/// What takes the curves of one object, with its path and transform.
+type AddCurves<'a> = dyn FnMut(&str, curves::Batch, &DMat4) -> Result<(), Problem> + 'a;
+/// What takes one mesh, already in the space of the stage, with its path.
+type AddMesh<'a> = dyn FnMut(&str, PolygonMesh) -> Result<(), Problem> + 'a;
+
+/// The bytes of a regular file that is not too large.
+fn readable(path: &Path) -> Result<Vec<u8>, Problem> {
+    let words = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => Problem::new("no such file"),
+        std::io::ErrorKind::PermissionDenied => Problem::new("no permission to read it"),
+        _ => Problem::new(format!("cannot be read: {e}")),
+    };
+    let metadata = std::fs::metadata(path).map_err(words)?;
+    if !metadata.is_file() {
+        return Err(Problem::new("expected a regular file, found a folder, pipe or device"));
+    }
+    if metadata.len() > MAX_BYTES {
+        return Err(Problem::new(format!("{} bytes; at most {MAX_BYTES} are read", metadata.len())));
+    }
+    let mut bytes = Vec::new();
+    File::open(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(words)?;
+    Ok(bytes)
+}

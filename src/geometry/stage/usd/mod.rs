@@ -1,0 +1,389 @@
+//! USD: the `openusd` crate composes the stage, so that sublayers, references, payloads, variants and native instances
+//! are as any USD program sees them; this room walks its prims.
+//!
+//! A binary file is looked over first ([`check`]), and a panic inside of the crate is an error like any other.
+
+pub(super) mod check;
+mod mesh;
+#[cfg(test)]
+mod tests;
+mod value;
+pub(super) mod write;
+
+use std::{
+    fmt,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::Path,
+};
+
+use glam::{DMat4, DVec3};
+use openusd::{
+    schemas::geom::{Imageable, Xformable},
+    sdf,
+    usd::{self, Prim, PrimPredicate, SchemaBase, SchemaKind, TimeCode},
+};
+
+use super::{
+    AddCurves, AddMesh, Contents, MAX_DEPTH, PrimPattern, Problem, StageCamera,
+    curves::{Batch, Spread, StageBasis, Wrap},
+};
+use value::{Values, token};
+
+impl From<anyhow::Error> for Problem {
+    fn from(error: anyhow::Error) -> Self {
+        // The chain of causes on one line.
+        Self::new(format!("{error:#}").replace('\n', " "))
+    }
+}
+
+/// A stage that is open.
+pub(super) struct UsdStage {
+    stage: usd::Stage,
+}
+
+impl fmt::Debug for UsdStage {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.debug_struct("UsdStage").finish_non_exhaustive()
+    }
+}
+
+impl UsdStage {
+    pub(super) fn open(path: &Path) -> Result<Self, Problem> {
+        guarded(|| {
+            let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
+            Ok(Self { stage: usd::Stage::open(name)? })
+        })
+    }
+
+    /// What could not be composed, one line each.
+    fn notes(&self) -> Vec<String> {
+        self.stage.composition_errors().iter().map(|e| e.to_string().replace('\n', " ")).collect()
+    }
+
+    /// Millimetres per unit: USD's `metersPerUnit`, centimetres where it says nothing.
+    pub(super) fn unit_mm(&self) -> f64 {
+        let unit = self.stage.stage_metadata("metersPerUnit").ok().flatten().and_then(|v| value::number(&v));
+        unit.filter(|u| u.is_finite() && *u > 0.0).unwrap_or(0.01) * 1000.0
+    }
+
+    /// Which axis points up: 1 for y, 2 for z.
+    pub(super) fn up_axis(&self) -> u8 {
+        let up = self.stage.stage_metadata("upAxis").ok().flatten();
+        if up.as_ref().and_then(token).is_some_and(|t| t == "Z") { 2 } else { 1 }
+    }
+
+    /// First and last time code, if the stage says so.
+    pub(super) fn time_range(&self) -> Option<[f64; 2]> {
+        self.stage.has_authored_time_code_range().then(|| [self.stage.start_time_code(), self.stage.end_time_code()])
+    }
+
+    /// What the stage holds, visible or not.
+    pub(super) fn contents(&self) -> Result<Contents, Problem> {
+        guarded(|| {
+            let mut contents = Contents::default();
+            self.stage.traverse(PrimPredicate::DEFAULT_PROXIES, |path| {
+                let kind = self.stage.prim(path.clone()).type_name().ok().flatten();
+                let list = match kind.as_ref().map(|k| k.as_str()) {
+                    Some("BasisCurves") => &mut contents.curves,
+                    Some("Mesh") => &mut contents.meshes,
+                    Some("Camera") => &mut contents.cameras,
+                    _ => return,
+                };
+                list.push(path.as_str().to_owned());
+            })?;
+            Ok(contents)
+        })
+    }
+
+    /// Hands over all visible basis curves; gives notes for the user.
+    pub(super) fn curves(
+        &self,
+        pattern: &PrimPattern,
+        frame: Option<f64>,
+        add: &mut AddCurves<'_>,
+    ) -> Result<Vec<String>, Problem> {
+        guarded(|| {
+            self.walk(pattern, frame, &mut |prim, to_stage, values| {
+                if prim.kind != "BasisCurves" {
+                    return Ok(());
+                }
+                add(&prim.path, batch(values).map_err(|p| p.at(&prim.path))?, to_stage)
+            })?;
+            Ok(self.notes())
+        })
+    }
+
+    /// Hands over all visible meshes; gives notes for the user.
+    pub(super) fn meshes(
+        &self,
+        pattern: &PrimPattern,
+        frame: Option<f64>,
+        add: &mut AddMesh<'_>,
+    ) -> Result<Vec<String>, Problem> {
+        guarded(|| {
+            self.walk(pattern, frame, &mut |prim, to_stage, values| {
+                if prim.kind != "Mesh" {
+                    return Ok(());
+                }
+                add(&prim.path, mesh::read(values, to_stage).map_err(|p| p.at(&prim.path))?)
+            })?;
+            Ok(self.notes())
+        })
+    }
+
+    /// The camera of this path at a frame, which is a time code.
+    pub(super) fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, Problem> {
+        guarded(|| {
+            let at = sdf::path(path).map_err(|e| Problem::new(format!("{path} is no path of a prim: {e:#}")))?;
+            let prim = self.stage.prim(at.clone());
+            if prim.type_name()?.is_none_or(|t| t != "Camera") {
+                let cameras = self.contents()?.cameras;
+                let known = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
+                return Err(Problem::new(format!("no camera at {path}; cameras here: {known}")));
+            }
+            let values = Values { prim: &prim, time: time_code(frame) };
+            let mut to_stage = DMat4::IDENTITY;
+            let mut above = Some(at);
+            while let Some(path) = above.filter(|p| !p.is_abs_root()) {
+                let view = AnyPrim(self.stage.prim(path.clone()));
+                to_stage = matrix(view.local_to_parent_transform(values.time)?) * to_stage;
+                above = if view.resets_xform_stack()? { None } else { path.parent() };
+            }
+            // The lens does not scale with its stand.
+            let axis = |i: usize| to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
+            let to_stage = DMat4::from_cols(axis(0), axis(1), axis(2), to_stage.w_axis);
+            let number = |name, otherwise| values.number(name).map(|v| v.unwrap_or(otherwise));
+            let orthographic = values.token("projection")?.is_some_and(|p| p == "orthographic");
+            let aperture = [number("horizontalAperture", 20.955)?, number("verticalAperture", 15.2908)?];
+            let focal_length = number("focalLength", 50.0)?;
+            if aperture.iter().chain([&focal_length]).any(|v| !v.is_finite() || *v <= 0.0) {
+                return Err(Problem::new("expected apertures and a focal length above 0").at(path));
+            }
+            // USD measures film in tenths of a unit, that of orthographic pictures as well.
+            Ok(StageCamera {
+                to_stage,
+                aperture: if orthographic { aperture.map(|a| 0.1 * a) } else { aperture },
+                focal_length: (!orthographic).then_some(focal_length),
+                film_unit: 0.1,
+                f_stop: number("fStop", 0.0)?.max(0.0),
+                focus_distance: number("focusDistance", 0.0)?.max(0.0),
+            })
+        })
+    }
+
+    /// Visits each visible prim that is chosen, with its transform; instancers repeat what is below their prototypes.
+    fn walk(&self, pattern: &PrimPattern, frame: Option<f64>, visit: &mut Visit<'_>) -> Result<(), Problem> {
+        let walk = Walk { stage: &self.stage, time: time_code(frame), pattern };
+        let roots = self.stage.root_prims()?;
+        for name in roots {
+            let path = sdf::Path::abs_root().append_path(name.as_str())?;
+            walk.prim(&path, DMat4::IDENTITY, false, 0, visit)?;
+        }
+        Ok(())
+    }
+}
+
+/// A prim as visitors see it.
+struct PrimName {
+    path: String,
+    kind: String,
+}
+
+type Visit<'a> = dyn FnMut(&PrimName, &DMat4, &Values<'_>) -> Result<(), Problem> + 'a;
+
+struct Walk<'a> {
+    stage: &'a usd::Stage,
+    time: TimeCode,
+    pattern: &'a PrimPattern,
+}
+
+impl Walk<'_> {
+    /// A prim and all below it. `chosen` where a prim above is.
+    fn prim(
+        &self,
+        path: &sdf::Path,
+        to_parent: DMat4,
+        chosen: bool,
+        depth: usize,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), Problem> {
+        if depth > MAX_DEPTH {
+            return Err(Problem::new(format!("prims lie more than {MAX_DEPTH} deep")).at(path.as_str()));
+        }
+        let prim = self.stage.prim(path.clone());
+        if !prim.is_active()? || !prim.is_loaded()? || !prim.is_defined()? || prim.is_abstract()? {
+            return Ok(());
+        }
+        let values = Values { prim: &prim, time: self.time };
+        if values.token("visibility")?.is_some_and(|v| v == "invisible") {
+            return Ok(());
+        }
+        // Stand-ins and helpers are not what is rendered.
+        if values.token("purpose")?.is_some_and(|p| p == "proxy" || p == "guide") {
+            return Ok(());
+        }
+        let view = AnyPrim(prim.clone());
+        let local = matrix(view.local_to_parent_transform(self.time).map_err(|e| Problem::from(e).at(path.as_str()))?);
+        let to_stage = if view.resets_xform_stack()? { local } else { to_parent * local };
+        let name = PrimName {
+            path: path.as_str().to_owned(),
+            kind: prim.type_name()?.map_or(String::new(), |t| t.as_str().to_owned()),
+        };
+        let chosen = chosen || self.pattern.matches(&name.path) || self.bound_material_matches(&prim)?;
+        if name.kind == "PointInstancer" {
+            return self.instances(&prim, &name, to_stage, chosen, depth, visit);
+        }
+        if chosen {
+            visit(&name, &to_stage, &values)?;
+        }
+        for child in prim.child_names()? {
+            self.prim(&path.append_path(child.as_str())?, to_stage, chosen, depth + 1, visit)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the pattern chooses the material that is bound to the prim itself.
+    fn bound_material_matches(&self, prim: &Prim) -> Result<bool, Problem> {
+        if !self.pattern.names_materials() {
+            return Ok(false);
+        }
+        let targets = prim.relationship("material:binding").targets()?;
+        Ok(targets.iter().any(|t| self.pattern.matches_material(t.as_str())))
+    }
+
+    fn instances(
+        &self,
+        prim: &Prim,
+        name: &PrimName,
+        to_stage: DMat4,
+        chosen: bool,
+        depth: usize,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), Problem> {
+        let values = Values { prim, time: self.time };
+        let prototypes = prim.relationship("prototypes").targets()?;
+        let indices = values.integers("protoIndices")?.unwrap_or_default();
+        let positions = values.vectors("positions")?.unwrap_or_default();
+        let turns = values.rotations("orientations")?.unwrap_or_default();
+        let scales = values.vectors("scales")?.unwrap_or_default();
+        let hidden = values.integers("invisibleIds")?.unwrap_or_default();
+        let ids = values.integers("ids")?.unwrap_or_default();
+        let count = indices.len();
+        let fits = |n: usize| n == 0 || n == count;
+        if positions.len() != count || !fits(turns.len()) || !fits(scales.len()) || !fits(ids.len()) {
+            let found = [positions.len(), turns.len(), scales.len()];
+            return Err(Problem::new(format!(
+                "{count} protoIndices, but {} positions, {} orientations and {} scales",
+                found[0], found[1], found[2]
+            ))
+            .at(&name.path));
+        }
+        for (i, &index) in indices.iter().enumerate() {
+            if hidden.contains(&ids.get(i).copied().unwrap_or(i as i64)) {
+                continue;
+            }
+            let Some(prototype) = usize::try_from(index).ok().and_then(|i| prototypes.get(i)) else {
+                let have = prototypes.len();
+                return Err(Problem::new(format!("instance {i} is of prototype {index}, of which there are {have}"))
+                    .at(&name.path));
+            };
+            let placed = DMat4::from_scale_rotation_translation(
+                scales.get(i).copied().unwrap_or(DVec3::ONE),
+                turns.get(i).copied().unwrap_or_default(),
+                positions[i],
+            );
+            self.prim(prototype, to_stage * placed, chosen, depth + 1, visit)?;
+        }
+        Ok(())
+    }
+}
+
+/// The curves of a prim.
+fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
+    let basis = match values.token("type")?.as_deref() {
+        Some("linear") => StageBasis::Linear,
+        None | Some("cubic") => match values.token("basis")?.as_deref() {
+            None | Some("bezier") => StageBasis::Bezier,
+            Some("bspline") => StageBasis::BSpline,
+            Some("catmullRom") => StageBasis::CatmullRom,
+            Some(other) => {
+                let known = "bezier, bspline and catmullRom are";
+                return Err(Problem::new(format!("the basis \"{other}\" is not read; {known}")));
+            }
+        },
+        Some(other) => return Err(Problem::new(format!("`type` is \"{other}\", expected linear or cubic"))),
+    };
+    let wrap = match values.token("wrap")?.as_deref() {
+        None | Some("nonperiodic") => Wrap::NonPeriodic,
+        Some("periodic") => Wrap::Periodic,
+        Some("pinned") => Wrap::Pinned,
+        Some(other) => {
+            return Err(Problem::new(format!("`wrap` is \"{other}\", expected nonperiodic, periodic or pinned")));
+        }
+    };
+    let widths = match values.numbers("widths")? {
+        Some(widths) => Some((widths, values.spread("widths", Spread::Vertex)?)),
+        None => None,
+    };
+    Ok(Batch {
+        basis,
+        wrap,
+        counts: values.integers("curveVertexCounts")?.unwrap_or_default(),
+        points: values.vectors("points")?.unwrap_or_default(),
+        widths,
+    })
+}
+
+/// Any prim as one with a transform; where it has none, that is the identity.
+struct AnyPrim(Prim);
+
+impl SchemaBase for AnyPrim {
+    const KIND: SchemaKind = SchemaKind::AbstractTyped;
+
+    fn prim(&self) -> &Prim {
+        &self.0
+    }
+}
+
+impl Imageable for AnyPrim {}
+impl Xformable for AnyPrim {}
+
+/// USD multiplies rows from the left: the same sixteen numbers in order are the columns here.
+fn matrix(m: openusd::gf::Matrix4d) -> DMat4 {
+    DMat4::from_cols_array(&m.0)
+}
+
+fn time_code(time: Option<f64>) -> TimeCode {
+    time.map_or(TimeCode::EARLIEST, TimeCode::new)
+}
+
+/// Runs work inside of the crate; a panic there becomes a problem, without words on standard error.
+fn guarded<T>(work: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
+    quiet::panics_of_this_thread(|| catch_unwind(AssertUnwindSafe(work)))
+        .unwrap_or_else(|_| Err(Problem::new("is damaged, or uses what the reader does not know")))
+}
+
+/// Keeps the panics of one thread from being printed.
+mod quiet {
+    use std::{cell::Cell, panic, sync::Once};
+
+    thread_local! {
+        static QUIET: Cell<bool> = const { Cell::new(false) };
+    }
+
+    pub(super) fn panics_of_this_thread<T>(work: impl FnOnce() -> T) -> T {
+        static HOOK: Once = Once::new();
+        HOOK.call_once(|| {
+            let loud = panic::take_hook();
+            panic::set_hook(Box::new(move |info| {
+                if !QUIET.get() {
+                    loud(info);
+                }
+            }));
+        });
+        let before = QUIET.replace(true);
+        let out = work();
+        QUIET.set(before);
+        out
+    }
+}

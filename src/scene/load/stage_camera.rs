@@ -1,0 +1,103 @@
+//! `camera = { type = "usd", path, prim }`: the camera of a stage, with its lens and its way in time.
+
+use std::path::Path;
+
+use glam::{DMat4, DVec3};
+
+use super::{
+    super::{
+        animation::Track,
+        camera::Projection,
+        defaults,
+        motion::Aim,
+        view::{CameraSetup, Focus, LensSetup},
+    },
+    Context, Reader, motion,
+};
+use crate::geometry::stage::{Stage, StageCamera, StageError};
+
+/// Frames around the shutter's time of which the camera's place is known: its way between them is smooth.
+const FRAMES_AROUND: i64 = 3;
+
+/// A camera in millimetres, +y up.
+struct Pose {
+    aim: Aim,
+    projection: Projection,
+    lens: Option<LensSetup>,
+}
+
+impl Pose {
+    fn new(camera: &StageCamera, unit: f64, z_up: bool) -> Self {
+        let turn = if z_up { DMat4::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DMat4::IDENTITY };
+        let to_world = DMat4::from_scale(DVec3::splat(unit)) * turn * camera.to_stage;
+        let position = to_world.w_axis.truncate();
+        let back = to_world.z_axis.truncate().normalize();
+        let up = to_world.y_axis.truncate().normalize();
+        let film = camera.film_unit * unit;
+        // What it looks at is what is sharp, or somewhere ahead.
+        let distance = if camera.focus_distance > 0.0 { camera.focus_distance * unit } else { 1000.0 };
+        let [_, height] = camera.aperture;
+        let projection = match camera.focal_length {
+            Some(focal) => Projection::Perspective(2.0 * (0.5 * height / focal).atan()),
+            None => Projection::Orthographic(height * unit),
+        };
+        let opening = camera.focal_length.filter(|_| camera.f_stop > 0.0).map(|focal| focal * film / camera.f_stop);
+        let lens = opening.filter(|_| camera.focus_distance > 0.0);
+        Self {
+            aim: Aim { position, target: position - distance * back, up },
+            projection,
+            lens: lens.map(|diameter| LensSetup { radius: 0.5 * diameter, focus: Focus::Distance(distance) }),
+        }
+    }
+}
+
+/// Reads the keys of such a camera and its stage.
+pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> Option<CameraSetup> {
+    let path = table.required_string("path").map(|p| context.resolve(p, table.span("path").unwrap_or(table.header())));
+    let prim = table.required_string("prim").map(str::to_owned);
+    let fallback = Projection::Perspective(defaults::FIELD_OF_VIEW.to_radians());
+    let own_motion = motion::read(table, context, None, fallback);
+    let (path, prim) = (path?, prim?);
+    let [open, close] = own_motion.shutter.unwrap_or_default();
+    match poses(&path, &prim, f64::from(frame), [open, close]) {
+        Ok((own, around)) => {
+            let Some(mut setup) = CameraSetup::aimed(own.aim, own.projection) else {
+                table.error_at("prim", "the camera has no direction", None);
+                return None;
+            };
+            setup.lens = own.lens;
+            setup.motion = own_motion;
+            if around.len() > 1 {
+                let track =
+                    |value: &dyn Fn(&Pose) -> DVec3| Track::new(around.iter().map(|(t, p)| (*t, value(p))).collect());
+                setup.motion.position = track(&|p| p.aim.position);
+                setup.motion.target = track(&|p| p.aim.target);
+                setup.motion.opening = track(&|p| match p.projection {
+                    Projection::Perspective(opening) | Projection::Orthographic(opening) => DVec3::splat(opening),
+                });
+            }
+            Some(setup)
+        }
+        Err(error) => {
+            table.error_at("path", error.to_string(), None);
+            None
+        }
+    }
+}
+
+/// The camera at a frame, and at the frames around the shutter's time if the stage has times.
+fn poses(path: &Path, prim: &str, frame: f64, [open, close]: [f64; 2]) -> Result<(Pose, Vec<(f64, Pose)>), StageError> {
+    let stage = Stage::open(path)?;
+    let unit = stage.unit_mm().unwrap_or(1.0);
+    let z_up = stage.up_axis() == Some(2);
+    let at = |frame: f64| stage.camera(prim, Some(frame)).map(|camera| Pose::new(&camera, unit, z_up));
+    let own = at(frame)?;
+    if stage.frames().is_none_or(|[first, last]| last <= first) {
+        return Ok((own, Vec::new()));
+    }
+    let first = (frame + open).floor() as i64 - FRAMES_AROUND;
+    let last = (frame + close).ceil() as i64 + FRAMES_AROUND;
+    let around = (first..=last).map(|f| Ok((f as f64, at(f as f64)?))).collect::<Result<Vec<_>, StageError>>()?;
+    let still = around.iter().all(|(_, p)| p.aim == own.aim && p.projection == own.projection);
+    Ok((own, if still { Vec::new() } else { around }))
+}
