@@ -636,6 +636,15 @@ mod tests {
     }
 
     #[test]
+    fn charts_know_every_stitch_that_is_understood() {
+        let all = "Row 1: k1, p1, k1 tbl, p1 tbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, sl1, \
+                   sl1 wyif, tuck, miss, c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC\nRow 2: k to last 2 sts, p2, yo";
+        let rows = rows(all, 51);
+        let chart = crate::geometry::pattern::chart::Chart::parse(&rows).unwrap();
+        assert_eq!(chart.work(51, 2, 1 << 20).unwrap().len(), 2);
+    }
+
+    #[test]
     fn repeats_and_ranges() {
         assert_eq!(rows("Rows 1-2: k\nRows 3 and 4: Repeat rows 1-2", 1), ["k", "p", "k", "p"]);
         assert_eq!(rows("Row 1: *k1, p1; rep from * 2 more times, k to end", 8), ["k2 p k p k p k"]);

@@ -11,6 +11,7 @@ use crate::{
             chart::{Chart, PATTERNS},
             draft::{Draft, DraftError},
             knit::{self, Edges, Form, Knit},
+            knitspeak,
             weave::{self, Weave},
         },
     },
@@ -19,6 +20,9 @@ use crate::{
         document::Value,
     },
 };
+
+/// Stitches of a knit that says no number.
+const STITCHES: u64 = 20;
 
 /// A knit that is checked but for what only knitting tells.
 pub(super) struct KnitPlan {
@@ -56,8 +60,11 @@ impl KnitPlan {
     }
 }
 
-/// `pattern` or `chart`: its name, the chart, and where its rows were written.
+/// `pattern`, `chart` or `instructions`: its name, the chart, and where its rows were written.
 pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Chart>, Vec<Span>) {
+    if let Some(text) = table.string("instructions") {
+        return ("knit".to_owned(), written(table, text), Vec::new());
+    }
     let chart_rows = table.strings("chart");
     if table.has("chart") && chart_rows.is_empty() {
         // A value of another type is told already.
@@ -95,6 +102,29 @@ pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
     (name.to_owned(), chart, chart_rows.iter().map(|(_, span)| *span).collect())
 }
 
+/// Written instructions over so many `stitches`, as a chart.
+fn written(table: &Reader<'_>, text: &str) -> Option<Chart> {
+    if let Some(other) = ["pattern", "chart"].into_iter().find(|key| table.has(key)) {
+        table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
+    }
+    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
+    let rows = match knitspeak::chart_rows(text, stitches) {
+        Ok(rows) => rows,
+        Err(error) => {
+            let line = error.line.map_or(String::new(), |line| format!("line {}: ", line + 1));
+            table.error_at("instructions", format!("{line}{}", error.problem), Some(&error.hint));
+            return None;
+        }
+    };
+    match Chart::parse(&rows) {
+        Ok(chart) => Some(chart),
+        Err(error) => {
+            table.error_at("instructions", error.problem, Some(&error.hint));
+            None
+        }
+    }
+}
+
 /// Reads the keys of a knit.
 pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
     let (name, chart, lines) = chart(table, context);
@@ -130,7 +160,7 @@ fn counted(
     rows: u32,
     lines: Vec<Span>,
 ) -> Option<KnitPlan> {
-    let stitches = table.u64_or("stitches", 20, 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
     let stitch_width = table.f64("stitch_width", Range::between(1.0, 20.0));
     let row_height = table.f64("row_height", Range::between(0.5, 20.0));
