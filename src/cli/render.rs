@@ -161,8 +161,10 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let load = started.elapsed();
     log::phase("load", load);
     pool.install(|| {
+        // Making it takes the curves.
+        let yarns: Vec<usize> = scene.fabrics.iter().map(|f| f.curves.len()).collect();
         let (world, made) = World::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
-        warn(args, &scene, &world);
+        warn(args, &scene, &world, &yarns);
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);
         log::phase("build", made.build);
@@ -419,7 +421,8 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number of seconds above 0".to_owned())
 }
 
-fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
+/// `yarns` are the numbers of yarns of each fabric.
+fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usize]) {
     for warning in &scene.warnings {
         tracing::warn!("{warning}");
     }
@@ -431,11 +434,11 @@ fn warn(args: &RenderArgs, scene: &Scene, world: &World) {
              at segment {}, whose inner side runs backwards by {:.1} of its radius{}",
             fabric.origin,
             bends().count(),
-            fabric.curves.len(),
+            yarns[i],
             worst.yarn,
             worst.segment,
             worst.fold,
-            match (2 * bends().count() > fabric.curves.len(), args.log.verbose > 0) {
+            match (2 * bends().count() > yarns[i], args.log.verbose > 0) {
                 (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
                 (false, false) => " (-v shows all)",
                 (false, true) => "",
