@@ -57,7 +57,7 @@ fn what_cannot_be_made_is_refused() {
         ),
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
-        (&["weave", "--warp-spacing", "1.2", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
+        (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
     ] {
         let run = yarnray(d, &[&["make"], args].concat());
         assert!(run.stderr.starts_with(message), "{args:?}: {}", run.stderr);

@@ -22,7 +22,7 @@ use crate::{
             draft::Draft,
             knit::{self, Edges, Form, Knit},
             overlap::overlap,
-            weave::{self, Weave},
+            weave::{self, Extent, Impossible, Measures, Weave},
         },
     },
     image::output,
@@ -135,13 +135,27 @@ struct WeaveArgs {
     /// Distance between wefts.
     #[arg(long, value_name = "L", value_parser = positive)]
     weft_spacing: Option<f64>,
-    /// The warp's share of the crimp, 0 to 1.
-    #[arg(long, default_value_t = 0.5, value_name = "X", value_parser = share)]
-    crimp: f64,
+    /// Share of the plane that yarns cover, 0 to 1; what the loom gives if neither this nor spacings are given.
+    #[arg(long, value_name = "X", value_parser = share)]
+    cover: Option<f64>,
+    /// The warp's share of the crimp, 0 to 1; by the yarns' stiffness if not given.
+    #[arg(long, value_name = "X", value_parser = share)]
+    crimp: Option<f64>,
+    /// Cut all around, with selvedges at the sides, with a fringe or with hems.
+    #[arg(long, value_parser = ["live", "selvedge", "fringe", "finished"])]
+    edges: Option<String>,
+    /// How high the pile of terry, velvet and corduroy stands.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pile_height: Option<f64>,
     /// Control points between two crossings.
-    #[arg(long, default_value_t = weave::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=200))]
+    #[arg(long, default_value_t = weave::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=24))]
     points: u32,
 }
+
+/// Length of a fringe, in radii of the warp.
+const FRINGE: f64 = 24.0;
+/// Height of a pile, in the same.
+const PILE: f64 = 8.0;
 
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
@@ -223,23 +237,47 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     };
     let piece = Weave {
         draft: draft.map_err(|e| Failure::Input(format!("error: {e}")))?,
-        warps: args.warps,
-        wefts: args.wefts,
+        warps: Extent::Yarns(args.warps),
+        wefts: Extent::Yarns(args.wefts),
         warp_radius: args.output.radius,
         weft_radius: args.weft_radius.unwrap_or(args.output.radius),
         warp_spacing: args.warp_spacing,
         weft_spacing: args.weft_spacing,
+        cover: args.cover,
         crimp: args.crimp,
+        // Curve files know round yarns only.
+        flatten: 1.0,
         points: args.points,
+        edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
+            "finished" => weave::Edges::Finished,
+            "selvedge" => weave::Edges::Selvedge,
+            "fringe" => weave::Edges::Fringe(FRINGE * args.output.radius),
+            _ => weave::Edges::Live,
+        }),
+        pile_height: args.pile_height.unwrap_or(PILE * args.output.radius),
     };
-    if piece.control_points() > MAX_POINTS {
-        return too_many("warps, wefts");
+    let cloth = match piece.relax() {
+        Ok(cloth) => cloth,
+        Err(Impossible::TooTight { warp, least }) => {
+            let option = if warp { "--warp-spacing" } else { "--weft-spacing" };
+            let problem = format!("error: {option} leaves the yarns no room to pass; at least {least:.4} here");
+            return Err(Failure::Input(problem));
+        }
+        Err(Impossible::TooMuchCover { most }) => {
+            let problem = format!("error: these yarns cover at most {most:.3} of the plane in this weave");
+            return Err(Failure::Input(problem));
+        }
+        Err(Impossible::TooLarge) => return too_many("warps, wefts"),
+    };
+    write(cloth.strands(), &args.output, piece.weft_radius)?;
+    if !args.output.quiet {
+        let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
+        eprintln!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]);
+        eprintln!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]);
+        eprintln!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through);
+        eprintln!("{:.3} wide, {:.3} high; {:.1} of warp, {:.1} of weft", size[0], size[1], length[0], length[1]);
     }
-    let strands = piece.strands().map_err(|tight| {
-        let option = if tight.warp { "--warp-spacing" } else { "--weft-spacing" };
-        Failure::Input(format!("error: {option} leaves the yarns no room to pass; at least {:.4} here", tight.least))
-    })?;
-    write(strands, &args.output, piece.weft_radius)
+    Ok(())
 }
 
 /// Writes all files and says what they hold.

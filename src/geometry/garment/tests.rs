@@ -8,7 +8,7 @@ use crate::geometry::{
         draft::Draft,
         knit::{Edges, Form, Knit},
         overlap::overlap,
-        weave::{self, Weave},
+        weave::Weave,
     },
 };
 
@@ -29,17 +29,9 @@ fn knitted() -> Tile {
 }
 
 fn woven() -> Tile {
-    let weave = Weave {
-        draft: Draft::named("plain").unwrap(),
-        warps: 1,
-        wefts: 1,
-        warp_radius: 0.5,
-        weft_radius: 0.5,
-        warp_spacing: Some(2.5),
-        weft_spacing: Some(2.5),
-        crimp: 0.5,
-        points: weave::POINTS,
-    };
+    let spacing = Some(2.5);
+    let plain = Weave::of(Draft::named("plain").unwrap(), 0.5);
+    let weave = Weave { warp_spacing: spacing, weft_spacing: spacing, crimp: Some(0.5), ..plain };
     Tile::of_weave(&weave).unwrap()
 }
 

@@ -57,15 +57,25 @@ impl PatternStrand {
     /// With the smoothest curve through the same points, a B-spline. Embree meets it sooner than a Catmull-Rom curve, it
     /// has no jumps of curvature where segments join, and so fewer points follow it.
     pub fn smooth(mut self) -> Self {
-        let curve = &self.curve;
-        let chain = Chain::new(curve, &vec![0.0; curve.points.len()]);
+        let curve = &mut self.curve;
+        let given = curve.radii.take();
+        let chain = Chain::new(curve, given.as_deref().unwrap_or(&vec![0.0; curve.points.len()]));
         let knots: Vec<(usize, f64)> =
             (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]).collect();
-        self.curve = chain.through(&knots, curve.closed, Basis::BSpline).curve(curve.closed);
-        if !self.curve.closed {
+        let flattening = curve.flattening.take();
+        let through = chain.through(&knots, curve.closed, Basis::BSpline);
+        *curve = through.curve(curve.closed);
+        let count = curve.points.len();
+        curve.radii = given.map(|_| through.points[..count].iter().map(|p| p.w).collect());
+        curve.flattening = flattening;
+        if !curve.closed {
             // An open one has a control point beyond each end.
             self.coordinates.insert(0, self.coordinates[0]);
             self.coordinates.extend(self.coordinates.last().copied());
+            if let Some(axes) = &mut curve.flattening {
+                axes.insert(0, axes[0]);
+                axes.extend(axes.last().copied());
+            }
         }
         self
     }

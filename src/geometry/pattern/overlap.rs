@@ -4,7 +4,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::contact::{PointGrid, Walk, nearest};
-use crate::geometry::{chain::Chain, curve::Curve};
+use crate::geometry::{
+    chain::Chain,
+    curve::{Basis, Curve},
+};
 
 /// How far yarns run into each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,10 +37,25 @@ const MOST_PIECES: usize = 1 << 24;
 struct Piece {
     from: DVec3,
     to: DVec3,
+    /// Half of the section's long axis.
     radius: f64,
+    /// Along the section's short axis, as long as its ratio to the long one; zero where it is round.
+    flattening: DVec3,
     curve: u32,
     /// Distance from the yarn's start to the middle.
     along: f64,
+}
+
+impl Piece {
+    /// How far the section reaches in a direction.
+    fn reach(&self, direction: DVec3) -> f64 {
+        let ratio = self.flattening.length_squared();
+        if ratio <= 0.0 {
+            return self.radius;
+        }
+        let along = direction.dot(self.flattening).powi(2) / ratio;
+        self.radius / (along / ratio + 1.0 - along).max(1e-12).sqrt()
+    }
 }
 
 /// Measures curves with their radii (one for each control point): for every piece the nearest strand that is not its
@@ -75,7 +93,9 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
                     continue;
                 }
             }
-            best = best.min(nearest(a.from, a.to, b.from, b.to).between.length() / both);
+            let between = nearest(a.from, a.to, b.from, b.to).between;
+            let (distance, way) = (between.length(), between.normalize_or_zero());
+            best = best.min(distance / (a.reach(way) + b.reach(way)));
         }
         best as f32
     };
@@ -101,6 +121,12 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
 /// Cuts a curve into straight pieces; gives its length.
 fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
     let chain = Chain::new(curve, radii);
+    // Segment i of an open B-spline is near its points i + 1 and i + 2.
+    let shift = usize::from(curve.basis == Basis::BSpline && !curve.closed);
+    let flattening = |segment: usize| {
+        let axes = curve.flattening.as_ref()?;
+        axes.get((segment + shift).min(axes.len().checked_sub(1)?)).copied()
+    };
     let mut along = 0.0;
     let mut here = chain.at(0, 0.0).at;
     for segment in 0..chain.segments() {
@@ -114,6 +140,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
                 from: here.truncate(),
                 to: next.truncate(),
                 radius: 0.5 * (here.w + next.w),
+                flattening: flattening(segment).unwrap_or(DVec3::ZERO),
                 curve: index,
                 along: along + 0.5 * length,
             });
@@ -130,7 +157,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{curve::Basis, pattern::straight};
+    use crate::geometry::pattern::straight;
 
     fn measured(curves: &[Curve], radius: f64) -> Overlap {
         let radii: Vec<Vec<f64>> = curves.iter().map(|c| vec![radius; c.points.len()]).collect();

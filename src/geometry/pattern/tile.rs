@@ -11,7 +11,7 @@ use super::{
     knit::Knit,
     overlap::{Overlap, overlap},
     relax::{Ends, Relaxation, Rope},
-    weave::{TooTight, Weave},
+    weave::{Extent, Impossible, Weave},
 };
 use crate::geometry::{
     chain::spline_through,
@@ -81,19 +81,21 @@ impl Tile {
         Self { period: cell.period * diameter, counts: cell.counts, strands }
     }
 
-    /// The repeat of a weave; its numbers of warps and wefts do not matter.
+    /// The repeat of a weave, its yarns round and without pile; its numbers of warps and wefts do not matter.
     ///
     /// # Errors
-    /// As [`Weave::spacing`].
-    pub fn of_weave(weave: &Weave) -> Result<Self, TooTight> {
-        let [warp_spacing, weft_spacing] = weave.spacing()?;
+    /// As [`Weave::relax`].
+    pub fn of_weave(weave: &Weave) -> Result<Self, Impossible> {
         let (warps, wefts) = (weave.draft.warps() as u32, weave.draft.wefts() as u32);
         // The one in the middle of three repeats has its like on both sides.
-        let piece = Weave { warps: 3 * warps, wefts: 3 * wefts, ..weave.clone() };
+        let (three_warps, three_wefts) = (Extent::Yarns(3 * warps), Extent::Yarns(3 * wefts));
+        let piece = Weave { warps: three_warps, wefts: three_wefts, flatten: 1.0, ..weave.clone() };
+        let cloth = piece.relax()?;
+        let [warp_spacing, weft_spacing] = cloth.measures().spacing;
         let (width, height) = (f64::from(warps) * warp_spacing, f64::from(wefts) * weft_spacing);
         let corner = DVec3::new(-0.5 * width, -0.5 * height, 0.0);
         let mut strands = Vec::new();
-        for strand in piece.strands()? {
+        for strand in cloth.ground() {
             let is_warp = strand.kind == StrandKind::Warp;
             let (own, along, axis) = if is_warp { (warps, wefts, 1) } else { (wefts, warps, 0) };
             if !(own..2 * own).contains(&strand.index) {
@@ -417,7 +419,6 @@ mod tests {
         chart::Chart,
         draft::Draft,
         knit::{Edges, Form, POINTS, ROW_HEIGHT, STITCH_WIDTH, YARN_PER_STITCH},
-        weave,
     };
 
     fn stockinette() -> Tile {
@@ -450,21 +451,12 @@ mod tests {
 
     #[test]
     fn a_weave_gives_its_repeat() {
-        let weave = Weave {
-            draft: Draft::named("twill 2/1").unwrap(),
-            warps: 7,
-            wefts: 7,
-            warp_radius: 0.5,
-            weft_radius: 0.5,
-            warp_spacing: None,
-            weft_spacing: None,
-            crimp: 0.5,
-            points: weave::POINTS,
-        };
+        let weave = Weave { crimp: Some(0.5), ..Weave::of(Draft::named("twill 2/1").unwrap(), 0.5) };
         let tile = Tile::of_weave(&weave).unwrap();
         assert_eq!((tile.counts, tile.strands.len()), ([3, 3], 6));
         for strand in &tile.strands {
-            assert!(strand.points.iter().all(|p| p.x > -1e-9 && p.y > -1e-9 && p.z.abs() <= 0.6));
+            // Yarns sway a little from their places.
+            assert!(strand.points.iter().all(|p| p.x > -0.3 && p.y > -0.3 && p.z.abs() <= 0.9));
             let along = usize::from(strand.kind == StrandKind::Warp);
             assert_eq!(strand.step[along], 1);
             // It goes on where it stopped: no step is longer than another by much.

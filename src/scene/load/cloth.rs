@@ -14,8 +14,9 @@ use super::{
     color::{self, ColorPlan, FabricCoordinates},
     garment::{self, GarmentPlan},
     mesh::prim_pattern,
-    pattern::{self, KnitPlan, WeavePlan},
+    pattern::{self, KnitPlan},
     placement, radians, sequence,
+    weave::{self, WeavePlan, Woven},
     yarns::Library,
 };
 use crate::{
@@ -146,7 +147,7 @@ pub(super) fn plan(
     let seed = table.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32;
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let transform = placement(&table, context);
-    let color = color::plan(&table, context, library);
+    let mut color = color::plan(&table, context, library);
     let source = match table.table("source") {
         Some(source_table) => {
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
@@ -165,6 +166,9 @@ pub(super) fn plan(
             None
         }
     };
+    if let Some(Source::Weave(plan)) = &source {
+        color.take_order(&table, &plan.order);
+    }
     table.finish();
     let kind = fiber.map(KindName::Fiber).or(yarn.map(KindName::Yarn))?;
     Some(FabricPlan { name, kind, radius, phases, seed, color, transform, source: source? })
@@ -253,7 +257,7 @@ fn source(
             path.map(|_| source)
         }
         Some(1) => pattern::knit(&table, context, yarns).map(Source::Knit),
-        Some(2) => pattern::weave(&table, context, yarns).map(Source::Weave),
+        Some(2) => weave::weave(&table, context, yarns).map(Source::Weave),
         // Short for a flat knit of that pattern.
         Some(4) => pattern::stockinette(&table).map(Source::Knit),
         Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
@@ -317,8 +321,8 @@ impl FabricPlan {
         };
         let radius = self.radius.unwrap_or(own_radius);
         let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
-            let with = |curve: Curve| {
-                let radii = vec![radius; curve.points.len()];
+            let with = |mut curve: Curve| {
+                let radii = curve.radii.take().unwrap_or_else(|| vec![radius; curve.points.len()]);
                 (curve, radii)
             };
             curves.into_iter().map(with).collect()
@@ -347,20 +351,18 @@ impl FabricPlan {
                 vec![Made::new(origin, kind, with_radius(curves, radius), Some(coordinates))]
             }
             Source::Weave(plan) => {
-                let [(warps, mut coordinates), (wefts, weft_coordinates)] = plan.curves(context)?;
+                let Woven { origin, sides } = plan.make(context)?;
+                let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
                 let weft = plan.weft_yarn.as_deref().map_or(Some(kind), place_of)?;
-                let weft_radius = plan.weave.weft_radius;
-                let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, weft_radius));
+                let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, plan.weft_radius()));
                 if weft == kind {
                     warps.extend(wefts);
                     coordinates.join(weft_coordinates);
-                    vec![Made::new(plan.origin(), kind, warps, Some(coordinates))]
+                    vec![Made::new(origin, kind, warps, Some(coordinates))]
                 } else {
-                    let (warp_origin, weft_origin) =
-                        (format!("{}, warp", plan.origin()), format!("{}, weft", plan.origin()));
                     vec![
-                        Made::new(warp_origin, kind, warps, Some(coordinates)),
-                        Made::new(weft_origin, weft, wefts, Some(weft_coordinates)),
+                        Made::new(format!("warp of {origin}"), kind, warps, Some(coordinates)),
+                        Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates)),
                     ]
                 }
             }

@@ -365,6 +365,24 @@ impl ColorPlan {
         !rows.is_empty() || !columns.is_empty() || motif.is_some() || self.tint.is_some()
     }
 
+    /// Takes the yarns of warps and of wefts from the weave itself.
+    pub(super) fn take_order(&mut self, table: &Reader<'_>, [warps, wefts]: &[Vec<String>; 2]) {
+        let sides = [
+            ("columns", "warp_order", &mut self.layout.columns, warps),
+            ("rows", "weft_order", &mut self.layout.rows, wefts),
+        ];
+        for (key, own, list, order) in sides {
+            if order.is_empty() {
+                continue;
+            }
+            if !list.is_empty() || self.layout.motif.is_some() {
+                let other = if list.is_empty() { "motif" } else { key };
+                table.error_at(other, format!("give `{other}` or `{own}`, not both"), None);
+            }
+            list.clone_from(order);
+        }
+    }
+
     /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them.
     pub(super) fn apply(
         &self,

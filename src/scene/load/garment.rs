@@ -15,7 +15,7 @@ use super::{
     Context, Range, Reader, UNITS,
     cloth::{Detail, Yarns},
     color::{self, ColorPlan, FabricCoordinates},
-    pattern,
+    pattern, weave,
     yarns::Library,
 };
 use crate::{
@@ -30,7 +30,7 @@ use crate::{
             draft::Draft,
             knit::{self, Edges, Form, Knit},
             tile::Tile,
-            weave::{self, Weave},
+            weave::{Impossible, Weave},
         },
     },
     input::diagnostic::{Span, unknown_name},
@@ -189,7 +189,7 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
         }
         Some(1) => {
             let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
-            let (name, draft) = pattern::draft(&table);
+            let (name, draft) = weave::draft(&table);
             draft.map(|draft| (name, Pattern::Weave { draft, crimp }))
         }
         Some(2) => {
@@ -260,27 +260,19 @@ impl ClothPlan {
                 }
             }
             Pattern::Weave { draft, crimp } => {
-                let weave = Weave {
-                    draft: draft.clone(),
-                    warps: 1,
-                    wefts: 1,
-                    warp_radius: radius,
-                    weft_radius: radius,
-                    warp_spacing: stitch.map(|s| s.x),
-                    weft_spacing: stitch.map(|s| s.y),
-                    crimp: *crimp,
-                    points: weave::POINTS,
-                };
+                let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
+                let own = Weave::of(draft.clone(), radius);
+                let weave = Weave { warp_spacing, weft_spacing, crimp: Some(*crimp), ..own };
                 match Tile::of_weave(&weave) {
                     Ok(tile) => Some(tile),
-                    Err(tight) => {
-                        let which = if tight.warp { "warp" } else { "weft" };
+                    Err(Impossible::TooTight { warp, least }) => {
+                        let which = if warp { "warp" } else { "weft" };
                         let problem = format!(
-                            "the yarn is too thick for this gauge: {which} threads of {d:.3} mm need {:.4} mm each",
-                            tight.least
+                            "the yarn is too thick for this gauge: {which} threads of {d:.3} mm need {least:.4} mm each"
                         );
                         tell(problem, "thinner yarn, fewer threads, or another `crimp`")
                     }
+                    Err(_) => tell("the draft is too large for a garment".to_owned(), "a smaller repeat"),
                 }
             }
             Pattern::File(path) => match curve_file::read_tile(path) {

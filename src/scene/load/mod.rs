@@ -14,6 +14,7 @@ mod sequence;
 mod settings;
 mod stage_camera;
 mod view;
+mod weave;
 mod yarns;
 
 use std::{

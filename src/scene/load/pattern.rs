@@ -1,4 +1,4 @@
-//! `source = { type = "knit" }` and `{ type = "weave" }`: cloth that the program makes.
+//! `source = { type = "knit" }`: knitted cloth that the program makes.
 
 use glam::DVec2;
 
@@ -7,12 +7,10 @@ use crate::{
     geometry::{
         curve::Curve,
         pattern::{
-            MAX_POINTS, PatternStrand, StrandKind,
+            MAX_POINTS,
             chart::{Chart, PATTERNS},
-            draft::{Draft, DraftError},
             knit::{self, Edges, Form, Knit},
             knitspeak,
-            weave::{self, Weave},
         },
     },
     input::{
@@ -200,89 +198,4 @@ fn revolution(table: &Reader<'_>, context: &Context<'_>, profile: Option<&[[f64;
         return Some(Form::Revolution(profile));
     }
     None
-}
-
-/// A weave that is checked.
-pub(super) struct WeavePlan {
-    pub(super) weave: Weave,
-    /// If it is not the fabric's own.
-    pub(super) weft_yarn: Option<String>,
-    name: String,
-    header: Span,
-}
-
-impl WeavePlan {
-    pub(super) fn origin(&self) -> String {
-        format!("{}, {} x {}", self.name, self.weave.warps, self.weave.wefts)
-    }
-
-    /// Warps and wefts with their places.
-    pub(super) fn curves(&self, context: &Context<'_>) -> Option<[(Vec<Curve>, FabricCoordinates); 2]> {
-        match self.weave.strands() {
-            Ok(strands) => {
-                let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
-                    strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-                Some([warps, wefts].map(|side| FabricCoordinates::of(side, [self.weave.warps, self.weave.wefts])))
-            }
-            Err(tight) => {
-                let (key, least) =
-                    (if tight.warp { "warp_spacing" } else { "weft_spacing" }, tight.least / context.unit);
-                let problem = format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here");
-                let hint = "thinner yarns, another `crimp`, or no spacing at all for the tightest";
-                context.error(self.header, problem, Some(hint.to_owned()));
-                None
-            }
-        }
-    }
-}
-
-/// Reads the keys of a weave.
-pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
-    let (name, draft) = draft(table);
-    let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
-    let names = &yarns.library.yarn_names;
-    if let Some(name) = weft_yarn.filter(|name| !names.iter().any(|n| n == name)) {
-        let span = table.span("weft_yarn").unwrap_or(table.header());
-        context.unknown(span, "yarn", name, names.iter().map(String::as_str));
-    }
-    let own = yarns.radius();
-    let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
-    let warps = table.u64_or("warps", 20, 1..=1_000_000) as u32;
-    let wefts = table.u64_or("wefts", 20, 1..=1_000_000) as u32;
-    let warp_spacing = table.f64("warp_spacing", Range::POSITIVE).map(|s| s * context.unit);
-    let weft_spacing = table.f64("weft_spacing", Range::POSITIVE).map(|s| s * context.unit);
-    let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
-    let points = table.u64_or("points", weave::POINTS.into(), 4..=200) as u32;
-    let warp_radius = own;
-    let draft = draft?;
-    let weave = Weave { draft, warps, wefts, warp_radius, weft_radius, warp_spacing, weft_spacing, crimp, points };
-    if weave.control_points() > MAX_POINTS {
-        table.error_at("warps", "more than 2^27 control points", Some("fewer warps, wefts or points"));
-        return None;
-    }
-    Some(WeavePlan { weave, weft_yarn: weft_yarn.map(str::to_owned), name, header: table.header() })
-}
-
-/// `draft`: a name, or rows of a matrix.
-pub(super) fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
-    let rows = table.strings("draft");
-    let read: Result<(String, Draft), DraftError> = match rows.as_slice() {
-        [] if table.has("draft") => {
-            // A value of another type is told already.
-            if table.node("draft").is_some_and(|node| matches!(&node.value, Value::Array(rows) if rows.is_empty())) {
-                table.error_at("draft", "a draft without rows", Some("draft = [\"#..\", \".#.\", \"..#\"]"));
-            }
-            return (String::new(), None);
-        }
-        [] => Draft::named("plain").map(|d| ("plain weave".to_owned(), d)),
-        [(name, _)] if !name.contains(['#', '.']) => Draft::named(name).map(|d| (format!("{name} weave"), d)),
-        rows => Draft::matrix(&rows.iter().map(|(text, _)| *text).collect::<Vec<_>>()).map(|d| ("weave".to_owned(), d)),
-    };
-    match read {
-        Ok((name, draft)) => (name, Some(draft)),
-        Err(error) => {
-            table.error_at("draft", error.problem, Some(&error.hint));
-            (String::new(), None)
-        }
-    }
 }

@@ -1,0 +1,78 @@
+//! How far flattened yarns run into each other: points of each yarn's surface, looked for inside the others.
+
+use glam::DVec3;
+
+/// A cross-section: an ellipse about a yarn's centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section {
+    /// Centre.
+    pub(super) at: DVec3,
+    /// Unit vector along the yarn.
+    pub(super) tangent: DVec3,
+    /// Unit vector along the minor axis.
+    pub(super) minor: DVec3,
+    /// Half width and half height.
+    pub(super) axes: [f64; 2],
+}
+
+/// Points around a section.
+const AROUND: usize = 16;
+
+/// The deepest point of any yarn inside another, as a length, and the share of surface points deeper than `tolerated`.
+/// Yarns are chains of sections.
+pub(super) fn intrusion(yarns: &[Vec<Section>], tolerated: f64) -> (f64, f64) {
+    let widest = yarns.iter().flatten().fold(0.0f64, |w, s| w.max(s.axes[0]).max(s.axes[1]));
+    let boxes: Vec<(DVec3, DVec3)> = yarns
+        .iter()
+        .map(|yarn| {
+            let low = yarn.iter().fold(DVec3::INFINITY, |m, s| m.min(s.at));
+            let high = yarn.iter().fold(DVec3::NEG_INFINITY, |m, s| m.max(s.at));
+            (low - widest, high + widest)
+        })
+        .collect();
+    let (mut deepest, mut deep, mut all) = (0.0f64, 0usize, 0usize);
+    for (i, yarn) in yarns.iter().enumerate() {
+        for section in yarn {
+            let major = section.tangent.cross(section.minor);
+            for k in 0..AROUND {
+                let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+                let point = section.at + major * (cos * section.axes[0]) + section.minor * (sin * section.axes[1]);
+                let others = yarns.iter().enumerate().filter(|(j, _)| *j != i);
+                let near = others.filter(|(j, _)| point.cmpge(boxes[*j].0).all() && point.cmple(boxes[*j].1).all());
+                let depth = near.map(|(_, other)| depth_in(other, point)).fold(0.0, f64::max);
+                deepest = deepest.max(depth);
+                deep += usize::from(depth > tolerated);
+                all += 1;
+            }
+        }
+    }
+    (deepest, deep as f64 / all.max(1) as f64)
+}
+
+/// How deep a point is inside a yarn.
+fn depth_in(yarn: &[Section], point: DVec3) -> f64 {
+    let mut best = 0.0f64;
+    for pair in yarn.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        let way = b.at - a.at;
+        let s = ((point - a.at).dot(way) / way.length_squared().max(1e-30)).clamp(0.0, 1.0);
+        let off = point - (a.at + s * way);
+        let axes = [0, 1].map(|c| a.axes[c] + s * (b.axes[c] - a.axes[c]));
+        if off.length_squared() >= axes[0].max(axes[1]).powi(2) {
+            continue;
+        }
+        let tangent = a.tangent.lerp(b.tangent, s).normalize_or(a.tangent);
+        let minor = a.minor.lerp(b.minor, s);
+        let minor = (minor - minor.dot(tangent) * tangent).normalize_or(a.minor);
+        // What lies along the yarn is no distance from its axis but at its ends.
+        let (p, q) = (off.dot(tangent.cross(minor)), off.dot(minor));
+        let root = ((p / axes[0]).powi(2) + (q / axes[1]).powi(2)).sqrt();
+        if root < 1.0 {
+            // To first order the distance to the surface; near the axis that breaks down, and less than half of the thinner
+            // half axis is never right.
+            let slope = 2.0 * (p / (axes[0] * axes[0])).hypot(q / (axes[1] * axes[1]));
+            best = best.max(((1.0 - root * root) / slope.max(1e-12)).min(axes[0].min(axes[1])));
+        }
+    }
+    best
+}

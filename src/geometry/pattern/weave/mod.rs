@@ -1,0 +1,341 @@
+//! Woven cloth: one repeat of the draft is brought to equilibrium ([`unit_cell`]) and repeated.
+//!
+//! Yarns touch where they cross, share their crimp by stiffness as in Peirce's geometry ("The Geometry of Cloth
+//! Structure", 1937), flatten at the same area (Kemp, "An Extension of Peirce's Cloth Geometry", 1958), and are as close
+//! as the loom beats them up, unless spacings or a cover are given.
+
+mod edges;
+mod intrusion;
+mod minimize;
+mod pile;
+mod unit_cell;
+
+#[cfg(test)]
+mod tests;
+
+use glam::DVec3;
+
+pub use self::edges::Edges;
+use self::unit_cell::{BEAT, CellOptions, UnitCell, full};
+use super::{
+    MAX_POINTS, PatternStrand, StrandKind,
+    draft::{Draft, Pile},
+};
+use crate::geometry::curve::{Basis, Curve};
+
+/// A rectangle of woven cloth in the plane z = 0: warps along y, wefts along x, right side towards +z. Lengths in the
+/// unit of the radii.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weave {
+    /// What lies over what.
+    pub draft: Draft,
+    /// How many warps, or how wide.
+    pub warps: Extent,
+    /// How many wefts, or how high.
+    pub wefts: Extent,
+    /// Radius of the warp yarn where it is round.
+    pub warp_radius: f64,
+    /// Radius of the weft yarn where it is round.
+    pub weft_radius: f64,
+    /// Distance between warps; what the loom gives if absent.
+    pub warp_spacing: Option<f64>,
+    /// Distance between wefts.
+    pub weft_spacing: Option<f64>,
+    /// Share of the plane that yarns cover, 0 to 1; the spacings that are not given follow from it.
+    pub cover: Option<f64>,
+    /// The warp's share of the crimp: 0 leaves warps straight, 1 wefts; by the yarns' stiffness if absent.
+    pub crimp: Option<f64>,
+    /// Width over height of a yarn that nothing presses in this cloth, at least 1.
+    pub flatten: f64,
+    /// Control points between two crossings.
+    pub points: u32,
+    /// How it ends at its sides, at the bottom and at the top; cloth with a pile of wefts is cut.
+    pub edges: Edges,
+    /// How high the pile stands, where there is one.
+    pub pile_height: f64,
+}
+
+/// How far cloth goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extent {
+    /// So many yarns.
+    Yarns(u32),
+    /// As many as fill this length best, at least one.
+    Length(f64),
+}
+
+/// Why there is no such cloth.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Impossible {
+    /// A spacing leaves yarns no room.
+    TooTight {
+        /// Whether it is the warps'; else the wefts'.
+        warp: bool,
+        /// About the least that is possible.
+        least: f64,
+    },
+    /// More cover than the yarns can give.
+    TooMuchCover {
+        /// The most that is possible.
+        most: f64,
+    },
+    /// More control points than [`MAX_POINTS`].
+    TooLarge,
+}
+
+/// What a weave came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    /// Distance between warps and between wefts.
+    pub spacing: [f64; 2],
+    /// Share of the plane that no yarn covers, seen from above.
+    pub see_through: f64,
+    /// Length of a warp and of a weft over the cloth's, less 1.
+    pub crimp: [f64; 2],
+    /// From the lowest to the highest point of a repeat.
+    pub thickness: f64,
+    /// Width and height of the cloth.
+    pub size: [f64; 2],
+    /// Length of all warps and of all wefts.
+    pub length: [f64; 2],
+}
+
+/// Control points between crossings unless asked otherwise.
+pub const POINTS: u32 = 8;
+/// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
+pub const FLATTEN: f64 = 1.5;
+/// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
+/// have no room.
+const MOST_OVERLAP: f64 = 0.03;
+
+/// Woven cloth in equilibrium, ready to be repeated.
+#[derive(Clone, Debug)]
+pub struct Cloth<'a> {
+    weave: &'a Weave,
+    cell: UnitCell,
+    /// Warps and wefts.
+    count: [u32; 2],
+}
+
+impl Weave {
+    /// A weave of one yarn as it comes by itself, cut all around: 20 by 20 yarns.
+    pub fn of(draft: Draft, radius: f64) -> Self {
+        Self {
+            draft,
+            warps: Extent::Yarns(20),
+            wefts: Extent::Yarns(20),
+            warp_radius: radius,
+            weft_radius: radius,
+            warp_spacing: None,
+            weft_spacing: None,
+            cover: None,
+            crimp: None,
+            flatten: FLATTEN,
+            points: POINTS,
+            edges: Edges::Live,
+            pile_height: 8.0 * radius,
+        }
+    }
+
+    fn options(&self) -> CellOptions {
+        let [p, q] = [self.warp_radius, self.weft_radius].map(|r| r * r);
+        CellOptions {
+            radius: [self.warp_radius, self.weft_radius],
+            aspect: [self.flatten; 2],
+            // A strand of fibres that slide is as stiff as they are many; the stiffer side bends less.
+            crimp: self.crimp.unwrap_or(q / (p + q)),
+            spacing: [self.warp_spacing, self.weft_spacing],
+            // Under pressure the crimp of equal yarns would all go into one of them; cloth of equal yarns is woven square.
+            balanced: self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)),
+            beat: BEAT,
+            nodes: self.points as usize,
+        }
+    }
+
+    /// Relaxes a repeat.
+    ///
+    /// # Errors
+    /// Spacings or a cover that leave yarns no room; too many control points.
+    pub fn relax(&self) -> Result<Cloth<'_>, Impossible> {
+        let options = self.options();
+        let free = || UnitCell::relax(&self.draft, &CellOptions { spacing: [None; 2], ..options.clone() });
+        if let Some(cover) = self.cover {
+            let free = free();
+            let spacing = self.spacing_for(cover, &free)?;
+            return self.cloth(UnitCell::relax(&self.draft, &CellOptions { spacing, ..options.clone() }));
+        }
+        let cell = UnitCell::relax(&self.draft, &options);
+        if options.spacing != [None; 2] && cell.overlap[1] > MOST_OVERLAP {
+            let least = match options.spacing {
+                [Some(_), Some(_)] => free().spacing,
+                // Where the others may give way, yarns need not have more room than side by side.
+                _ => [0, 1].map(|side| full(&self.draft, &options, side)),
+            };
+            // What the loom gives by itself always fits.
+            let tight = |side: usize| options.spacing[side].is_some_and(|s| s < least[side] * 0.999);
+            if let Some(side) = [0, 1].into_iter().find(|&side| tight(side)) {
+                return Err(Impossible::TooTight { warp: side == 0, least: least[side] });
+            }
+        }
+        self.cloth(cell)
+    }
+
+    fn cloth(&self, cell: UnitCell) -> Result<Cloth<'_>, Impossible> {
+        let count = |extent: Extent, spacing: f64| match extent {
+            Extent::Yarns(count) => count,
+            Extent::Length(length) => (length / spacing).round().clamp(1.0, 1e9) as u32,
+        };
+        let count = [count(self.warps, cell.spacing[0]), count(self.wefts, cell.spacing[1])];
+        let points = 2 * u64::from(count[0] + 1) * u64::from(count[1] + 1) * u64::from(self.points);
+        if points > MAX_POINTS {
+            return Err(Impossible::TooLarge);
+        }
+        Ok(Cloth { weave: self, cell, count })
+    }
+
+    /// Spacings at which the cloth covers so much of the plane.
+    fn spacing_for(&self, cover: f64, free: &UnitCell) -> Result<[Option<f64>; 2], Impossible> {
+        let options = self.options();
+        let at = |factor: f64| [0, 1].map(|side| Some(options.spacing[side].unwrap_or(free.spacing[side] * factor)));
+        let covered = |factor: f64| {
+            let cell = UnitCell::relax(&self.draft, &CellOptions { spacing: at(factor), ..options.clone() });
+            1.0 - cell.see_through()
+        };
+        let most = 1.0 - free.see_through();
+        if cover > most + 0.02 {
+            return Err(Impossible::TooMuchCover { most });
+        }
+        if cover >= most {
+            return Ok(at(1.0));
+        }
+        // Cover falls as spacings grow; yarns that do not touch any more are straight.
+        let (mut low, mut high) = (1.0, 2.0);
+        while covered(high) > cover && high < 64.0 {
+            (low, high) = (high, 2.0 * high);
+        }
+        for _ in 0..10 {
+            let middle = 0.5 * (low + high);
+            if covered(middle) > cover { low = middle } else { high = middle }
+        }
+        Ok(at(0.5 * (low + high)))
+    }
+
+    /// The warps, from left to right, then the wefts, from bottom to top; each an open curve.
+    ///
+    /// # Errors
+    /// As [`Self::relax`].
+    pub fn strands(&self) -> Result<Vec<PatternStrand>, Impossible> {
+        Ok(self.relax()?.strands())
+    }
+}
+
+impl Cloth<'_> {
+    /// What it came to.
+    pub fn measures(&self) -> Measures {
+        let cell = &self.cell;
+        let crimp = [0, 1].map(|side| {
+            let straight = cell.spacing[1 - side] * cell.yarns[1 - side].len() as f64;
+            cell.length(side) / (straight * cell.yarns[side].len() as f64) - 1.0
+        });
+        let (low, high) = cell
+            .yarns
+            .iter()
+            .flatten()
+            .flatten()
+            .fold((f64::MAX, f64::MIN), |(l, h), n| (l.min(n.height - n.axes[1]), h.max(n.height + n.axes[1])));
+        let size = [0, 1].map(|side| cell.spacing[side] * f64::from(self.count[side]));
+        let length = [0, 1].map(|side| f64::from(self.count[side]) * size[1 - side] * (1.0 + crimp[side]));
+        let thickness = high - low;
+        Measures { spacing: cell.spacing, see_through: cell.see_through(), crimp, thickness, size, length }
+    }
+
+    /// Numbers of warps and wefts.
+    pub fn count(&self) -> [u32; 2] {
+        self.count
+    }
+
+    /// The yarns as the draft has them, cut all around, without pile: warps from left to right, then wefts from bottom to
+    /// top.
+    pub fn ground(&self) -> Vec<PatternStrand> {
+        let sides = (0..2).flat_map(|side| (0..self.count[side]).map(move |index| (side, index)));
+        sides.map(|(side, index)| self.strand(side, index, 0)).collect()
+    }
+
+    /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top, which
+    /// selvedges make one.
+    pub fn strands(&self) -> Vec<PatternStrand> {
+        let thickness = self.measures().thickness;
+        let cut = self.weave.draft.pile().is_some_and(Pile::of_wefts);
+        let edges = if cut { Edges::Live } else { self.weave.edges };
+        let hem = if edges == Edges::Finished { edges::hem_wefts(thickness, self.cell.spacing[1]) } else { 0 };
+        let numbers = [0..self.count[0], 0..self.count[1] + 2 * hem];
+        let strands = |side: usize| {
+            numbers[side].clone().flat_map(move |index| {
+                let number = i64::from(index) - if side == 1 { i64::from(hem) } else { 0 };
+                pile::raise(self, self.strand(side, index, hem), number, i64::from(hem))
+            })
+        };
+        let mut strands: Vec<PatternStrand> = strands(0).chain(strands(1)).collect();
+        if let Edges::Fringe(length) = edges {
+            edges::fringe(self, &mut strands, length);
+        }
+        if edges != Edges::Live {
+            strands = edges::selvedges(self, strands);
+        }
+        if edges == Edges::Finished {
+            edges::hem(&mut strands, 0.5 * self.measures().size[1], thickness);
+        }
+        strands
+    }
+
+    /// A yarn across all of the other side, with half a spacing beyond the first and the last. There are `hem` more wefts
+    /// at the bottom and at the top.
+    fn strand(&self, side: usize, index: u32, hem: u32) -> PatternStrand {
+        let cell = &self.cell;
+        let nodes = cell.nodes as i64;
+        let (own, along) = (cell.spacing[side], cell.spacing[1 - side]);
+        let hem = i64::from(hem);
+        // The first and the number of the yarns on both sides.
+        let range = [(0, i64::from(self.count[0])), (-hem, i64::from(self.count[1]) + 2 * hem)];
+        let middle = |side: usize| 0.5 * f64::from(self.count[side]);
+        let (first, others) = range[1 - side];
+        let number = range[side].0 + i64::from(index);
+        let across = (number as f64 + 0.5 - middle(side)) * own;
+        let yarn = &cell.yarns[side][number.rem_euclid(cell.yarns[side].len() as i64) as usize];
+        let steps = first * nodes - nodes / 2..=(first + others - 1) * nodes + nodes / 2;
+        let node = |k: i64| yarn[k.rem_euclid(yarn.len() as i64) as usize];
+        let place = |k: i64| k as f64 / nodes as f64 + 0.5;
+        let point = |k: i64| {
+            let (a, b) = ((place(k) - middle(1 - side)) * along, across + node(k).aside);
+            if side == 0 { DVec3::new(b, a, node(k).height) } else { DVec3::new(a, b, node(k).height) }
+        };
+        let coordinates = |k: i64| {
+            let (i, place) = (number as f32 + 0.5, place(k) as f32);
+            if side == 0 { [i, place] } else { [place, i] }
+        };
+        // The short axis is in the plane that stands on the cloth along the yarn.
+        let flattening = |k: i64| {
+            let tangent = (point(k + 1) - point(k - 1)).normalize();
+            let [wide, high] = node(k).axes;
+            (DVec3::Z - tangent.z * tangent).normalize_or(DVec3::Z) * (high / wide)
+        };
+        let kind = [StrandKind::Warp, StrandKind::Weft][side];
+        let mut made = strand(kind, index, steps.clone().map(|k| (point(k), coordinates(k))));
+        if self.weave.flatten > 1.0 {
+            made.curve.radii = Some(steps.clone().map(|k| node(k).axes[0]).collect());
+            made.curve.flattening = Some(steps.map(flattening).collect());
+        }
+        made
+    }
+}
+
+/// A round strand through points, each with its place in the cloth.
+fn strand(kind: StrandKind, index: u32, points: impl Iterator<Item = (DVec3, [f32; 2])>) -> PatternStrand {
+    let (points, coordinates) = points.unzip();
+    PatternStrand {
+        curve: Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None },
+        kind,
+        index,
+        coordinates,
+    }
+}

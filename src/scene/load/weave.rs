@@ -1,0 +1,284 @@
+//! `source = { type = "weave" }`: woven cloth that the program makes.
+
+use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
+use crate::{
+    geometry::{
+        curve::Curve,
+        pattern::{
+            PatternStrand, StrandKind,
+            draft::{Draft, DraftError},
+            weave::{self, Edges, Extent, Impossible, Measures, Weave},
+        },
+    },
+    input::{
+        diagnostic::Span,
+        document::{Node, Value},
+    },
+};
+
+/// Length of a fringe unless given, in radii of the warp.
+const FRINGE: f64 = 24.0;
+
+/// Height of a pile unless given, in the same.
+const PILE: f64 = 8.0;
+
+/// A weave that is checked.
+pub(super) struct WeavePlan {
+    weave: Weave,
+    /// If it is not the fabric's own.
+    pub(super) weft_yarn: Option<String>,
+    /// Yarns of warps from the left and of wefts from the bottom, in turns; empty where they are all the same.
+    pub(super) order: [Vec<String>; 2],
+    name: String,
+    header: Span,
+}
+
+/// Woven yarns.
+pub(super) struct Woven {
+    /// What it is and what it came to.
+    pub(super) origin: String,
+    /// Warps and wefts, with their places.
+    pub(super) sides: [(Vec<Curve>, FabricCoordinates); 2],
+}
+
+impl WeavePlan {
+    /// Radius of the weft yarn.
+    pub(super) fn weft_radius(&self) -> f64 {
+        self.weave.weft_radius
+    }
+
+    /// Weaves it.
+    pub(super) fn make(&self, context: &Context<'_>) -> Option<Woven> {
+        let wrong = |problem: String, hint: &str| context.error(self.header, problem, Some(hint.to_owned()));
+        match self.weave.relax() {
+            Ok(cloth) => {
+                let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
+                    cloth.strands().into_iter().partition(|s| s.kind == StrandKind::Warp);
+                let length =
+                    [&warps, &wefts].map(|side| side.iter().map(|s| s.curve.polygon_length()).sum::<f64>() / 1000.0);
+                let origin = self.origin(cloth.count(), &cloth.measures(), length);
+                let sides = [warps, wefts].map(|side| FabricCoordinates::of(side, cloth.count()));
+                return Some(Woven { origin, sides });
+            }
+            Err(Impossible::TooTight { warp, least }) => {
+                let (key, least) = (if warp { "warp_spacing" } else { "weft_spacing" }, least / context.unit);
+                wrong(
+                    format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here"),
+                    "thinner yarns, another `crimp`, or no spacing at all for the tightest",
+                );
+            }
+            Err(Impossible::TooMuchCover { most }) => wrong(
+                format!("these yarns cover at most {most:.3} of the plane in this weave"),
+                "a lower `cover`, a higher `flatten`, or no cover at all for the closest",
+            ),
+            Err(Impossible::TooLarge) => {
+                wrong("more than 2^27 control points".to_owned(), "fewer warps, wefts or points");
+            }
+        }
+        None
+    }
+
+    /// As a weaver would describe it, in millimetres and metres.
+    fn origin(&self, count: [u32; 2], measures: &Measures, [warp, weft]: [f64; 2]) -> String {
+        let [ends, picks] = measures.spacing.map(|s| 10.0 / s);
+        let [width, height] = measures.size;
+        format!(
+            "{}, {} x {}: {ends:.1} ends and {picks:.1} picks per cm, {width:.1} x {height:.1} mm, {:.1} % see-through, \
+             {warp:.2} m of warp and {weft:.2} m of weft",
+            self.name,
+            count[0],
+            count[1],
+            100.0 * measures.see_through,
+        )
+    }
+}
+
+/// Reads the keys of a weave.
+pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
+    let (name, draft) = draft(table);
+    let names = &yarns.library.yarn_names;
+    let check = |key: &str, name: &str| {
+        if !names.iter().any(|n| n == name) {
+            context.unknown(table.span(key).unwrap_or(table.header()), "yarn", name, names.iter().map(String::as_str));
+        }
+    };
+    let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
+    weft_yarn.inspect(|name| check("weft_yarn", name));
+    let order = ["warp_order", "weft_order"].map(|key| {
+        let order: Vec<String> = table.strings(key).into_iter().flat_map(|(entry, _)| in_turns(entry)).collect();
+        order.iter().for_each(|name| check(key, name));
+        order
+    });
+    let own = yarns.radius();
+    let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
+    let warp_spacing = spacing(table, context, "warp_spacing", "ends_per_cm");
+    let weft_spacing = spacing(table, context, "weft_spacing", "picks_per_cm");
+    let cover = table.f64("cover", Range::between(0.01, 1.0));
+    if cover.is_some() && warp_spacing.is_some() && weft_spacing.is_some() {
+        table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
+    }
+    let (warps, wefts) = (extent(table, context, "warps", "width"), extent(table, context, "wefts", "height"));
+    let crimp = table.f64("crimp", Range::UNIT);
+    let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
+    let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
+    let edges = edges(table, context, own);
+    let pile = table.f64("pile_height", Range::POSITIVE).map(|h| h * context.unit);
+    let weave = Weave {
+        draft: draft?,
+        warps,
+        wefts,
+        warp_radius: own,
+        weft_radius,
+        warp_spacing,
+        weft_spacing,
+        cover,
+        crimp,
+        flatten,
+        points,
+        edges,
+        pile_height: pile.unwrap_or(PILE * own),
+    };
+    if pile.is_some() && weave.draft.pile().is_none() {
+        table.error_at("pile_height", "this draft has no pile", Some("draft = \"terry\", \"velvet\" or \"corduroy\""));
+    }
+    warn_about_loose(table, &weave.draft);
+    Some(WeavePlan { weave, weft_yarn: weft_yarn.map(str::to_owned), order, name, header: table.header() })
+}
+
+/// How the cloth ends.
+fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64) -> Edges {
+    let fringe = table.f64("fringe", Range::POSITIVE).map(|l| l * context.unit);
+    let fringed = Edges::Fringe(fringe.unwrap_or(FRINGE * radius));
+    let names =
+        [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
+    let edges = table.one_of_or("edges", if fringe.is_some() { fringed } else { Edges::Finished }, &names);
+    if fringe.is_some() && edges != fringed {
+        table.error_at("fringe", "only `edges = \"fringe\"` has a fringe", None);
+    }
+    edges
+}
+
+/// `"navy"`, or `"4 navy"` for four of them.
+fn in_turns(entry: &str) -> Vec<String> {
+    let counted = entry.split_once(' ').and_then(|(count, name)| Some((count.parse::<usize>().ok()?, name.trim())));
+    match counted {
+        Some((count @ 1..=10_000, name)) => vec![name.to_owned(); count],
+        _ => vec![entry.to_owned()],
+    }
+}
+
+/// Yarns that always stay on one side are held by nothing.
+fn warn_about_loose(table: &Reader<'_>, draft: &Draft) {
+    let loose = draft.loose();
+    let told: Vec<String> = ["warp", "weft"]
+        .iter()
+        .zip(&loose)
+        .filter(|(_, places)| !places.is_empty())
+        .map(|(side, places)| {
+            let list: Vec<String> = places.iter().take(8).map(|p| (p + 1).to_string()).collect();
+            let more = if places.len() > 8 { ", ..." } else { "" };
+            format!("{side} {}{more}", list.join(", "))
+        })
+        .collect();
+    if !told.is_empty() {
+        let message = format!(
+            "this draft does not interlace: {} of each {} x {} never change sides",
+            told.join(" and "),
+            draft.warps(),
+            draft.wefts()
+        );
+        table.warning_at("draft", message, Some("warps count from the left, wefts from the bottom"));
+    }
+}
+
+/// A distance of yarns, or how many there are to 10 mm.
+fn spacing(table: &Reader<'_>, context: &Context<'_>, key: &str, density: &str) -> Option<f64> {
+    let spacing = table.f64(key, Range::POSITIVE).map(|s| s * context.unit);
+    let counted = table.f64(density, Range::POSITIVE).map(|n| 10.0 / n);
+    if spacing.is_some() && counted.is_some() {
+        table.error_at(density, format!("give `{key}` or `{density}`, not both"), None);
+    }
+    spacing.or(counted)
+}
+
+/// A number of yarns, or the length that they fill.
+fn extent(table: &Reader<'_>, context: &Context<'_>, key: &str, length: &str) -> Extent {
+    let asked = table.f64(length, Range::POSITIVE).map(|l| l * context.unit);
+    if asked.is_some() && table.has(key) {
+        table.error_at(length, format!("give `{key}` or `{length}`, not both"), None);
+    }
+    let count = table.u64_or(key, 20, 1..=1_000_000) as u32;
+    asked.map_or(Extent::Yarns(count), Extent::Length)
+}
+
+/// `draft`: a name, rows of a matrix, or a loom's lists.
+pub(super) fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
+    let read: Option<(String, Result<Draft, DraftError>)> =
+        if matches!(table.node("draft").map(|node| &node.value), Some(Value::Table(_))) {
+            table.table("draft").and_then(loom).map(|draft| ("weave".to_owned(), draft))
+        } else {
+            let rows = table.strings("draft");
+            match rows.as_slice() {
+                [] if table.has("draft") => {
+                    // A value of another type is told already.
+                    let empty = |node: &Node| matches!(&node.value, Value::Array(rows) if rows.is_empty());
+                    if table.node("draft").is_some_and(empty) {
+                        table.error_at("draft", "a draft without rows", Some("draft = [\"#..\", \".#.\", \"..#\"]"));
+                    }
+                    None
+                }
+                [] => Some(("plain weave".to_owned(), Draft::named("plain"))),
+                [(name, _)] if !name.contains(['#', '.']) => Some((format!("{name} weave"), Draft::named(name))),
+                rows => {
+                    let rows: Vec<&str> = rows.iter().map(|(text, _)| *text).collect();
+                    Some(("weave".to_owned(), Draft::matrix(&rows)))
+                }
+            }
+        };
+    match read {
+        Some((name, Ok(draft))) => (name, Some(draft)),
+        Some((_, Err(error))) => {
+            table.error_at("draft", error.problem, Some(&error.hint));
+            (String::new(), None)
+        }
+        None => (String::new(), None),
+    }
+}
+
+/// `threading`, `tie_up` and `treadling`; `None` where that is told.
+fn loom(table: Reader<'_>) -> Option<Result<Draft, DraftError>> {
+    const HINT: &str = "threading = [1, 2, 3, 4], tie_up = [[1, 2], [2, 3], [3, 4], [4, 1]], treadling = [1, 2, 3, 4]";
+    let missing: Vec<&str> = ["threading", "tie_up", "treadling"].into_iter().filter(|key| !table.has(key)).collect();
+    for key in &missing {
+        table.error(format!("missing key `{key}` of the loom"), Some(HINT));
+    }
+    let count = |number: f64| (number.fract() == 0.0 && (1.0..=1024.0).contains(&number)).then_some(number as u32);
+    let whole = |key: &str| -> Option<Vec<u32>> {
+        let numbers = table.numbers(key, Range::FINITE)?;
+        let counts = numbers.into_iter().map(count).collect::<Option<Vec<u32>>>();
+        if counts.is_none() {
+            table.error_at(key, format!("`{key}` expects whole numbers from 1 to 1024"), Some(HINT));
+        }
+        counts
+    };
+    let (threading, treadling) = (whole("threading"), whole("treadling"));
+    let shafts = |node: &Node| -> Option<Vec<u32>> {
+        let number = |node: &Node| match node.value {
+            Value::Integer(value) => count(value as f64),
+            _ => None,
+        };
+        match &node.value {
+            Value::Array(elements) => elements.iter().map(number).collect(),
+            _ => number(node).map(|shaft| vec![shaft]),
+        }
+    };
+    let tie_up = match table.node("tie_up").map(|node| &node.value) {
+        Some(Value::Array(treadles)) => treadles.iter().map(shafts).collect::<Option<Vec<_>>>(),
+        _ => None,
+    };
+    if tie_up.is_none() && table.has("tie_up") {
+        table.error_at("tie_up", "`tie_up` expects the shafts that each treadle raises", Some(HINT));
+    }
+    table.finish();
+    Some(Draft::from_loom(&threading?, &tie_up?, &treadling?))
+}
