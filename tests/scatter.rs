@@ -46,7 +46,7 @@ fn scatter_writes_every_format_and_sweeps_any_key() {
 fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
     let directory = directory();
     for (args, word) in [
-        (&["scatter", "silk"][..], "did you mean \"silk1\"?"),
+        (&["scatter", "silk2x"][..], "did you mean \"silk2\"?"),
         (&["scatter", "silk1", "--theta", "90"], "between -90 and 90"),
         (&["scatter", "silk1", "--offset", "1.1"], "from -1 to 1"),
         (&["scatter", "silk1", "--ply", "3"], "3 plies"),

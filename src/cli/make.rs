@@ -272,10 +272,13 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     write(cloth.strands(), &args.output, piece.weft_radius)?;
     if !args.output.quiet {
         let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
-        eprintln!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]);
-        eprintln!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]);
-        eprintln!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through);
-        eprintln!("{:.3} wide, {:.3} high; {:.1} of warp, {:.1} of weft", size[0], size[1], length[0], length[1]);
+        log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
+        log::say(&format!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]));
+        log::say(&format!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through));
+        log::say(&format!(
+            "{:.3} wide, {:.3} high; {:.1} of warp, {:.1} of weft",
+            size[0], size[1], length[0], length[1]
+        ));
     }
     Ok(())
 }

@@ -9,9 +9,9 @@ use super::{Failure, log, terminal::print};
 use crate::image::output;
 
 const COMPLETIONS: &str = "Examples:
-  yarnray completions bash > ~/.local/share/bash-completion/completions/yarnray
-  yarnray completions zsh > ~/.zfunc/_yarnray
-  yarnray completions fish > ~/.config/fish/completions/yarnray.fish";
+  yarnray completions bash      into ~/.local/share/bash-completion/completions/yarnray
+  yarnray completions zsh       into ~/.zfunc/_yarnray
+  yarnray completions fish      into ~/.config/fish/completions/yarnray.fish";
 
 #[derive(Args, Debug)]
 #[command(after_help = COMPLETIONS)]
@@ -20,8 +20,8 @@ pub(super) struct CompletionsArgs {
     shell: Shell,
 }
 
-const MAN: &str = "Example:
-  yarnray man ~/.local/share/man/man1      then: man yarnray, man yarnray-render";
+const MAN: &str = "Examples:
+  yarnray man man1      for ~/.local/share/man/man1; then: man yarnray, man yarnray-render";
 
 #[derive(Args, Debug)]
 #[command(after_help = MAN)]

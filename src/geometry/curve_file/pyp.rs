@@ -485,7 +485,7 @@ mod tests {
     fn the_number_of_cells_is_limited() {
         let text = file(&[[1.0, 1.0], [5.0, 1.0]], &[[0, 1, 0, 0], [1, 0, 1, 0]]);
         for (tile, expected) in [
-            ([u32::MAX, u32::MAX], "4294967295 x 4294967295 cells of 2 points are more than the 67108864 allowed"),
+            ([u32::MAX, u32::MAX], "4294967295 x 4294967295 cells of 2 points are more than the 134217728 allowed"),
             ([1, 0], "expected tile counts of 1 or more, found 1 x 0"),
         ] {
             let options = ReadOptions { tile, ..ReadOptions::default() };

@@ -251,6 +251,16 @@ impl Widths {
         if let Some(i) = widths.iter().position(|w| !w.is_finite()) {
             return Err(Problem::new(format!("width {i} is not finite")));
         }
+        let mut widths = widths;
+        let segments: usize = counts.iter().map(|&c| kind.segments(c as usize)).sum();
+        if spread == Spread::Varying && kind.wrap == Wrap::Periodic && widths.len() == segments + counts.len() {
+            // Some writers give a ring's first value again at its end, as usd-core counts linear ones.
+            let mut end = 0;
+            for &count in counts {
+                end += kind.segments(count as usize);
+                widths.remove(end);
+            }
+        }
         let points: usize = counts.iter().map(|&c| c as usize).sum();
         let varying: usize = counts.iter().map(|&c| kind.varying_values(c as usize)).sum();
         let wrong = |name: &str, expected: usize| {

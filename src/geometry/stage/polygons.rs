@@ -155,7 +155,7 @@ impl PolygonMesh {
         let (first_point, first_face) = (self.points.len() as u32, self.counts.len() as u32);
         if !self.uv_corners.is_empty() || !other.uv_corners.is_empty() {
             let zero = |mesh: &mut Self| {
-                if mesh.uv_corners.is_empty() {
+                if mesh.uv_corners.is_empty() && !mesh.corners.is_empty() {
                     mesh.uvs = vec![DVec2::ZERO];
                     mesh.uv_corners = vec![0; mesh.corners.len()];
                 }
