@@ -1,6 +1,6 @@
 //! Lights of all kinds against closed forms and against each other.
 
-use crate::support::{Picture, SWATCH, mean, render};
+use crate::support::{Picture, SWATCH, render};
 
 /// The middle of a floor of albedo 0.8 at y = 0, seen straight from above; `more` are tables of lights.
 fn floor(more: &str, spp: u32) -> Picture {

@@ -13,10 +13,8 @@ use crate::geometry::{
 
 const EXAMPLES: &str = "Examples:
   yarnray convert glove.bcc glove.usdc --unit cm --radius 0.08     curves for Blender, Houdini and usdview
-  yarnray convert cloth.usdc yarns.bcc --prim '/Garment/*'         some prims of a stage
-  yarnray convert braid.abc braid.hair --frame 12                  one frame of an Alembic archive
-  yarnray convert stockinette.pyp patch.usda --tile 8,12           a periodic pattern, repeated
 
+--prim '/Garment/*' takes some prims of a stage, --frame 12 one frame of it, --tile 8,12 repeats a periodic pattern.
 Read: .bcc .hair .obj .pyp .txt .usd .usda .usdc .usdz .abc. Written: .bcc .hair .obj .txt .usda .usdc .usd.
 What a format cannot hold is said.";
 

@@ -12,7 +12,7 @@ use crate::geometry::{
 
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc
-  yarnray make garment scenes/pullover.toml --set render.frame=12 -o pullover.0012.hair
+  yarnray make garment scenes/pullover.toml --set render.frame=12 -o pullover.0012.usdc
   yarnray info scenes/pullover.toml                               how many stitches there would be
 
 The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius). Positions are

@@ -14,8 +14,8 @@ use glam::{DMat4, DVec3};
 use super::{MAX_POINTS, Problem};
 use crate::geometry::curve::{Basis, Curve, CurveSet};
 
-/// Points of a segment whose basis is put through points: the curve through them is off by less than 1/500 of the
-/// segment's bulge.
+/// Points of a segment whose basis is put through points: the curve through them is off by about a hundredth of the
+/// segment's bulge, most where two segments meet at an angle.
 const STEPS: usize = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub(super) enum Wrap {
 struct Kind {
     basis: StageBasis,
     wrap: Wrap,
+    /// Whether pinned curves have as many varying values as open ones, as usd-core counts them.
+    few_varying: bool,
 }
 
 /// The curves of one object, as stages keep them: all points in one list.
@@ -75,7 +77,7 @@ impl Spread {
 impl Batch {
     /// Adds the curves, in the space of the stage.
     pub(super) fn add_to(self, set: &mut CurveSet, to_stage: &DMat4) -> Result<(), Problem> {
-        let kind = Kind::new(self.basis, self.wrap);
+        let mut kind = Kind::new(self.basis, self.wrap);
         let Self { counts, points, .. } = self;
         let mut total = 0usize;
         for (i, &count) in counts.iter().enumerate() {
@@ -98,6 +100,10 @@ impl Batch {
             return Err(Problem::new(format!("point {i} is not finite")));
         }
         let scale = to_stage.determinant().abs().cbrt();
+        if let (Wrap::Pinned, Some((widths, Spread::Varying))) = (kind.wrap, &self.widths) {
+            let open: i64 = counts.iter().map(|&c| (c - 2).max(2)).sum();
+            kind.few_varying = widths.len() as i64 == open;
+        }
         let widths = Widths::new(self.widths, &kind, &counts)?;
         let mut first = 0;
         let mut first_varying = 0;
@@ -127,7 +133,7 @@ impl Kind {
             (StageBasis::Linear | StageBasis::Bezier, Wrap::Pinned) => Wrap::NonPeriodic,
             _ => wrap,
         };
-        Self { basis, wrap }
+        Self { basis, wrap, few_varying: false }
     }
 
     fn name(&self) -> &'static str {
@@ -166,6 +172,9 @@ impl Kind {
 
     /// How many varying values such a curve has: one for each end of a segment.
     fn varying_values(&self, count: usize) -> usize {
+        if self.few_varying {
+            return (count - 2.min(count)).max(2);
+        }
         self.segments(count) + usize::from(self.wrap != Wrap::Periodic)
     }
 
@@ -290,7 +299,7 @@ impl Widths {
             Self::Vertex(widths) => Some(widths[first..first + count].to_vec()),
             Self::Varying(widths) => {
                 let own = &widths[first_varying..first_varying + kind.varying_values(count)];
-                Some((0..count).map(|point| kind.varying_at(own, point)).collect())
+                Some((0..count).map(|point| kind.varying_at(own, point, count)).collect())
             }
         }
     }
@@ -298,13 +307,14 @@ impl Widths {
 
 impl Kind {
     /// Widths that run evenly from end to end of each segment, at a control point; beyond the ends they run on.
-    fn varying_at(&self, ends: &[f64], point: usize) -> f64 {
+    fn varying_at(&self, ends: &[f64], point: usize, count: usize) -> f64 {
         // Where along the curve, counted in segments, the control point counts.
         let place = match (self.basis, self.wrap) {
             (StageBasis::Bezier, _) => point as f64 / 3.0,
             (StageBasis::BSpline | StageBasis::CatmullRom, Wrap::NonPeriodic) => point as f64 - 1.0,
             // Segment i of a closed B-spline or Catmull-Rom curve begins at its point i + 1.
             (StageBasis::BSpline | StageBasis::CatmullRom, Wrap::Periodic) => point as f64 - 1.0,
+            (_, Wrap::Pinned) => point as f64 * (ends.len() - 1) as f64 / (count - 1) as f64,
             _ => point as f64,
         };
         if self.wrap == Wrap::Periodic {
