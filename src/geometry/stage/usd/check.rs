@@ -1,4 +1,5 @@
-//! A look at a file before the reader sees it: counts that its bytes cannot hold are refused here.
+//! A look at a file before the reader sees it: counts that its bytes cannot hold are refused here, and names that would
+//! lead it in circles.
 //!
 //! The reader of binary files takes room for as many values as a count says. So every count of the structural sections,
 //! and of the arrays that fields point at, is held against the size of the file.
@@ -88,44 +89,140 @@ fn binary(bytes: &[u8]) -> Result<(), Problem> {
         }
         Err(Problem::new(format!("there is no section {name}")))
     };
-    let believable = |name: &str, at: usize, count: u64, section: &Section| {
-        let most = (section.end - section.start) as u64 * MOST_EXPANSION;
-        if count <= most {
-            return Ok(());
-        }
-        Err(Problem::new(format!("byte {at}: {count} {name} do not fit in {} bytes", section.end - section.start)))
+    let tokens = section("TOKENS")?;
+    let uncompressed = number(bytes, tokens.start + 8, 8)?;
+    believable(tokens.start, number(bytes, tokens.start, 8)?, uncompressed)?;
+    block(bytes, tokens.start + 16, uncompressed)?;
+    let strings = section("STRINGS")?;
+    believable(strings.start, number(bytes, strings.start, 8)?, (strings.end - strings.start) as u64 / 4)?;
+    // Each a count, then so many numbers in one block or in several of the same count.
+    packed_numbers(bytes, section("FIELDSETS")?.start, 1)?;
+    packed_numbers(bytes, section("SPECS")?.start, 3)?;
+    paths(bytes, &tokens, section("PATHS")?.start)?;
+    fields(&Crate { bytes, version }, &section("FIELDS")?)
+}
+
+/// Unpacks a block into at most so many bytes.
+fn unpacked(bytes: &[u8], at: usize, most: usize) -> Result<Vec<u8>, Problem> {
+    let end = block(bytes, at, most as u64)?;
+    // A first byte of 0 says that there is one chunk.
+    let Some((0, packed)) = bytes[at + 8..end].split_first().map(|(&chunks, rest)| (chunks, rest)) else {
+        return Err(Problem::new(format!("byte {at}: a block is in several chunks, which are not read")));
     };
-    for name in ["TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"] {
-        let own = section(name)?;
-        let count = number(bytes, own.start, 8)?;
-        believable(&name.to_lowercase(), own.start, count, &own)?;
-        if name == "TOKENS" {
-            believable("bytes of tokens", own.start + 8, number(bytes, own.start + 8, 8)?, &own)?;
+    let mut out = vec![0; most];
+    let length = lz4_flex::block::decompress_into(packed, &mut out)
+        .map_err(|e| Problem::new(format!("byte {at}: a block cannot be unpacked: {e}")))?;
+    out.truncate(length);
+    Ok(out)
+}
+
+/// The paths: three lists of numbers, of which the second gives each path's last element by its token, properties below 0.
+fn paths(bytes: &[u8], tokens: &Section, at: usize) -> Result<(), Problem> {
+    let count = number(bytes, at + 8, 8)?;
+    packed_numbers(bytes, at + 8, 3)?;
+    believable(at, number(bytes, at, 8)?, count)?;
+    let words = unpacked(bytes, tokens.start + 16, number(bytes, tokens.start + 8, 8)? as usize)?;
+    let words: Vec<&[u8]> = words.split(|&b| b == 0).collect();
+    let elements = block(bytes, at + 16, count)?;
+    let coded = unpacked(bytes, elements, 4 + count.div_ceil(4) as usize + 4 * count as usize)?;
+    for element in whole_numbers(&coded, count as usize)? {
+        let word = words.get(element.unsigned_abs() as usize);
+        let word = word.ok_or_else(|| Problem::new(format!("byte {elements}: a path of token {element}")))?;
+        // Of variants the element is `{set=name}`; the root has an empty one.
+        let variant = word.starts_with(b"{") && word.ends_with(b"}");
+        if element > 0 && !variant && !word.is_empty() {
+            identifier(word, elements)?;
         }
     }
-    fields(bytes, &section("FIELDS")?)
+    Ok(())
+}
+
+/// Names of prims are letters, digits and `_`, by USD's rule; others make paths that mean something else.
+fn identifier(name: &[u8], at: usize) -> Result<(), Problem> {
+    if !name.is_empty() && name.iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_' || *b >= 0x80) {
+        return Ok(());
+    }
+    let name = String::from_utf8_lossy(name);
+    Err(Problem::new(format!("byte {at}: {name:?} is no name of a prim; one is of letters, digits and _")))
+}
+
+/// Braces of a path hold one variant: `{set=name}`. Others lead the reader in circles.
+fn path(path: &[u8], at: usize) -> Result<(), Problem> {
+    let mut open = false;
+    let sound = path.iter().all(|&b| match b {
+        b'{' => !std::mem::replace(&mut open, true),
+        b'}' => std::mem::replace(&mut open, false),
+        _ => true,
+    });
+    if sound && !open {
+        return Ok(());
+    }
+    let path = String::from_utf8_lossy(path);
+    Err(Problem::new(format!("byte {at}: <{path}> is no path; its braces do not hold one variant each")))
+}
+
+/// The format's coding of 32-bit numbers: the commonest step, two bits a number for the size of its step, the steps.
+fn whole_numbers(coded: &[u8], count: usize) -> Result<Vec<i32>, Problem> {
+    let step = |at: usize, size: usize| -> Result<i32, Problem> {
+        let shift = 64 - 8 * size;
+        // Sign of its own size.
+        Ok((((number(coded, at, size)? << shift) as i64) >> shift) as i32)
+    };
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let common = step(0, 4)?;
+    let mut at = 4 + count.div_ceil(4);
+    let mut last = 0i32;
+    (0..count)
+        .map(|i| {
+            let size = [0, 1, 2, 4][(number(coded, 4 + i / 4, 1)? >> (2 * (i % 4)) & 3) as usize];
+            last = last.wrapping_add(if size == 0 { common } else { step(at, size)? });
+            at += size;
+            Ok(last)
+        })
+        .collect()
+}
+
+/// A count that its place has room for.
+fn believable(at: usize, count: u64, most: u64) -> Result<(), Problem> {
+    if count <= most {
+        return Ok(());
+    }
+    Err(Problem::new(format!("byte {at}: {count} values do not fit where they are, {most} would")))
+}
+
+/// A compressed block, its size in front, that holds so many bytes when unpacked: the byte after it.
+fn block(bytes: &[u8], at: usize, unpacked: u64) -> Result<usize, Problem> {
+    let size = number(bytes, at, 8)?;
+    believable(at, size, (bytes.len() - at - 8) as u64)?;
+    believable(at, unpacked, size.saturating_mul(MOST_EXPANSION))?;
+    Ok(at + 8 + size as usize)
+}
+
+/// A count, then so many numbers in each of some compressed blocks: the byte after them.
+fn packed_numbers(bytes: &[u8], at: usize, blocks: usize) -> Result<usize, Problem> {
+    let count = number(bytes, at, 8)?;
+    (0..blocks).try_fold(at + 8, |at, _| block(bytes, at, count))
+}
+
+/// A binary file, and the version of the format.
+struct Crate<'a> {
+    bytes: &'a [u8],
+    version: [u64; 2],
 }
 
 /// Every field that points at an array points at a count that the file can hold.
-fn fields(bytes: &[u8], section: &Section) -> Result<(), Problem> {
-    let count = number(bytes, section.start, 8)? as usize;
+fn fields(file: &Crate<'_>, section: &Section) -> Result<(), Problem> {
+    let bytes = file.bytes;
+    let count = number(bytes, section.start, 8)?;
     // Token indices, compressed, then the representations of values, compressed.
-    let size = number(bytes, section.start + 8, 8)? as usize;
-    let at = section.start.checked_add(16).and_then(|a| a.checked_add(size)).filter(|&a| a + 8 <= section.end);
-    let at = at.ok_or_else(|| Problem::new("section FIELDS is cut off"))?;
-    let size = number(bytes, at, 8)? as usize;
-    let packed = at.checked_add(8 + size).and_then(|end| bytes.get(at + 8..end));
-    let packed = packed.ok_or_else(|| Problem::new("section FIELDS is cut off"))?;
-    let mut values = vec![0; count.saturating_mul(8)];
-    // A first byte of 0 says that there is one chunk.
-    let Some((0, packed)) = packed.split_first().map(|(&chunks, rest)| (chunks, rest)) else {
-        return Err(Problem::new("section FIELDS is in several chunks, which are not read"));
-    };
-    let length = lz4_flex::block::decompress_into(packed, &mut values)
-        .map_err(|e| Problem::new(format!("section FIELDS cannot be unpacked: {e}")))?;
-    for value in values[..length].chunks_exact(8) {
+    let at = packed_numbers(bytes, section.start, 1)?;
+    block(bytes, at, count.saturating_mul(8))?;
+    let values = unpacked(bytes, at, count as usize * 8)?;
+    for value in values.chunks_exact(8) {
         let value = u64::from_le_bytes(value.try_into().expect("eight bytes"));
-        representation(bytes, value, 0)?;
+        representation(file, value, 0)?;
     }
     Ok(())
 }
@@ -139,6 +236,11 @@ const MOST_NESTED: usize = 32;
 
 /// Kinds of values by their number in the format.
 mod kind {
+    use std::ops::RangeInclusive;
+
+    pub(super) const INTEGERS: RangeInclusive<u64> = 3..=6;
+    /// Of two, four and eight bytes.
+    pub(super) const FLOATS: RangeInclusive<u64> = 7..=9;
     pub(super) const DICTIONARY: u64 = 31;
     pub(super) const FIRST_LIST_OP: u64 = 32;
     pub(super) const LAST_LIST_OP: u64 = 39;
@@ -155,24 +257,20 @@ mod kind {
 }
 
 /// Looks a value over: arrays and lists have counts, dictionaries and time samples hold further values.
-fn representation(bytes: &[u8], value: u64, depth: usize) -> Result<(), Problem> {
-    let at = (value & PAYLOAD) as usize;
+fn representation(file: &Crate<'_>, value: u64, depth: usize) -> Result<(), Problem> {
+    let (bytes, at) = (file.bytes, (value & PAYLOAD) as usize);
     let own = (value >> 48) & 0xff;
     if value & IS_INLINED != 0 || at == 0 {
         return Ok(());
     }
-    // What is not packed takes at least a byte of the file for each value.
-    let count = |at: usize, packed: bool| {
-        let count = number(bytes, at, 8)?;
-        let most = bytes.len() as u64 * if packed { MOST_EXPANSION } else { 1 };
-        if count > most {
-            return Err(Problem::new(format!("byte {at}: {count} values do not fit in the file")));
-        }
-        Ok(count as usize)
-    };
     if value & IS_ARRAY != 0 {
-        return count(at, value & IS_PACKED != 0).map(|_| ());
+        return array(file, at, own, value & IS_PACKED != 0);
     }
+    // What is not packed takes at least a byte of the file for each value.
+    let count = |at: usize| {
+        let count = number(bytes, at, 8)?;
+        believable(at, count, bytes.len() as u64).map(|()| count as usize)
+    };
     match own {
         kind::PATH_VECTOR
         | kind::TOKEN_VECTOR
@@ -180,24 +278,53 @@ fn representation(bytes: &[u8], value: u64, depth: usize) -> Result<(), Problem>
         | kind::DOUBLE_VECTOR
         | kind::LAYER_OFFSETS
         | kind::VARIANT_SELECTIONS
-        | kind::RELOCATES => count(at, value & IS_PACKED != 0).map(|_| ()),
+        | kind::RELOCATES => count(at).map(|_| ()),
         kind::FIRST_LIST_OP..=kind::LAST_LIST_OP | kind::UNREGISTERED_LIST_OP | kind::PAYLOAD_LIST_OP => {
             // A byte that tells which lists follow, at most six; the first bit is no list.
             let lists = number(bytes, at, 1)? >> 1;
             if lists == 0 { Ok(()) } else { list_op(bytes, own, at + 1, lists.count_ones()) }
         }
-        kind::DICTIONARY => dictionary(bytes, at, depth),
+        kind::DICTIONARY => dictionary(file, at, depth),
         kind::TIME_SAMPLES => {
             if depth > 0 {
                 return Err(Problem::new(format!("byte {at}: time samples inside of another value")));
             }
             let times = offset(bytes, at)?;
-            representation(bytes, number(bytes, times, 8)?, depth + 1)?;
+            representation(file, number(bytes, times, 8)?, depth + 1)?;
             let values = offset(bytes, times + 8)?;
-            let count = count(values, false)?;
-            (0..count).try_for_each(|i| representation(bytes, number(bytes, values + 8 + 8 * i, 8)?, depth + 1))
+            let count = count(values)?;
+            (0..count).try_for_each(|i| representation(file, number(bytes, values + 8 + 8 * i, 8)?, depth + 1))
         }
         _ => Ok(()),
+    }
+}
+
+/// An array: its count, whose width hangs on the version, then values as they are, or packed: whole numbers in a block,
+/// fractions as whole numbers (`i`) or as places in a table that comes first (`t`).
+fn array(file: &Crate<'_>, at: usize, own: u64, packed: bool) -> Result<(), Problem> {
+    const FEWEST_PACKED: u64 = 4;
+    let bytes = file.bytes;
+    let at = if file.version < [0, 5] { at.saturating_add(4) } else { at };
+    let wide = if file.version < [0, 7] { 4 } else { 8 };
+    let count = number(bytes, at, wide)?;
+    let values = at + wide;
+    let whole = kind::INTEGERS.contains(&own) && file.version >= [0, 5];
+    let fraction = kind::FLOATS.contains(&own) && file.version >= [0, 6];
+    if !packed || count < FEWEST_PACKED || !(whole || fraction) {
+        return believable(at, count, (bytes.len() - values) as u64);
+    }
+    if whole {
+        return block(bytes, values, count).map(|_| ());
+    }
+    match number(bytes, values, 1)? as u8 {
+        b'i' => block(bytes, values + 1, count).map(|_| ()),
+        b't' => {
+            let size = number(bytes, values + 1, 4)?;
+            believable(values + 1, size, (bytes.len() - values - 5) as u64 / 2)?;
+            let width = 2 << (own - kind::FLOATS.start());
+            block(bytes, values + 5 + size as usize * width, count).map(|_| ())
+        }
+        code => Err(Problem::new(format!("byte {values}: fractions are packed in an unknown way, {code}"))),
     }
 }
 
@@ -220,7 +347,8 @@ fn list_op(bytes: &[u8], kind: u64, mut at: usize, lists: u32) -> Result<(), Pro
 }
 
 /// A count, then for each entry the index of its key, and an offset from there to its value.
-fn dictionary(bytes: &[u8], at: usize, depth: usize) -> Result<(), Problem> {
+fn dictionary(file: &Crate<'_>, at: usize, depth: usize) -> Result<(), Problem> {
+    let bytes = file.bytes;
     if depth > MOST_NESTED {
         return Err(Problem::new(format!("byte {at}: dictionaries lie more than {MOST_NESTED} deep")));
     }
@@ -231,7 +359,7 @@ fn dictionary(bytes: &[u8], at: usize, depth: usize) -> Result<(), Problem> {
     let mut entry = at + 8;
     for _ in 0..count {
         let value = offset(bytes, entry + 4)?;
-        representation(bytes, number(bytes, value, 8)?, depth + 1)?;
+        representation(file, number(bytes, value, 8)?, depth + 1)?;
         entry = value + 8;
     }
     Ok(())
@@ -245,26 +373,52 @@ fn offset(bytes: &[u8], at: usize) -> Result<usize, Problem> {
         .ok_or_else(|| Problem::new(format!("byte {at}: an offset leads out of the file")))
 }
 
-/// Brackets of text in one another, outside of quotes and comments: each takes a call of the reader.
+/// Brackets of text in one another, outside of quotes and comments: each takes a call of the reader. Quoted names of prims
+/// are looked at as well.
 fn text(bytes: &[u8]) -> Result<(), Problem> {
     const MOST: usize = 1000;
     let (mut depth, mut deepest, mut i) = (0usize, 0, 0);
+    // Whether `def`, `over` or `class` came before, with at most a type between.
+    let mut declares = false;
     while i < bytes.len() {
         match bytes[i] {
             b'{' | b'[' | b'(' => {
                 depth += 1;
                 deepest = deepest.max(depth);
+                declares = false;
             }
-            b'}' | b']' | b')' => depth = depth.saturating_sub(1),
+            b'}' | b']' | b')' | b'=' => {
+                depth = depth.saturating_sub(usize::from(bytes[i] != b'='));
+                declares = false;
+            }
             b'#' => i += bytes[i..].iter().position(|&b| b == b'\n').unwrap_or(bytes.len() - i - 1),
             quote @ (b'"' | b'\'') => {
                 let long = bytes[i..].starts_with(&[quote; 3]);
                 let end: &[u8] = if long { &[quote; 3] } else { &[quote; 1] };
                 i += end.len();
+                let first = i;
                 while i < bytes.len() && !bytes[i..].starts_with(end) {
                     i += if bytes[i] == b'\\' { 2 } else { 1 };
                 }
+                if std::mem::take(&mut declares) {
+                    identifier(&bytes[first..i.min(bytes.len())], first)?;
+                }
                 i += end.len() - 1;
+            }
+            b'@' => {
+                let end: &[u8] = if bytes[i..].starts_with(b"@@@") { b"@@@" } else { b"@" };
+                i += end.len();
+                i += bytes[i.min(bytes.len())..].windows(end.len()).position(|w| w == end).unwrap_or(0) + end.len() - 1;
+            }
+            b'<' => {
+                let length = bytes[i..].iter().position(|&b| b == b'>').unwrap_or(bytes.len() - i);
+                path(&bytes[i + 1..(i + length).max(i + 1)], i)?;
+                i += length;
+            }
+            letter if letter.is_ascii_alphabetic() => {
+                let length = bytes[i..].iter().position(|b| !b.is_ascii_alphanumeric()).unwrap_or(bytes.len() - i);
+                declares |= matches!(&bytes[i..i + length], b"def" | b"over" | b"class");
+                i += length - 1;
             }
             _ => {}
         }

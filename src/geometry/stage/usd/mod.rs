@@ -1,10 +1,11 @@
 //! USD: the `openusd` crate composes the stage, so that sublayers, references, payloads, variants and native instances
 //! are as any USD program sees them; this room walks its prims.
 //!
-//! A binary file is looked over first ([`check`]), and a panic inside of the crate is an error like any other.
+//! A file, and each that it refers to, is looked over first ([`check`]), and a panic inside of the crate is an error like any other.
 
 pub(super) mod check;
 mod mesh;
+mod resolver;
 #[cfg(test)]
 mod tests;
 mod value;
@@ -27,6 +28,7 @@ use super::{
     AddCurves, AddMesh, Contents, MAX_DEPTH, PrimPattern, Problem, StageCamera,
     curves::{Batch, Spread, StageBasis, Wrap},
 };
+use resolver::LookingResolver;
 use value::{Values, token};
 
 impl From<anyhow::Error> for Problem {
@@ -51,7 +53,7 @@ impl UsdStage {
     pub(super) fn open(path: &Path) -> Result<Self, Problem> {
         guarded(|| {
             let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
-            Ok(Self { stage: usd::Stage::open(name)? })
+            Ok(Self { stage: usd::Stage::builder().resolver(LookingResolver::default()).open(name)? })
         })
     }
 
@@ -62,19 +64,28 @@ impl UsdStage {
 
     /// Millimetres per unit: USD's `metersPerUnit`, centimetres where it says nothing.
     pub(super) fn unit_mm(&self) -> f64 {
-        let unit = self.stage.stage_metadata("metersPerUnit").ok().flatten().and_then(|v| value::number(&v));
+        let unit = self.metadata("metersPerUnit").and_then(|v| value::number(&v));
         unit.filter(|u| u.is_finite() && *u > 0.0).unwrap_or(0.01) * 1000.0
     }
 
     /// Which axis points up: 1 for y, 2 for z.
     pub(super) fn up_axis(&self) -> u8 {
-        let up = self.stage.stage_metadata("upAxis").ok().flatten();
+        let up = self.metadata("upAxis");
         if up.as_ref().and_then(token).is_some_and(|t| t == "Z") { 2 } else { 1 }
     }
 
     /// First and last time code, if the stage says so.
     pub(super) fn time_range(&self) -> Option<[f64; 2]> {
-        self.stage.has_authored_time_code_range().then(|| [self.stage.start_time_code(), self.stage.end_time_code()])
+        let range = || {
+            let stage = &self.stage;
+            Ok(stage.has_authored_time_code_range().then(|| [stage.start_time_code(), stage.end_time_code()]))
+        };
+        guarded(range).ok().flatten()
+    }
+
+    /// A word of the whole stage; none where it cannot be read.
+    fn metadata(&self, name: &str) -> Option<sdf::Value> {
+        guarded(|| Ok(self.stage.stage_metadata(name)?)).ok().flatten()
     }
 
     /// What the stage holds, visible or not.

@@ -66,6 +66,16 @@ fn meant(basis: &str, wrap: &str, points: &[DVec4], s: usize, u: f64) -> DVec4 {
     blend(basis, u, std::array::from_fn(|i| all[(first + i) % n]))
 }
 
+/// A little beyond the end of segment `s`, on the next one; its end where there is no next one.
+fn start(basis: &str, wrap: &str, points: &[DVec4], s: usize) -> DVec4 {
+    let pieces = segments(basis, wrap, points.len());
+    match (s + 1 < pieces, wrap) {
+        (true, _) => meant(basis, wrap, points, s + 1, 0.125),
+        (false, "periodic") => meant(basis, wrap, points, 0, 0.125),
+        (false, _) => meant(basis, wrap, points, s, 1.0),
+    }
+}
+
 /// The same place on a curve of this program.
 fn made(basis: &str, wrap: &str, curve: &Curve, s: usize, u: f64) -> DVec4 {
     let radii = curve.radii.clone().unwrap();
@@ -112,32 +122,47 @@ fn every_basis_wrap_and_spread_means_what_usd_means() {
                         let own: Vec<DVec4> =
                             (first..first + n).map(|k| point(k).extend(0.1 + 0.05 * k as f64)).collect();
                         let pieces = segments(basis, wrap, n);
-                        let ends = pieces + usize::from(wrap != "periodic");
+                        let ends = match wrap {
+                            "pinned" => n - 2,
+                            "periodic" => pieces,
+                            _ => pieces + 1,
+                        };
                         for (s, u) in (0..pieces).flat_map(|s| [(s, 0.0), (s, 0.5), (s, 0.99)]) {
                             let (want, got) = (meant(basis, wrap, &own, s, u), made(basis, wrap, curve, s, u));
-                            // What is put through points is off by a little between them.
-                            let exact = curve.basis != Basis::CatmullRom || u != 0.99;
+                            // What is put through points rounds the corners of a curve between two of them.
+                            let rounded = curve.basis == Basis::CatmullRom && u == 0.99;
+                            let around = |d: f64| meant(basis, wrap, &own, s, 1.0 + d);
+                            let step = (around(0.0) - around(-0.125)).abs()
+                                + (around(0.0) - start(basis, wrap, &own, s)).abs();
+                            let most = |exact: f64, step: f64| if rounded { exact + 0.15 * step } else { exact };
                             let off = (want - got).truncate().length();
-                            assert!(off < if exact { 1e-5 } else { 0.05 }, "{file} {name} {s} {u}: {want} {got}");
+                            let least = most(1e-5, step.truncate().length());
+                            assert!(off < least, "{file} {name} {s} {u}: {want} {got} {least}");
                             let radius = match spread {
                                 "constant" => 0.1,
                                 "uniform" => 0.1 + 0.05 * i as f64,
                                 "vertex" => want.w,
+                                // usd-core counts as many for pinned curves as for open ones: they are spread evenly.
+                                _ if wrap == "pinned" => {
+                                    let along = (s as f64 + u) / pieces as f64;
+                                    0.1 + 0.05 * (end as f64 + along * (ends - 1) as f64)
+                                }
                                 _ => {
                                     let at = |k: usize| 0.1 + 0.05 * (end + k % ends) as f64;
                                     at(s) + u * (at(s + 1) - at(s))
                                 }
                             };
                             // Where varying widths jump back to the first of a ring, a spline through them is softer.
-                            let loose = spread == "varying" && wrap != "nonperiodic";
-                            let most = if loose {
-                                0.25
-                            } else if exact {
-                                1e-5
-                            } else {
-                                2e-3
-                            };
-                            assert!((got.w - radius).abs() < most, "{file} {name} {s} {u}: {} {radius}", got.w);
+                            let last = 0.1 + 0.05 * (end + ends - 1) as f64;
+                            if spread == "varying" && wrap == "periodic" && (s < 2 || s + 2 >= pieces) {
+                                assert!(got.w > 0.04 && got.w < last + 0.06, "{file} {name} {s} {u}: {}", got.w);
+                                continue;
+                            }
+                            // Radii of open Catmull-Rom curves level off in the last segment: by a sixteenth of a step.
+                            let end_piece = (basis, wrap) == ("catmullRom", "pinned") && (s == 0 || s + 1 == pieces);
+                            let level = if end_piece { 0.05 / 16.0 } else { 0.0 };
+                            let off = (got.w - radius).abs();
+                            assert!(off < most(level + 1e-5, step.w), "{file} {name} {s} {u}: {} {radius}", got.w);
                         }
                         first += n;
                         end += ends;
@@ -293,7 +318,8 @@ fn damaged_files_are_errors() {
     for name in ["matrix.usda", "matrix.usdc", "matrix.usdz", "scene.usda", "mesh.usda"] {
         let whole = std::fs::read(data(name)).unwrap();
         let mut random = crate::math::sampler::Stream::new(7);
-        for round in 0..60 {
+        let rounds = std::env::var("ROUNDS").map_or(60, |r| r.parse().unwrap());
+        for round in 0..rounds {
             let mut bytes = whole.clone();
             if round < 20 {
                 bytes.truncate(bytes.len() * round / 20);
@@ -307,10 +333,19 @@ fn damaged_files_are_errors() {
             let _ = refused(name, &bytes);
         }
         assert_eq!(refused(name, &whole).err(), None, "{name}");
+        for path in std::fs::read_dir(folder.path()).unwrap() {
+            std::fs::remove_file(path.unwrap().path()).unwrap();
+        }
     }
     assert!(refused("x.usda", b"hello").unwrap_err().contains("#usda"));
     let deep = format!("#usda 1.0\n{}", "def Xform \"a\" {\n".repeat(5000));
     assert!(refused("deep.usda", deep.as_bytes()).unwrap_err().contains("deep"));
+    for name in ["}a", "a b", "", "a/b", "a.b"] {
+        let odd = format!("#usda 1.0\ndef Xform \"{name}\" {{ }}\n");
+        assert!(refused("odd.usda", odd.as_bytes()).unwrap_err().contains("no name of a prim"), "{name}");
+    }
+    let odd = "#usda 1.0\ndef Scope \"a\" {\nrel b = </c}d/e>\n}\n";
+    assert!(refused("odd.usda", odd.as_bytes()).unwrap_err().contains("is no path"));
     let huge = "#usda 1.0\ndef BasisCurves \"a\" {\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2147483647]\n\
                 point3f[] points = [(0,0,0)]\n}\n";
     assert!(refused("huge.usda", huge.as_bytes()).unwrap_err().contains("/a: "));
