@@ -156,9 +156,9 @@ impl UsdStage {
             let mut to_stage = DMat4::IDENTITY;
             let mut above = Some(at);
             while let Some(path) = above.filter(|p| !p.is_abs_root()) {
-                let view = AnyPrim(self.stage.prim(path.clone()));
-                to_stage = matrix(view.local_to_parent_transform(values.time)?) * to_stage;
-                above = if view.resets_xform_stack()? { None } else { path.parent() };
+                let (local, alone) = placed(&self.stage.prim(path.clone()), values.time)?;
+                to_stage = local * to_stage;
+                above = if alone { None } else { path.parent() };
             }
             // The lens does not scale with its stand.
             let axis = |i: usize| to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
@@ -233,9 +233,8 @@ impl Walk<'_> {
         if values.token("purpose")?.is_some_and(|p| p == "proxy" || p == "guide") {
             return Ok(());
         }
-        let view = AnyPrim(prim.clone());
-        let local = matrix(view.local_to_parent_transform(self.time).map_err(|e| Problem::from(e).at(path.as_str()))?);
-        let to_stage = if view.resets_xform_stack()? { local } else { to_parent * local };
+        let (local, alone) = placed(&prim, self.time).map_err(|p| p.at(path.as_str()))?;
+        let to_stage = if alone { local } else { to_parent * local };
         let name = PrimName {
             path: path.as_str().to_owned(),
             kind: prim.type_name()?.map_or(String::new(), |t| t.as_str().to_owned()),
@@ -358,6 +357,19 @@ impl SchemaBase for AnyPrim {
 
 impl Imageable for AnyPrim {}
 impl Xformable for AnyPrim {}
+
+/// A prim's own transform, and whether those above it do not count.
+fn placed(prim: &Prim, time: TimeCode) -> Result<(DMat4, bool), Problem> {
+    // The crate takes the names of operations as they are for names of attributes.
+    let of_a_name = |c: char| c.is_alphanumeric() || matches!(c, '_' | ':' | '!');
+    for operation in (Values { prim, time }).tokens("xformOpOrder")?.unwrap_or_default() {
+        if !operation.chars().all(of_a_name) {
+            return Err(Problem::new(format!("{operation:?} is no name of a transform's operation")));
+        }
+    }
+    let view = AnyPrim(prim.clone());
+    Ok((matrix(view.local_to_parent_transform(time)?), view.resets_xform_stack()?))
+}
 
 /// USD multiplies rows from the left: the same sixteen numbers in order are the columns here.
 fn matrix(m: openusd::gf::Matrix4d) -> DMat4 {

@@ -318,6 +318,7 @@ fn damaged_files_are_errors() {
     for name in ["matrix.usda", "matrix.usdc", "matrix.usdz", "scene.usda", "mesh.usda"] {
         let whole = std::fs::read(data(name)).unwrap();
         let mut random = crate::math::sampler::Stream::new(7);
+        // ROUNDS=6000 looks longer.
         let rounds = std::env::var("ROUNDS").map_or(60, |r| r.parse().unwrap());
         for round in 0..rounds {
             let mut bytes = whole.clone();

@@ -37,6 +37,13 @@ impl Values<'_> {
         self.typed(name, "a token", |v| token(&v))
     }
 
+    pub(super) fn tokens(&self, name: &str) -> Result<Option<Vec<String>>, Problem> {
+        self.typed(name, "tokens", |v| match v {
+            Value::TokenVec(list) => Some(list.iter().map(|t| t.as_str().to_owned()).collect()),
+            v => empty(&v),
+        })
+    }
+
     pub(super) fn integers(&self, name: &str) -> Result<Option<Vec<i64>>, Problem> {
         self.typed(name, "a list of integers", |v| {
             Some(match v {
