@@ -193,18 +193,17 @@ fn the_recommended_model_keeps_its_distance_from_the_oracle() {
             .filter(|v| plies(v["n_plies"].as_u64().unwrap()) && v["density_area"].as_f64().unwrap() >= 0.3 - 1e-9)
             .collect()
     };
-    // Fibres that only transmit return more than they should: .130. Those of several plies are twice the former model's,
-    // until they are measured anew.
+    // Of one ply, fibres that only transmit return more than they should: they make most of the third error.
     // With 16,000 paths and one seed for all cases, noise alone moves these means by 0.001 (relative ones by 0.005).
     for (name, cases, paths, bounds) in [
-        ("one ply", dense(&|n| n == 1), 128_000, [0.0100, 0.0125, 0.130, 0.115]),
-        ("several plies", dense(&|n| n > 1), 512_000, [0.012, 0.013, 0.060, 0.044]),
+        ("one ply", dense(&|n| n == 1), 128_000, [0.0103, 0.0100, 0.130, 0.078]),
+        ("several plies", dense(&|n| n > 1), 512_000, [0.006, 0.0055, 0.030, 0.019]),
     ] {
         let ours = errors(Model::Aggregated, &cases, paths);
         let printed = errors(Model::Printed, &cases, 16_000);
         eprintln!("{name}, {} cases of density 0.3 to 0.9: {ours:.4?}; printed {printed:.3?}", cases.len());
         assert!(ours.iter().zip(bounds).all(|(e, bound)| *e <= bound), "{name}: {ours:?}");
-        assert!(printed.iter().zip(ours).all(|(p, o)| *p > 3.0 * o), "the printed model has become good: {printed:?}");
+        assert!(printed.iter().zip(ours).all(|(p, o)| *p > 4.0 * o), "the printed model has become good: {printed:?}");
     }
 }
 

@@ -403,9 +403,10 @@ fn energy(scale: Scale, checks: &mut Checks) {
     }
 }
 
-/// Cells of (theta, phi) in which samples are counted, and the finer grid on which densities are summed up.
+/// Cells of (theta, phi) in which samples are counted.
 const BINS: usize = 16;
-const FINE: usize = 12;
+/// Samples for each vertex whose densities are summed up: the sums are less noisy than the counts by far.
+const SAMPLES_PER_SUM: u32 = 10;
 
 fn bin(w: Vec3A) -> usize {
     let row = ((f64::from(w.z) * 0.5 + 0.5) * BINS as f64) as usize;
@@ -413,15 +414,13 @@ fn bin(w: Vec3A) -> usize {
     row.min(BINS - 1) * BINS + ((phi / TAU * BINS as f64) as usize).min(BINS - 1)
 }
 
-/// Directions with equal solid angle (its size beside them), by which every bin is covered evenly.
-fn fine_sphere() -> impl Iterator<Item = (Vec3A, f64)> {
-    let n = BINS * FINE;
-    (0..n * n).map(move |i| {
-        let z = ((i / n) as f64 + 0.5) / n as f64 * 2.0 - 1.0;
-        let (s, c) = (((i % n) as f64 + 0.5) / n as f64 * TAU).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        (Vec3A::new((r * c) as f32, (r * s) as f32, z as f32), 2.0 * TAU / (n * n) as f64)
-    })
+/// A direction in a bin, for two numbers in [0, 1); all bins have the same solid angle.
+fn within(bin: usize, u: [f32; 2]) -> Vec3A {
+    let place = |i: usize, u: f32| (i as f64 + f64::from(u)) / BINS as f64;
+    let z = place(bin / BINS, u[0]) * 2.0 - 1.0;
+    let (s, c) = (place(bin % BINS, u[1]) * TAU).sin_cos();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Vec3A::new((r * c) as f32, (r * s) as f32, z as f32)
 }
 
 /// The density behind a multiple-importance weight: values weighted for a light density of 1 give it away.
@@ -453,19 +452,23 @@ fn samples_against_density(scale: Scale, checks: &mut Checks) {
             for v in expected.iter_mut().chain(&mut counts) {
                 v.resize(BINS * BINS, 0.0);
             }
-            let fixed = vertex(&mut stream);
-            for (w, dw) in fine_sphere() {
-                let (full, weighted) = (fixed.evaluate(w, f32::INFINITY).lobes, fixed.evaluate(w, 1.0).lobes);
-                let f = density_of(full.f.max_channel(), weighted.f.max_channel());
-                let single = |l: &crate::scattering::LobeValues| (l.r + l.tt + l.d).max_channel();
-                let s = density_of(single(&full), single(&weighted));
-                let all = density_of(full.sum().max_channel(), weighted.sum().max_channel());
-                for (k, p) in [f, s, all].into_iter().enumerate() {
-                    expected[k][bin(w)] += p * dw * f64::from(n);
-                }
-            }
-            for _ in 0..n {
+            // The first fibre, and with it the densities, is drawn anew in each vertex: densities are summed over vertices, each
+            // at one place of every bin.
+            for i in 0..n {
                 let v = vertex(&mut stream);
+                for cell in (0..BINS * BINS).filter(|_| i % SAMPLES_PER_SUM == 0) {
+                    let w = within(cell, [stream.next(), stream.next()]);
+                    let (full, weighted) = (v.evaluate(w, f32::INFINITY).lobes, v.evaluate(w, 1.0).lobes);
+                    let single = |l: &crate::scattering::LobeValues| (l.r + l.tt + l.d).max_channel();
+                    let densities = [
+                        density_of(full.f.max_channel(), weighted.f.max_channel()),
+                        density_of(single(&full), single(&weighted)),
+                        density_of(full.sum().max_channel(), weighted.sum().max_channel()),
+                    ];
+                    for (expected, density) in expected.iter_mut().zip(densities) {
+                        expected[cell] += density * 2.0 * TAU / (BINS * BINS) as f64 * f64::from(SAMPLES_PER_SUM);
+                    }
+                }
                 let u = [0; 3].map(|_| stream.next());
                 let Some(next) = v.sample(u, &mut stream) else { continue };
                 let cell = bin(next.direction);

@@ -117,6 +117,19 @@ pub struct Cloth<'a> {
     count: [u32; 2],
 }
 
+/// Distance of wefts over that of warps that looms are set to: square where both show alike; the side that shows more lies
+/// closer, so that its floats close up and hide the other: denim has 1.5 times as many ends as picks, warp satin twice.
+fn sett(draft: &Draft) -> f64 {
+    const MOST: f64 = 2.0;
+    let crossings = (0..draft.wefts()).flat_map(|weft| (0..draft.warps()).map(move |warp| (weft, warp)));
+    let over = crossings.clone().filter(|&(weft, warp)| draft.warp_over(weft, warp)).count() as f64;
+    let under = crossings.count() as f64 - over;
+    if draft.layers() > 1 {
+        return 1.0;
+    }
+    (over / under.max(1.0)).sqrt().clamp(1.0 / MOST, MOST)
+}
+
 impl Weave {
     /// A weave of one yarn as it comes by itself, cut all around: 20 by 20 yarns.
     pub fn of(draft: Draft, radius: f64) -> Self {
@@ -145,8 +158,9 @@ impl Weave {
             // A strand of fibres that slide is as stiff as they are many; the stiffer side bends less.
             crimp: self.crimp.unwrap_or(q / (p + q)),
             spacing: [self.warp_spacing, self.weft_spacing],
-            // Under pressure the crimp of equal yarns would all go into one of them; cloth of equal yarns is woven square.
-            balanced: self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)),
+            // Under pressure the crimp of equal yarns would all go into one of them.
+            sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)))
+                .then(|| sett(&self.draft)),
             beat: BEAT,
             nodes: self.points as usize,
         }

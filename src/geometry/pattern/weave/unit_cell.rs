@@ -58,8 +58,8 @@ pub(super) struct CellOptions {
     pub(super) crimp: f64,
     /// Distances of warps and of wefts, where they are given.
     pub(super) spacing: [Option<f64>; 2],
-    /// Whether it has as many ends as picks where neither is given.
-    pub(super) balanced: bool,
+    /// Distance of wefts over that of warps where neither is given; both find their own without it.
+    pub(super) sett: Option<f64>,
     /// Force that packs the cloth.
     pub(super) beat: f64,
     /// Nodes of a yarn from one crossing to the next.
@@ -107,8 +107,8 @@ struct Energy<'a> {
     count: [usize; 2],
     fixed: [Option<f64>; 2],
     contact: f64,
-    /// Whether warps are as far apart as wefts.
-    balanced: bool,
+    /// Distance of wefts over that of warps, where it is fixed.
+    sett: Option<f64>,
     /// Spacings at which the reed is full.
     densest: [f64; 2],
     /// How much a variable of spacing moves it.
@@ -135,8 +135,8 @@ impl Energy<'_> {
 
     fn spacing(&self, x: &[f64]) -> [f64; 2] {
         let n = x.len();
-        if self.balanced {
-            return [x[n - 2] * self.gear; 2];
+        if let Some(sett) = self.sett {
+            return [1.0, sett].map(|share| share * x[n - 2] * self.gear);
         }
         [0, 1].map(|side| self.fixed[side].unwrap_or(x[n - 2 + side] * self.gear))
     }
@@ -171,8 +171,8 @@ impl Energy<'_> {
         }
         self.hand_on_tangents(&by_tangent, &tangents, g, &mut by_spacing);
         let n = g.len();
-        if self.balanced {
-            g[n - 2] = (by_spacing[0] + by_spacing[1]) * self.gear;
+        if let Some(sett) = self.sett {
+            g[n - 2] = (by_spacing[0] + sett * by_spacing[1]) * self.gear;
             g[n - 1] = 0.0;
             return sum;
         }
@@ -576,7 +576,7 @@ impl UnitCell {
             count,
             fixed: options.spacing.map(|s| s.map(|s| s / unit)),
             contact: CONTACT,
-            balanced: options.balanced && options.spacing == [None; 2] && !draft.twines(),
+            sett: options.sett.filter(|_| options.spacing == [None; 2] && !draft.twines()),
             densest: [0, 1].map(|side| full(draft, options, side) / unit),
             gear: 0.5 / (total as f64).sqrt(),
         };
@@ -742,7 +742,7 @@ mod tests {
             count: [3, 3],
             fixed: [None; 2],
             contact: CONTACT,
-            balanced: false,
+            sett: None,
             densest: [1.6, 2.4],
             gear: 0.1,
         };
