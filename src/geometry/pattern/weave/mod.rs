@@ -289,7 +289,8 @@ impl Cloth<'_> {
                 pile::raise(self, self.strand(side, index, hem), number, i64::from(hem))
             })
         };
-        let mut strands: Vec<PatternStrand> = strands(0).chain(strands(1)).collect();
+        let diameter = self.weave.warp_radius + self.weave.weft_radius;
+        let mut strands = pile::settle(strands(0).chain(strands(1)).collect(), diameter);
         if let Edges::Fringe(length) = edges {
             edges::fringe(self, &mut strands, length);
         }

@@ -1,10 +1,12 @@
-//! Pile: floats that stand up from the ground cloth as loops (terry) or as cut tufts (velvet, corduroy).
+//! Pile: floats that stand up from the ground cloth as loops (terry) or as cut tufts (velvet, corduroy), which find room
+//! between the yarns of the ground and beside each other.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
 use super::{
+    super::relax::{Ends, Relaxation, Rope},
     Cloth, PatternStrand, StrandKind,
     edges::{Point, from_points, points},
 };
@@ -15,13 +17,78 @@ const RISE: f64 = 0.7;
 /// Distance of points of loops and legs, in radii of the yarn.
 const STEP: f64 = 1.1;
 
+/// Rounds in which pile finds room.
+const ROUNDS: usize = 80;
+
+/// A yarn, some of whose points stand free of the ground.
+pub(super) struct Standing {
+    strand: PatternStrand,
+    /// For each point; empty where none does.
+    free: Vec<bool>,
+}
+
+impl Standing {
+    fn ground(strand: PatternStrand) -> Self {
+        Self { strand, free: Vec::new() }
+    }
+
+    fn of(like: &PatternStrand, points: &[(Point, bool)], flat: bool) -> Self {
+        let places: Vec<Point> = points.iter().map(|p| p.0).collect();
+        let strand = from_points(like.kind, like.index, &places, flat);
+        Self { strand, free: points.iter().map(|p| p.1).collect() }
+    }
+
+    /// The points by which the yarn finds room: all free ones and those beside them, few of the others.
+    fn places(&self, step: f64) -> Vec<usize> {
+        let points = &self.strand.curve.points;
+        let free = |i: usize| self.free.get(i).copied().unwrap_or(false);
+        let mut places: Vec<usize> = Vec::new();
+        for i in 0..points.len() {
+            let beside = free(i) || (i > 0 && free(i - 1)) || free(i + 1);
+            let far = places.last().is_none_or(|&last| points[last].distance(points[i]) > step);
+            if beside || far || i + 1 == points.len() {
+                places.push(i);
+            }
+        }
+        places
+    }
+
+    fn rope(&self, places: &[usize], diameter: f64) -> Rope {
+        let points = &self.strand.curve.points;
+        let pinned: Vec<bool> = places.iter().map(|&i| !self.free.get(i).copied().unwrap_or(false)).collect();
+        let segments = places.windows(2).zip(pinned.windows(2));
+        let lengths =
+            segments.filter(|(_, pinned)| *pinned != [true; 2]).map(|(i, _)| points[i[0]].distance(points[i[1]]));
+        let (sum, count) = lengths.fold((0.0, 0), |(sum, count), length| (sum + length, count + 1));
+        let rest = if count > 0 { sum / f64::from(count) } else { STEP * 0.5 * diameter };
+        let points = places.iter().map(|&i| points[i] / diameter).collect();
+        Rope { points, pinned, ends: Ends::Open, rest: rest / diameter }
+    }
+}
+
+/// Lets what stands free find room; the ground stays.
+pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStrand> {
+    if yarns.iter().any(|yarn| !yarn.free.is_empty()) {
+        let places: Vec<Vec<usize>> = yarns.iter().map(|yarn| yarn.places(0.5 * STEP * diameter)).collect();
+        let ropes = yarns.iter().zip(&places).map(|(yarn, places)| yarn.rope(places, diameter)).collect();
+        let mut relaxation = Relaxation { ropes, period: None };
+        relaxation.run(ROUNDS, |_| {});
+        for ((yarn, places), rope) in yarns.iter_mut().zip(&places).zip(relaxation.ropes) {
+            for (&i, point) in places.iter().zip(rope.points).filter(|(i, _)| yarn.free.get(**i) == Some(&true)) {
+                yarn.strand.curve.points[i] = point * diameter;
+            }
+        }
+    }
+    yarns.into_iter().map(|yarn| yarn.strand).collect()
+}
+
 /// Raises the floats of a pile yarn. It is held where it lies on the other side of the cloth.
-pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: i64) -> Vec<PatternStrand> {
+pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: i64) -> Vec<Standing> {
     let draft = &cloth.weave.draft;
-    let Some(pile) = draft.pile() else { return vec![strand] };
+    let Some(pile) = draft.pile() else { return vec![Standing::ground(strand)] };
     let side = usize::from(strand.kind == StrandKind::Weft);
     let Some(back) = pile.stands(side, number.rem_euclid([draft.warps(), draft.wefts()][side] as i64) as usize) else {
-        return vec![strand];
+        return vec![Standing::ground(strand)];
     };
     let nodes = cloth.cell.nodes as i64;
     let way = points(&strand);
@@ -37,36 +104,46 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
         let on_top = warp_over == (side == 0);
         on_top == back
     };
-    let holds: Vec<i64> = (0..crossings).filter(|&c| held(c)).map(|c| nodes / 2 + c * nodes).collect();
+    // A hem, and what it is folded onto, is woven flat, as borders of towels are.
+    let flat_border = if hem > 0 { hem + 1 } else { 0 };
+    let border = |c: i64| side == 0 && !(flat_border..i64::from(cloth.count[1]) - flat_border).contains(&(c + first));
+    let at = |c: i64| nodes / 2 + c * nodes;
+    let holds: Vec<(i64, bool)> = (0..crossings).filter(|&c| held(c)).map(|c| (at(c), border(c))).collect();
     let rise = (RISE * nodes as f64).round() as i64;
     let made = Raised { cloth, side, up: if back { -1.0 } else { 1.0 }, seed: strand.index ^ ((side as u32) << 30) };
-    let part = |from: i64, to: i64| way[from.max(0) as usize..=(to.min(way.len() as i64 - 1)) as usize].to_vec();
+    // Nothing where a part would begin beyond the end: the yarn may end on top of its last crossing.
+    let part = |from: i64, to: i64| -> Vec<(Point, bool)> {
+        let (from, to) = (from.max(0), to.min(way.len() as i64 - 1));
+        if from > to { Vec::new() } else { way[from as usize..=to as usize].iter().map(|&p| (p, false)).collect() }
+    };
     let flat = cloth.weave.flatten > 1.0;
     if pile.cut {
-        let tuft = |&at: &i64| {
+        let tuft = |at: i64| {
             let base = part(at - rise, at + rise);
-            let (a, b) = (base[0], base[base.len() - 1]);
-            let mut all: Vec<Point> = made.leg(a, -1.0, at as u32);
+            let (a, b) = (base[0].0, base[base.len() - 1].0);
+            let free = |points: Vec<Point>| points.into_iter().map(|p| (p, true));
+            let mut all: Vec<(Point, bool)> = free(made.leg(a, -1.0, at as u32)).collect();
             all.reverse();
             all.extend(&base);
-            all.extend(made.leg(b, 1.0, at as u32));
-            from_points(strand.kind, strand.index, &all, flat)
+            all.extend(free(made.leg(b, 1.0, at as u32)));
+            Standing::of(&strand, &all, flat)
         };
-        return holds.iter().map(tuft).collect();
+        return holds.iter().filter(|(_, border)| !border).map(|&(at, _)| tuft(at)).collect();
     }
-    let Some((&start, &end)) = holds.first().zip(holds.last()) else { return vec![strand] };
+    let Some((&(start, _), &(end, _))) = holds.first().zip(holds.last()) else { return vec![Standing::ground(strand)] };
     let mut all = part(0, start + rise);
     for pair in holds.windows(2) {
-        if pair[1] - pair[0] > nodes {
-            let (a, b) = (all[all.len() - 1], way[(pair[1] - rise) as usize]);
-            all.extend(made.arch(a, b, pair[0] as u32));
-            all.extend(part(pair[1] - rise, pair[1] + rise));
+        let [(from, flat_from), (to, flat_to)] = [pair[0], pair[1]];
+        if to - from > nodes && !flat_from && !flat_to {
+            let (a, b) = (all[all.len() - 1].0, way[(to - rise) as usize]);
+            all.extend(made.arch(a, b, from as u32).into_iter().map(|p| (p, true)));
+            all.extend(part(to - rise, to + rise));
         } else {
-            all.extend(part(pair[0] + rise + 1, pair[1] + rise));
+            all.extend(part(from + rise + 1, to + rise));
         }
     }
     all.extend(part(end + rise + 1, way.len() as i64 - 1));
-    vec![from_points(strand.kind, strand.index, &all, flat)]
+    vec![Standing::of(&strand, &all, flat)]
 }
 
 struct Raised<'a> {

@@ -49,6 +49,11 @@ fn yarns_touch_and_hardly_run_into_each_other() {
             _ => (MOST_OVERLAP, 0.35),
         };
         assert!(share < most && deepest < depth, "{name}: {deepest} of a diameter, {share} of the surface");
+        // The table of docs/cloth.md.
+        let Measures { spacing: [p, q], crimp: [c, d], see_through, .. } = cloth.measures();
+        let percent = [c, d, see_through, share].map(|x| format!("{:.1}", 100.0 * x));
+        let [c, d, see_through, share] = percent;
+        eprintln!("| {name} | {:.2} x {:.2} | {c}, {d} | {see_through} | {share}, {deepest:.2} |", p / 2.0, q / 2.0);
     }
 }
 
@@ -223,6 +228,17 @@ fn fringes_are_as_long_as_they_are_asked_to_be() {
         let (first, last) = (warp.curve.points[0].y, warp.curve.points.last().unwrap().y);
         for end in [-first, last] {
             assert!((end - half - 20.0).abs() < 2.0, "{end}");
+        }
+    }
+}
+
+#[test]
+fn pile_is_made_in_pieces_of_any_size() {
+    for (name, sizes) in [("terry", 1..9), ("velvet", 1..5), ("corduroy", 1..7)] {
+        for n in sizes {
+            let weave = Weave { warps: Extent::Yarns(n), wefts: Extent::Yarns(9 - n), ..weave(name) };
+            let strands = weave.relax().unwrap().strands();
+            assert!(strands.iter().all(|s| s.curve.points.iter().all(|p| p.is_finite())), "{name} {n}");
         }
     }
 }
