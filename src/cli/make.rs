@@ -19,10 +19,11 @@ use crate::{
         pattern::{
             MAX_POINTS, PatternStrand, StrandKind,
             chart::{Chart, PATTERNS},
-            draft::Draft,
+            draft::{Draft, DraftError},
             knit::{self, Edges, Form, Knit},
             overlap::overlap,
             weave::{self, Extent, Impossible, Measures, Weave},
+            wif::{self, WifUse, WovenWif},
         },
     },
     image::output,
@@ -63,9 +64,9 @@ struct Output {
     /// Where to write; the extension names the format (.bcc, .hair, .obj, .txt, .usda, .usdc). Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required = true)]
     out: Vec<PathBuf>,
-    /// Radius of the yarn.
-    #[arg(long, default_value_t = 0.5, value_name = "R", value_parser = positive)]
-    radius: f64,
+    /// Radius of the yarn; 0.5, or that of a WIF draft.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    radius: Option<f64>,
     /// Say nothing.
     #[arg(long, short)]
     quiet: bool,
@@ -116,16 +117,16 @@ struct KnitArgs {
 struct WeaveArgs {
     #[command(flatten)]
     output: Output,
-    /// plain, 'basket 2', 'twill 2/1', 'satin 5', 'satin 8/3', 'sateen 5'; or a row of a matrix of # and ., top row first
-    /// (repeatable).
+    /// plain, 'basket 2', 'twill 2/1', 'satin 5', 'satin 8/3', 'sateen 5'; a row of a matrix of # and ., top row first
+    /// (repeatable); or a draft of a weaving program (.wif), whose lengths count as millimetres.
     #[arg(long, default_value = "plain", value_name = "DRAFT")]
     draft: Vec<String>,
-    /// Number of warps.
-    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    warps: u32,
-    /// Number of wefts.
-    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    wefts: u32,
+    /// Number of warps; 20, or those of the file.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    warps: Option<u32>,
+    /// Number of wefts; 20, or those of the file.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    wefts: Option<u32>,
     /// Radius of the weft yarn, if not that of the warp.
     #[arg(long, value_name = "R", value_parser = positive)]
     weft_radius: Option<f64>,
@@ -152,6 +153,10 @@ struct WeaveArgs {
     points: u32,
 }
 
+/// Radius of the yarn unless given.
+const RADIUS: f64 = 0.5;
+/// Yarns of each side unless given.
+const YARNS: u32 = 20;
 /// Length of a fringe, in radii of the warp.
 const FRINGE: f64 = 24.0;
 /// Height of a pile, in the same.
@@ -196,9 +201,10 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         let rows = chart.rows();
         (Some(chart), (!args.profile.is_empty()).then_some(rows))
     };
+    let radius = args.output.radius.unwrap_or(RADIUS);
     let Some(chart) = chart else { return Err(Failure::Input("error: unknown pattern".to_owned())) };
     let profile: Vec<DVec2> = args.profile.iter().map(|p| DVec2::from(*p)).collect();
-    if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * args.output.radius) {
+    if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
         return Err(Failure::Input(
             "error: a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80".into(),
         ));
@@ -225,24 +231,33 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
     if piece.control_points() > MAX_POINTS {
         return too_many("stitches, rows");
     }
-    let strands = piece.strands(2.0 * args.output.radius).map_err(|e| wrong(&e))?;
+    let strands = piece.strands(2.0 * radius).map_err(|e| wrong(&e))?;
     // Flat cloth lies in the plane z = 0, as the files of others do.
-    write(strands, &args.output, args.output.radius)
+    write(strands, &args.output, [radius; 2])
 }
 
 fn weave(args: &WeaveArgs) -> Result<(), Failure> {
-    let draft = match args.draft.as_slice() {
-        [name] if !name.contains(['#', '.']) => Draft::named(name),
-        rows => Draft::matrix(rows),
+    let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
+    let (draft, file) = match args.draft.as_slice() {
+        [path] if path.to_lowercase().ends_with(".wif") => {
+            let file = wif_draft(path)?;
+            (file.draft.clone(), Some(file))
+        }
+        [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
+        rows => (Draft::matrix(rows).map_err(wrong)?, None),
     };
+    let [warps, wefts] = file.as_ref().map_or([YARNS; 2], |f| f.count);
+    let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
+    let radius = own(args.output.radius, 0).unwrap_or(RADIUS);
+    let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let piece = Weave {
-        draft: draft.map_err(|e| Failure::Input(format!("error: {e}")))?,
-        warps: Extent::Yarns(args.warps),
-        wefts: Extent::Yarns(args.wefts),
-        warp_radius: args.output.radius,
-        weft_radius: args.weft_radius.unwrap_or(args.output.radius),
-        warp_spacing: args.warp_spacing,
-        weft_spacing: args.weft_spacing,
+        draft,
+        warps: Extent::Yarns(args.warps.unwrap_or(warps)),
+        wefts: Extent::Yarns(args.wefts.unwrap_or(wefts)),
+        warp_radius: radius,
+        weft_radius: own(args.weft_radius, 1).unwrap_or(radius),
+        warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
+        weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
         cover: args.cover,
         crimp: args.crimp,
         // Curve files know round yarns only.
@@ -251,10 +266,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
             "finished" => weave::Edges::Finished,
             "selvedge" => weave::Edges::Selvedge,
-            "fringe" => weave::Edges::Fringe(FRINGE * args.output.radius),
+            "fringe" => weave::Edges::Fringe(FRINGE * radius),
             _ => weave::Edges::Live,
         }),
-        pile_height: args.pile_height.unwrap_or(PILE * args.output.radius),
+        pile_height: args.pile_height.unwrap_or(PILE * radius),
+        threads: file.map(|f| f.threads).unwrap_or_default(),
     };
     let cloth = match piece.relax() {
         Ok(cloth) => cloth,
@@ -269,7 +285,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         }
         Err(Impossible::TooLarge) => return too_many("warps, wefts"),
     };
-    write(cloth.strands(), &args.output, piece.weft_radius)?;
+    write(cloth.strands(), &args.output, [radius, piece.weft_radius])?;
     if !args.output.quiet {
         let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
@@ -283,14 +299,29 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes all files and says what they hold.
-fn write(strands: Vec<PatternStrand>, output: &Output, weft_radius: f64) -> Result<(), Failure> {
+/// A draft of a weaving program; what it leaves open is said.
+fn wif_draft(path: &str) -> Result<WovenWif, Failure> {
+    let wrong = |problem: String| Failure::Input(format!("error: {path}: {problem}"));
+    let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
+    let file = wif::parse(&bytes).map_err(|e| wrong(e.to_string()))?;
+    let woven = file.woven(WifUse::default()).map_err(|e| wrong(e.to_string()))?;
+    woven.notes.iter().for_each(|note| log::say(&format!("{path}: {note}")));
+    Ok(woven)
+}
+
+/// Writes all files and says what they hold. Radii are those of other strands and of wefts.
+fn write(strands: Vec<PatternStrand>, output: &Output, [radius, weft_radius]: [f64; 2]) -> Result<(), Failure> {
     let curves = strands
         .into_iter()
         .map(|strand| {
-            let radius = if strand.kind == StrandKind::Weft { weft_radius } else { output.radius };
+            let radius = if strand.kind == StrandKind::Weft { weft_radius } else { radius };
             let mut curve = strand.curve;
-            curve.radii = Some(vec![radius; curve.points.len()]);
+            // Curve files know round yarns only: of equal area.
+            let own = curve.radii.take().zip(curve.flattening.take());
+            let round = |(wide, axes): (Vec<f64>, Vec<glam::DVec3>)| -> Vec<f64> {
+                wide.iter().zip(&axes).map(|(w, axis)| w * axis.length().sqrt()).collect()
+            };
+            curve.radii = Some(own.map_or_else(|| vec![radius; curve.points.len()], round));
             curve
         })
         .collect();

@@ -3,7 +3,11 @@
 //! Weaving programs write the format freely, so the reader forgives what has one meaning (garbage before the first
 //! section, empty values, private sections, missing defaults) and refuses what has none, with the line.
 
+mod woven;
+
 use std::{collections::BTreeMap, fmt};
+
+pub use woven::{WifUse, WovenWif};
 
 /// The most threads of one system, and the most crossings.
 const MAX_THREADS: u64 = 1 << 20;
@@ -20,12 +24,16 @@ pub struct WifError {
     pub hint: Option<String>,
 }
 
+impl WifError {
+    /// The line and the problem.
+    pub fn without_hint(&self) -> String {
+        if self.line > 0 { format!("line {}: {}", self.line, self.problem) } else { self.problem.clone() }
+    }
+}
+
 impl fmt::Display for WifError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.line > 0 {
-            write!(out, "line {}: ", self.line)?;
-        }
-        out.write_str(&self.problem)?;
+        out.write_str(&self.without_hint())?;
         self.hint.as_ref().map_or(Ok(()), |hint| write!(out, "; {hint}"))
     }
 }

@@ -12,6 +12,7 @@ use super::{
     super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Mode, Yarn, defaults, transform_curves},
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan, FabricCoordinates},
+    dyes::Dyes,
     garment::{self, GarmentPlan},
     mesh::prim_pattern,
     pattern::{self, KnitPlan},
@@ -220,6 +221,11 @@ impl Yarns<'_> {
         self.radius.or(self.own.1.map(|y| y.radius)).unwrap_or(self.fallback)
     }
 
+    /// Whether the fabric itself says it.
+    pub(super) fn has_radius(&self) -> bool {
+        self.radius.is_some()
+    }
+
     /// Name of the fabric's yarn.
     pub(super) fn name(&self) -> &str {
         self.own.0
@@ -285,6 +291,8 @@ struct Made {
     coordinates: Option<FabricCoordinates>,
     /// Their colours, if they are not the fabric's.
     color: Option<ColorPlan>,
+    /// Colours that came with them.
+    dyes: Option<Dyes>,
     motion: FabricMotion,
     /// Whether there are no more points than are needed.
     exact: bool,
@@ -297,7 +305,16 @@ impl Made {
         curves: Vec<(Curve, Vec<f64>)>,
         coordinates: Option<FabricCoordinates>,
     ) -> Self {
-        Self { origin, kind, curves, coordinates, color: None, motion: FabricMotion::default(), exact: false }
+        Self {
+            origin,
+            kind,
+            curves,
+            coordinates,
+            color: None,
+            dyes: None,
+            motion: FabricMotion::default(),
+            exact: false,
+        }
     }
 }
 
@@ -354,16 +371,17 @@ impl FabricPlan {
                 let Woven { origin, sides } = plan.make(context)?;
                 let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
                 let weft = plan.weft_yarn.as_deref().map_or(Some(kind), place_of)?;
-                let (mut warps, wefts) = (with_radius(warps, radius), with_radius(wefts, plan.weft_radius()));
+                let [warp_radius, weft_radius] = plan.radii();
+                let (mut warps, wefts) = (with_radius(warps, warp_radius), with_radius(wefts, weft_radius));
+                let dyes = || Dyes::of_threads(&plan.colors);
                 if weft == kind {
                     warps.extend(wefts);
                     coordinates.join(weft_coordinates);
-                    vec![Made::new(origin, kind, warps, Some(coordinates))]
+                    vec![Made { dyes: dyes(), ..Made::new(origin, kind, warps, Some(coordinates)) }]
                 } else {
-                    vec![
-                        Made::new(format!("warp of {origin}"), kind, warps, Some(coordinates)),
-                        Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates)),
-                    ]
+                    let warp = Made::new(format!("warp of {origin}"), kind, warps, Some(coordinates));
+                    let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
+                    vec![Made { dyes: dyes(), ..warp }, Made { dyes: dyes(), ..weft }]
                 }
             }
             Source::Straight { count, length, spacing } => {
@@ -395,7 +413,7 @@ impl FabricPlan {
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
         let name = self.name.unwrap_or_else(|| self.kind.into_name());
-        let fabric = |Made { origin, kind, curves, coordinates, color, motion, exact }: Made| {
+        let fabric = |Made { origin, kind, curves, coordinates, color, dyes, motion, exact }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -419,6 +437,7 @@ impl FabricPlan {
             fabric.transform(&self.transform);
             color.as_ref().unwrap_or(&self.color).apply(
                 &mut fabric,
+                dyes.as_ref(),
                 |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
                 context,
                 library,

@@ -13,7 +13,9 @@ use glam::Vec3;
 
 use super::{
     super::{CurveKind, Fabric, Yarn},
-    Context, Range, Reader, radians,
+    Context, Range, Reader,
+    dyes::Dyes,
+    radians,
     yarns::Library,
 };
 use crate::{
@@ -383,10 +385,12 @@ impl ColorPlan {
         }
     }
 
-    /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them.
+    /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them; `dyes`
+    /// are used where the scene does not say which yarn lies where.
     pub(super) fn apply(
         &self,
         fabric: &mut Fabric,
+        dyes: Option<&Dyes>,
         coordinates: impl FnOnce(&Fabric) -> FabricCoordinates,
         context: &Context<'_>,
         library: &Library,
@@ -397,7 +401,8 @@ impl ColorPlan {
         let shades = self.variation.filter(|v| v.color > 0.0);
         let Layout { rows, columns, motif } = &self.layout;
         let plain = rows.is_empty() && columns.is_empty() && motif.is_none();
-        if plain && self.tint.is_none() && shades.is_none() {
+        let dyes = dyes.filter(|_| plain);
+        if plain && self.tint.is_none() && shades.is_none() && dyes.is_none() {
             return Some(());
         }
         let CurveKind::Yarn(base) = fabric.kind else {
@@ -425,7 +430,7 @@ impl ColorPlan {
                 }
             },
         };
-        let painter = Painter { coordinates: &coordinates, cells: &cells, texture, shades, yarns: &yarns };
+        let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, texture, shades, yarns: &yarns };
         let mut variants = Variants::default();
         let curves = fabric.curves.iter().enumerate();
         let material_indices =
@@ -511,6 +516,8 @@ impl LaidCells {
 struct Painter<'a> {
     coordinates: &'a FabricCoordinates,
     cells: &'a LaidCells,
+    /// Colours that came with the curves.
+    dyes: Option<&'a Dyes>,
     /// A picture over the cloth, and how often it is repeated.
     texture: Option<(Texture, [f64; 2])>,
     /// How yarns differ in colour, if they do.
@@ -530,8 +537,11 @@ impl Painter<'_> {
         let material_at = |place: usize| {
             let [x, y] = self.coordinates.between(index, place, steps, count);
             let yarn = cells.at(x, y);
+            let kind = self.coordinates.kinds.get(index).copied();
+            let dye = self.dyes.and_then(|d| d.at(index, kind, [x, y]));
+            let own = self.dyes.map_or(Vec3::ONE, |d| d.color(dye));
             let (key, color) = match &self.texture {
-                None => (Key { yarn, shade, levels: [0; 3] }, Vec3::splat(shine)),
+                None => (Key { yarn, shade, dye, levels: [0; 3] }, own * shine),
                 Some((texture, repeat)) => {
                     let extent = self.coordinates.extent;
                     let uv = |[x, y]: [f32; 2]| [x / extent[0] * repeat[0] as f32, y / extent[1] * repeat[1] as f32];
@@ -544,7 +554,7 @@ impl Painter<'_> {
                         .sample(here[0], here[1], width)
                         .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
                     let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
-                    (Key { yarn, shade: None, levels }, Vec3::from(color))
+                    (Key { yarn, shade: None, dye, levels }, own * Vec3::from(color))
                 }
             };
             variants.material_index(key, || self.yarns[key.yarn].dyed(color.to_array().map(f64::from)))
@@ -557,6 +567,7 @@ impl Painter<'_> {
 struct Key {
     yarn: usize,
     shade: Option<u32>,
+    dye: Option<u32>,
     levels: [u8; 3],
 }
 

@@ -189,8 +189,8 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
         }
         Some(1) => {
             let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
-            let (name, draft) = weave::draft(&table);
-            draft.map(|draft| (name, Pattern::Weave { draft, crimp }))
+            let (name, drafted) = weave::draft(&table, context);
+            drafted.map(|d| (name, Pattern::Weave { draft: d.draft, crimp }))
         }
         Some(2) => {
             let path = table.required_string("path");

@@ -6,6 +6,7 @@
 mod cloth;
 mod color;
 mod definitions;
+mod dyes;
 mod garment;
 mod mesh;
 mod motion;
@@ -125,6 +126,10 @@ impl Context<'_> {
             Some(hint) => diagnostic.hint(hint),
             None => diagnostic,
         });
+    }
+
+    fn warning(&self, span: Span, message: impl Into<String>) {
+        self.diagnostics.push(Diagnostic::warning(message).at(span));
     }
 
     /// A vector in the scene's unit, as millimetres.

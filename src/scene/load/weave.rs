@@ -8,6 +8,7 @@ use crate::{
             PatternStrand, StrandKind,
             draft::{Draft, DraftError},
             weave::{self, Edges, Extent, Impossible, Measures, Weave},
+            wif::{self, WifUse, WovenWif},
         },
     },
     input::{
@@ -15,6 +16,9 @@ use crate::{
         document::{Node, Value},
     },
 };
+
+/// Yarns of each side unless given.
+const YARNS: u32 = 20;
 
 /// Length of a fringe unless given, in radii of the warp.
 const FRINGE: f64 = 24.0;
@@ -29,8 +33,12 @@ pub(super) struct WeavePlan {
     pub(super) weft_yarn: Option<String>,
     /// Yarns of warps from the left and of wefts from the bottom, in turns; empty where they are all the same.
     pub(super) order: [Vec<String>; 2],
+    /// Colours of warps and wefts in turns, sRGB; empty where the draft has none.
+    pub(super) colors: [Vec<[f64; 3]>; 2],
     name: String,
     header: Span,
+    /// Whether spacings of warps and wefts are those of the draft's file.
+    filed: [bool; 2],
 }
 
 /// Woven yarns.
@@ -42,9 +50,9 @@ pub(super) struct Woven {
 }
 
 impl WeavePlan {
-    /// Radius of the weft yarn.
-    pub(super) fn weft_radius(&self) -> f64 {
-        self.weave.weft_radius
+    /// Radii of warp and weft, mm.
+    pub(super) fn radii(&self) -> [f64; 2] {
+        [self.weave.warp_radius, self.weave.weft_radius]
     }
 
     /// Weaves it.
@@ -62,10 +70,21 @@ impl WeavePlan {
             }
             Err(Impossible::TooTight { warp, least }) => {
                 let (key, least) = (if warp { "warp_spacing" } else { "weft_spacing" }, least / context.unit);
-                wrong(
-                    format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here"),
-                    "thinner yarns, another `crimp`, or no spacing at all for the tightest",
-                );
+                if self.filed[usize::from(!warp)] {
+                    let hint = "thinner yarns, or `spacing = false` in the draft for as close as they go";
+                    let spacing = key.replace('_', " ");
+                    wrong(
+                        format!(
+                            "the {spacing} of the draft leaves the yarns no room to pass: at least {least:.4} here"
+                        ),
+                        hint,
+                    );
+                } else {
+                    wrong(
+                        format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here"),
+                        "thinner yarns, another `crimp`, or no spacing at all for the tightest",
+                    );
+                }
             }
             Err(Impossible::TooMuchCover { most }) => wrong(
                 format!("these yarns cover at most {most:.3} of the plane in this weave"),
@@ -95,7 +114,8 @@ impl WeavePlan {
 
 /// Reads the keys of a weave.
 pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
-    let (name, draft) = draft(table);
+    let (name, drafted) = draft(table, context);
+    let wif = drafted.as_ref().and_then(|d| d.wif.as_ref());
     let names = &yarns.library.yarn_names;
     let check = |key: &str, name: &str| {
         if !names.iter().any(|n| n == name) {
@@ -109,22 +129,31 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
         order.iter().for_each(|name| check(key, name));
         order
     });
+    let written = |side: usize| wif.and_then(|w| w.radius[side]).filter(|_| !yarns.has_radius());
     let own = yarns.radius();
     let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
-    let warp_spacing = spacing(table, context, "warp_spacing", "ends_per_cm");
-    let weft_spacing = spacing(table, context, "weft_spacing", "picks_per_cm");
+    let (own, weft_radius) = (written(0).unwrap_or(own), written(1).unwrap_or(weft_radius));
     let cover = table.f64("cover", Range::between(0.01, 1.0));
+    let filed = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
+    let asked =
+        [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
+    let own_setting = [0, 1].map(|side| asked[side].is_none() && filed(side).is_some());
+    let [warp_spacing, weft_spacing] = [0, 1].map(|side| asked[side].or_else(|| filed(side)));
     if cover.is_some() && warp_spacing.is_some() && weft_spacing.is_some() {
         table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
     }
-    let (warps, wefts) = (extent(table, context, "warps", "width"), extent(table, context, "wefts", "height"));
+    let count = wif.map_or([YARNS; 2], |w| w.count);
+    let warps = extent(table, context, "warps", "width", count[0]);
+    let wefts = extent(table, context, "wefts", "height", count[1]);
     let crimp = table.f64("crimp", Range::UNIT);
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
     let edges = edges(table, context, own);
     let pile = table.f64("pile_height", Range::POSITIVE).map(|h| h * context.unit);
+    let Drafted { draft, wif } = drafted?;
+    let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
     let weave = Weave {
-        draft: draft?,
+        draft,
         warps,
         wefts,
         warp_radius: own,
@@ -137,12 +166,21 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
         points,
         edges,
         pile_height: pile.unwrap_or(PILE * own),
+        threads,
     };
     if pile.is_some() && weave.draft.pile().is_none() {
         table.error_at("pile_height", "this draft has no pile", Some("draft = \"terry\", \"velvet\" or \"corduroy\""));
     }
     warn_about_loose(table, &weave.draft);
-    Some(WeavePlan { weave, weft_yarn: weft_yarn.map(str::to_owned), order, name, header: table.header() })
+    Some(WeavePlan {
+        weave,
+        weft_yarn: weft_yarn.map(str::to_owned),
+        order,
+        colors,
+        name,
+        header: table.header(),
+        filed: own_setting,
+    })
 }
 
 /// How the cloth ends.
@@ -201,18 +239,29 @@ fn spacing(table: &Reader<'_>, context: &Context<'_>, key: &str, density: &str) 
     spacing.or(counted)
 }
 
-/// A number of yarns, or the length that they fill.
-fn extent(table: &Reader<'_>, context: &Context<'_>, key: &str, length: &str) -> Extent {
+/// A number of yarns, `default` unless given, or the length that they fill.
+fn extent(table: &Reader<'_>, context: &Context<'_>, key: &str, length: &str, default: u32) -> Extent {
     let asked = table.f64(length, Range::POSITIVE).map(|l| l * context.unit);
     if asked.is_some() && table.has(key) {
         table.error_at(length, format!("give `{key}` or `{length}`, not both"), None);
     }
-    let count = table.u64_or(key, 20, 1..=1_000_000) as u32;
+    let count = table.u64_or(key, default.into(), 1..=1_000_000) as u32;
     asked.map_or(Extent::Yarns(count), Extent::Length)
 }
 
-/// `draft`: a name, rows of a matrix, or a loom's lists.
-pub(super) fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
+/// A draft, and what its file says beside it.
+pub(super) struct Drafted {
+    pub(super) draft: Draft,
+    pub(super) wif: Option<WovenWif>,
+}
+
+/// `draft`: a name, rows of a matrix, a loom's lists or a file.
+pub(super) fn draft(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Drafted>) {
+    if let Some(Value::Table(_)) = table.node("draft").map(|node| &node.value)
+        && let Some(file) = table.table("draft").filter(|t| t.has("type"))
+    {
+        return from_file(file, context);
+    }
     let read: Option<(String, Result<Draft, DraftError>)> =
         if matches!(table.node("draft").map(|node| &node.value), Some(Value::Table(_))) {
             table.table("draft").and_then(loom).map(|draft| ("weave".to_owned(), draft))
@@ -236,12 +285,50 @@ pub(super) fn draft(table: &Reader<'_>) -> (String, Option<Draft>) {
             }
         };
     match read {
-        Some((name, Ok(draft))) => (name, Some(draft)),
+        Some((name, Ok(draft))) => (name, Some(Drafted { draft, wif: None })),
         Some((_, Err(error))) => {
             table.error_at("draft", error.problem, Some(&error.hint));
             (String::new(), None)
         }
         None => (String::new(), None),
+    }
+}
+
+/// `{ type = "wif", path = "x.wif" }`.
+fn from_file(table: Reader<'_>, context: &Context<'_>) -> (String, Option<Drafted>) {
+    table.kind("type", &[("wif", ())]);
+    let defaults = WifUse::default();
+    let take = WifUse {
+        spacing: table.bool_or("spacing", defaults.spacing),
+        thickness: table.bool_or("thickness", defaults.thickness),
+        colors: table.bool_or("colors", defaults.colors),
+    };
+    let path = table.required_string("path").map(str::to_owned);
+    let span = table.span("path").unwrap_or(table.header());
+    table.finish();
+    let Some(path) = path.map(|p| context.resolve(&p, span)) else { return (String::new(), None) };
+    let wrong = |problem: String, hint: Option<String>| {
+        context.error(span, format!("{}: {problem}", path.display()), hint);
+        (String::new(), None)
+    };
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        // Missing files are told with all others.
+        Err(error) => return wrong(error.to_string(), None),
+    };
+    let file = match wif::parse(&bytes) {
+        Ok(file) => file,
+        Err(error) => return wrong(error.without_hint(), error.hint),
+    };
+    match file.woven(take) {
+        Ok(woven) => {
+            for note in &woven.notes {
+                context.warning(span, format!("{}: {note}", path.display()));
+            }
+            let name = file.title.clone().unwrap_or_else(|| "weave".to_owned());
+            (name, Some(Drafted { draft: woven.draft.clone(), wif: Some(woven) }))
+        }
+        Err(error) => wrong(error.problem, Some(error.hint)),
     }
 }
 

@@ -1,10 +1,12 @@
 //! Weaving drafts: at which crossings the warp lies over the weft. Weaves with a name are in `named`.
 
 mod named;
+mod repeat;
 
 use std::fmt;
 
 pub use named::NAMES;
+pub use repeat::{MOST_CROSSINGS, Threads};
 
 /// A repeat of a weave.
 #[derive(Clone, Debug, PartialEq, Eq)]

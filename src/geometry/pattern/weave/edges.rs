@@ -59,11 +59,10 @@ pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
 pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<PatternStrand> {
     let (mut warps, wefts): (Vec<_>, Vec<_>) = strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
     let radius = [cloth.weave.warp_radius, cloth.weave.weft_radius];
-    let flat = cloth.weave.flatten > 1.0;
+    let flat = cloth.weave.sized();
     let nodes = cloth.cell.nodes;
     let reach = radius[0] + radius[1];
-    let edge =
-        0.5 * cloth.cell.spacing[0] * f64::from(cloth.count[0]) + 0.5 * cloth.cell.spacing[0].max(2.2 * radius[0]);
+    let edge = 0.5 * cloth.size(0) + 0.5 * cloth.cell.spacing[0].max(2.2 * radius[0]);
     // The two warps: straight, round.
     let last = cloth.count[0];
     for (sign, index, place) in [(-1.0, last, -0.5), (1.0, last + 1, last as f32 + 0.5)] {
@@ -144,7 +143,7 @@ fn join(way: &mut Vec<Point>, to: Point, nodes: usize, outwards: bool) {
 /// Lets warps go on beyond both ends, each its own way.
 pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f64) {
     let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.warp_radius);
-    let flat = cloth.weave.flatten > 1.0;
+    let flat = cloth.weave.sized();
     let step = 1.2 * radius;
     let steps = (length / step).ceil().max(2.0) as usize;
     for strand in strands.iter_mut().filter(|s| s.kind == StrandKind::Warp) {

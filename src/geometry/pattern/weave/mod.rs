@@ -19,7 +19,7 @@ pub use self::edges::Edges;
 use self::unit_cell::{BEAT, CellOptions, UnitCell, full};
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
-    draft::{Draft, Pile},
+    draft::{Draft, Pile, Threads},
 };
 use crate::geometry::curve::{Basis, Curve};
 
@@ -53,6 +53,8 @@ pub struct Weave {
     pub edges: Edges,
     /// How high the pile stands, where there is one.
     pub pile_height: f64,
+    /// How warps differ, and wefts, one value for each of the draft's repeat.
+    pub threads: [Threads; 2],
 }
 
 /// How far cloth goes.
@@ -147,6 +149,7 @@ impl Weave {
             points: POINTS,
             edges: Edges::Live,
             pile_height: 8.0 * radius,
+            threads: <[Threads; 2]>::default(),
         }
     }
 
@@ -163,7 +166,13 @@ impl Weave {
                 .then(|| sett(&self.draft)),
             beat: BEAT,
             nodes: self.points as usize,
+            thickness: [0, 1].map(|side| self.threads[side].thickness.clone()),
         }
+    }
+
+    /// Whether its curves carry the widths and heights of their yarns.
+    fn sized(&self) -> bool {
+        self.flatten > 1.0 || self.threads.iter().any(|t| !t.thickness.is_empty())
     }
 
     /// Relaxes a repeat.
@@ -197,6 +206,7 @@ impl Weave {
     fn cloth(&self, cell: UnitCell) -> Result<Cloth<'_>, Impossible> {
         let count = |extent: Extent, spacing: f64| match extent {
             Extent::Yarns(count) => count,
+            // Threads of several spacings are so far apart in the mean.
             Extent::Length(length) => (length / spacing).round().clamp(1.0, 1e9) as u32,
         };
         let count = [count(self.warps, cell.spacing[0]), count(self.wefts, cell.spacing[1])];
@@ -257,10 +267,28 @@ impl Cloth<'_> {
             .flatten()
             .flatten()
             .fold((f64::MAX, f64::MIN), |(l, h), n| (l.min(n.height - n.axes[1]), h.max(n.height + n.axes[1])));
-        let size = [0, 1].map(|side| cell.spacing[side] * f64::from(self.count[side]));
+        let size = [0, 1].map(|side| self.size(side));
         let length = [0, 1].map(|side| f64::from(self.count[side]) * size[1 - side] * (1.0 + crimp[side]));
         let thickness = high - low;
         Measures { spacing: cell.spacing, see_through: cell.see_through(), crimp, thickness, size, length }
+    }
+
+    /// Width of the warps, or height of the wefts.
+    fn size(&self, side: usize) -> f64 {
+        self.cell.spacing[side] * room_before(&self.weave.threads[side].spacing, i64::from(self.count[side]))
+    }
+
+    /// Where a place of a side is, from the middle of the cloth: yarn i goes from i to i + 1, and its centre is at i + 1/2.
+    fn position(&self, side: usize, place: f64) -> f64 {
+        let given = &self.weave.threads[side].spacing;
+        let spacing = self.cell.spacing[side];
+        if given.is_empty() {
+            return (place - 0.5 * f64::from(self.count[side])) * spacing;
+        }
+        let centre = |yarn: i64| 0.5 * (room_before(given, yarn) + room_before(given, yarn + 1));
+        let yarn = (place - 0.5).floor();
+        let (a, b) = (centre(yarn as i64), centre(yarn as i64 + 1));
+        (a + (place - 0.5 - yarn) * (b - a)) * spacing - 0.5 * self.size(side)
     }
 
     /// Numbers of warps and wefts.
@@ -308,20 +336,18 @@ impl Cloth<'_> {
     fn strand(&self, side: usize, index: u32, hem: u32) -> PatternStrand {
         let cell = &self.cell;
         let nodes = cell.nodes as i64;
-        let (own, along) = (cell.spacing[side], cell.spacing[1 - side]);
         let hem = i64::from(hem);
         // The first and the number of the yarns on both sides.
         let range = [(0, i64::from(self.count[0])), (-hem, i64::from(self.count[1]) + 2 * hem)];
-        let middle = |side: usize| 0.5 * f64::from(self.count[side]);
         let (first, others) = range[1 - side];
         let number = range[side].0 + i64::from(index);
-        let across = (number as f64 + 0.5 - middle(side)) * own;
+        let across = self.position(side, number as f64 + 0.5);
         let yarn = &cell.yarns[side][number.rem_euclid(cell.yarns[side].len() as i64) as usize];
         let steps = first * nodes - nodes / 2..=(first + others - 1) * nodes + nodes / 2;
         let node = |k: i64| yarn[k.rem_euclid(yarn.len() as i64) as usize];
         let place = |k: i64| k as f64 / nodes as f64 + 0.5;
         let point = |k: i64| {
-            let (a, b) = ((place(k) - middle(1 - side)) * along, across + node(k).aside);
+            let (a, b) = (self.position(1 - side, place(k)), across + node(k).aside);
             if side == 0 { DVec3::new(b, a, node(k).height) } else { DVec3::new(a, b, node(k).height) }
         };
         let coordinates = |k: i64| {
@@ -336,12 +362,22 @@ impl Cloth<'_> {
         };
         let kind = [StrandKind::Warp, StrandKind::Weft][side];
         let mut made = strand(kind, index, steps.clone().map(|k| (point(k), coordinates(k))));
-        if self.weave.flatten > 1.0 {
+        if self.weave.sized() {
             made.curve.radii = Some(steps.clone().map(|k| node(k).axes[0]).collect());
             made.curve.flattening = Some(steps.map(flattening).collect());
         }
         made
     }
+}
+
+/// Room of the yarns before one, in mean spacings; yarns repeat.
+fn room_before(spacing: &[f64], yarn: i64) -> f64 {
+    let count = spacing.len() as i64;
+    if count == 0 {
+        return yarn as f64;
+    }
+    let rest = yarn.rem_euclid(count) as usize;
+    yarn.div_euclid(count) as f64 * spacing.iter().sum::<f64>() + spacing[..rest].iter().sum::<f64>()
 }
 
 /// A round strand through points, each with its place in the cloth.

@@ -116,7 +116,7 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
         let (from, to) = (from.max(0), to.min(way.len() as i64 - 1));
         if from > to { Vec::new() } else { way[from as usize..=to as usize].iter().map(|&p| (p, false)).collect() }
     };
-    let flat = cloth.weave.flatten > 1.0;
+    let flat = cloth.weave.sized();
     if pile.cut {
         let tuft = |at: i64| {
             let base = part(at - rise, at + rise);

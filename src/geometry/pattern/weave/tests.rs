@@ -269,3 +269,30 @@ fn pile_stands_as_high_as_it_is_asked_to() {
         }
     }
 }
+
+/// Every fourth warp is twice as thick and has more room.
+#[test]
+fn threads_of_several_kinds_have_their_own_thickness_and_room() {
+    let thickness = vec![0.8, 0.8, 1.6, 0.8];
+    let spacing = vec![0.8, 1.0, 1.4, 0.8];
+    let threads = [Threads { thickness, spacing }, Threads::default()];
+    let warps = Extent::Yarns(8);
+    let piece = Weave { threads, warps, warp_spacing: Some(4.0), ..Weave::of(Draft::named("twill 2/2").unwrap(), 1.0) };
+    let cloth = piece.relax().unwrap();
+    let strands = cloth.strands();
+    let warps: Vec<&PatternStrand> = strands.iter().filter(|s| s.kind == StrandKind::Warp).collect();
+    let mean_x = |s: &PatternStrand| s.curve.points.iter().map(|p| p.x).sum::<f64>() / s.curve.points.len() as f64;
+    let gaps: Vec<f64> = warps.windows(2).map(|pair| mean_x(pair[1]) - mean_x(pair[0])).collect();
+    // Neighbours slide aside, repeats do not.
+    assert!((gaps[..4].iter().sum::<f64>() - 16.0).abs() < 1e-6 && (gaps[0] - gaps[4]).abs() < 1e-6, "{gaps:?}");
+    // Beside the thick one there is more room, as the reed has it.
+    assert!(gaps[1].min(gaps[2]) > 1.2 * gaps[0].max(gaps[3]), "{gaps:?}");
+    // Equal area: half the width times half the height.
+    for (warp, want) in warps.iter().zip([0.8, 0.8, 1.6, 0.8]) {
+        let (wide, axes) = (warp.curve.radii.as_ref().unwrap(), warp.curve.flattening.as_ref().unwrap());
+        let round = (wide[9] * wide[9] * axes[9].length()).sqrt();
+        assert!((round - want).abs() < 0.01, "{round} for {want}");
+    }
+    assert!((cloth.measures().size[0] - 32.0).abs() < 1e-9);
+    assert!(cloth.cell.overlap[1] < 0.03, "{:?}", cloth.cell.overlap);
+}

@@ -64,6 +64,8 @@ pub(super) struct CellOptions {
     pub(super) beat: f64,
     /// Nodes of a yarn from one crossing to the next.
     pub(super) nodes: usize,
+    /// Thickness of each yarn of the repeat over the mean; empty where all are alike.
+    pub(super) thickness: [Vec<f64>; 2],
 }
 
 /// A place of a yarn in the cell.
@@ -95,8 +97,10 @@ const PER_NODE: usize = 3;
 
 struct Energy<'a> {
     draft: &'a Draft,
-    /// In mean radii.
+    /// Mean of each side, in mean radii.
     radius: [f64; 2],
+    /// Thickness of each yarn over the mean of its side.
+    thickness: [Vec<f64>; 2],
     rest: [f64; 2],
     /// Tension and bending of warp and weft relative to the mean.
     stiffness: [f64; 2],
@@ -187,10 +191,11 @@ impl Energy<'_> {
         let per_node = 1.0 / self.nodes as f64;
         let along = spacing[1 - side] * per_node;
         let n = self.length(side);
-        let tension = TENSION * self.stiffness[side];
-        let bending = tension * STIFF_LENGTH * STIFF_LENGTH;
         let mut sum = 0.0;
         for yarn in 0..self.count[side] {
+            // A yarn is as stiff as its fibres are many.
+            let tension = TENSION * self.stiffness[side] * self.thickness[side][yarn].powi(2);
+            let bending = tension * STIFF_LENGTH * STIFF_LENGTH;
             let edge = |k: usize| {
                 let (a, b) = (self.at(side, yarn, k), self.at(side, yarn, (k + 1) % n));
                 let e = [along, x[b] - x[a], x[b + 1] - x[a + 1]];
@@ -263,7 +268,12 @@ impl Energy<'_> {
         if warps * wefts <= MOST_SHIFTS && !self.draft.twines() {
             let shifts = (0..warps).flat_map(|a| (0..wefts).map(move |b| (a, b))).skip(1);
             let maps = |&(a, b): &(usize, usize)| {
-                (0..wefts).all(|i| (0..warps).all(|j| self.draft.warp_over(i, j) == self.draft.warp_over(i + b, j + a)))
+                let same = |side: usize, by: usize| {
+                    let list = &self.thickness[side];
+                    (0..list.len()).all(|i| list[i] == list[(i + by) % list.len()])
+                };
+                let over = |i: usize, j: usize| self.draft.warp_over(i, j) == self.draft.warp_over(i + b, j + a);
+                same(0, a) && same(1, b) && (0..wefts).all(|i| (0..warps).all(|j| over(i, j)))
             };
             // All shifts together are a group: the least variable of an orbit leads it.
             for (a, b) in shifts.filter(maps) {
@@ -312,15 +322,22 @@ impl Energy<'_> {
         }
     }
 
-    fn axes(&self, side: usize, flat: f64) -> [f64; 2] {
-        [self.radius[side] * flat.exp(), self.radius[side] * (-flat).exp()]
+    /// Radius of a yarn where it is round.
+    fn round(&self, side: usize, yarn: usize) -> f64 {
+        self.radius[side] * self.thickness[side][yarn]
+    }
+
+    fn axes(&self, side: usize, yarn: usize, flat: f64) -> [f64; 2] {
+        [self.round(side, yarn) * flat.exp(), self.round(side, yarn) * (-flat).exp()]
     }
 
     /// Half width and half height of all nodes.
     fn all_axes(&self, x: &[f64]) -> Vec<[f64; 2]> {
         let nodes = x[..x.len() - 2].chunks_exact(PER_NODE);
         let warps = self.base(1) / PER_NODE;
-        nodes.enumerate().map(|(i, node)| self.axes(usize::from(i >= warps), node[2])).collect()
+        let place = |i: usize| if i < warps { (0, i / self.length(0)) } else { (1, (i - warps) / self.length(1)) };
+        let axes = |(side, yarn): (usize, usize), flat: f64| self.axes(side, yarn, flat);
+        nodes.enumerate().map(|(i, node)| axes(place(i), node[2])).collect()
     }
 
     /// Unit tangents of all nodes, in the world, with half the way between their neighbours along the yarn.
@@ -374,14 +391,15 @@ impl Energy<'_> {
     ) -> f64 {
         let n = self.length(side);
         let count = self.count[side];
-        let far = ((3.2 * self.radius[side] / spacing[side]).ceil() as usize).clamp(1, 5);
-        let size = 2.0 * self.radius[side];
-        let stiff = 4.0 * self.contact * size * size / self.nodes as f64;
+        let thickest = self.thickness[side].iter().fold(1.0, |m: f64, t| m.max(*t));
+        let far = ((3.2 * thickest * self.radius[side] / spacing[side]).ceil() as usize).clamp(1, 5);
         // Half height of a sloping yarn's cut, over its own.
         let steep = |at: usize| 1.0 / local(side, tangents[at / PER_NODE].unit)[0].max(0.2);
         let mut sum = 0.0;
         for yarn in 0..count {
             for apart in 1..=far {
+                let size = self.round(side, yarn) + self.round(side, (yarn + apart) % count);
+                let stiff = 4.0 * self.contact * size * size / self.nodes as f64;
                 for k in 0..n {
                     let (a, b) = (self.at(side, yarn, k), self.at(side, (yarn + apart) % count, k));
                     let d = [apart as f64 * spacing[side] + x[b] - x[a], x[b + 1] - x[a + 1]];
@@ -424,12 +442,6 @@ impl Energy<'_> {
     /// round yarns.
     fn crossings(&self, x: &[f64], spacing: [f64; 2], spheroids: &[Spheroid], gradient: &mut Gradient<'_>) -> f64 {
         let per_node = 1.0 / self.nodes as f64;
-        let size = self.radius[0] + self.radius[1];
-        let ratio = self.radius[0] / self.radius[1];
-        let parts = [1.0 + ratio.recip(), 1.0 + ratio];
-        // A crossing has more pairs the more nodes there are.
-        let stiff = self.contact * size * size * (4.0 * per_node).powi(2);
-        let limit = 1.6 * size;
         let (step_x, step_y) = (spacing[0] * per_node, spacing[1] * per_node);
         let (warp_length, weft_length) = (self.length(0) as isize, self.length(1) as isize);
         let g = &mut *gradient.nodes;
@@ -437,6 +449,12 @@ impl Energy<'_> {
         for i in 0..self.count[1] {
             for j in 0..self.count[0] {
                 let sign = if self.draft.warp_over(i, j) { 1.0 } else { -1.0 };
+                let (own, other) = (self.round(0, j), self.round(1, i));
+                let (size, ratio) = (own + other, own / other);
+                let parts = [1.0 + ratio.recip(), 1.0 + ratio];
+                // A crossing has more pairs the more nodes there are.
+                let stiff = self.contact * size * size * (4.0 * per_node).powi(2);
+                let limit = 1.6 * size;
                 let reach_y = (limit / step_y).ceil() as isize;
                 for b in -reach_y..=reach_y {
                     let node = ((i * self.nodes) as isize + b).rem_euclid(warp_length) as usize;
@@ -566,6 +584,10 @@ impl UnitCell {
         let mut energy = Energy {
             draft,
             radius,
+            thickness: [0, 1].map(|side| match options.thickness[side].as_slice() {
+                [] => vec![1.0; count[side]],
+                given => given.to_vec(),
+            }),
             rest: options.aspect.map(|a| 0.5 * a.ln()),
             // The stiffer side bends less: h1 / h2 = B2 / B1.
             stiffness: [2.0 * (1.0 - crimp), 2.0 * crimp],
@@ -641,7 +663,7 @@ impl UnitCell {
                             Node {
                                 aside: x[at] * unit,
                                 height: x[at + 1] * unit,
-                                axes: energy.axes(side, flat).map(|v| v * unit),
+                                axes: energy.axes(side, yarn, flat).map(|v| v * unit),
                             }
                         })
                         .collect()
@@ -734,6 +756,7 @@ mod tests {
         let energy = Energy {
             draft: &draft,
             radius: [0.8, 1.2],
+            thickness: [vec![1.3, 0.7, 1.0], vec![1.0, 0.9, 1.1]],
             rest: [0.2, 0.1],
             stiffness: [1.2, 0.8],
             section: SECTION,
