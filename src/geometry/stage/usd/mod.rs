@@ -4,6 +4,7 @@
 //! A file, and each that it refers to, is looked over first ([`check`]), and a panic inside of the crate is an error like any other.
 
 pub(super) mod check;
+mod children;
 mod mesh;
 mod resolver;
 #[cfg(test)]

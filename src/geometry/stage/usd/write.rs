@@ -12,6 +12,7 @@ use openusd::{
     usda, usdc,
 };
 
+use super::children;
 use crate::geometry::curve::{Basis, Curve};
 
 /// Values of a primvar beside curves.
@@ -39,8 +40,9 @@ pub struct CurvesOut<'a> {
 }
 
 /// Writes a layer whose unit is `unit_mm` millimetres, +y up, with all prims below `/cloth`. Widths are constant where
-/// all radii are one, else varying (one for each end of a segment), which renderers take that refuse vertex widths.
-/// Open Catmull-Rom curves are `pinned`, as they reach their ends; B-splines are `nonperiodic`.
+/// all radii are one, else varying (one for each end of a segment), which renderers take that refuse vertex widths; but
+/// vertex where usd-core counts ends otherwise than renderers, of linear and of pinned curves. Open Catmull-Rom curves are
+/// `pinned`, as they reach their ends; B-splines are `nonperiodic`.
 ///
 /// # Errors
 /// The extension is not `.usda`, `.usdc` or `.usd`, a curve has too few points for its basis, or writing failed.
@@ -58,7 +60,7 @@ pub fn write(path: &Path, unit_mm: f64, groups: &[CurvesOut<'_>], out: &mut impl
     } else {
         let mut bytes = Cursor::new(Vec::new());
         usdc::CrateWriter::write(&data, &mut bytes).map_err(|e| invalid(&format!("{e:#}")))?;
-        out.write_all(bytes.get_ref())
+        out.write_all(&children::as_token_vectors(bytes.get_ref())?)
     }
 }
 
@@ -160,7 +162,13 @@ fn add_curves(data: &mut sdf::Data, path: &sdf::Path, group: &CurvesOut<'_>) -> 
             "float[]",
             Value::FloatVec(widths),
             false,
-            Some(if constant { "constant" } else { "varying" }),
+            Some(if constant {
+                "constant"
+            } else if kind.basis.is_none() || kind.wrap == "pinned" {
+                "vertex"
+            } else {
+                "varying"
+            }),
         ),
     ];
     if let Some(basis) = kind.basis {
