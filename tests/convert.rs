@@ -76,3 +76,113 @@ fn shells_and_manuals_know_every_command() {
     let page = fs::read_to_string(folder.path().join("man1/yarnray-render.1")).unwrap();
     assert!(page.starts_with(".ie") && page.contains("spp"), "{page:.200}");
 }
+
+/// What stands before every fabric of the scenes below.
+fn head(yarn: &str) -> String {
+    format!(
+        "unit = \"mm\"\n[render]\nwidth = 48\nheight = 48\nspp = 4\n[camera]\ntype = \"frame\"\ndirection = [0, 0.2, 1]\n\
+         [fiber.wool]\nr = [0.05, 0.05, 0.05]\ntt = [0.4, 0.4, 0.4]\nd = [0.4, 0.4, 0.4]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 20\n\
+         [yarn.one]\nradius = {yarn}\nplies = 2\nfiber = \"wool\"\nfibers = 30\ndensity = 0.3\n\
+         [[light]]\ntype = \"environment\"\nradiance = [1, 1, 1]\n"
+    )
+}
+
+/// A tube of 12 x 3 faces in usd-core's own file, and in one of Alembic: 12.6 cm around, 3 cm high, a hem of its own cloth.
+#[test]
+fn garments_are_laid_on_meshes_of_stages() {
+    let folder = directory();
+    let at = folder.path();
+    let stages = project("tests/data/stages");
+    let info = |file: &str, more: &str, set: &[&str]| {
+        let scene = head("0.5")
+            + &format!(
+                "[[fabric]]\nyarn = \"one\"\ngauge = [30, 40]\nsource = {{ type = \"garment\", path = {:?}, {more}\
+                 cloth = {{ type = \"knit\" }} }}\n[[fabric.panel]]\ngroup = \"hem\"\ncloth = {{ type = \"knit\", pattern = \"rib1x1\" }}\n",
+                stages.join(file)
+            );
+        write(at, "s.toml", scene);
+        yarnray(at, &[&["info", "s.toml", "--json"], set].concat())
+    };
+    let said = |run: crate::support::Run| -> serde_json::Value { serde_json::from_str(&run.good().stdout).unwrap() };
+    let usd = said(info("garment.usda", "prim = \"/figure/tube\", ", &[]));
+    let garment = |v: &serde_json::Value| v["garments"][0].clone();
+    // 126 x 30 mm at 30 wales and 40 courses in 100 mm; the last row may be half.
+    let stitches = garment(&usd)["stitches"].as_f64().unwrap();
+    assert!((stitches - 126.0 * 30.0 * 0.3 * 0.4).abs() < 60.0, "{stitches}");
+    // Chords of a dodecagon, where the texture coordinates have the arc.
+    let ratio = garment(&usd)["uv_ratio"]["p50"].as_f64().unwrap();
+    assert!((0.98..=1.02).contains(&ratio), "{usd}");
+    let panels = garment(&usd)["panels"].to_string();
+    assert!(panels.contains("hem") && panels.contains("tube"), "{panels}");
+    // The other format, which knows no unit, gives the same.
+    let abc = said(info("garment.abc", "unit = \"cm\", ", &[]));
+    assert_eq!(garment(&abc)["stitches"], garment(&usd)["stitches"]);
+    info("garment.usda", "prim = \"/figure/tube\", ", &[]);
+    // z points up in the one file, y in the other.
+    yarnray(at, &["make", "garment", "s.toml", "-o", "g.txt", "-q"]).good();
+    let made = yarnray(at, &["info", "g.txt", "--json"]);
+    let bounds = serde_json::from_str::<serde_json::Value>(&made.good().stdout).unwrap()["bounds"].clone();
+    let size = [0, 1, 2].map(|k| bounds[1][k].as_f64().unwrap() - bounds[0][k].as_f64().unwrap());
+    assert!(size[0] > 38.0 && size[2] > 38.0 && (27.0..33.0).contains(&size[1]), "{size:?}");
+    let missing = info("garment.usda", "prim = \"/figure/bare\", ", &[]);
+    assert!(missing.stderr.contains("garment.usda: a mesh without texture coordinates"), "{}", missing.stderr);
+    let missing = info("garment.usda", "prim = \"/none\", ", &[]);
+    assert!(missing.stderr.contains("meshes here: /figure/tube, /figure/bare"), "{}", missing.stderr);
+    // It moves while the shutter is open.
+    info("garment.usda", "prim = \"/figure/tube\", ", &[]);
+    let args = [
+        "render",
+        "s.toml",
+        "--set",
+        "camera.shutter=[0,1]",
+        "--set",
+        "render.frame=1",
+        "-o",
+        "a.exr",
+        "--stats",
+        "a.json",
+    ];
+    yarnray(at, &args).good();
+    assert!(
+        read_json(&at.join("a.json"))["used"].to_string().contains("yarn_motion"),
+        "{}",
+        read_json(&at.join("a.json"))["used"]
+    );
+}
+
+#[test]
+fn colours_of_curves_dye_yarns_where_the_scene_asks_for_it() {
+    let folder = directory();
+    let at = folder.path();
+    let file = project("tests/data/stages/colors.usda");
+    let run = yarnray(at, &["info", file.to_str().unwrap(), "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&run.good().stdout).unwrap();
+    // Red, blue, green, and the mean of red and blue; the last prim has none.
+    assert_eq!(
+        (info["curves"].as_u64(), info["colored"].as_u64(), info["colors"].as_u64()),
+        (Some(10), Some(8), Some(4))
+    );
+    assert_eq!(info["ids"].as_u64(), Some(2));
+    let mean = |colors: &str, prim: &str| -> Vec<f64> {
+        let source = format!("source = {{ type = \"file\", path = {file:?}, prim = \"{prim}\"{colors} }}");
+        write(at, "s.toml", head("0.2") + "[[fabric]]\nyarn = \"one\"\n" + &source + "\n");
+        yarnray(at, &["render", "s.toml", "-o", "a.exr", "--spp", "16"]).good();
+        let picture = yarnray::image::read(&at.join("a.exr")).unwrap();
+        let rgb = picture.rgb().unwrap();
+        let alpha = &picture.channels.iter().find(|c| c.name == "A").unwrap().samples;
+        let covered: Vec<usize> = (0..alpha.len()).filter(|&i| alpha[i] == 1.0).collect();
+        assert!(covered.len() > 20);
+        rgb.iter().map(|c| covered.iter().map(|&i| f64::from(c[i])).sum::<f64>() / covered.len() as f64).collect()
+    };
+    let plain = mean("", "/constant");
+    assert!((plain[0] - plain[2]).abs() < 0.02 * plain[0], "{plain:?}");
+    let red = mean(", colors = true", "/constant");
+    assert!(red[0] > 3.0 * red[2] && red[0] < plain[0], "{red:?}");
+    let none =
+        yarnray(at, &["render", "s.toml", "--set", "fabric.0.source.prim=/none", "-o", "b.png", "--spp", "1"]).good();
+    assert!(none.stderr.contains("no curve has one"), "{}", none.stderr);
+    // They survive a conversion.
+    yarnray(at, &["convert", file.to_str().unwrap(), "c.usda", "--prim", "/uniform"]).good();
+    let text = fs::read_to_string(at.join("c.usda")).unwrap();
+    assert!(text.contains("[7, 9]") && text.contains("0.8, 0.05, 0.05"), "{text}");
+}

@@ -143,6 +143,10 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         None => "none",
     };
     let radii = set.curves.iter().any(|c| c.radii.is_some());
+    let colored = set.colors.iter().flatten().count();
+    let distinct: std::collections::BTreeSet<[u32; 3]> =
+        set.colors.iter().flatten().map(|c| c.map(f32::to_bits)).collect();
+    let numbered: std::collections::BTreeSet<i64> = set.ids.iter().flatten().copied().collect();
     let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
     // What the file does not say, and nobody has.
     let proposal = if radii || radius.is_some() { None } else { Proposal::new(set) };
@@ -158,6 +162,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         "points": points, "basis": basis, "radii": radii, "up": up,
         "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found),
         "bounds": [list(low), list(high)], "notes": set.notes,
+        "colored": colored, "colors": distinct.len(), "ids": numbered.len(),
     });
     let mut text = format!(
         "{}\n  curves    {} ({closed} closed, {open} open), {basis}\n  points    {points}\n  length    {length:.6}\n  bounds    {low:.4} to {high:.4}\n  radii     {}\n  unit      {}\n",
@@ -166,6 +171,13 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         if radii { "in the file" } else { "none: the scene's yarn gives them" },
         set.unit_mm.map_or("not stated".to_owned(), |u| format!("{u} mm")),
     );
+    if colored > 0 {
+        let how = "`colors = true` in a scene's source dyes the yarns";
+        text += &format!("  colours   {} on {colored} curves; {how}\n", distinct.len());
+    }
+    if let (Some(first), Some(last)) = (numbered.first(), numbered.last()) {
+        text += &format!("  ids       {} from {first} to {last}\n", numbered.len());
+    }
     text += &overlap_line(found);
     if let Some(p) = proposal {
         text += &format!(

@@ -52,4 +52,26 @@ pub struct CurveSet {
     pub up_axis: Option<u8>,
     /// What was repaired on the way in, one line each, for the user to see.
     pub notes: Vec<String>,
+    /// Colour of each curve, linear Rec.709, where the file has one; empty where no curve has.
+    pub colors: Vec<Option<[f32; 3]>>,
+    /// The number that the file gives each curve; empty where it gives none.
+    pub ids: Vec<Option<i64>>,
+}
+
+impl CurveSet {
+    /// Gives the curves from `before` on what they are labelled with; those without have none.
+    pub fn add_labels<T: Clone>(
+        &mut self,
+        before: usize,
+        own: Option<Vec<Option<T>>>,
+        list: impl Fn(&mut Self) -> &mut Vec<Option<T>>,
+    ) {
+        let count = self.curves.len();
+        if own.is_none() && list(self).is_empty() {
+            return;
+        }
+        list(self).resize(before, None);
+        list(self).extend(own.unwrap_or_default());
+        list(self).resize(count, None);
+    }
 }

@@ -304,9 +304,8 @@ mod tests {
             set,
             CurveSet {
                 curves: vec![curve(true, &points), curve(false, &points[..2])],
-                unit_mm: None,
                 up_axis: Some(1),
-                notes: vec![]
+                ..CurveSet::default()
             }
         );
     }

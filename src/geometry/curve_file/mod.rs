@@ -180,6 +180,14 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
     fs::read(path).map_err(unreadable)
 }
 
+/// Reads the curves of a stage that is open: at several times it need not be opened again.
+///
+/// # Errors
+/// The stage is damaged, or has no visible curves that are chosen.
+pub fn read_stage(stage: &Stage, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
+    staged::read_open(stage, options).map_err(|error| error.in_file(stage.path()))
+}
+
 fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
     if stage::is_stage(path) {
         return staged::read(path, options);

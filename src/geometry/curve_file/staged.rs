@@ -22,7 +22,10 @@ impl From<StageError> for CurveFileError {
 }
 
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    let stage = Stage::open(path)?;
+    read_open(&Stage::open(path)?, options)
+}
+
+pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
     let everything = PrimPattern::all();
     let (mut set, objects) = stage.curves(options.prim.as_ref().unwrap_or(&everything), options.frame)?;
     if objects.is_empty() {
@@ -60,12 +63,14 @@ pub(super) fn can_write(path: &Path) -> bool {
 
 /// One prim for each basis and kind of ends, with the number of each yarn.
 pub(super) fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
-    let kind = |c: &Curve| (c.basis, c.closed, c.radii.is_some());
+    let color = |i: usize| set.colors.get(i).copied().flatten();
+    let kind = |i: usize, c: &Curve| (c.basis, c.closed, c.radii.is_some(), color(i).is_some());
+    let all_have_ids = !set.ids.is_empty() && set.ids.iter().all(Option::is_some);
     let mut groups: Vec<CurvesOut<'_>> = Vec::new();
     let mut kinds = Vec::new();
     for (i, curve) in set.curves.iter().enumerate() {
-        let own = kinds.iter().position(|k| *k == kind(curve)).unwrap_or_else(|| {
-            kinds.push(kind(curve));
+        let own = kinds.iter().position(|k| *k == kind(i, curve)).unwrap_or_else(|| {
+            kinds.push(kind(i, curve));
             let basis = match curve.basis {
                 Basis::CatmullRom => "catmull_rom",
                 Basis::BSpline => "b_spline",
@@ -78,9 +83,19 @@ pub(super) fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io
             kinds.len() - 1
         });
         groups[own].curves.push(curve);
-        match groups[own].primvars.first_mut() {
-            Some((_, Interpolated::Id(ids))) => ids.push(i as i32),
-            _ => groups[own].primvars.push(("yarnId".into(), Interpolated::Id(vec![i as i32]))),
+        // The file's own numbers, where it has some for all.
+        let id = if all_have_ids { set.ids[i].unwrap_or(0) } else { i as i64 };
+        let id = i32::try_from(id).unwrap_or(i as i32);
+        let primvars = &mut groups[own].primvars;
+        match primvars.first_mut() {
+            Some((_, Interpolated::Id(ids))) => ids.push(id),
+            _ => primvars.push(("yarnId".into(), Interpolated::Id(vec![id]))),
+        }
+        if let Some(color) = color(i) {
+            match primvars.get_mut(1) {
+                Some((_, Interpolated::Color(colors))) => colors.push(color),
+                _ => primvars.push(("displayColor".into(), Interpolated::Color(vec![color]))),
+            }
         }
     }
     stage::write(path, set.unit_mm.unwrap_or(1.0), &groups, out)

@@ -5,11 +5,14 @@
 //! lines and splits vertices, so that this reader is the program's own.
 
 use std::{
+    collections::HashMap,
     fmt,
     path::{Path, PathBuf},
 };
 
 use glam::{DVec2, DVec3};
+
+use crate::geometry::stage::PolygonMesh;
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 30;
@@ -38,7 +41,8 @@ impl GarmentError {
     }
 
     /// The same, of a file.
-    pub(super) fn of(mut self, path: &Path) -> Self {
+    #[must_use]
+    pub fn of(mut self, path: &Path) -> Self {
         self.path.get_or_insert_with(|| path.to_owned());
         self
     }
@@ -115,6 +119,42 @@ impl GarmentMesh {
         }
         let bytes = std::fs::read(path).map_err(|e| fail(unreadable(&e)))?;
         Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|e| e.of(path))
+    }
+
+    /// Takes the mesh of a stage; its groups are subsets of faces or objects, and faces have no lines.
+    ///
+    /// # Errors
+    /// Faces without texture coordinates.
+    pub fn from_polygons(given: &PolygonMesh) -> Result<Self, GarmentError> {
+        if given.uv_corners.len() != given.corners.len() {
+            let hint = "the texture coordinates (`st`) are the flat panels of the garment: export them with the mesh";
+            return Err(GarmentError::at(0, "a mesh without texture coordinates", hint));
+        }
+        let mut mesh = Self { points: given.points.clone(), notes: given.notes.clone(), ..Self::default() };
+        // Corners that have the same point and value are one, however the file shares them.
+        let mut known: HashMap<(u32, [u64; 2]), u32> = HashMap::new();
+        let mut uv = |corner: usize| {
+            let value = given.uvs[given.uv_corners[corner] as usize];
+            *known.entry((given.corners[corner], value.to_array().map(f64::to_bits))).or_insert_with(|| {
+                mesh.uvs.push(value);
+                mesh.uvs.len() as u32 - 1
+            })
+        };
+        let mut part_of_face = vec![0; given.counts.len()];
+        for group in &given.groups {
+            let part = Part { group: group.name.clone(), material: String::new() };
+            let own = mesh.parts.iter().position(|p| *p == part).unwrap_or_else(|| {
+                mesh.parts.push(part);
+                mesh.parts.len() - 1
+            });
+            group.faces.iter().for_each(|&f| part_of_face[f as usize] = own as u32);
+        }
+        let faces = given.counts.iter().zip(&part_of_face).flat_map(|(&count, &part)| vec![part; count as usize - 2]);
+        let triangles = given.triangles().zip(faces);
+        mesh.faces = triangles
+            .map(|(t, part)| Face { points: t.map(|c| given.corners[c]), uvs: t.map(&mut uv), part, line: 0 })
+            .collect();
+        Ok(mesh)
     }
 
     /// Takes a mesh from the text of an OBJ file.
@@ -216,6 +256,7 @@ impl GarmentMesh {
         }
         let differs = self.faces.iter().zip(&other.faces).find(|(a, b)| a.points != b.points || a.uvs != b.uvs);
         match differs {
+            Some((_, face)) if face.line == 0 => Err("a face has other corners than in the first frame".to_owned()),
             Some((_, face)) => Err(format!("the face in line {} has other corners than in the first frame", face.line)),
             None => Ok(()),
         }
@@ -245,7 +286,8 @@ impl Counted {
     /// Says it, once.
     pub(super) fn note(&self, what: &str, notes: &mut Vec<String>) {
         if self.count > 0 {
-            notes.push(format!("{} {what} (first in panel `{}`, line {})", self.count, self.panel, self.line));
+            let line = if self.line > 0 { format!(", line {}", self.line) } else { String::new() };
+            notes.push(format!("{} {what} (first in panel `{}`{line})", self.count, self.panel));
         }
     }
 }

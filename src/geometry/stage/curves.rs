@@ -50,6 +50,10 @@ pub(super) struct Batch {
     pub(super) points: Vec<DVec3>,
     /// Diameters, and how they are spread.
     pub(super) widths: Option<(Vec<f64>, Spread)>,
+    /// Colours, linear Rec.709.
+    pub(super) colors: Option<(Vec<DVec3>, Spread)>,
+    /// Numbers of the curves.
+    pub(super) ids: Option<(Vec<i64>, Spread)>,
 }
 
 /// How values are spread over an object.
@@ -105,6 +109,7 @@ impl Batch {
             kind.few_varying = widths.len() as i64 == open;
         }
         let widths = Widths::new(self.widths, &kind, &counts)?;
+        let before = set.curves.len();
         let mut first = 0;
         let mut first_varying = 0;
         for (i, &count) in counts.iter().enumerate() {
@@ -116,6 +121,14 @@ impl Batch {
             first += count;
             first_varying += kind.varying_values(count);
         }
+        let mean = |v: &[DVec3]| v.iter().sum::<DVec3>() / v.len().max(1) as f64;
+        let color = |v: DVec3| {
+            Some(v.max(DVec3::ZERO).to_array().map(|c| c as f32)).filter(|c| c.iter().all(|c| c.is_finite()))
+        };
+        let colors = per_curve(self.colors, &counts, mean).map_err(|p| p.of("displayColor"))?;
+        set.add_labels(before, colors.map(|all| all.into_iter().map(color).collect()), |set| &mut set.colors);
+        let ids = per_curve(self.ids, &counts, |v| v[0]).map_err(|p| p.of("ids"))?;
+        set.add_labels(before, ids.map(|all| all.into_iter().map(Some).collect()), |set| &mut set.ids);
         let stretch = [to_stage.x_axis, to_stage.y_axis, to_stage.z_axis].map(|axis| axis.truncate().length());
         let (least, most) =
             (stretch.iter().copied().fold(f64::INFINITY, f64::min), stretch.iter().copied().fold(0.0, f64::max));
@@ -242,6 +255,38 @@ impl Kind {
             ]
         }
     }
+}
+
+/// One value for each curve; of values along curves what `one` makes of them.
+fn per_curve<T: Copy>(
+    given: Option<(Vec<T>, Spread)>,
+    counts: &[i64],
+    one: impl Fn(&[T]) -> T,
+) -> Result<Option<Vec<T>>, Problem> {
+    let Some((values, spread)) = given.filter(|(v, _)| !v.is_empty()) else { return Ok(None) };
+    // One value is that of all, whatever it is called.
+    if values.len() == 1 {
+        return Ok(Some(vec![values[0]; counts.len()]));
+    }
+    if values.len() == counts.len() && matches!(spread, Spread::Constant | Spread::Uniform) {
+        return Ok(Some(values));
+    }
+    let points: i64 = counts.iter().sum();
+    if spread != Spread::Vertex || values.len() as i64 != points {
+        // Along segments their numbers depend on basis and ends: all are one.
+        if matches!(spread, Spread::Varying | Spread::FaceVarying) {
+            return Ok(Some(vec![one(&values); counts.len()]));
+        }
+        let expected = if spread == Spread::Vertex { points } else { counts.len() as i64 };
+        return Err(Problem::new(format!("{} values are {expected} here, found {}", spread.name(), values.len())));
+    }
+    let mut rest = values.as_slice();
+    let of_curve = |&count: &i64| {
+        let (own, others) = rest.split_at(count as usize);
+        rest = others;
+        one(own)
+    };
+    Ok(Some(counts.iter().map(of_curve).collect()))
 }
 
 /// The widths of a batch, as they are spread.

@@ -61,6 +61,11 @@ impl Problem {
         Self { object: None, text: text.into() }
     }
 
+    /// Of this property.
+    fn of(self, property: &str) -> Self {
+        Self { text: format!("`{property}`: {}", self.text), ..self }
+    }
+
     fn at(mut self, object: &str) -> Self {
         self.object.get_or_insert_with(|| object.to_owned());
         self
@@ -106,17 +111,35 @@ pub struct Contents {
     pub cameras: Vec<String>,
 }
 
-/// A stage that is open.
+/// A stage that is open. It can be asked at any number of times.
 #[derive(Debug)]
 pub struct Stage {
     path: PathBuf,
-    format: Format,
+    format: Box<dyn Format>,
 }
 
-#[derive(Debug)]
-enum Format {
-    Usd(Box<usd::UsdStage>),
-    Alembic(alembic::Archive),
+/// What a format of stages answers; times are frames, `None` the earliest.
+trait Format: fmt::Debug {
+    fn unit_mm(&self) -> Option<f64>;
+
+    fn up_axis(&self) -> Option<u8>;
+
+    fn frames(&self) -> Option<[f64; 2]>;
+
+    fn contents(&self) -> Result<Contents, Problem>;
+
+    /// Hands over the visible objects that are chosen, those that `take` is for; gives notes for the user.
+    fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem>;
+
+    fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, Problem>;
+}
+
+/// What takes the objects of a kind.
+enum Take<'a> {
+    /// The curves of one object, with its path and transform.
+    Curves(&'a mut AddCurves<'a>),
+    /// One mesh, already in the space of the stage, with its path.
+    Meshes(&'a mut AddMesh<'a>),
 }
 
 /// Whether a file's name says that it is a stage.
@@ -135,39 +158,35 @@ impl Stage {
         let open = || {
             let bytes = readable(path)?;
             if bytes.starts_with(alembic::MAGIC) || bytes.starts_with(alembic::HDF5_MAGIC) {
-                Ok(Format::Alembic(alembic::Archive::new(bytes)?))
+                Ok(Box::new(alembic::Archive::new(bytes)?) as Box<dyn Format>)
             } else {
                 usd::check::look_over(&bytes)?;
                 drop(bytes);
-                Ok(Format::Usd(Box::new(usd::UsdStage::open(path)?)))
+                Ok(Box::new(usd::UsdStage::open(path)?) as Box<dyn Format>)
             }
         };
         let format = open().map_err(|p: Problem| p.in_file(path))?;
         Ok(Self { path: path.into(), format })
     }
 
+    /// The file as it was named.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Millimetres per unit, where the stage says so: USD does (a centimetre if it is silent), Alembic does not.
     pub fn unit_mm(&self) -> Option<f64> {
-        match &self.format {
-            Format::Usd(stage) => Some(stage.unit_mm()),
-            Format::Alembic(_) => None,
-        }
+        self.format.unit_mm()
     }
 
     /// Which axis points up: 1 for y, 2 for z; `None` where the stage does not say.
     pub fn up_axis(&self) -> Option<u8> {
-        match &self.format {
-            Format::Usd(stage) => Some(stage.up_axis()),
-            Format::Alembic(_) => None,
-        }
+        self.format.up_axis()
     }
 
     /// First and last time that something is known of, in frames.
     pub fn frames(&self) -> Option<[f64; 2]> {
-        match &self.format {
-            Format::Usd(stage) => stage.time_range(),
-            Format::Alembic(archive) => archive.frames(),
-        }
+        self.format.frames()
     }
 
     /// What the stage holds, visible or not.
@@ -175,11 +194,7 @@ impl Stage {
     /// # Errors
     /// The stage is damaged.
     pub fn contents(&self) -> Result<Contents, StageError> {
-        match &self.format {
-            Format::Usd(stage) => stage.contents(),
-            Format::Alembic(archive) => archive.contents(),
-        }
-        .map_err(|p| p.in_file(&self.path))
+        self.format.contents().map_err(|p| p.in_file(&self.path))
     }
 
     /// All visible curves of the objects that `pattern` chooses, at a frame (at the earliest if `None`), in the order of
@@ -203,10 +218,7 @@ impl Stage {
             }
             Ok(())
         };
-        let notes = match &self.format {
-            Format::Usd(stage) => stage.curves(pattern, frame, &mut add),
-            Format::Alembic(archive) => archive.curves(pattern, frame, &mut add),
-        };
+        let notes = self.format.visit(pattern, frame, &mut Take::Curves(&mut add));
         set.notes.extend(notes.map_err(|p| p.in_file(&self.path))?);
         Ok((set, objects))
     }
@@ -225,10 +237,7 @@ impl Stage {
             }
             Ok(())
         };
-        let notes = match &self.format {
-            Format::Usd(stage) => stage.meshes(pattern, frame, &mut add),
-            Format::Alembic(archive) => archive.meshes(pattern, frame, &mut add),
-        };
+        let notes = self.format.visit(pattern, frame, &mut Take::Meshes(&mut add));
         all.notes.extend(notes.map_err(|p| p.in_file(&self.path))?);
         Ok(all)
     }
@@ -238,17 +247,11 @@ impl Stage {
     /// # Errors
     /// There is no such camera.
     pub fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, StageError> {
-        match &self.format {
-            Format::Usd(stage) => stage.camera(path, frame),
-            Format::Alembic(_) => Err(Problem::new("cameras are read from USD, not from Alembic")),
-        }
-        .map_err(|p| p.in_file(&self.path))
+        self.format.camera(path, frame).map_err(|p| p.in_file(&self.path))
     }
 }
 
-/// What takes the curves of one object, with its path and transform.
 type AddCurves<'a> = dyn FnMut(&str, curves::Batch, &DMat4) -> Result<(), Problem> + 'a;
-/// What takes one mesh, already in the space of the stage, with its path.
 type AddMesh<'a> = dyn FnMut(&str, PolygonMesh) -> Result<(), Problem> + 'a;
 
 /// The bytes of a regular file that is not too large.

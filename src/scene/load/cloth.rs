@@ -23,8 +23,9 @@ use super::{
 use crate::{
     geometry::{
         curve::{Basis, Curve, CurveSet},
-        curve_file::{self, ReadOptions},
+        curve_file::{self, CurveFileError, ReadOptions},
         pattern::straight,
+        stage,
     },
     input::diagnostic::Span,
     math::sampler::Stream,
@@ -83,6 +84,8 @@ pub(super) struct CurveFile {
     unit: Option<f64>,
     options: ReadOptions,
     up: Up,
+    /// Whether the colours that the file gives its curves dye them.
+    colors: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -184,10 +187,12 @@ fn file_source(
 ) -> Source {
     let mut options = ReadOptions::default();
     let mut up = Up::Auto;
+    let mut colors = false;
     if let Some(table) = table {
         let bases = [("catmull-rom", Basis::CatmullRom), ("b-spline", Basis::BSpline)];
         options.basis = table.one_of("basis", &bases);
-        options.prim = prim_pattern(table);
+        options.prim = prim_pattern(table, "prim");
+        colors = table.bool_or("colors", false);
         up = table.one_of_or("up", Up::Auto, &[("auto", Up::Auto), ("y", Up::Y), ("z", Up::Z)]);
         if let Some(tile) = table.numbers("tile", Range::between(1.0, 100_000.0)) {
             match tile.as_slice() {
@@ -201,7 +206,7 @@ fn file_source(
         }
     }
     let rest = table.and_then(|t| t.string("rest").map(|p| context.resolve(p, t.span("rest").unwrap_or(span))));
-    Source::File(CurveFile { path, rest, span, unit, options, up })
+    Source::File(CurveFile { path, rest, span, unit, options, up, colors })
 }
 
 /// The yarns that a source may name.
@@ -389,8 +394,10 @@ impl FabricPlan {
                 vec![Made::new(format!("{count} straight"), kind, curves, None)]
             }
             Source::File(file) => {
+                let mut colors = None;
                 let mut read = |path: &Path, frame: Option<f64>| {
-                    let (set, scale) = file.read(path, frame, context, warnings)?;
+                    let (mut set, scale) = file.read(path, frame, context, warnings)?;
+                    colors.get_or_insert_with(|| std::mem::take(&mut set.colors));
                     let own_radii = |mut curve: Curve| {
                         let given = curve.radii.take().filter(|_| self.radius.is_none());
                         let radii = given.map_or_else(
@@ -408,7 +415,12 @@ impl FabricPlan {
                     Some(curves)
                 };
                 let (path, curves, motion) = sequence::read(&file, detail, context, &mut read)?;
-                vec![Made { motion, ..Made::new(path.display().to_string(), kind, curves, None) }]
+                let dyes = colors.filter(|_| file.colors).map(|colors| Dyes::of_curves(&colors));
+                if let Some(None) = dyes {
+                    warnings.push(format!("{}: `colors` is asked for, but no curve has one", path.display()));
+                }
+                let made = Made::new(path.display().to_string(), kind, curves, None);
+                vec![Made { motion, dyes: dyes.flatten(), ..made }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
@@ -458,7 +470,13 @@ impl CurveFile {
         warnings: &mut Vec<String>,
     ) -> Option<(CurveSet, f64)> {
         let options = ReadOptions { frame, ..self.options.clone() };
-        let mut set = match curve_file::read(path, &options) {
+        let read = if stage::is_stage(path) && path.is_file() {
+            let open = context.stages.open(path).map_err(CurveFileError::from);
+            open.and_then(|stage| curve_file::read_stage(&stage, &options))
+        } else {
+            curve_file::read(path, &options)
+        };
+        let mut set = match read {
             Ok(set) => set,
             Err(error) => {
                 context.error(self.span, error.to_string(), None);

@@ -1,21 +1,18 @@
 //! `source = { type = "garment" }`: cloth laid on a mesh with its panels as texture coordinates.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use glam::{DVec2, DVec3};
 
 use super::{
-    super::{
-        FabricMotion, GarmentFacts,
-        animation::{first_number, numbered},
-    },
+    super::{FabricMotion, GarmentFacts},
     Context, Range, Reader, UNITS,
     cloth::{Detail, Yarns},
     color::{self, ColorPlan, FabricCoordinates},
-    pattern, weave,
+    mesh::prim_pattern,
+    pattern,
+    poses::{Frames, Moment, Pose, between},
+    weave,
     yarns::Library,
 };
 use crate::{
@@ -24,7 +21,6 @@ use crate::{
         curve_file,
         garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, SeamKind, Tension},
         mesh::Mesh,
-        obj,
         pattern::{
             chart::Chart,
             draft::Draft,
@@ -32,6 +28,7 @@ use crate::{
             tile::Tile,
             weave::{Impossible, Weave},
         },
+        stage::PrimPattern,
     },
     input::diagnostic::{Span, unknown_name},
 };
@@ -78,10 +75,16 @@ struct Rule {
 pub(super) struct GarmentPlan {
     path: PathBuf,
     span: Span,
-    unit: f64,
+    /// Millimetres, where the scene says so, and what they are multiplied by.
+    unit: Option<f64>,
+    scale: f64,
     uv_unit: Option<f64>,
     seam: SeamKind,
     body: Option<(PathBuf, Span)>,
+    /// Which meshes of a stage are the garment, and which its body.
+    prims: [Option<PrimPattern>; 2],
+    /// Whether z points up, where the scene says so.
+    z_up: Option<bool>,
     rules: Vec<Rule>,
 }
 
@@ -96,7 +99,9 @@ pub(super) fn garment(
         source.required_string("path").map(|p| context.resolve(p, source.span("path").unwrap_or(source.header())));
     let span = source.span("path").unwrap_or(source.header());
     let scale = source.f64_or("scale", 1.0, Range::POSITIVE);
-    let unit = source.one_of("unit", &UNITS).unwrap_or(context.unit) * scale;
+    let unit = source.one_of("unit", &UNITS);
+    let prims = [prim_pattern(source, "prim"), prim_pattern(source, "body_prim")];
+    let z_up = source.one_of("up", &[("y", false), ("z", true)]);
     let uv_unit = source.one_of("uv_unit", &UNITS);
     let seams = [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
     let seam = source.one_of("seam", &seams);
@@ -156,7 +161,7 @@ pub(super) fn garment(
     for panel in panels {
         rules.push(panel?);
     }
-    Some(GarmentPlan { path: path?, span, unit, uv_unit, seam, body, rules })
+    Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, body, prims, z_up, rules })
 }
 
 fn grain(table: &Reader<'_>) -> f64 {
@@ -339,11 +344,13 @@ impl GarmentPlan {
             context.error(self.span, error.to_string(), hint);
         };
         let frames = Frames::find(&self.path, detail);
-        let mut read: BTreeMap<PathBuf, GarmentMesh> = BTreeMap::new();
-        for path in frames.files() {
-            match GarmentMesh::read(path) {
-                Ok(mesh) => {
-                    read.insert(path.clone(), mesh);
+        let mut read: BTreeMap<Moment, GarmentMesh> = BTreeMap::new();
+        let mut own_unit = None;
+        for moment in frames.moments() {
+            match moment.garment(self.prims[0].as_ref(), self.z_up, context) {
+                Ok((mesh, unit)) => {
+                    own_unit = unit;
+                    read.insert(moment.clone(), mesh);
                 }
                 Err(error) => {
                     tell(error);
@@ -351,11 +358,12 @@ impl GarmentPlan {
                 }
             }
         }
+        let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
         let rest = &read[&frames.rest];
         let cloths = cloths?;
         let overlap = cloths.iter().filter_map(|c| c.tile.overlap()).max_by(|a, b| a.share.total_cmp(&b.share));
         let options = Options {
-            unit_mm: self.unit,
+            unit_mm: unit,
             uv_mm: self.uv_unit,
             cloths,
             seam: self.seam,
@@ -400,9 +408,9 @@ impl GarmentPlan {
         let mut meshes = Vec::new();
         for pose in &frames.poses {
             let (a, b) = (&read[&pose.before], &read[&pose.after]);
-            for (mesh, path) in [(a, &pose.before), (b, &pose.after)] {
+            for (mesh, moment) in [(a, &pose.before), (b, &pose.after)] {
                 if let Err(problem) = rest.same_topology(mesh) {
-                    let message = format!("{}: {problem}", path.display());
+                    let message = format!("{}: {problem}", moment.path.display());
                     context.error(self.span, message, Some("all frames have the same faces".to_owned()));
                     return None;
                 }
@@ -424,7 +432,7 @@ impl GarmentPlan {
         if with_rest {
             meshes.push(rest.clone());
         }
-        let bodies = self.bodies(&frames, meshes.len(), with_rest, detail, context)?;
+        let bodies = self.bodies(&frames, unit, meshes.len(), with_rest, detail, context)?;
         let all: Vec<&GarmentMesh> = meshes.iter().collect();
         let body: Vec<&Mesh> = bodies.iter().collect();
         let mut laid = match garment.lay(rest, &all, &body, &mut notes) {
@@ -489,6 +497,7 @@ impl GarmentPlan {
     fn bodies(
         &self,
         frames: &Frames,
+        unit: f64,
         count: usize,
         with_rest: bool,
         detail: &Detail,
@@ -496,15 +505,17 @@ impl GarmentPlan {
     ) -> Option<Vec<Mesh>> {
         let Some((path, span)) = &self.body else { return Some(Vec::new()) };
         let own = Frames::find(path, detail);
-        let mut read: BTreeMap<PathBuf, Mesh> = BTreeMap::new();
-        for file in own.files() {
-            match obj::read(file) {
-                Ok(mut mesh) => {
-                    mesh.transform(&glam::DAffine3::from_scale(DVec3::splat(self.unit)));
-                    read.insert(file.clone(), mesh);
+        let mut read: BTreeMap<Moment, Mesh> = BTreeMap::new();
+        for moment in own.moments() {
+            match moment.body(self.prims[1].as_ref(), self.z_up, context) {
+                Ok((mut mesh, own_unit)) => {
+                    // A body without a unit of its own has the garment's.
+                    let scale = self.unit.or(own_unit).map_or(unit, |mm| mm * self.scale);
+                    mesh.transform(&glam::DAffine3::from_scale(DVec3::splat(scale)));
+                    read.insert(moment.clone(), mesh);
                 }
-                Err(error) => {
-                    context.error(*span, error.to_string(), None);
+                Err(problem) => {
+                    context.error(*span, problem, None);
                     return None;
                 }
             }
@@ -536,59 +547,4 @@ fn length(yarns: &[LaidYarn]) -> f64 {
     };
     // Chords are a little shorter than what they span: by two percent for loops of twelve points.
     yarns.iter().map(of).sum()
-}
-
-/// A mesh between two frames.
-fn between(a: &GarmentMesh, b: &GarmentMesh, share: f64) -> GarmentMesh {
-    let mut mesh = a.clone();
-    if share > 0.0 {
-        for (p, q) in mesh.points.iter_mut().zip(&b.points) {
-            *p = p.lerp(*q, share);
-        }
-    }
-    mesh
-}
-
-/// A time between two files.
-struct Pose {
-    before: PathBuf,
-    after: PathBuf,
-    share: f64,
-}
-
-/// The files of a frame and of the first one.
-struct Frames {
-    rest: PathBuf,
-    poses: Vec<Pose>,
-    animated: bool,
-}
-
-impl Frames {
-    fn find(path: &Path, detail: &Detail) -> Self {
-        let own = numbered(path, detail.frame).filter(|_| !path.exists());
-        let Some(own) = own else {
-            let pose = Pose { before: path.to_owned(), after: path.to_owned(), share: 0.0 };
-            return Self { rest: path.to_owned(), poses: vec![pose], animated: false };
-        };
-        // Before the first file and after the last all stand still.
-        let there = |number: f64| {
-            let path = numbered(path, number.max(0.0) as u32)?;
-            path.exists().then_some(path)
-        };
-        let needed = |number: f64| there(number).unwrap_or_else(|| own.clone());
-        let poses = super::sequence::times(detail.frame, detail.shutter)
-            .into_iter()
-            .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
-            .collect();
-        let rest = first_number(path).and_then(|n| numbered(path, n)).unwrap_or_else(|| own.clone());
-        Self { rest, poses, animated: true }
-    }
-
-    fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        let mut all: Vec<&PathBuf> = self.poses.iter().flat_map(|p| [&p.before, &p.after]).collect();
-        all.push(&self.rest);
-        all.sort();
-        all.dedup();
-        all.into_iter()
-    }
 }

@@ -11,12 +11,13 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::{
     super::{AlbedoTexture, Material, Object, defaults},
     Context, Range, Reader, UNITS, placement,
+    stages::Stages,
 };
 use crate::{
     geometry::{
         mesh::Mesh,
         obj,
-        stage::{self, PrimPattern, Stage},
+        stage::{self, PolygonMesh, PrimPattern, Stage},
     },
     image::texture::Texture,
     input::diagnostic::Span,
@@ -163,7 +164,7 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
             let span = table.span("path").unwrap_or(table.header());
             let unit = table.one_of("unit", &UNITS);
             let z_up = table.one_of("up", &[("y", false), ("z", true)]);
-            let prim = prim_pattern(&table);
+            let prim = prim_pattern(&table, "prim");
             smooth = table.bool_or("smooth", false);
             Some(Source::File(MeshFile { path: context.resolve(path, span), span, unit, z_up, prim, frame }))
         }
@@ -237,24 +238,40 @@ fn profile(table: &Reader<'_>, context: &Context<'_>) -> Option<Vec<DVec2>> {
 }
 
 /// Meshes of a stage as one, millimetres of its unit and the axis that points up.
-fn of_stage(path: &Path, prim: Option<&PrimPattern>, frame: f64) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
-    let stage = Stage::open(path).map_err(|e| e.to_string())?;
-    let mesh = stage.mesh(prim.unwrap_or(&PrimPattern::all()), Some(frame)).map_err(|e| e.to_string())?;
+fn of_stage(
+    stages: &Stages,
+    path: &Path,
+    prim: Option<&PrimPattern>,
+    frame: f64,
+) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
+    let stage = stages.open(path).map_err(|e| e.to_string())?;
+    let mesh = polygons(&stage, path, prim, Some(frame))?;
+    Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
+}
+
+/// The visible meshes of a stage that are chosen, at a frame; an error if there are none.
+pub(super) fn polygons(
+    stage: &Stage,
+    path: &Path,
+    prim: Option<&PrimPattern>,
+    frame: Option<f64>,
+) -> Result<PolygonMesh, String> {
+    let mesh = stage.mesh(prim.unwrap_or(&PrimPattern::all()), frame).map_err(|e| e.to_string())?;
     if mesh.counts.is_empty() {
         let known = stage.contents().map_err(|e| e.to_string())?.meshes;
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         return Err(format!("{}: no visible mesh is chosen; meshes here: {known}", path.display()));
     }
-    Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
+    Ok(mesh)
 }
 
-/// `prim`: which objects of a stage.
-pub(super) fn prim_pattern(table: &Reader<'_>) -> Option<PrimPattern> {
-    let text = table.string("prim")?;
+/// `prim`, or another key: which objects of a stage.
+pub(super) fn prim_pattern(table: &Reader<'_>, key: &str) -> Option<PrimPattern> {
+    let text = table.string(key)?;
     match PrimPattern::parse(text) {
         Ok(pattern) => Some(pattern),
         Err(problem) => {
-            table.error_at("prim", problem, Some("prim = \"/Garment/*\""));
+            table.error_at(key, problem, Some("prim = \"/Garment/*\""));
             None
         }
     }
@@ -267,7 +284,7 @@ impl MeshPlan {
             Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
             Source::File(MeshFile { path, span, unit, z_up, prim, frame }) => {
                 let read = if stage::is_stage(&path) {
-                    of_stage(&path, prim.as_ref(), f64::from(frame))
+                    of_stage(&context.stages, &path, prim.as_ref(), f64::from(frame))
                 } else {
                     obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
                 };

@@ -11,9 +11,11 @@ mod garment;
 mod mesh;
 mod motion;
 mod pattern;
+mod poses;
 mod sequence;
 mod settings;
 mod stage_camera;
+mod stages;
 mod view;
 mod weave;
 mod yarns;
@@ -82,11 +84,20 @@ struct Context<'a> {
     libraries_are_read: bool,
     /// Files that the text names, and where.
     named: RefCell<Vec<(PathBuf, Span)>>,
+    /// Stages that are open.
+    stages: stages::Stages,
 }
 
 impl<'a> Context<'a> {
     fn new(sources: &'a Sources, diagnostics: &'a Diagnostics, unit: f64, libraries_are_read: bool) -> Self {
-        Self { sources, diagnostics, unit, libraries_are_read, named: RefCell::default() }
+        Self {
+            sources,
+            diagnostics,
+            unit,
+            libraries_are_read,
+            named: RefCell::default(),
+            stages: stages::Stages::default(),
+        }
     }
 }
 

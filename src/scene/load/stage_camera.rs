@@ -1,7 +1,5 @@
 //! `camera = { type = "usd", path, prim }`: the camera of a stage, with its lens and its way in time.
 
-use std::path::Path;
-
 use glam::{DMat4, DVec3};
 
 use super::{
@@ -59,7 +57,8 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
     let own_motion = motion::read(table, context, None, fallback);
     let (path, prim) = (path?, prim?);
     let [open, close] = own_motion.shutter.unwrap_or_default();
-    match poses(&path, &prim, f64::from(frame), [open, close]) {
+    let stage = context.stages.open(&path);
+    match stage.and_then(|stage| poses(&stage, &prim, f64::from(frame), [open, close])) {
         Ok((own, around)) => {
             let Some(mut setup) = CameraSetup::aimed(own.aim, own.projection) else {
                 table.error_at("prim", "the camera has no direction", None);
@@ -86,8 +85,12 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
 }
 
 /// The camera at a frame, and at the frames around the shutter's time if the stage has times.
-fn poses(path: &Path, prim: &str, frame: f64, [open, close]: [f64; 2]) -> Result<(Pose, Vec<(f64, Pose)>), StageError> {
-    let stage = Stage::open(path)?;
+fn poses(
+    stage: &Stage,
+    prim: &str,
+    frame: f64,
+    [open, close]: [f64; 2],
+) -> Result<(Pose, Vec<(f64, Pose)>), StageError> {
     let unit = stage.unit_mm().unwrap_or(1.0);
     let z_up = stage.up_axis() == Some(2);
     let at = |frame: f64| stage.camera(prim, Some(frame)).map(|camera| Pose::new(&camera, unit, z_up));

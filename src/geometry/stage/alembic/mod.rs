@@ -13,7 +13,7 @@ use std::fmt;
 use glam::{DMat4, DVec2, DVec3};
 
 use super::{
-    AddCurves, AddMesh, Contents, MAX_DEPTH, PolygonMesh, PrimPattern, Problem,
+    Contents, Format, MAX_DEPTH, PolygonMesh, PrimPattern, Problem, StageCamera, Take,
     curves::{Batch, Spread, StageBasis, Wrap},
     polygons::AtCorners,
 };
@@ -121,9 +121,19 @@ impl Archive {
         (archive.samplings, archive.metadata) = (samplings, metadata);
         Ok(archive)
     }
+}
+
+impl Format for Archive {
+    fn unit_mm(&self) -> Option<f64> {
+        None
+    }
+
+    fn up_axis(&self) -> Option<u8> {
+        None
+    }
 
     /// First and last frame of all that changes.
-    pub(super) fn frames(&self) -> Option<[f64; 2]> {
+    fn frames(&self) -> Option<[f64; 2]> {
         let mut ends: Option<[f64; 2]> = None;
         let everything = PrimPattern::all();
         let seen = self.walk(&everything, None, &mut |object, _| {
@@ -140,7 +150,7 @@ impl Archive {
         seen.ok().and(ends)
     }
 
-    pub(super) fn contents(&self) -> Result<Contents, Problem> {
+    fn contents(&self) -> Result<Contents, Problem> {
         let mut contents = Contents::default();
         self.walk(&PrimPattern::all(), None, &mut |object, _| {
             let list = match object.schema {
@@ -155,42 +165,31 @@ impl Archive {
         Ok(contents)
     }
 
-    /// Hands over all visible curves; gives notes for the user.
-    pub(super) fn curves(
-        &self,
-        pattern: &PrimPattern,
-        frame: Option<f64>,
-        add: &mut AddCurves<'_>,
-    ) -> Result<Vec<String>, Problem> {
+    fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem> {
         let time = frame.map(|f| f / FRAMES_PER_SECOND);
         self.walk(pattern, time, &mut |object, visible| {
-            if object.schema != CURVES || !visible {
-                return Ok(());
+            let at = |p: Problem| p.at(&object.path);
+            match (&mut *take, object.schema) {
+                (Take::Curves(add), CURVES) if visible => match self.batch(object, time).map_err(at)? {
+                    Some(batch) => add(&object.path, batch, &object.to_stage),
+                    None => Ok(()),
+                },
+                (Take::Meshes(add), MESH) if visible => match self.mesh(object, time).map_err(at)? {
+                    Some(mesh) => add(&object.path, mesh),
+                    None => Ok(()),
+                },
+                _ => Ok(()),
             }
-            let batch = self.batch(object, time).map_err(|p| p.at(&object.path))?;
-            batch.map_or(Ok(()), |batch| add(&object.path, batch, &object.to_stage))
         })?;
         Ok(Vec::new())
     }
 
-    /// Hands over all visible meshes; gives notes for the user.
-    pub(super) fn meshes(
-        &self,
-        pattern: &PrimPattern,
-        frame: Option<f64>,
-        add: &mut AddMesh<'_>,
-    ) -> Result<Vec<String>, Problem> {
-        let time = frame.map(|f| f / FRAMES_PER_SECOND);
-        self.walk(pattern, time, &mut |object, visible| {
-            if object.schema != MESH || !visible {
-                return Ok(());
-            }
-            let mesh = self.mesh(object, time).map_err(|p| p.at(&object.path))?;
-            mesh.map_or(Ok(()), |mesh| add(&object.path, mesh))
-        })?;
-        Ok(Vec::new())
+    fn camera(&self, _: &str, _: Option<f64>) -> Result<StageCamera, Problem> {
+        Err(Problem::new("cameras are read from USD, not from Alembic"))
     }
+}
 
+impl Archive {
     /// Visits the objects that are chosen, and whether they are visible.
     fn walk(&self, pattern: &PrimPattern, time: Option<f64>, visit: &mut Visit<'_>) -> Result<(), Problem> {
         let top = Bytes(&self.bytes).root()?.group(2)?;
@@ -225,7 +224,7 @@ impl Archive {
             };
             (values, spread)
         });
-        Ok(Some(Batch { basis, wrap, counts, points: vectors(&points, "P")?, widths }))
+        Ok(Some(Batch { basis, wrap, counts, points: vectors(&points, "P")?, widths, colors: None, ids: None }))
     }
 
     fn mesh(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<PolygonMesh>, Problem> {

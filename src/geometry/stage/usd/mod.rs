@@ -26,7 +26,7 @@ use openusd::{
 };
 
 use super::{
-    AddCurves, AddMesh, Contents, MAX_DEPTH, PrimPattern, Problem, StageCamera,
+    Contents, Format, MAX_DEPTH, PrimPattern, Problem, StageCamera, Take,
     curves::{Batch, Spread, StageBasis, Wrap},
 };
 use resolver::LookingResolver;
@@ -63,20 +63,25 @@ impl UsdStage {
         self.stage.composition_errors().iter().map(|e| e.to_string().replace('\n', " ")).collect()
     }
 
-    /// Millimetres per unit: USD's `metersPerUnit`, centimetres where it says nothing.
-    pub(super) fn unit_mm(&self) -> f64 {
+    /// A word of the whole stage; none where it cannot be read.
+    fn metadata(&self, name: &str) -> Option<sdf::Value> {
+        guarded(|| Ok(self.stage.stage_metadata(name)?)).ok().flatten()
+    }
+}
+
+impl Format for UsdStage {
+    /// `metersPerUnit`, centimetres where it says nothing.
+    fn unit_mm(&self) -> Option<f64> {
         let unit = self.metadata("metersPerUnit").and_then(|v| value::number(&v));
-        unit.filter(|u| u.is_finite() && *u > 0.0).unwrap_or(0.01) * 1000.0
+        Some(unit.filter(|u| u.is_finite() && *u > 0.0).unwrap_or(0.01) * 1000.0)
     }
 
-    /// Which axis points up: 1 for y, 2 for z.
-    pub(super) fn up_axis(&self) -> u8 {
+    fn up_axis(&self) -> Option<u8> {
         let up = self.metadata("upAxis");
-        if up.as_ref().and_then(token).is_some_and(|t| t == "Z") { 2 } else { 1 }
+        Some(if up.as_ref().and_then(token).is_some_and(|t| t == "Z") { 2 } else { 1 })
     }
 
-    /// First and last time code, if the stage says so.
-    pub(super) fn time_range(&self) -> Option<[f64; 2]> {
+    fn frames(&self) -> Option<[f64; 2]> {
         let range = || {
             let stage = &self.stage;
             Ok(stage.has_authored_time_code_range().then(|| [stage.start_time_code(), stage.end_time_code()]))
@@ -84,13 +89,7 @@ impl UsdStage {
         guarded(range).ok().flatten()
     }
 
-    /// A word of the whole stage; none where it cannot be read.
-    fn metadata(&self, name: &str) -> Option<sdf::Value> {
-        guarded(|| Ok(self.stage.stage_metadata(name)?)).ok().flatten()
-    }
-
-    /// What the stage holds, visible or not.
-    pub(super) fn contents(&self) -> Result<Contents, Problem> {
+    fn contents(&self) -> Result<Contents, Problem> {
         guarded(|| {
             let mut contents = Contents::default();
             self.stage.traverse(PrimPredicate::DEFAULT_PROXIES, |path| {
@@ -107,44 +106,21 @@ impl UsdStage {
         })
     }
 
-    /// Hands over all visible basis curves; gives notes for the user.
-    pub(super) fn curves(
-        &self,
-        pattern: &PrimPattern,
-        frame: Option<f64>,
-        add: &mut AddCurves<'_>,
-    ) -> Result<Vec<String>, Problem> {
+    fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem> {
         guarded(|| {
             self.walk(pattern, frame, &mut |prim, to_stage, values| {
-                if prim.kind != "BasisCurves" {
-                    return Ok(());
+                let at = |p: Problem| p.at(&prim.path);
+                match (&mut *take, prim.kind.as_str()) {
+                    (Take::Curves(add), "BasisCurves") => add(&prim.path, batch(values).map_err(at)?, to_stage),
+                    (Take::Meshes(add), "Mesh") => add(&prim.path, mesh::read(values, to_stage).map_err(at)?),
+                    _ => Ok(()),
                 }
-                add(&prim.path, batch(values).map_err(|p| p.at(&prim.path))?, to_stage)
             })?;
             Ok(self.notes())
         })
     }
 
-    /// Hands over all visible meshes; gives notes for the user.
-    pub(super) fn meshes(
-        &self,
-        pattern: &PrimPattern,
-        frame: Option<f64>,
-        add: &mut AddMesh<'_>,
-    ) -> Result<Vec<String>, Problem> {
-        guarded(|| {
-            self.walk(pattern, frame, &mut |prim, to_stage, values| {
-                if prim.kind != "Mesh" {
-                    return Ok(());
-                }
-                add(&prim.path, mesh::read(values, to_stage).map_err(|p| p.at(&prim.path))?)
-            })?;
-            Ok(self.notes())
-        })
-    }
-
-    /// The camera of this path at a frame, which is a time code.
-    pub(super) fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, Problem> {
+    fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, Problem> {
         guarded(|| {
             let at = sdf::path(path).map_err(|e| Problem::new(format!("{path} is no path of a prim: {e:#}")))?;
             let prim = self.stage.prim(at.clone());
@@ -182,7 +158,9 @@ impl UsdStage {
             })
         })
     }
+}
 
+impl UsdStage {
     /// Visits each visible prim that is chosen, with its transform; instancers repeat what is below their prototypes.
     fn walk(&self, pattern: &PrimPattern, frame: Option<f64>, visit: &mut Visit<'_>) -> Result<(), Problem> {
         let walk = Walk { stage: &self.stage, time: time_code(frame), pattern };
@@ -337,12 +315,39 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
         None => None,
     };
     Ok(Batch {
+        colors: colors(values)?,
+        ids: ids(values)?,
         basis,
         wrap,
         counts: values.integers("curveVertexCounts")?.unwrap_or_default(),
         points: values.vectors("points")?.unwrap_or_default(),
         widths,
     })
+}
+
+/// Primvars that number curves; the first that a prim has counts.
+const ID_NAMES: [&str; 3] = ["primvars:yarnId", "primvars:id", "primvars:curveId"];
+
+/// `displayColor`, linear as USD has it.
+fn colors(values: &Values<'_>) -> Result<Option<(Vec<DVec3>, Spread)>, Problem> {
+    const NAME: &str = "primvars:displayColor";
+    let Some(colors) = values.vectors(NAME)? else { return Ok(None) };
+    let spread = values.spread(NAME, Spread::Constant)?;
+    let Some(indices) = values.integers("primvars:displayColor:indices")? else { return Ok(Some((colors, spread))) };
+    let known = |&index: &i64| usize::try_from(index).ok().and_then(|i| colors.get(i)).copied();
+    let given = indices.iter().map(known).collect::<Option<Vec<DVec3>>>();
+    let given = given.ok_or_else(|| Problem::new(format!("`{NAME}:indices` names none of {} values", colors.len())))?;
+    Ok(Some((given, spread)))
+}
+
+fn ids(values: &Values<'_>) -> Result<Option<(Vec<i64>, Spread)>, Problem> {
+    for name in ID_NAMES {
+        // Other programs keep other things under such names.
+        if let Ok(Some(ids)) = values.integers(name) {
+            return Ok(Some((ids, values.spread(name, Spread::Constant)?)));
+        }
+    }
+    Ok(None)
 }
 
 /// Any prim as one with a transform; where it has none, that is the identity.

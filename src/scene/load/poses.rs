@@ -1,0 +1,149 @@
+//! The meshes of a garment and its body at the times that are needed: files numbered by frame, or a stage with times.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    super::animation::{first_number, numbered},
+    Context,
+    cloth::Detail,
+    mesh::polygons,
+};
+use crate::geometry::{
+    garment::{GarmentError, GarmentMesh},
+    mesh::Mesh,
+    obj,
+    stage::{self, PolygonMesh, PrimPattern},
+};
+
+/// A mesh between two frames.
+pub(super) fn between(a: &GarmentMesh, b: &GarmentMesh, share: f64) -> GarmentMesh {
+    let mut mesh = a.clone();
+    if share > 0.0 {
+        for (p, q) in mesh.points.iter_mut().zip(&b.points) {
+            *p = p.lerp(*q, share);
+        }
+    }
+    mesh
+}
+
+/// A mesh of a file: of a stage at a frame.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Moment {
+    pub(super) path: PathBuf,
+    /// Bits of the frame; none for files of one time, and for the earliest of a stage.
+    frame: Option<u64>,
+}
+
+impl Moment {
+    fn of_file(path: &Path) -> Self {
+        Self { path: path.to_owned(), frame: None }
+    }
+
+    /// The garment, +y up, and millimetres per unit where the file says so.
+    pub(super) fn garment(
+        &self,
+        prim: Option<&PrimPattern>,
+        z_up: Option<bool>,
+        context: &Context<'_>,
+    ) -> Result<(GarmentMesh, Option<f64>), GarmentError> {
+        if !stage::is_stage(&self.path) {
+            let mut mesh = GarmentMesh::read(&self.path)?;
+            if z_up == Some(true) {
+                mesh.points.iter_mut().for_each(upright);
+            }
+            return Ok((mesh, None));
+        }
+        let fail = |problem: String| GarmentError::new(problem, "a mesh with texture coordinates; `prim` chooses one");
+        let (mesh, unit) = self.of_stage(prim, z_up, context).map_err(fail)?;
+        Ok((GarmentMesh::from_polygons(&mesh).map_err(|e| e.of(&self.path))?, unit))
+    }
+
+    /// The body, likewise.
+    pub(super) fn body(
+        &self,
+        prim: Option<&PrimPattern>,
+        z_up: Option<bool>,
+        context: &Context<'_>,
+    ) -> Result<(Mesh, Option<f64>), String> {
+        if !stage::is_stage(&self.path) {
+            let mut mesh = obj::read(&self.path).map_err(|e| e.to_string())?;
+            if z_up == Some(true) {
+                mesh.transform(&glam::DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+            }
+            return Ok((mesh, None));
+        }
+        let (mesh, unit) = self.of_stage(prim, z_up, context)?;
+        Ok((mesh.to_mesh(), unit))
+    }
+
+    fn of_stage(
+        &self,
+        prim: Option<&PrimPattern>,
+        z_up: Option<bool>,
+        context: &Context<'_>,
+    ) -> Result<(PolygonMesh, Option<f64>), String> {
+        let stage = context.stages.open(&self.path).map_err(|e| e.to_string())?;
+        let mut mesh = polygons(&stage, &self.path, prim, self.frame.map(f64::from_bits))?;
+        if z_up.unwrap_or(stage.up_axis() == Some(2)) {
+            mesh.points.iter_mut().chain(&mut mesh.normals).for_each(upright);
+        }
+        Ok((mesh, stage.unit_mm()))
+    }
+}
+
+/// z up becomes y up.
+fn upright(p: &mut glam::DVec3) {
+    *p = glam::DVec3::new(p.x, p.z, -p.y);
+}
+
+/// A time between two moments.
+pub(super) struct Pose {
+    pub(super) before: Moment,
+    pub(super) after: Moment,
+    pub(super) share: f64,
+}
+
+/// The moments of a frame, and the first of all.
+pub(super) struct Frames {
+    pub(super) rest: Moment,
+    pub(super) poses: Vec<Pose>,
+    pub(super) animated: bool,
+}
+
+impl Frames {
+    pub(super) fn find(path: &Path, detail: &Detail) -> Self {
+        if stage::is_stage(path) && path.exists() {
+            let at = |time: f64| Moment { frame: Some(time.to_bits()), ..Moment::of_file(path) };
+            let pose = |time: f64| Pose { before: at(time), after: at(time), share: 0.0 };
+            let times = super::sequence::times(detail.frame, detail.shutter);
+            return Self { rest: Moment::of_file(path), poses: times.into_iter().map(pose).collect(), animated: true };
+        }
+        let own = numbered(path, detail.frame).filter(|_| !path.exists());
+        let Some(own) = own else {
+            let own = Moment::of_file(path);
+            let pose = Pose { before: own.clone(), after: own.clone(), share: 0.0 };
+            return Self { rest: own, poses: vec![pose], animated: false };
+        };
+        // Before the first file and after the last all stand still.
+        let there = |number: f64| {
+            let path = numbered(path, number.max(0.0) as u32)?;
+            path.exists().then_some(path)
+        };
+        let needed = |number: f64| Moment::of_file(&there(number).unwrap_or_else(|| own.clone()));
+        let poses = super::sequence::times(detail.frame, detail.shutter)
+            .into_iter()
+            .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
+            .collect();
+        let rest = first_number(path).and_then(|n| numbered(path, n)).unwrap_or_else(|| own.clone());
+        Self { rest: Moment::of_file(&rest), poses, animated: true }
+    }
+
+    /// All moments, each once.
+    pub(super) fn moments(&self) -> impl Iterator<Item = &Moment> {
+        let mut all: Vec<&Moment> = self.poses.iter().flat_map(|p| [&p.before, &p.after]).collect();
+        all.push(&self.rest);
+        all.sort();
+        all.dedup();
+        all.into_iter()
+    }
+}
