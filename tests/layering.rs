@@ -11,7 +11,7 @@ use crate::support::project;
 const ROOMS: [(&str, &[&str]); 16] = [
     ("ffi", &[]),
     ("math", &[]),
-    ("image", &["ffi"]),
+    ("image", &["ffi", "math"]),
     ("input", &[]),
     ("geometry", &["math"]),
     ("scattering", &["geometry", "math"]),

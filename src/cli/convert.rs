@@ -34,6 +34,9 @@ pub(super) struct ConvertArgs {
     /// Which objects of a stage, such as '/Garment/*' or 'material:/Looks/Wool'.
     #[arg(long, value_name = "PATTERN", value_parser = PrimPattern::parse)]
     prim: Option<PrimPattern>,
+    /// The face library (.sf) of a stitch mesh (.smobj), if it is not the file of its name.
+    #[arg(long, value_name = "FILE")]
+    faces: Option<PathBuf>,
     /// The frame of a stage; its first if not given.
     #[arg(long, value_name = "N")]
     frame: Option<f64>,
@@ -74,20 +77,28 @@ fn millimetres(unit: &str) -> f64 {
 /// What a format can say.
 struct Abilities {
     radii: bool,
+    /// Whether radii change along a curve.
+    varying: bool,
     unit: bool,
+    colors: bool,
+    ids: bool,
     bases: &'static [Basis],
 }
 
 /// By the extension of a file that can be written.
 fn abilities(path: &Path) -> Abilities {
     let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
+    let least = Abilities { radii: true, varying: true, unit: false, colors: false, ids: false, bases: &[] };
     let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match extension.as_deref() {
-        Some("bcc") => Abilities { radii: false, unit: false, bases: all },
-        Some("hair") => Abilities { radii: true, unit: false, bases: &[Basis::CatmullRom] },
-        Some("obj") => Abilities { radii: false, unit: false, bases: &[] },
-        Some("usd" | "usda" | "usdc") => Abilities { radii: true, unit: true, bases: all },
-        _ => Abilities { radii: true, unit: false, bases: &[] },
+        Some("bcc") => Abilities { radii: false, bases: all, ..least },
+        Some("hair") => Abilities { bases: &[Basis::CatmullRom], ..least },
+        Some("obj") => Abilities { radii: false, ..least },
+        Some("yarns") => {
+            Abilities { varying: false, colors: true, bases: &[Basis::CatmullRom, Basis::BSpline], ..least }
+        }
+        Some("usd" | "usda" | "usdc") => Abilities { unit: true, colors: true, ids: true, bases: all, ..least },
+        _ => least,
     }
 }
 
@@ -97,6 +108,16 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
     let mut lost = Vec::new();
     if !can.radii && set.curves.iter().any(|c| c.radii.is_some()) {
         lost.push("radii are lost: the format has none".to_owned());
+    }
+    let uneven = |r: &Vec<f64>| r.windows(2).any(|w| w[0] != w[1]);
+    if can.radii && !can.varying && set.curves.iter().filter_map(|c| c.radii.as_ref()).any(uneven) {
+        lost.push("radii are the mean of each curve's: the format has one for each".to_owned());
+    }
+    if !can.colors && set.colors.iter().any(Option::is_some) {
+        lost.push("colours are lost: the format has none".to_owned());
+    }
+    if !can.ids && set.ids.iter().any(Option::is_some) {
+        lost.push("ids are lost: curves are numbered as they come".to_owned());
     }
     if !can.unit && set.unit_mm.is_some_and(|unit| unit != 1.0) {
         let unit = set.unit_mm.unwrap_or(1.0);
@@ -113,7 +134,7 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if !curve_file::can_write(&args.output) {
-        let known = ".bcc, .hair, .obj, .txt, .usda or .usdc";
+        let known = ".bcc, .hair, .obj, .yarns, .txt, .usda or .usdc";
         let problem = format!("error: {}: expected a name that ends in {known}", args.output.display());
         return Err(Failure::Input(problem));
     }
@@ -124,6 +145,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
         tile: args.tile.unwrap_or([1, 1]),
         prim: args.prim.clone(),
         frame: args.frame,
+        faces: args.faces.clone(),
         ..ReadOptions::default()
     };
     let mut set = curve_file::read(&args.input, &options).map_err(|e| Failure::Input(format!("error: {e}")))?;

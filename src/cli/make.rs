@@ -61,7 +61,7 @@ enum What {
 /// What all of them share.
 #[derive(Args, Debug)]
 struct Output {
-    /// Where to write; the extension names the format (.bcc, .hair, .obj, .txt, .usda, .usdc). Repeatable.
+    /// Where to write; the extension names the format (.bcc, .hair, .obj, .yarns, .txt, .usda, .usdc). Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required = true)]
     out: Vec<PathBuf>,
     /// Radius of the yarn; 0.5, or that of a WIF draft.
@@ -329,7 +329,7 @@ fn write(strands: Vec<PatternStrand>, output: &Output, [radius, weft_radius]: [f
     for path in &output.out {
         if !curve_file::can_write(path) {
             let problem = format!(
-                "error: {}: expected a name that ends in .bcc, .hair, .obj, .txt, .usda or .usdc",
+                "error: {}: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc",
                 path.display()
             );
             return Err(Failure::Input(problem));

@@ -7,6 +7,7 @@ pub mod frame;
 pub mod rgb;
 pub mod sampler;
 pub mod special;
+pub mod srgb;
 pub mod stats;
 pub mod warp;
 

@@ -1,20 +1,23 @@
 //! Curve files: bytes in, a [`CurveSet`] out, and back to bytes.
 //!
-//! Six formats are read: BCC (binary, Yuksel's yarn models), cyHair, PYP (periodic yarn patterns of MADYPG), lines of
-//! Wavefront OBJ, plain text, and stages (USD and Alembic, by [`super::stage`]). All but PYP and Alembic are written.
+//! Seven formats are read: BCC (binary, Yuksel's yarn models), cyHair, PYP (periodic yarn patterns of MADYPG), the yarns
+//! of stitch meshes, lines of Wavefront OBJ, plain text, and stages (USD and Alembic, by [`super::stage`]). All but PYP and Alembic are written.
 //! Files come from strangers, so every number is checked before it is believed, memory stays a small multiple of the
 //! file's size, and small defects are repaired with a note for the user. Radii, units and the direction of up are only
 //! passed on; nothing is smoothed, scaled or sampled here.
 
 mod bcc;
+mod faces;
 mod hair;
 mod obj_lines;
 mod pyp;
 mod repair;
 mod staged;
+mod stitch_mesh;
 #[cfg(test)]
 mod tests;
 mod text;
+mod yarns;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -32,6 +35,7 @@ pub use bcc::write_bcc;
 pub use hair::write_hair;
 pub use obj_lines::write_obj_lines;
 pub use text::write_text;
+pub use yarns::write_yarns;
 
 /// What the file itself cannot say.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,12 +50,14 @@ pub struct ReadOptions {
     pub prim: Option<PrimPattern>,
     /// The frame of a stage; its earliest time if absent.
     pub frame: Option<f64>,
+    /// The face library of a stitch mesh; the file of its name that ends in `.sf` if absent.
+    pub faces: Option<PathBuf>,
 }
 
 impl Default for ReadOptions {
     /// One cell, at most 2^27 points (3.2 GB of coordinates).
     fn default() -> Self {
-        Self { basis: None, tile: [1, 1], max_points: 1 << 27, prim: None, frame: None }
+        Self { basis: None, tile: [1, 1], max_points: 1 << 27, prim: None, frame: None, faces: None }
     }
 }
 
@@ -69,6 +75,8 @@ pub enum Format {
     /// `x y z [radius]` on each line, a blank line between curves, `#` begins a comment. A curve whose last line
     /// repeats its first, radius included, is closed (it needs four lines or more).
     Text,
+    /// The yarns of a stitch mesh (textiles-lab/smobj): chunks of points, and radius and colour of each yarn.
+    Yarns,
 }
 
 /// Where in a file something is wrong.
@@ -192,13 +200,23 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     if stage::is_stage(path) {
         return staged::read(path, options);
     }
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("smobj")) {
+        let own = path.with_extension("sf");
+        let library = options.faces.as_ref().unwrap_or(&own);
+        let in_library = |error: CurveFileError| {
+            let text = error.in_file(library).to_string();
+            CurveFileError::new(FileLocation::File, format!("its faces: {text}"))
+        };
+        let library = read_bytes(library).and_then(|bytes| faces::parse(&bytes)).map_err(in_library)?;
+        return stitch_mesh::parse(&read_bytes(path)?, &library, options);
+    }
     let bytes = read_bytes(path)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
         CurveFileError::new(
             FileLocation::File,
             "expected a curve file, found neither the letters BCC or HAIR nor a known extension",
         )
-        .hint("name it .bcc, .hair, .pyp, .obj, .txt, .curves, .usda, .usdc, .usdz or .abc after its content")
+        .hint("name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .usda, .usdc, .usdz or .abc after its content")
     })?;
     parse(&bytes, format, options)
 }
@@ -210,12 +228,16 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
     if bytes.starts_with(hair::MAGIC) {
         return Some(Format::Hair);
     }
+    if bytes.starts_with(yarns::MAGIC) {
+        return Some(Format::Yarns);
+    }
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "bcc" => Some(Format::Bcc),
         "hair" => Some(Format::Hair),
         "obj" => Some(Format::Obj),
         "pyp" => Some(Format::Pyp),
         "txt" | "curves" => Some(Format::Text),
+        "yarns" => Some(Format::Yarns),
         _ => None,
     }
 }
@@ -231,6 +253,7 @@ pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Curv
         Format::Obj => obj_lines::parse(bytes, options)?,
         Format::Pyp => pyp::parse(bytes, options)?,
         Format::Text => text::parse(bytes, options)?,
+        Format::Yarns => yarns::parse(bytes, options)?,
     };
     if set.curves.is_empty() {
         set.notes.push("the file holds no curve that can be drawn".into());
@@ -246,7 +269,7 @@ pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Curv
 
 /// Whether a file is named as those that [`read`] reads.
 pub fn can_read(path: &Path) -> bool {
-    recognise(&[], path).is_some()
+    recognise(&[], path).is_some() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("smobj"))
 }
 
 /// The format that a file's name asks for, if it can be written.
@@ -256,6 +279,7 @@ fn written_as(path: &Path) -> Option<Format> {
         "hair" => Some(Format::Hair),
         "obj" => Some(Format::Obj),
         "txt" | "curves" => Some(Format::Text),
+        "yarns" => Some(Format::Yarns),
         _ => None,
     }
 }
@@ -265,8 +289,8 @@ pub fn can_write(path: &Path) -> bool {
     written_as(path).is_some() || staged::can_write(path)
 }
 
-/// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.txt`, `.curves`, `.usda`,
-/// `.usdc`, `.usd`) to `out`.
+/// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.yarns`, `.txt`,
+/// `.curves`, `.usda`, `.usdc`, `.usd`) to `out`.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] if there is no such format or the curves do not fit it; whatever `out` reports.
@@ -279,9 +303,10 @@ pub fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Resul
         Some(Format::Hair) => write_hair(set, out),
         Some(Format::Obj) => write_obj_lines(set, out),
         Some(Format::Text) => write_text(set, out),
+        Some(Format::Yarns) => write_yarns(set, out),
         Some(Format::Pyp) | None => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            "a curve file ends in .bcc, .hair, .obj, .txt, .usda or .usdc",
+            "a curve file ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc",
         )),
     }
 }

@@ -241,6 +241,14 @@ impl Chart {
         Ok(Self { rows })
     }
 
+    /// How many stitches steps make that are written as in a row.
+    ///
+    /// # Errors
+    /// A step that is none.
+    pub fn stitches_of(steps: &str) -> Result<u32, ChartError> {
+        Ok(parse_steps(steps, 0)?.iter().map(|step| step.takes_and_makes().1).sum())
+    }
+
     /// Number of rows before they repeat.
     pub fn rows(&self) -> u32 {
         self.rows.len() as u32

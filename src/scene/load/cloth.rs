@@ -193,6 +193,7 @@ fn file_source(
         options.basis = table.one_of("basis", &bases);
         options.prim = prim_pattern(table, "prim");
         colors = table.bool_or("colors", false);
+        options.faces = table.string("faces").map(|p| context.resolve(p, table.span("faces").unwrap_or(span)));
         up = table.one_of_or("up", Up::Auto, &[("auto", Up::Auto), ("y", Up::Y), ("z", Up::Z)]);
         if let Some(tile) = table.numbers("tile", Range::between(1.0, 100_000.0)) {
             match tile.as_slice() {

@@ -24,10 +24,11 @@ use crate::{
         garment::Tension,
         pattern::{PatternStrand, StrandKind},
     },
-    image::{self, png::srgb_to_linear, texture::Texture},
+    image::{self, texture::Texture},
     input::diagnostic::Span,
     math::{
         sampler::{Stream, hash2},
+        srgb::srgb_to_linear,
         warp::normal,
     },
 };
@@ -271,7 +272,7 @@ fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&str, Span)) -
 }
 
 /// `#rrggbb`, as sRGB.
-fn hex(text: &str) -> Option<[f32; 3]> {
+pub(super) fn hex(text: &str) -> Option<[f32; 3]> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii())?;
     let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f32::from(v) / 255.0);
     Some([channel(0)?, channel(1)?, channel(2)?])

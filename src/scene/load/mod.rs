@@ -3,6 +3,7 @@
 //! All mistakes of a scene are reported together, each where it was written. Only when the text is sound are curve
 //! files and images read.
 
+mod chart_picture;
 mod cloth;
 mod color;
 mod definitions;

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
+use super::{Context, Range, Reader, chart_picture, cloth::Yarns, color::FabricCoordinates};
 use crate::{
     geometry::{
         curve::Curve,
@@ -63,6 +63,18 @@ pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
     if let Some(text) = table.string("instructions") {
         return ("knit".to_owned(), written(table, text), Vec::new());
     }
+    if let Some(Value::Table(_)) = table.node("chart").map(|node| &node.value)
+        && let Some(picture) = table.table("chart")
+    {
+        if table.has("pattern") {
+            table.error_at(
+                "chart",
+                "both `pattern` and `chart` are given",
+                Some("a chart is a pattern of its own: keep one"),
+            );
+        }
+        return ("knit".to_owned(), drawn(table, picture, context), Vec::new());
+    }
     let chart_rows = table.strings("chart");
     if table.has("chart") && chart_rows.is_empty() {
         // A value of another type is told already.
@@ -98,6 +110,19 @@ pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
         }
     };
     (name.to_owned(), chart, chart_rows.iter().map(|(_, span)| *span).collect())
+}
+
+/// A chart that is a picture.
+fn drawn(table: &Reader<'_>, picture: Reader<'_>, context: &Context<'_>) -> Option<Chart> {
+    let rows = chart_picture::rows(picture, context)?;
+    match Chart::parse(&rows) {
+        Ok(chart) => Some(chart),
+        Err(error) => {
+            let row = error.line.map_or(String::new(), |line| format!("row {} of the picture: ", line + 1));
+            table.error_at("chart", format!("{row}{}", error.problem), Some(&error.hint));
+            None
+        }
+    }
 }
 
 /// Written instructions over so many `stitches`, as a chart.

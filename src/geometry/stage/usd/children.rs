@@ -1,22 +1,27 @@
-//! Binary layers as usd-core takes them: names of children are of a type of their own.
+//! Binary layers as usd-core takes them.
 //!
-//! The `openusd` crate stores `primChildren` and `properties` as arrays of tokens. usd-core 26 refuses such a file: it has
-//! them as token vectors, the same bytes under another type. Here their type is put right in the table of fields, which
-//! is written again behind all other sections.
+//! The `openusd` crate (0.6) stores `primChildren` and `properties` as arrays of tokens. usd-core 26 refuses such a file: it
+//! has them as token vectors, the same bytes under another type. And the crate compresses lists of four integers, usd-core
+//! only those of sixteen: it takes what is shorter for plain numbers. Both are put right in the table of fields, which is
+//! written again behind all other sections.
 
 use std::io;
 
 /// Types of values in the format.
+const INT: u64 = 3;
 const TOKEN: u64 = 11;
 const TOKEN_VECTOR: u64 = 41;
 const ARRAY: u64 = 1 << 63;
+const COMPRESSED: u64 = 1 << 61;
+/// Lists of fewer integers are never compressed.
+const FEWEST: usize = 16;
 const SECTION_ENTRY: usize = 32;
 
-/// The same layer with the types of its lists of children as usd-core writes them.
+/// The same layer with lists of children and of integers as usd-core writes them.
 ///
 /// # Errors
 /// The bytes are no binary layer.
-pub(super) fn as_token_vectors(bytes: &[u8]) -> io::Result<Vec<u8>> {
+pub(super) fn as_usd_core_writes(bytes: &[u8]) -> io::Result<Vec<u8>> {
     rewritten(bytes).ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "a binary layer that cannot be read"))
 }
 
@@ -44,16 +49,26 @@ fn rewritten(bytes: &[u8]) -> Option<Vec<u8>> {
     let names = integers(&unpacked(bytes, fields + 8, 8 + 5 * count)?, count)?;
     let second = fields + 16 + packed;
     let mut values = unpacked(bytes, second, 8 * count)?;
+    let mut out = bytes[..toc].to_vec();
     for (value, name) in values.chunks_exact_mut(8).zip(&names) {
         let bits = u64::from_le_bytes(value.try_into().ok()?);
         let (kind, payload) = (bits >> 48 & 0xff, bits & ((1 << 48) - 1));
         if kind == TOKEN && bits & ARRAY != 0 && lists.contains(name) {
             value.copy_from_slice(&(TOKEN_VECTOR << 48 | payload).to_le_bytes());
         }
+        let packed = ARRAY | COMPRESSED;
+        let count = usize::try_from(number(bytes, usize::try_from(payload).ok()?).unwrap_or(0)).ok()?;
+        if kind == INT && bits & packed == packed && count < FEWEST {
+            let list = integers(&unpacked(bytes, payload as usize + 8, 8 + 5 * count)?, count)?;
+            let place = out.len() as u64;
+            out.extend((count as u64).to_le_bytes());
+            out.extend(list.iter().flat_map(|v| (*v as i32).to_le_bytes()));
+            value.copy_from_slice(&(ARRAY | INT << 48 | place).to_le_bytes());
+        }
     }
 
     // The table of contents moves behind the new section.
-    let mut out = bytes[..toc].to_vec();
+    let start_of_fields = out.len();
     out.extend(&bytes[fields..second]);
     let mut block = vec![0];
     block.extend(lz4_flex::block::compress(&values));
@@ -62,8 +77,8 @@ fn rewritten(bytes: &[u8]) -> Option<Vec<u8>> {
     let new_toc = out.len();
     out.extend(&bytes[toc..]);
     let place = new_toc + (own - toc) + 16;
-    out[place..place + 8].copy_from_slice(&(toc as u64).to_le_bytes());
-    out[place + 8..place + 16].copy_from_slice(&((new_toc - toc) as u64).to_le_bytes());
+    out[place..place + 8].copy_from_slice(&(start_of_fields as u64).to_le_bytes());
+    out[place + 8..place + 16].copy_from_slice(&((new_toc - start_of_fields) as u64).to_le_bytes());
     out[16..24].copy_from_slice(&(new_toc as u64).to_le_bytes());
     Some(out)
 }
@@ -127,13 +142,18 @@ mod tests {
     fn lists_of_children_are_token_vectors() {
         let points = (0..5).map(|i| glam::DVec3::new(f64::from(i), 0.0, 0.0)).collect();
         let curve = Curve { basis: Basis::BSpline, closed: false, points, radii: None, flattening: None };
-        let set = CurveSet { curves: vec![curve], ..CurveSet::default() };
+        // Seven counts and ids: fewer than are compressed.
+        let set = CurveSet { curves: vec![curve; 7], ..CurveSet::default() };
         let mut bytes = Vec::new();
         curve_file::write(std::path::Path::new("a.usdc"), &set, &mut bytes).unwrap();
         // Of the root, of /cloth and of its curves.
         assert_eq!(kinds(&bytes).iter().filter(|k| **k == TOKEN_VECTOR).count(), 3);
-        let again = as_token_vectors(&bytes).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.usdc"), &bytes).unwrap();
+        let read = curve_file::read(&folder.path().join("a.usdc"), &curve_file::ReadOptions::default()).unwrap();
+        assert_eq!((read.curves.len(), read.ids[6]), (7, Some(6)));
+        let again = as_usd_core_writes(&bytes).unwrap();
         assert_eq!(kinds(&again), kinds(&bytes));
-        assert!(as_token_vectors(b"PXR-USDC").is_err() && as_token_vectors(&bytes[..bytes.len() - 9]).is_err());
+        assert!(as_usd_core_writes(b"PXR-USDC").is_err() && as_usd_core_writes(&bytes[..bytes.len() - 9]).is_err());
     }
 }

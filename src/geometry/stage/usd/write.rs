@@ -60,7 +60,7 @@ pub fn write(path: &Path, unit_mm: f64, groups: &[CurvesOut<'_>], out: &mut impl
     } else {
         let mut bytes = Cursor::new(Vec::new());
         usdc::CrateWriter::write(&data, &mut bytes).map_err(|e| invalid(&format!("{e:#}")))?;
-        out.write_all(&children::as_token_vectors(bytes.get_ref())?)
+        out.write_all(&children::as_usd_core_writes(bytes.get_ref())?)
     }
 }
 
