@@ -227,6 +227,7 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         edges: if args.edges == "live" { Edges::Live } else { Edges::Finished },
         yarn_per_stitch: args.yarn_per_stitch,
         points: args.points,
+        colors: None,
     };
     if piece.control_points() > MAX_POINTS {
         return too_many("stitches, rows");

@@ -125,6 +125,7 @@ mod tests {
             edges: knit::Edges::Live,
             yarn_per_stitch: None,
             points: knit::POINTS,
+            colors: None,
         };
         let mut curves: Vec<Curve> = piece.strands(1.0).unwrap().into_iter().map(|s| s.curve).collect();
         for curve in &mut curves {

@@ -24,6 +24,7 @@ fn knitted() -> Tile {
         yarn_per_stitch: Some(13.9),
         edges: Edges::Live,
         points: 24,
+        colors: None,
     };
     Tile::of_knit(&knit, 1.2).unwrap()
 }

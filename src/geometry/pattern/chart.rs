@@ -271,6 +271,20 @@ impl Chart {
         Some(width)
     }
 
+    /// Whether rows may be cut anywhere: each stitch is made of one.
+    pub fn is_plain(&self) -> bool {
+        self.rows.iter().all(Row::is_plain)
+    }
+
+    /// The first row, from 0, that has more stitches than it finds in rows of so many, and how many it has: the rest of it is
+    /// left out.
+    pub fn cut_short(&self, cast_on: u32, widths: &[u32]) -> Option<(usize, u32)> {
+        let found = std::iter::once(cast_on).chain(widths.iter().copied());
+        let rows = self.rows.iter().cycle().zip(found).take(widths.len()).enumerate();
+        let mut rows = rows.map(|(r, (row, found))| (r, row.takes_and_makes().0, found));
+        rows.find(|(_, takes, found)| takes > found).map(|(r, takes, _)| (r, takes))
+    }
+
     /// Knits `rows` rows onto `cast_on` stitches.
     ///
     /// # Errors

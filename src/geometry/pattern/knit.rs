@@ -6,6 +6,7 @@
 //! Inside this folder the unit is the yarn's diameter.
 
 mod cell;
+mod colors;
 mod loops;
 mod piece;
 mod shape;
@@ -15,8 +16,10 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+pub use self::colors::Colors;
 use self::{
     cell::Cell,
+    colors::Way,
     loops::{Border, Loops},
     piece::{Laying, Surface, Thread, settle},
 };
@@ -72,6 +75,8 @@ pub struct Knit {
     pub yarn_per_stitch: Option<f64>,
     /// Control points of a stitch.
     pub points: u32,
+    /// Colour work, if there is any: a yarn for each colour.
+    pub colors: Option<Colors>,
 }
 
 /// A piece as it came out.
@@ -79,6 +84,8 @@ pub struct Knit {
 pub struct Knitted {
     /// Its yarns.
     pub strands: Vec<PatternStrand>,
+    /// The colour of each yarn: 0 where there is no colour work.
+    pub colors: Vec<u16>,
     /// Width of a stitch and distance between rows.
     pub gauge: [f64; 2],
 }
@@ -102,8 +109,6 @@ const PIECE_STEPS: usize = 60;
 const FINE_STEPS: usize = 16;
 /// Points of a stitch while a piece without a cell is relaxed.
 const COARSE: u32 = 14;
-/// Length of yarn beyond the first and the last stitch, in diameters.
-const TAIL: f64 = 6.0;
 
 impl Knit {
     /// How many control points the cloth would have at most if it kept its width.
@@ -176,6 +181,21 @@ impl Knit {
         })
     }
 
+    /// How many stitches each row has.
+    ///
+    /// # Errors
+    /// As [`Self::knitted`].
+    pub fn widths(&self) -> Result<Vec<u32>, ChartError> {
+        Ok(self.worked()?.iter().map(|row| row.len() as u32).collect())
+    }
+
+    /// The ways of its yarns.
+    fn ways(&self) -> Vec<Way> {
+        let (finished, round) = (self.edges == Edges::Finished, self.form != Form::Flat);
+        let one = || Colors { rows: vec![vec![0]; self.rows as usize], catch: None, carry: 0 };
+        self.colors.as_ref().unwrap_or(&one()).ways(finished, round)
+    }
+
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
         self.chart.work(self.stitches, self.rows, MAX_POINTS / u64::from(self.points).max(1))
     }
@@ -197,7 +217,12 @@ impl Knit {
         let finished = self.edges == Edges::Finished;
         let round = self.form != Form::Flat;
         let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished };
-        let loops = Loops::new(&rows, self.stitches as usize, border);
+        let ways = self.ways();
+        let backwards = ways.iter().flat_map(|w| &w.rows).any(|r| *r == (rows.len() as i32, true));
+        let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
+        if let Some(colors) = &self.colors {
+            loops.dye(colors);
+        }
         let profile = match &self.form {
             Form::Revolution(profile) => {
                 let scaled: Vec<DVec2> = profile.iter().map(|p| *p / diameter).collect();
@@ -224,10 +249,7 @@ impl Knit {
             None => kinds.of_row.get(row).copied().flatten().map(|k| (&kinds.cells[k], 0)),
         };
         let laying = Laying { loops: &loops, surface: &surface, cells: &cell_of, even, yarn: self.yarn(size), points };
-        let mut thread = laying.thread();
-        if finished {
-            thread.tails(TAIL, DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0));
-        }
+        let mut threads = laying.threads(&ways);
         let steps = if even { EDGE_STEPS } else { PIECE_STEPS };
         let run = Run {
             steps,
@@ -238,7 +260,6 @@ impl Knit {
             firm: 2.0,
             calm: 0.02,
         };
-        let mut threads = [thread];
         settle(&mut threads, &run);
         if !even {
             threads.iter_mut().for_each(|t| t.refine(f64::from(self.points) / f64::from(points)));
@@ -261,7 +282,8 @@ impl Knit {
             coordinates: thread.grid,
         };
         let strands = threads.into_iter().enumerate().map(strand).collect();
-        Ok(Knitted { strands, gauge: [width * diameter, height * diameter] })
+        let colors = ways.iter().map(|w| w.color).collect();
+        Ok(Knitted { strands, colors, gauge: [width * diameter, height * diameter] })
     }
 
     /// Cells for rows of knit and purl columns that are above and below their like: what a shaped piece begins with.

@@ -432,6 +432,7 @@ mod tests {
             yarn_per_stitch: Some(YARN_PER_STITCH),
             edges: Edges::Live,
             points: POINTS,
+            colors: None,
         };
         Tile::of_knit(&knit, 0.5).unwrap()
     }

@@ -268,10 +268,10 @@ fn source(
             let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table), context);
             path.map(|_| source)
         }
-        Some(1) => pattern::knit(&table, context, yarns).map(Source::Knit),
+        Some(1) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
         Some(2) => weave::weave(&table, context, yarns).map(Source::Weave),
         // Short for a flat knit of that pattern.
-        Some(4) => pattern::stockinette(&table).map(Source::Knit),
+        Some(4) => pattern::stockinette(&table, fabric, context).map(Source::Knit),
         Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
         Some(3) => Some(Source::Straight {
             count: table.u64_or("count", 1, 1..=1_000_000) as u32,
@@ -370,8 +370,18 @@ impl FabricPlan {
                     .collect::<Option<Vec<Made>>>()?
             }
             Source::Knit(plan) => {
-                let (curves, coordinates, origin) = plan.curves(2.0 * radius, context)?;
-                vec![Made::new(origin, kind, with_radius(curves, radius), Some(coordinates))]
+                let plan = plan.sized(2.0 * radius, context, warnings)?;
+                let colors = match kind {
+                    CurveKind::Yarn(base) if !self.color.is_plain() => {
+                        let of_rows = |widths: &[u32]| self.color.stitches(widths, base, context, library);
+                        plan.colors(context, &of_rows, warnings)?
+                    }
+                    _ => Default::default(),
+                };
+                let (curves, coordinates, origin) = plan.curves(2.0 * radius, colors, context)?;
+                let curves = with_radius(curves, radius);
+                plan.warn_of_overlap(&curves, warnings);
+                vec![Made::new(origin, kind, curves, Some(coordinates))]
             }
             Source::Weave(plan) => {
                 let Woven { origin, sides } = plan.make(context)?;

@@ -38,6 +38,9 @@ const LEVELS: f32 = 31.0;
 /// Shades that variation draws yarns from.
 const SHADES: u32 = 256;
 
+/// The colour of each stitch by rows, from 0, and the yarn in the library that each colour is.
+pub(super) type StitchColors = (Vec<Vec<u16>>, Vec<usize>);
+
 /// Where each control point of a fabric lies in its own grid.
 pub(super) struct FabricCoordinates {
     /// Wale and course, warp and weft, or the place along a yarn and the yarn's number; none where the latter holds for
@@ -47,17 +50,20 @@ pub(super) struct FabricCoordinates {
     kinds: Vec<StrandKind>,
     /// Columns and rows.
     extent: [f32; 2],
+    /// The yarn of each curve in the library, where each is of one colour; else empty.
+    own: Vec<usize>,
 }
 
 impl FabricCoordinates {
     /// That of curves of which nothing is known: `columns` along each, and one row each.
     pub(super) fn along(columns: f32, fabric: &Fabric) -> Self {
-        Self { points: Vec::new(), kinds: Vec::new(), extent: [columns, fabric.curves.len() as f32] }
+        Self { points: Vec::new(), kinds: Vec::new(), extent: [columns, fabric.curves.len() as f32], own: Vec::new() }
     }
 
     /// That of cloth that the program makes, and its curves.
     pub(super) fn of(strands: Vec<PatternStrand>, extent: [u32; 2]) -> (Vec<Curve>, Self) {
-        let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent: extent.map(|n| n as f32) };
+        let extent = extent.map(|n| n as f32);
+        let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent, own: Vec::new() };
         let curves = strands.into_iter().map(PatternStrand::smooth).map(|strand| {
             grid.points.push(strand.coordinates);
             grid.kinds.push(strand.kind);
@@ -70,7 +76,13 @@ impl FabricCoordinates {
     pub(super) fn laid(points: Vec<Vec<[f32; 2]>>, kinds: Vec<StrandKind>) -> Self {
         let most = |k: usize| points.iter().flatten().map(|c| c[k]).fold(1.0, f32::max).ceil();
         let extent = [most(0), most(1)];
-        Self { points, kinds, extent }
+        Self { points, kinds, extent, own: Vec::new() }
+    }
+
+    /// The same of curves each of which is of one yarn of the library.
+    pub(super) fn with_yarns(mut self, own: Vec<usize>) -> Self {
+        self.own = own;
+        self
     }
 
     /// Of the curves of both, this one's first.
@@ -386,6 +398,41 @@ impl ColorPlan {
         }
     }
 
+    /// Whether all stitches are of the fabric's own yarn.
+    pub(super) fn is_plain(&self) -> bool {
+        let Layout { rows, columns, motif } = &self.layout;
+        rows.is_empty() && columns.is_empty() && motif.is_none()
+    }
+
+    /// Which yarn knits each stitch of a knit, by rows of so many stitches, and the yarns in the library.
+    pub(super) fn stitches(
+        &self,
+        widths: &[u32],
+        base: usize,
+        context: &Context<'_>,
+        library: &Library,
+    ) -> Option<StitchColors> {
+        let widest = widths.iter().copied().max().unwrap_or(1);
+        let cells = self.cells([widest as f32, widths.len() as f32], false, base, context, library)?;
+        let map = cells.of_rows();
+        let at = |(row, width): (usize, &u32)| -> Vec<usize> {
+            (0..*width).map(|column| map.at(column as f32 + 0.5, row as f32 + 0.5)).collect()
+        };
+        let yarns: Vec<Vec<usize>> = widths.iter().enumerate().map(at).collect();
+        // The yarn of most stitches is the first one.
+        let mut counts: Vec<(usize, usize)> = Vec::new();
+        for &yarn in yarns.iter().flatten() {
+            match counts.iter_mut().find(|c| c.1 == yarn) {
+                Some(count) => count.0 += 1,
+                None => counts.push((1, yarn)),
+            }
+        }
+        counts.sort_by_key(|&(count, yarn)| (std::cmp::Reverse(count), yarn));
+        let order: Vec<usize> = counts.into_iter().map(|c| c.1).collect();
+        let color = |yarn: &usize| order.iter().position(|y| y == yarn).unwrap_or(0) as u16;
+        Some((yarns.iter().map(|row| row.iter().map(color).collect()).collect(), order))
+    }
+
     /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them; `dyes`
     /// are used where the scene does not say which yarn lies where.
     pub(super) fn apply(
@@ -400,10 +447,8 @@ impl ColorPlan {
             variation.apply(fabric);
         }
         let shades = self.variation.filter(|v| v.color > 0.0);
-        let Layout { rows, columns, motif } = &self.layout;
-        let plain = rows.is_empty() && columns.is_empty() && motif.is_none();
-        let dyes = dyes.filter(|_| plain);
-        if plain && self.tint.is_none() && shades.is_none() && dyes.is_none() {
+        let dyes = dyes.filter(|_| self.is_plain());
+        if self.is_plain() && self.tint.is_none() && shades.is_none() && dyes.is_none() {
             return Some(());
         }
         let CurveKind::Yarn(base) = fabric.kind else {
@@ -412,7 +457,8 @@ impl ColorPlan {
         };
         let coordinates = coordinates(fabric);
         let yarns: Vec<&Yarn> = library.yarns.values().collect();
-        let cells = self.cells(&coordinates, base, context, library)?;
+        let woven = coordinates.kinds.iter().any(|kind| *kind != StrandKind::Course);
+        let cells = self.cells(coordinates.extent, woven, base, context, library)?;
         for map in cells.maps() {
             let asked = (0..fabric.curves.len()).any(|curve| std::ptr::eq(cells.of(curve, &coordinates), map));
             let wrong = map.cells.iter().find_map(|&yarn| other_build(yarns[yarn], yarns[base]));
@@ -449,13 +495,13 @@ impl ColorPlan {
     /// Which yarn lies where, as the layout says; `base` where it does not.
     fn cells(
         &self,
-        coordinates: &FabricCoordinates,
+        extent: [f32; 2],
+        woven: bool,
         base: usize,
         context: &Context<'_>,
         library: &Library,
     ) -> Option<LaidCells> {
         let Layout { rows, columns, motif } = &self.layout;
-        let woven = coordinates.kinds.iter().any(|kind| *kind != StrandKind::Course);
         if !rows.is_empty() && !columns.is_empty() && !woven {
             let hint = "in a weave they are the yarns of wefts and of warps; elsewhere a `motif` says both";
             context.error(self.header, "both `rows` and `columns` are given", Some(hint.to_owned()));
@@ -471,7 +517,7 @@ impl ColorPlan {
             None => None,
             Some(motif) => {
                 let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| index_of(name)).collect();
-                match motif.cells(coordinates.extent, &yarns, base) {
+                match motif.cells(extent, &yarns, base) {
                     Ok(cells) => Some(cells),
                     Err(problem) => {
                         context.error(motif.span, problem, None);
@@ -500,6 +546,15 @@ impl LaidCells {
         [&self.by_row, &self.by_column].into_iter().chain(&self.motif)
     }
 
+    /// Those of the stitches of a knit.
+    fn of_rows(&self) -> &CellMap {
+        match &self.motif {
+            Some(motif) => motif,
+            None if self.by_columns => &self.by_column,
+            None => &self.by_row,
+        }
+    }
+
     /// The cells that a curve of the fabric runs through.
     fn of(&self, curve: usize, coordinates: &FabricCoordinates) -> &CellMap {
         match (&self.motif, coordinates.kinds.get(curve)) {
@@ -507,8 +562,7 @@ impl LaidCells {
             // A weft keeps its colour all along, and so does a warp.
             (None, Some(StrandKind::Warp)) => &self.by_column,
             (None, Some(StrandKind::Weft)) => &self.by_row,
-            (None, _) if !self.by_columns => &self.by_row,
-            (None, _) => &self.by_column,
+            (None, _) => self.of_rows(),
         }
     }
 }
@@ -532,17 +586,18 @@ impl Painter<'_> {
         let shade = self.shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
         let shine = self.shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade));
         let cells = self.cells.of(index, self.coordinates);
+        let own = self.coordinates.own.get(index).copied();
         let count = curve.points.len();
         let steps = steps(curve, radii);
         let places = if curve.closed { count * steps } else { (count - 1) * steps + 1 };
         let material_at = |place: usize| {
             let [x, y] = self.coordinates.between(index, place, steps, count);
-            let yarn = cells.at(x, y);
+            let yarn = own.unwrap_or_else(|| cells.at(x, y));
             let kind = self.coordinates.kinds.get(index).copied();
             let dye = self.dyes.and_then(|d| d.at(index, kind, [x, y]));
-            let own = self.dyes.map_or(Vec3::ONE, |d| d.color(dye));
+            let dyed = self.dyes.map_or(Vec3::ONE, |d| d.color(dye));
             let (key, color) = match &self.texture {
-                None => (Key { yarn, shade, dye, levels: [0; 3] }, own * shine),
+                None => (Key { yarn, shade, dye, levels: [0; 3] }, dyed * shine),
                 Some((texture, repeat)) => {
                     let extent = self.coordinates.extent;
                     let uv = |[x, y]: [f32; 2]| [x / extent[0] * repeat[0] as f32, y / extent[1] * repeat[1] as f32];
@@ -555,7 +610,7 @@ impl Painter<'_> {
                         .sample(here[0], here[1], width)
                         .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
                     let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
-                    (Key { yarn, shade: None, dye, levels }, own * Vec3::from(color))
+                    (Key { yarn, shade: None, dye, levels }, dyed * Vec3::from(color))
                 }
             };
             variants.material_index(key, || self.yarns[key.yarn].dyed(color.to_array().map(f64::from)))

@@ -175,7 +175,7 @@ fn per(table: &Reader<'_>) -> f64 {
 }
 
 /// Width and height of a stitch from `gauge`, mm.
-fn stitch(table: &Reader<'_>, outer: Option<f64>) -> Option<DVec2> {
+pub(super) fn stitch(table: &Reader<'_>, outer: Option<f64>) -> Option<DVec2> {
     let own = if table.has("gauge_per") || outer.is_none() { per(table) } else { outer.unwrap_or(100.0) };
     let gauge = table.vec2("gauge", Range::between(1e-3, 1e6))?;
     Some(own / DVec2::from(gauge))
@@ -258,6 +258,7 @@ impl ClothPlan {
                     yarn_per_stitch: Some(length.clamp(6.0, 60.0)),
                     edges: Edges::Live,
                     points: knit::POINTS,
+                    colors: None,
                 };
                 match Tile::of_knit(&knit, d) {
                     Ok(tile) => Some(tile),

@@ -9,6 +9,7 @@ mod color;
 mod definitions;
 mod dyes;
 mod garment;
+mod knit_size;
 mod mesh;
 mod motion;
 mod pattern;

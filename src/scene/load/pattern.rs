@@ -2,15 +2,21 @@
 
 use glam::DVec2;
 
-use super::{Context, Range, Reader, chart_picture, cloth::Yarns, color::FabricCoordinates};
+use super::{
+    Context, Range, Reader, chart_picture,
+    cloth::Yarns,
+    color::{FabricCoordinates, StitchColors},
+    knit_size::Sizes,
+};
 use crate::{
     geometry::{
         curve::Curve,
         pattern::{
             MAX_POINTS,
-            chart::{Chart, PATTERNS},
-            knit::{self, Edges, Form, Knit},
+            chart::{Chart, ChartError, PATTERNS},
+            knit::{self, Colors, Edges, Form, Knit, Knitted},
             knitspeak,
+            overlap::overlap,
         },
     },
     input::{
@@ -21,6 +27,9 @@ use crate::{
 
 /// Stitches of a knit that says no number.
 const STITCHES: u64 = 20;
+/// Stitches over which a yarn floats before it is caught, and rows that it is carried, unless the knit says so.
+const CATCH_FLOATS: u64 = 7;
+const CARRY_ROWS: u64 = 6;
 
 /// A knit that is checked but for what only knitting tells.
 pub(super) struct KnitPlan {
@@ -29,32 +38,123 @@ pub(super) struct KnitPlan {
     /// Where the chart's rows were written, for what is wrong with them.
     lines: Vec<Span>,
     header: Span,
+    work: ColorWork,
+    sizes: Sizes,
 }
 
+/// How the stitches of a knit get their colours.
+#[derive(Clone, Copy)]
+enum ColorWork {
+    /// A yarn for each colour.
+    Stranded { catch: Option<u32>, carry: u32 },
+    /// One yarn that is dyed from place to place.
+    Printed,
+}
+
+/// More yarns in a row than this are more than anyone strands.
+const MOST_STRANDED: usize = 4;
+
 impl KnitPlan {
-    /// What it is, with its gauge as knitters give it: stitches and rows in 10 cm.
-    fn origin(&self, gauge: [f64; 2]) -> String {
-        let [across, up] = gauge.map(|mm| 100.0 / mm);
-        format!("{}, {} x {}, gauge {across:.1} x {up:.1} in 10 cm", self.name, self.knit.stitches, self.knit.rows)
+    /// What it is, with its gauge as knitters give it, stitches and rows in 10 cm, its size and its yarn.
+    fn origin(&self, made: &Knitted) -> String {
+        let [across, up] = made.gauge.map(|mm| 100.0 / mm);
+        let Knit { stitches, rows, form, .. } = &self.knit;
+        let (width, height) = (f64::from(*stitches) * made.gauge[0], f64::from(*rows) * made.gauge[1]);
+        let size = match form {
+            Form::Flat => format!(", {width:.0} x {height:.0} mm"),
+            Form::Tube => format!(", {width:.0} mm around, {height:.0} mm high"),
+            Form::Revolution(_) => String::new(),
+        };
+        let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
+        let yarn = format!("{:.2} m of yarn", 1e-3 * length);
+        format!("{}, {stitches} x {rows}, gauge {across:.1} x {up:.1} in 10 cm{size}, {yarn}", self.name)
+    }
+
+    /// The same with the counts that its sizes make, of yarn of a diameter; what cannot be knitted is told.
+    pub(super) fn sized(mut self, diameter: f64, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Self> {
+        self.knit = self.sizes.apply(&self.knit, diameter, context)?;
+        let Knit { chart, stitches, rows, .. } = &self.knit;
+        let widths = self.told(self.knit.widths(), context)?;
+        if let Some((row, takes)) = chart.cut_short(*stitches, &widths) {
+            let found = if row > 0 { widths[row - 1] } else { *stitches };
+            warnings.push(format!(
+                "{}: row {} has {takes} stitches, but only {found} are there: the rest of the row is left out",
+                self.name,
+                row + 1
+            ));
+        }
+        if *rows < chart.rows() && !self.lines.is_empty() {
+            warnings.push(format!("{}: {rows} rows are knitted of a chart of {}", self.name, chart.rows()));
+        }
+        Some(self)
+    }
+
+    /// Tells if yarns run into each other, where a given size could make them.
+    pub(super) fn warn_of_overlap(&self, curves: &[(Curve, Vec<f64>)], warnings: &mut Vec<String>) {
+        const MOST: f64 = 0.05;
+        let given = self.knit.stitch_width.or(self.knit.row_height).or(self.knit.yarn_per_stitch).is_some();
+        if !given && !matches!(self.knit.form, Form::Revolution(_)) {
+            return;
+        }
+        let found = overlap(curves.iter().map(|(c, r)| (c, r.as_slice())));
+        if let Some(found) = found.filter(|f| f.share > MOST) {
+            let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
+            let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * 2.0 * curves[0].1[0]));
+            warnings.push(format!(
+                "{}: {:.0} % of the yarn overlaps: too many stitches or rows for its size; this yarn knits to {own_across:.1} x \
+                 {own_up:.1} in 10 cm by itself",
+                self.name,
+                100.0 * found.share
+            ));
+        }
+    }
+
+    /// The colours of the stitches, as `of_rows` says for rows of so many, and the yarns they are of; what is wrong with the
+    /// chart is told.
+    pub(super) fn colors(
+        &self,
+        context: &Context<'_>,
+        of_rows: &dyn Fn(&[u32]) -> Option<StitchColors>,
+        warnings: &mut Vec<String>,
+    ) -> Option<(Option<Colors>, Vec<usize>)> {
+        let ColorWork::Stranded { catch, carry } = self.work else { return Some((None, Vec::new())) };
+        let widths = self.told(self.knit.widths(), context)?;
+        let (rows, yarns) = of_rows(&widths)?;
+        if yarns.is_empty() {
+            return Some((None, yarns));
+        }
+        let colors = Colors { rows, catch, carry };
+        let (most, row) = colors.most_in_a_row();
+        if most > MOST_STRANDED {
+            warnings.push(format!(
+                "row {} is knitted of {most} yarns, and each floats behind the stitches of the others;                  `color_work = \"printed\"` makes one yarn of them",
+                row + 1
+            ));
+        }
+        Some((Some(colors), yarns))
     }
 
     /// The yarns with their places; what is wrong with the chart is told.
     pub(super) fn curves(
         &self,
         diameter: f64,
+        (colors, yarns): (Option<Colors>, Vec<usize>),
         context: &Context<'_>,
     ) -> Option<(Vec<Curve>, FabricCoordinates, String)> {
-        match self.knit.knitted(diameter) {
-            Ok(made) => {
-                let (curves, coordinates) = FabricCoordinates::of(made.strands, [self.knit.stitches, self.knit.rows]);
-                Some((curves, coordinates, self.origin(made.gauge)))
-            }
-            Err(error) => {
-                let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
-                context.error(*span, error.problem, Some(error.hint));
-                None
-            }
-        }
+        let knit = Knit { colors, ..self.knit.clone() };
+        let made = self.told(knit.knitted(diameter), context)?;
+        let origin = self.origin(&made);
+        let (curves, coordinates) = FabricCoordinates::of(made.strands, [knit.stitches, knit.rows]);
+        let own = if yarns.is_empty() { yarns } else { made.colors.iter().map(|c| yarns[usize::from(*c)]).collect() };
+        Some((curves, coordinates.with_yarns(own), origin))
+    }
+
+    fn told<T>(&self, made: Result<T, ChartError>, context: &Context<'_>) -> Option<T> {
+        made.map_err(|error| {
+            let span = error.line.and_then(|l| self.lines.get(l)).unwrap_or(&self.header);
+            context.error(*span, error.problem, Some(error.hint));
+        })
+        .ok()
     }
 }
 
@@ -149,7 +249,12 @@ fn written(table: &Reader<'_>, text: &str) -> Option<Chart> {
 }
 
 /// Reads the keys of a knit.
-pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<KnitPlan> {
+pub(super) fn knit(
+    table: &Reader<'_>,
+    fabric: &Reader<'_>,
+    context: &Context<'_>,
+    yarns: &Yarns<'_>,
+) -> Option<KnitPlan> {
     let (name, chart, lines) = chart(table, context);
     let profile = table.pairs("profile", Range::FINITE);
     let forms = [("flat", 0), ("tube", 1), ("revolution", 2)];
@@ -162,7 +267,8 @@ pub(super) fn knit(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>)
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
     let rows = if lines_are_all(&form, &lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
-    counted(table, chart, form, &name, rows, lines)
+    let sizes = Sizes::read(table, Some(fabric), context, &form);
+    counted(table, chart, form, &name, rows, lines, sizes)
 }
 
 /// Shaped pieces are knitted once, from the first row of the chart to the last.
@@ -171,8 +277,10 @@ fn lines_are_all(form: &Option<Form>, lines: &[Span]) -> bool {
 }
 
 /// `type = "stockinette"`: a flat knit of that pattern.
-pub(super) fn stockinette(table: &Reader<'_>) -> Option<KnitPlan> {
-    counted(table, Chart::named("stockinette"), Some(Form::Flat), "stockinette", 20, Vec::new())
+pub(super) fn stockinette(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>) -> Option<KnitPlan> {
+    let form = Some(Form::Flat);
+    let sizes = Sizes::read(table, Some(fabric), context, &form);
+    counted(table, Chart::named("stockinette"), form, "stockinette", 20, Vec::new(), sizes)
 }
 
 fn counted(
@@ -182,6 +290,7 @@ fn counted(
     name: &str,
     rows: u32,
     lines: Vec<Span>,
+    sizes: Sizes,
 ) -> Option<KnitPlan> {
     let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
@@ -190,8 +299,16 @@ fn counted(
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
     let edges = table.one_of_or("edges", Edges::Finished, &[("finished", Edges::Finished), ("live", Edges::Live)]);
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
+    let printed = table.one_of_or("color_work", false, &[("stranded", false), ("printed", true)]);
+    let catch = table.u64_or("catch_floats", CATCH_FLOATS, 0..=1_000_000) as u32;
+    let carry = table.u64_or("carry_rows", CARRY_ROWS, 0..=1_000_000) as u32;
+    let work = match printed {
+        true => ColorWork::Printed,
+        false => ColorWork::Stranded { catch: (catch > 0).then_some(catch), carry },
+    };
     let (chart, form) = (chart?, form?);
-    let knit = Knit { chart, stitches, rows, form, edges, stitch_width, row_height, yarn_per_stitch, points };
+    let knit =
+        Knit { chart, stitches, rows, form, edges, stitch_width, row_height, yarn_per_stitch, points, colors: None };
     if knit.control_points() > MAX_POINTS {
         table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
     }
@@ -199,7 +316,7 @@ fn counted(
         table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
         return None;
     }
-    Some(KnitPlan { knit, name: name.to_owned(), lines, header: table.header() })
+    Some(KnitPlan { knit, name: name.to_owned(), lines, header: table.header(), work, sizes })
 }
 
 /// The profile in millimetres, if it is one.

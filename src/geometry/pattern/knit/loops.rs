@@ -1,6 +1,9 @@
 //! Which loop passes through which: a chart's stitches become loops, and the way of the yarn through each row.
 
-use super::super::chart::{Act, Stitch, Top};
+use super::{
+    super::chart::{Act, Stitch, Top},
+    colors::Hold,
+};
 
 /// A loop of yarn that a needle has held.
 #[derive(Clone, Debug)]
@@ -41,14 +44,43 @@ pub(in super::super) enum Visit {
         /// Whether in front.
         front: bool,
     },
+    /// It passes behind a stitch of another colour.
+    Float {
+        /// Where.
+        at: f64,
+    },
 }
 
-/// A row from left to right.
+/// A yarn's way along a row, from left to right.
 #[derive(Clone, Debug)]
 pub(in super::super) struct Course {
     pub(in super::super) row: i32,
     /// What the yarn does, each with the column of the chart.
     pub(in super::super) visits: Vec<(u32, Visit)>,
+    pub(in super::super) color: u16,
+    /// How far its floats are lifted, in rows: those of several colours lie beside each other.
+    pub(in super::super) lift: f64,
+    /// What happens after each visit; none where nothing does.
+    pub(in super::super) holds: Vec<Hold>,
+}
+
+impl Course {
+    fn new(row: i32, visits: Vec<(u32, Visit)>) -> Self {
+        Self { row, visits, color: 0, lift: 0.0, holds: Vec::new() }
+    }
+
+    /// What happens between a visit and the next one.
+    pub(in super::super) fn hold(&self, k: usize) -> Hold {
+        self.holds.get(k).copied().unwrap_or(Hold::None)
+    }
+
+    /// Whether other colours change a visit: a float, a loop beside one, or one that catches another.
+    pub(in super::super) fn is_mixed(&self, k: usize) -> bool {
+        let n = self.visits.len();
+        let before = (k + n - 1) % n;
+        let float = |k: usize| matches!(self.visits[k].1, Visit::Float { .. });
+        float(k) || float(before) || float((k + 1) % n) || self.hold(k) != Hold::None || self.hold(before) != Hold::None
+    }
 }
 
 /// Loops and rows of a piece.
@@ -57,6 +89,8 @@ pub(in super::super) struct Loops {
     pub(in super::super) loops: Vec<Loop>,
     pub(in super::super) courses: Vec<Course>,
     pub(in super::super) border: Border,
+    /// Rows without edges.
+    pub(in super::super) rows: i32,
 }
 
 /// What is beside the last stitch of a row, above the last row and below the first one.
@@ -91,11 +125,17 @@ const NONE: u32 = u32::MAX;
 impl Loops {
     /// The loops of rows from the first one upwards.
     pub(in super::super) fn new(rows: &[Vec<Stitch>], cast_on: usize, border: Border) -> Self {
+        let backwards = border.round.is_none() && rows.len() % 2 == 1;
+        Self::bound_off(rows, cast_on, border, backwards)
+    }
+
+    /// The same, with the side from which a finished piece is bound off.
+    pub(in super::super) fn bound_off(rows: &[Vec<Stitch>], cast_on: usize, border: Border, backwards: bool) -> Self {
         let mut maker = Maker::new(rows, cast_on, border);
         maker.positions();
         maker.draw();
         if border.finished {
-            maker.bind_off();
+            maker.bind_off(backwards);
         }
         maker.finish()
     }
@@ -295,7 +335,7 @@ impl<'a> Maker<'a> {
                 .map(|&at| self.push(Loop { row: -1, at, foot: at, twist: 1.0, yarn: CAST_ON, ..plain.clone() }))
                 .collect();
             let visits = self.cast.iter().enumerate().map(|(j, &c)| (j as u32, Visit::Loop(c))).collect();
-            self.below = Some(Course { row: -1, visits });
+            self.below = Some(Course::new(-1, visits));
         }
         // Loops first, for at a periodic border they are drawn through those of the last row.
         for (r, row) in self.rows.iter().enumerate() {
@@ -321,7 +361,7 @@ impl<'a> Maker<'a> {
                 }));
             }
             self.made.push(made);
-            self.courses.push(Course { row: r as i32, visits });
+            self.courses.push(Course::new(r as i32, visits));
         }
         let mut content = Vec::new();
         for r in 0..self.rows.len() {
@@ -400,10 +440,9 @@ impl<'a> Maker<'a> {
     }
 
     /// Each stitch of the last row is drawn through it and through the one before it.
-    fn bind_off(&mut self) {
+    fn bind_off(&mut self, backwards: bool) {
         let last = self.rows.len() - 1;
         let row = self.rows.len() as i32;
-        let backwards = self.border.round.is_none() && row % 2 == 1;
         let n = self.rows[last].len();
         let mut visits = Vec::with_capacity(n);
         let mut before: Option<u32> = None;
@@ -433,7 +472,7 @@ impl<'a> Maker<'a> {
         if backwards {
             visits.reverse();
         }
-        self.above = Some(Course { row, visits });
+        self.above = Some(Course::new(row, visits));
     }
 
     fn finish(mut self) -> Loops {
@@ -441,6 +480,6 @@ impl<'a> Maker<'a> {
         courses.extend(self.below.take());
         courses.append(&mut self.courses);
         courses.extend(self.above.take());
-        Loops { loops: self.loops, courses, border: self.border }
+        Loops { loops: self.loops, courses, border: self.border, rows: self.rows.len() as i32 }
     }
 }

@@ -11,7 +11,8 @@ use super::{
         rods::{Rods, Run, Strand},
     },
     cell::Cell,
-    loops::{Loop, Loops, Visit},
+    colors::{Hold, Way},
+    loops::{Course, Loop, Loops, Visit},
     shape::{Piece, Place, points_of, spaced},
 };
 
@@ -24,6 +25,14 @@ pub(super) enum Surface {
 }
 
 impl Surface {
+    /// How far it is from one unit of `at` to the next.
+    fn across(&self, p: &Place) -> f64 {
+        match self {
+            Self::Plane { width, .. } => *width,
+            Self::Round { revolution, height } => TAU * revolution.radius((p.up + p.at - 0.5) * height),
+        }
+    }
+
     fn place(&self, p: &Place) -> DVec3 {
         match self {
             Self::Plane { width, height } => DVec3::new(p.at * width, p.up * height, p.out),
@@ -69,64 +78,149 @@ pub(super) struct Laying<'a> {
 
 /// Stitches and rows at the edges that find their place anew.
 const EDGE: usize = 2;
+/// Length of yarn beyond the first and the last stitch, in diameters.
+const TAIL: f64 = 6.0;
 
 impl Laying<'_> {
-    /// One yarn through all rows: it turns at the edges of a flat piece, and goes round and round in a tube.
-    pub(super) fn thread(&self) -> Thread {
-        let courses = &self.loops.courses;
-        let last = courses.len() - 1;
+    /// The yarns: each goes through its rows, turns at the edges of a flat piece, and goes round and round in a tube.
+    pub(super) fn threads(&self, ways: &[Way]) -> Vec<Thread> {
         let pieces = self.loops.pieces();
-        let round = self.loops.border.turns;
+        ways.iter().map(|way| self.thread(way, &pieces)).collect()
+    }
+
+    fn thread(&self, way: &Way, pieces: &[Vec<Piece>]) -> Thread {
         let mut all = Thread::default();
-        for (c, (course, pieces)) in courses.iter().zip(&pieces).enumerate() {
-            let mut own = Thread::default();
-            let count = course.visits.len();
-            for (k, ((_, visit), piece)) in course.visits.iter().zip(pieces).enumerate() {
-                let side = !round && (k < EDGE || k + EDGE >= count);
-                let edge = side || (self.loops.border.finished && (c <= EDGE || c + EDGE > last));
-                self.lay(course.row, k, visit, piece, edge, &mut own);
-            }
-            if let (Some(piece), Some(end)) = (pieces.last(), pieces.last().and_then(|p| p.places.last())) {
-                // The end of a row, where it is not the beginning of the next.
-                if !round {
-                    own.push(self.surface.place(end), 0.0, piece.grid[piece.grid.len() - 1], State::Move);
-                }
-            }
-            let backwards = if round { course.row == -1 } else { course.row.rem_euclid(2) == 1 };
+        // Where it begins, and where it is.
+        let (mut start, mut here): (Option<Place>, Option<(i32, Place)>) = (None, None);
+        for &(row, backwards) in &way.rows {
+            let is_own = |c: &usize| self.loops.courses[*c].color == way.color;
+            let Some(c) = self.courses_of(row).find(is_own) else { continue };
+            let mut own = self.row(c, &pieces[c]);
+            let ends = pieces[c].first().zip(pieces[c].last());
+            let Some(ends) = ends.map(|(a, b)| [a.places[0], b.places[b.places.len() - 1]]) else { continue };
             if backwards {
                 own.reverse();
             }
-            all.join(
-                own,
-                if round {
-                    0.0
-                } else if backwards {
-                    1.0
-                } else {
-                    -1.0
-                },
-            );
+            let [from, to] = if backwards { [ends[1], ends[0]] } else { ends };
+            start.get_or_insert(from);
+            match here {
+                Some((before, place)) if row - before > 1 => self.carry(&mut all, place, from, own),
+                _ => all.join(own, self.side(backwards)),
+            }
+            here = Some((row, to));
+        }
+        if !self.loops.border.finished {
+            return all;
+        }
+        let is_in = |row: i32| way.rows.iter().any(|r| r.0 == row);
+        match here {
+            _ if is_in(self.loops.rows) => all.tail(TAIL, DVec3::Y, false),
+            Some((_, place)) => all.go_on(&self.hidden(place)),
+            None => {}
+        }
+        match start {
+            _ if is_in(-1) => all.tail(TAIL, DVec3::NEG_Y, true),
+            Some(place) => all.come_from(&self.hidden(place)),
+            None => {}
         }
         all
     }
 
-    fn lay(&self, row: i32, k: usize, visit: &Visit, piece: &Piece, edge: bool, out: &mut Thread) {
-        let own = match visit {
-            Visit::Loop(i) => Some(&self.loops.loops[*i as usize]),
-            Visit::Pass { .. } => None,
-        };
-        let rows = self.loops.courses.len();
+    /// To which side a yarn turns before it goes through a row of a flat piece.
+    fn side(&self, backwards: bool) -> f64 {
+        match (self.loops.border.turns, backwards) {
+            (true, _) => 0.0,
+            (false, true) => 1.0,
+            (false, false) => -1.0,
+        }
+    }
+
+    /// A yarn goes on some rows higher: up the side of a flat piece, inside of a tube.
+    fn carry(&self, all: &mut Thread, from: Place, to: Place, own: Thread) {
+        let turns = self.loops.border.turns;
+        // The row before ended a turn farther, and a row higher, than it began.
+        let from = if turns { Place { at: from.at - 1.0, up: from.up + 1.0, ..from } } else { from };
+        let side = if turns { 0.0 } else { 0.12 * to.at.signum() };
+        let line = (0..=64).map(|k| {
+            let t = f64::from(k) / 64.0;
+            let deep = (4.0 * t * (1.0 - t)).sqrt();
+            let mix = |a: f64, b: f64| a + (b - a) * t;
+            let out = mix(from.out, to.out) - deep;
+            let place = Place { at: mix(from.at, to.at) + side * deep, up: mix(from.up, to.up), out };
+            self.surface.place(&place)
+        });
+        all.go_on(&line.collect::<Vec<_>>());
+        // The row begins with the last of these.
+        all.pop();
+        all.join(own, 0.0);
+    }
+
+    /// The end of a yarn that neither casts on nor binds off: from the edge of the row back behind it.
+    fn hidden(&self, end: Place) -> Vec<DVec3> {
+        const DEEP: f64 = 2.9;
+        let middle = if self.loops.border.turns { 0.5 } else { 0.0 };
+        let inward = (middle - end.at).signum() / self.surface.across(&end);
+        let line = (0..=64).map(|k| {
+            let along = TAIL * f64::from(k) / 64.0;
+            let down = (along / 2.5).min(1.0);
+            let at = end.at + inward * (along - 1.2).max(0.0);
+            self.surface.place(&Place {
+                at,
+                up: end.up,
+                out: end.out - (end.out + DEEP) * down * down * (3.0 - 2.0 * down),
+            })
+        });
+        line.collect()
+    }
+
+    /// Those of a row: they follow each other.
+    fn courses_of(&self, row: i32) -> std::ops::Range<usize> {
+        let courses = &self.loops.courses;
+        courses.partition_point(|c| c.row < row)..courses.partition_point(|c| c.row <= row)
+    }
+
+    /// A yarn's way along a row, from left to right.
+    fn row(&self, c: usize, pieces: &[Piece]) -> Thread {
+        let course = &self.loops.courses[c];
+        let round = self.loops.border.turns;
         let finished = self.loops.border.finished;
-        let cell = usize::try_from(row).ok().and_then(|r| (self.cells)(r));
+        let (low, high) = (EDGE as i32 - 1, self.loops.rows - EDGE as i32 + 1);
+        let mut own = Thread::default();
+        let count = course.visits.len();
+        for (k, piece) in pieces.iter().enumerate() {
+            let side = !round && (k < EDGE || k + EDGE >= count);
+            let begins = round && !course.holds.is_empty() && (k == 0 || k + 1 == count);
+            let edge = side || begins || (finished && (course.row <= low || course.row >= high)) || course.is_mixed(k);
+            self.lay(course, k, piece, edge, &mut own);
+        }
+        if let (Some(piece), Some(end)) = (pieces.last(), pieces.last().and_then(|p| p.places.last())) {
+            // The end of a row, where it is not the beginning of the next.
+            if !round {
+                own.push(self.surface.place(end), 0.0, piece.grid[piece.grid.len() - 1], State::Move);
+            }
+        }
+        own
+    }
+
+    fn lay(&self, course: &Course, k: usize, piece: &Piece, edge: bool, out: &mut Thread) {
+        let row = course.row;
+        let own = match course.visits[k].1 {
+            Visit::Loop(i) => Some(&self.loops.loops[i as usize]),
+            Visit::Pass { .. } | Visit::Float { .. } => None,
+        };
+        let is_float = matches!(course.visits[k].1, Visit::Float { .. });
+        let finished = self.loops.border.finished;
+        let cell = usize::try_from(row).ok().filter(|_| !is_float).and_then(|r| (self.cells)(r));
         let held = |grid: [f32; 2]| {
             let head = grid[1] - row as f32;
-            !finished && ((row == 0 && head < 0.1) || (row as usize + 1 == rows && head > 0.9))
+            !finished && ((row == 0 && head < 0.1) || (row + 1 == self.loops.rows && head > 0.9))
         };
         let state = |grid: [f32; 2], rest: bool| match (held(grid), rest) {
             (true, _) => State::Held,
             (false, true) => State::Rest,
             (false, false) => State::Move,
         };
+        let first = out.points.len();
         match (cell, &self.surface) {
             // As the cell has it.
             (Some((cell, r)), Surface::Plane { width, height }) if self.even => {
@@ -137,13 +231,14 @@ impl Laying<'_> {
                     let grid = [g[0], g[1] - r as f32 + row as f32];
                     out.push(p + left, rest, grid, state(grid, !edge));
                 }
+                self.lead(course, k, piece, first, out);
                 return;
             }
             // Bent round.
             (Some((cell, r)), Surface::Round { .. }) if self.plain(own) => {
                 let Some(own) = own else { return };
                 let [width, height] = cell.gauge();
-                let count = self.loops.courses.get(row as usize).map_or(1, |c| c.visits.len()) as f64;
+                let count = course.visits.len() as f64;
                 let rest = cell.rest(r, k);
                 for (p, g) in cell.visit(r, k) {
                     let head = f64::from(g[1] - r as f32);
@@ -158,6 +253,7 @@ impl Laying<'_> {
                         state(grid, self.even && !edge),
                     );
                 }
+                self.lead(course, k, piece, first, out);
                 return;
             }
             _ => {}
@@ -168,6 +264,28 @@ impl Laying<'_> {
             let (a, b) = (piece.grid[i], piece.grid[i + 1]);
             let grid = [0, 1].map(|c| a[c] + share as f32 * (b[c] - a[c]));
             out.push(point, piece.yarn * self.yarn / count as f64, grid, state(grid, false));
+        }
+    }
+
+    /// Leads the ends of a loop, laid from point `first` on as its cell has it, to the floats beside it, and around what it
+    /// catches.
+    fn lead(&self, course: &Course, k: usize, piece: &Piece, first: usize, out: &mut Thread) {
+        const REACH: f64 = 0.22;
+        let n = course.visits.len();
+        let float = |k: usize| matches!(course.visits[k % n].1, Visit::Float { .. });
+        let count = out.points.len() - first;
+        let Some((begin, end)) = piece.places.first().zip(piece.places.last()) else { return };
+        let sides = [(begin, first, k + n - 1, k + n - 1), (end, first + count - 1, k, k + 1)];
+        let by = sides.map(|(place, point, joint, beside)| {
+            let mixed = float(beside) || course.hold(joint % n) != Hold::None;
+            if mixed { self.surface.place(place) - out.points[point] } else { DVec3::ZERO }
+        });
+        for i in 0..count {
+            let along = (i as f64 + 0.5) / count as f64;
+            for (by, from) in by.iter().zip([along, 1.0 - along]) {
+                let near = (1.0 - from / REACH).max(0.0);
+                out.points[first + i] += *by * (near * near * (3.0 - 2.0 * near));
+            }
         }
     }
 
@@ -208,19 +326,15 @@ impl Thread {
         if let (Some(&from), Some(&to)) = (self.points.last(), next.points.first()) {
             if side != 0.0 {
                 const BULGE: f64 = 0.8;
-                let steps = (from.distance(to) / 0.7).ceil().clamp(2.0, 16.0) as usize;
                 let (a, b) = (from + DVec3::X * side * BULGE, to + DVec3::X * side * BULGE);
-                let at = |t: f64| {
+                let at = |k: u32| {
+                    let t = f64::from(k) / 32.0;
                     let u = 1.0 - t;
                     from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t)
                 };
-                let grid = self.grid[self.grid.len() - 1];
-                let line: Vec<DVec3> = (0..=steps).map(|k| at(k as f64 / steps as f64)).collect();
-                let rest = line.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>() / steps as f64;
-                if let Some(last) = self.rest.last_mut() {
-                    *last = rest;
-                }
-                line[1..steps].iter().for_each(|p| self.push(*p, rest, grid, State::Move));
+                self.go_on(&(0..=32).map(at).collect::<Vec<_>>());
+                // The row begins with the last of these.
+                self.pop();
             } else if let Some(last) = self.rest.last_mut()
                 && *last == 0.0
             {
@@ -233,22 +347,45 @@ impl Thread {
         self.state.append(&mut next.state);
     }
 
-    /// Goes on straight for a while at both ends.
-    pub(super) fn tails(&mut self, length: f64, at_start: DVec3, at_end: DVec3) {
-        const STEP: f64 = 0.6;
-        let steps = (length / STEP).round().max(1.0) as usize;
-        if let (Some(&from), Some(&grid)) = (self.points.last(), self.grid.last()) {
-            if let Some(last) = self.rest.last_mut() {
-                *last = STEP;
-            }
-            (1..=steps).for_each(|k| self.push(from + at_end * (STEP * k as f64), STEP, grid, State::Move));
+    /// Goes on along a line that begins where it ends.
+    fn go_on(&mut self, line: &[DVec3]) {
+        const STEP: f64 = 0.7;
+        let (Some(&grid), Some(last)) = (self.grid.last(), self.rest.last_mut()) else { return };
+        let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let count = (length / STEP).ceil().clamp(2.0, 64.0) as usize;
+        let rest = length / count as f64;
+        *last = rest;
+        for (point, ..) in spaced(line, count).into_iter().skip(1) {
+            self.push(point, rest, grid, State::Move);
         }
-        if let (Some(&from), Some(&grid)) = (self.points.first(), self.grid.first()) {
-            let mut tail = Self::default();
-            (1..=steps).rev().for_each(|k| tail.push(from + at_start * (STEP * k as f64), STEP, grid, State::Move));
-            tail.join(std::mem::take(self), 0.0);
-            *self = tail;
-        }
+        self.push(line[line.len() - 1], rest, grid, State::Move);
+    }
+
+    /// Begins with the same line, from its far end.
+    fn come_from(&mut self, line: &[DVec3]) {
+        let Some(&grid) = self.grid.first() else { return };
+        let mut own = Self::default();
+        own.push(line[0], 0.0, grid, State::Move);
+        own.go_on(line);
+        own.reverse();
+        own.pop();
+        own.join(std::mem::take(self), 0.0);
+        *self = own;
+    }
+
+    fn pop(&mut self) {
+        self.points.pop();
+        self.rest.pop();
+        self.grid.pop();
+        self.state.pop();
+    }
+
+    /// Goes on straight for a while at its end or its start.
+    fn tail(&mut self, length: f64, way: DVec3, at_start: bool) {
+        let end = if at_start { self.points.first() } else { self.points.last() };
+        let Some(&from) = end else { return };
+        let line = [from, from + way * length];
+        if at_start { self.come_from(&line) } else { self.go_on(&line) }
     }
 }
 

@@ -9,7 +9,10 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::loops::{Border, Loop, Loops, Visit};
+use super::{
+    colors::Hold,
+    loops::{Border, Course, Loop, Loops, Visit},
+};
 
 /// How far across, up and out a point is: stitches or turns, rows, yarn diameters.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +78,8 @@ impl Loops {
     }
 
     /// Where the feet of a visit are: its middle, and how far up and out.
-    fn foot(&self, row: i32, visit: &Visit) -> Foot {
+    fn foot(&self, course: &Course, visit: &Visit) -> Foot {
+        let row = course.row;
         match visit {
             Visit::Loop(i) => {
                 let l = &self.loops[*i as usize];
@@ -90,6 +94,9 @@ impl Loops {
                 let out = if *front { FLOAT } else { -FLOAT };
                 Foot { at: *at, up: f64::from(row) - 0.5 * REACH, out, behind: 0.0 }
             }
+            Visit::Float { at } => {
+                Foot { at: *at, up: f64::from(row) - 0.5 * REACH + course.lift, out: -FLOAT, behind: 0.0 }
+            }
         }
     }
 
@@ -100,7 +107,7 @@ impl Loops {
             .map(|course| {
                 let count = course.visits.iter().filter(|(_, v)| self.is_stitch(v)).count().max(1);
                 let step = self.step(count);
-                let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course.row, v)).collect();
+                let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course, v)).collect();
                 let n = feet.len();
                 // The joint between a visit and the next, as the first one has it.
                 let joint = |k: usize| -> Option<Foot> {
@@ -118,7 +125,13 @@ impl Loops {
                         (-1.0, -1.0) => a.out.max(b.out),
                         _ => 0.5 * (a.out + b.out),
                     };
-                    Some(Foot { at: 0.5 * (a.at + b.at + round), up: 0.5 * (a.up + b.up + climb), out, behind: 0.0 })
+                    let (up, out) = match course.hold(k) {
+                        Hold::None => (0.5 * (a.up + b.up + climb), out),
+                        // The float dips below the feet of the stitches that hold it, in front of the yarn between them.
+                        Hold::Caught => (f64::from(course.row) + 0.5 * climb - 0.5, -1.0),
+                        Hold::Catches => (f64::from(course.row) + 0.5 * climb - 0.8, -3.0),
+                    };
+                    Some(Foot { at: 0.5 * (a.at + b.at + round), up, out, behind: 0.0 })
                 };
                 let joints: Vec<Option<Foot>> = (0..n).map(joint).collect();
                 (0..n)
@@ -137,7 +150,7 @@ impl Loops {
                         let (column, visit) = &course.visits[k];
                         match visit {
                             Visit::Loop(i) => self.loop_piece(&self.loops[*i as usize], *column, own, ends, step),
-                            Visit::Pass { .. } => pass_piece(*column, course.row, own, ends),
+                            Visit::Pass { .. } | Visit::Float { .. } => pass_piece(*column, course.row, own, ends),
                         }
                     })
                     .collect()
@@ -154,7 +167,7 @@ impl Loops {
                     self.border.finished && self.loops[*i as usize].row == -1
                 }
             }
-            Visit::Pass { .. } => true,
+            Visit::Pass { .. } | Visit::Float { .. } => true,
         }
     }
 

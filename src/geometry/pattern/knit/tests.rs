@@ -20,6 +20,7 @@ fn knit(pattern: &str, stitches: u32, rows: u32) -> Knit {
         row_height: None,
         yarn_per_stitch: None,
         points: POINTS,
+        colors: None,
     }
 }
 
@@ -295,4 +296,81 @@ fn charts_that_do_not_fit_are_refused() {
     let chart = Chart::parse(&["k", "c4f"]).unwrap();
     let error = Knit { chart, ..knit("stockinette", 6, 4) }.strands(1.0).unwrap_err();
     assert_eq!(error.problem, "row 2 repeats over 4 stitches, but finds 6");
+}
+
+/// A piece of stockinette in colours: a sign for each stitch, rows from the bottom.
+fn in_colors(rows: &[&str], form: Form) -> Knit {
+    let row = |r: &&str| r.bytes().map(|b| u16::from(b - b'a')).collect();
+    let colors = Colors { rows: rows.iter().map(row).collect(), catch: Some(5), carry: 3 };
+    let count = rows.len() as u32;
+    Knit { colors: Some(colors), form, ..knit("stockinette", rows[0].len() as u32, count) }
+}
+
+const TWO_COLORS: [&str; 8] = [
+    "aaaaaaaaaaaaaaaa",
+    "aaaaaaaaaaaaaaaa",
+    "abababababababab",
+    "aabbaabbaabbaabb",
+    "aaaaaaaabaaaaaaa",
+    "bbbbbbbbbbbbbbbb",
+    "aaaaaaaaaaaaaaaa",
+    "aaaaaaaaaaaaaaaa",
+];
+
+#[test]
+fn each_colour_is_a_yarn_whose_floats_are_on_the_back() {
+    for form in [Form::Flat, Form::Tube] {
+        let knit = in_colors(&TWO_COLORS, form.clone());
+        let made = knit.knitted(1.0).unwrap();
+        assert_eq!(made.colors, [0, 1], "{form:?}");
+        let found = measured(&made.strands);
+        eprintln!("{form:?}: {found:?}");
+        assert!(found.share <= 0.02, "{form:?}: {found:?}");
+        let radius = 16.0 * made.gauge[0] / TAU;
+        let depth = |p: &DVec3| if form == Form::Flat { p.z } else { p.x.hypot(p.z) - radius };
+        // Row 4 has one stitch of the second colour: what else that has in this row is a float.
+        let (mut floats, mut loops) = (Vec::new(), Vec::new());
+        for (strand, color) in made.strands.iter().zip(&made.colors) {
+            for (p, [wale, course]) in strand.curve.points.iter().zip(&strand.coordinates) {
+                // Away from edges, from its one stitch and from where it is caught.
+                if !(4.0..5.0).contains(course) || !(1.0..15.0).contains(wale) || (7.0..10.0).contains(wale) {
+                    continue;
+                }
+                if *color == 1 { floats.push(depth(p)) } else { loops.push(depth(p)) }
+            }
+        }
+        let back = loops.iter().copied().fold(f64::MAX, f64::min);
+        let mean = floats.iter().sum::<f64>() / floats.len() as f64;
+        eprintln!("{form:?}: {} points of floats, {mean:.2}, loops from {back:.2}", floats.len());
+        assert!(floats.len() > 20);
+        assert!(mean < -1.1, "{form:?}: {mean}");
+        let behind = floats.iter().filter(|z| **z < -0.5).count();
+        assert!(behind as f64 > 0.95 * floats.len() as f64, "{form:?}: {floats:?}");
+    }
+}
+
+#[test]
+fn a_colour_that_is_not_needed_for_long_is_cut() {
+    let mut rows = vec!["bbbbbbbb"];
+    rows.extend(["aaaaaaaa"; 6]);
+    rows.push("bbbbbbbb");
+    let cut = in_colors(&rows, Form::Flat).knitted(1.0).unwrap();
+    assert_eq!(cut.colors, [1, 0, 1]);
+    let found = measured(&cut.strands);
+    assert!(found.share <= 0.02, "{found:?}");
+    // Every yarn ends at an edge: at the corners, or behind the edge stitches.
+    let half = 4.0 * cut.gauge[0];
+    for strand in &cut.strands {
+        let points = &strand.curve.points;
+        for end in [points[0], points[points.len() - 1]] {
+            let inside = end.x.abs() < half - 1.0 && end.z > -1.5 && end.y.abs() < 0.5 * 8.0 * cut.gauge[1] - 1.0;
+            assert!(!inside, "{end}");
+        }
+    }
+    // Carried up the side it is one.
+    let carried = in_colors(&["aaaaaaaa", "aaaaaaaa", "bbbbbbbb", "bbbbbbbb", "aaaaaaaa", "aaaaaaaa"], Form::Flat);
+    let carried = carried.knitted(1.0).unwrap();
+    assert_eq!(carried.colors, [0, 1]);
+    let found = measured(&carried.strands);
+    assert!(found.share <= 0.02, "{found:?}");
 }

@@ -1,0 +1,221 @@
+//! Colour work: which yarn knits which stitch, and where the others are meanwhile.
+//!
+//! Each colour is a yarn of its own. In a row of several colours each one makes its own loops and floats behind those of the
+//! others, from edge to edge; one that a few rows do not need is carried up the side, or inside of a tube. Floats keep
+//! their order, the first colour's below, so that no two yarns wind around each other.
+
+use super::loops::{Course, Loops, Visit};
+
+/// The colours of a piece, and how they are worked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Colors {
+    /// The colour of each stitch, from 0, by rows from the first. Those of the cast-on edge and of the bind-off are what
+    /// most stitches beside them have.
+    pub rows: Vec<Vec<u16>>,
+    /// A float over more stitches is caught by the working yarn between two of its stitches.
+    pub catch: Option<u32>,
+    /// A yarn that more rows do without is cut.
+    pub carry: u32,
+}
+
+impl Colors {
+    /// Colour of a stitch; of an edge, which has no rows of its own, what its row has most.
+    pub(super) fn of(&self, row: i32, column: u32) -> u16 {
+        let last = self.rows.len() as i32 - 1;
+        let own = &self.rows[row.clamp(0, last) as usize];
+        if (0..=last).contains(&row) {
+            own.get(column as usize).or(own.last()).copied().unwrap_or(0)
+        } else {
+            most(own)
+        }
+    }
+
+    /// The most yarns that any row has, and that row, from 0.
+    pub fn most_in_a_row(&self) -> (usize, usize) {
+        let count = |row: &Vec<u16>| in_use(row.iter().copied()).len();
+        let counts = self.rows.iter().map(count).enumerate();
+        counts.map(|(r, n)| (n, r)).max_by_key(|&(n, r)| (n, std::cmp::Reverse(r))).unwrap_or((0, 0))
+    }
+
+    /// The ways of all yarns through a piece of so many rows, each a list of rows and whether it goes from right to left there.
+    /// They begin where a colour begins or was cut.
+    pub(super) fn ways(&self, finished: bool, round: bool) -> Vec<Way> {
+        let rows = self.rows.len() as i32;
+        let mut open: Vec<Option<usize>> = Vec::new();
+        let mut ways: Vec<Way> = Vec::new();
+        let (first, after) = if finished { (-1, rows + 1) } else { (0, rows) };
+        for row in first..after {
+            let own = &self.rows[row.clamp(0, rows - 1) as usize];
+            let used = if (0..rows).contains(&row) { in_use(own.iter().copied()) } else { vec![most(own)] };
+            for color in used {
+                if open.len() <= usize::from(color) {
+                    open.resize(usize::from(color) + 1, None);
+                }
+                let slot = &mut open[usize::from(color)];
+                let near = |w: &usize| ways[*w].rows.last().is_some_and(|l| row - l.0 - 1 <= self.carry as i32);
+                let way = match slot.filter(near) {
+                    Some(way) => way,
+                    None => {
+                        ways.push(Way { color, rows: Vec::new() });
+                        ways.len() - 1
+                    }
+                };
+                *slot = Some(way);
+                // A yarn goes on from the side where it hangs.
+                let backwards = match (round, ways[way].rows.last()) {
+                    (true, _) => row == -1,
+                    (false, Some(last)) => !last.1,
+                    (false, None) => row.rem_euclid(2) == 1,
+                };
+                ways[way].rows.push((row, backwards));
+            }
+        }
+        ways
+    }
+}
+
+/// The way of one yarn.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Way {
+    pub(super) color: u16,
+    /// Rows and whether it goes from right to left.
+    pub(super) rows: Vec<(i32, bool)>,
+}
+
+/// The colours in a row, each once, in their order.
+fn in_use(row: impl Iterator<Item = u16>) -> Vec<u16> {
+    let mut used: Vec<u16> = row.collect();
+    used.sort_unstable();
+    used.dedup();
+    used
+}
+
+/// What most stitches of a row have; the first of several.
+fn most(row: &[u16]) -> u16 {
+    let count = |color: u16| row.iter().filter(|c| **c == color).count();
+    in_use(row.iter().copied()).into_iter().max_by_key(|&c| (count(c), std::cmp::Reverse(c))).unwrap_or(0)
+}
+
+impl Loops {
+    /// Gives each colour of a row a course of its own.
+    pub(super) fn dye(&mut self, colors: &Colors) {
+        let courses = std::mem::take(&mut self.courses);
+        for course in courses {
+            let of = |k: usize| colors.of(course.row, course.visits[k].0);
+            let n = course.visits.len();
+            let used = in_use((0..n).map(of));
+            let holds = caught(&course, &of, &used, colors.catch, self.border.round.is_some());
+            for (rank, &color) in used.iter().enumerate() {
+                let own = |k: usize| {
+                    let (column, visit) = course.visits[k];
+                    let at = match visit {
+                        _ if of(k) == color => return (column, visit),
+                        Visit::Loop(i) => self.loops[i as usize].foot,
+                        Visit::Pass { at, .. } | Visit::Float { at } => at,
+                    };
+                    (column, Visit::Float { at })
+                };
+                let holds = (0..n).map(|k| match holds[k] {
+                    Some((float, _)) if float == color => Hold::Caught,
+                    Some((_, working)) if working == color => Hold::Catches,
+                    _ => Hold::None,
+                });
+                self.courses.push(Course {
+                    row: course.row,
+                    visits: (0..n).map(own).collect(),
+                    color,
+                    lift: LIFT * (rank as f64 - 0.5 * (used.len() - 1) as f64),
+                    holds: if used.len() > 1 { holds.collect() } else { Vec::new() },
+                });
+            }
+        }
+    }
+}
+
+/// How far apart the floats of two colours lie, in rows.
+const LIFT: f64 = 0.42;
+
+/// What happens between a visit and the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Hold {
+    None,
+    /// The float goes between the cloth and the working yarn.
+    Caught,
+    /// The working yarn goes behind the float.
+    Catches,
+}
+
+/// After which visits a float is caught: its colour and that of the working yarn.
+fn caught(
+    course: &Course,
+    of: &dyn Fn(usize) -> u16,
+    used: &[u16],
+    catch: Option<u32>,
+    round: bool,
+) -> Vec<Option<(u16, u16)>> {
+    let n = course.visits.len();
+    let mut holds = vec![None; n];
+    let Some(longest) = catch.map(|c| c.max(1) as usize) else { return holds };
+    if used.len() < 2 {
+        return holds;
+    }
+    let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
+    for &color in used {
+        let own: Vec<usize> = (0..n).filter(|&k| of(k) == color).collect();
+        let mut spans: Vec<(usize, usize)> = own.windows(2).map(|w| (w[0] + 1, w[1])).collect();
+        if let (Some(&first), Some(&last)) = (own.first(), own.last()) {
+            if round {
+                spans.push((last + 1, first + n));
+            } else {
+                spans.extend([(0, first), (last + 1, n)]);
+            }
+        }
+        for (from, to) in spans.into_iter().filter(|(from, to)| to.saturating_sub(*from) > longest) {
+            let count = (to - from).div_ceil(longest) - 1;
+            for i in 1..=count {
+                let ideal = from + (to - from) * i / (count + 1);
+                // Between two loops of one colour, where nothing else is held.
+                let fits = |k: &usize| {
+                    let (a, b) = ((k - 1) % n, k % n);
+                    of(a) == of(b) && is_loop(a) && is_loop(b) && holds[a].is_none()
+                };
+                let near = (from + 1..to).filter(fits).min_by_key(|k| (k.abs_diff(ideal), *k));
+                if let Some(k) = near {
+                    holds[(k - 1) % n] = Some((color, of(k % n)));
+                }
+            }
+        }
+    }
+    holds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn colors(rows: &[&str]) -> Colors {
+        let row = |r: &&str| r.bytes().map(|b| u16::from(b - b'a')).collect();
+        Colors { rows: rows.iter().map(row).collect(), catch: None, carry: 2 }
+    }
+
+    #[test]
+    fn a_yarn_goes_on_from_the_side_where_it_hangs_and_is_cut_after_a_while() {
+        let ways = colors(&["aa", "ab", "ab", "aa", "aa", "aa", "ab"]).ways(false, false);
+        assert_eq!(ways.len(), 3);
+        let rows = |n: i32| (0..n).map(|r| (r, r % 2 == 1)).collect::<Vec<_>>();
+        assert_eq!(ways[0], Way { color: 0, rows: rows(7) });
+        assert_eq!(ways[1], Way { color: 1, rows: vec![(1, true), (2, false)] });
+        assert_eq!(ways[2], Way { color: 1, rows: vec![(6, false)] });
+        // A row that it does without leaves it on its side.
+        let ways = colors(&["aa", "bb", "aa"]).ways(false, false);
+        assert_eq!(ways[0], Way { color: 0, rows: vec![(0, false), (2, true)] });
+        assert_eq!(ways[1], Way { color: 1, rows: vec![(1, true)] });
+    }
+
+    #[test]
+    fn edges_have_the_colour_of_most_stitches_beside_them() {
+        let colors = colors(&["abb", "aab"]);
+        assert_eq!((colors.of(-1, 0), colors.of(2, 2)), (1, 0));
+        assert_eq!(colors.most_in_a_row(), (2, 0));
+    }
+}
