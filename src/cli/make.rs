@@ -107,6 +107,9 @@ struct KnitArgs {
     /// Cast on and bound off, or with open loops.
     #[arg(long, default_value = "finished", value_parser = ["finished", "live"])]
     edges: String,
+    /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
+    #[arg(long, conflicts_with_all = ["edges", "form", "profile"])]
+    tile: bool,
     /// Control points of a stitch.
     #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
     points: u32,
@@ -224,7 +227,11 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         form,
         stitch_width: args.stitch_width,
         row_height: args.row_height,
-        edges: if args.edges == "live" { Edges::Live } else { Edges::Finished },
+        edges: match args.edges.as_str() {
+            _ if args.tile => Edges::Tile,
+            "live" => Edges::Live,
+            _ => Edges::Finished,
+        },
         yarn_per_stitch: args.yarn_per_stitch,
         points: args.points,
         colors: None,
@@ -232,9 +239,22 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
     if piece.control_points() > MAX_POINTS {
         return too_many("stitches, rows");
     }
-    let strands = piece.strands(2.0 * radius).map_err(|e| wrong(&e))?;
+    let made = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
+    let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
-    write(strands, &args.output, [radius; 2])
+    write(made.strands, &args.output, [radius; 2])?;
+    if !args.output.quiet {
+        let [width, height] = made.gauge;
+        let (across, up) = (f64::from(piece.stitches) * width, f64::from(piece.rows) * height);
+        log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));
+        log::say(&match piece.form {
+            Form::Flat if args.tile => format!("period {across:.6} across, {up:.6} up; {length:.1} of yarn"),
+            Form::Flat => format!("{across:.3} wide, {up:.3} high; {length:.1} of yarn"),
+            Form::Tube => format!("{across:.3} around, {up:.3} high; {length:.1} of yarn"),
+            Form::Revolution(_) => format!("{length:.1} of yarn"),
+        });
+    }
+    Ok(())
 }
 
 fn weave(args: &WeaveArgs) -> Result<(), Failure> {

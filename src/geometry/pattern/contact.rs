@@ -48,8 +48,18 @@ pub(super) struct Entry {
     pub(super) index: u32,
 }
 
-/// Where a cell is along z, y and x.
-type Key = [i32; 3];
+/// Where a cell is along z, y and x, as one number that is sorted fast.
+type Key = u64;
+
+fn key([z, y, x]: [i32; 3]) -> Key {
+    const HALF: i32 = 1 << 20;
+    let place = |v: i32| (v.clamp(-HALF, HALF - 1) + HALF) as u64;
+    place(z) << 42 | place(y) << 21 | place(x)
+}
+
+fn cell(key: Key) -> [i32; 3] {
+    [42, 21, 0].map(|shift| ((key >> shift) & 0x1f_ffff) as i32 - (1 << 20))
+}
 
 impl PointGrid {
     /// Sorts points into cells at least `reach` wide, so that all within `reach` of a point are in the 27 cells around
@@ -60,14 +70,14 @@ impl PointGrid {
             (Some(p), Some([nx, ny])) => DVec3::new(p.x / f64::from(nx), p.y / f64::from(ny), reach),
             _ => DVec3::splat(reach),
         };
-        let key = |p: DVec3| {
+        let key_of = |p: DVec3| {
             let mut c = (p / size).floor().as_ivec3();
             if let Some([nx, ny]) = wrap {
                 (c.x, c.y) = (c.x.rem_euclid(nx), c.y.rem_euclid(ny));
             }
-            [c.z, c.y, c.x]
+            key([c.z, c.y, c.x])
         };
-        let mut order: Vec<(Key, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key(p), i as u32)).collect();
+        let mut order: Vec<(Key, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key_of(p), i as u32)).collect();
         order.par_sort_unstable();
         let mut cells: Vec<(Key, u32)> = Vec::new();
         let mut cell_of = vec![0; points.len()];
@@ -77,7 +87,7 @@ impl PointGrid {
             }
             cell_of[index as usize] = cells.len() as u32 - 1;
         }
-        cells.push(([i32::MAX; 3], points.len() as u32));
+        cells.push((Key::MAX, points.len() as u32));
         let entries = order.iter().map(|&(_, index)| Entry { at: points[index as usize], index }).collect();
         Self { wrap, entries, cells, cell_of }
     }
@@ -90,12 +100,10 @@ impl PointGrid {
     /// The entries of the 27 cells around a cell, as few runs.
     fn runs_around(&self, cell: u32, runs: &mut Vec<Range<u32>>) {
         runs.clear();
-        let [z, y, x] = self.cells[cell as usize].0;
+        let [z, y, x] = self::cell(self.cells[cell as usize].0);
         let mut run = |z: i32, y: i32, from: i32, to: i32| {
-            let first = self.cells.partition_point(|c| c.0 < [z, y, from]);
-            let after = first + self.cells[first..].iter().take_while(|c| c.0 <= [z, y, to]).count();
-            // The last cell is none; only a point as far away as numbers reach could be taken for it.
-            let after = after.min(self.cells.len() - 1);
+            let first = self.cells.partition_point(|c| c.0 < key([z, y, from]));
+            let after = first + self.cells[first..].iter().take_while(|c| c.0 <= key([z, y, to])).count();
             if first < after {
                 runs.push(self.cells[first].1..self.cells[after].1);
             }

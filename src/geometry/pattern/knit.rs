@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-pub use self::colors::Colors;
+pub use self::colors::{Colors, Work};
 use self::{
     cell::Cell,
     colors::Way,
@@ -52,6 +52,8 @@ pub enum Edges {
     Finished,
     /// Open loops at the top, nothing below the first row.
     Live,
+    /// No edges at all: a flat patch whose rows are yarns that go on at one border as they begin at the other.
+    Tile,
 }
 
 /// A piece of knitting.
@@ -192,8 +194,40 @@ impl Knit {
     /// The ways of its yarns.
     fn ways(&self) -> Vec<Way> {
         let (finished, round) = (self.edges == Edges::Finished, self.form != Form::Flat);
-        let one = || Colors { rows: vec![vec![0]; self.rows as usize], catch: None, carry: 0 };
+        let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
         self.colors.as_ref().unwrap_or(&one()).ways(finished, round)
+    }
+
+    /// A patch that repeats, of one colour, centred.
+    fn patch(&self, diameter: f64) -> Result<Knitted, ChartError> {
+        let Some(wide) = self.repeat() else {
+            let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
+            return Err(ChartError::new(None, "a chart with shaping has no repeat for a tile", hint));
+        };
+        let high = self.chart.rows();
+        if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
+            let problem = format!("a tile of {} x {} of what repeats over {wide} x {high}", self.stitches, self.rows);
+            return Err(ChartError::new(None, problem, "give multiples of these stitches and rows"));
+        }
+        let cell = self.cell(wide, self.size(), self.points);
+        let [width, height] = cell.gauge();
+        let size = DVec2::new(f64::from(self.stitches) * width, f64::from(self.rows) * height);
+        let row = |r: usize| {
+            let visits = (cell.visits[r % high as usize].len() - 1) * (self.stitches / wide) as usize;
+            // The first point of the next patch ends it.
+            let mut way: Vec<_> = (0..visits).flat_map(|k| cell.visit(r, k)).collect();
+            way.extend(cell.visit(r, visits).next());
+            let (points, coordinates) =
+                way.into_iter().map(|(p, g)| ((p - (0.5 * size).extend(0.0)) * diameter, g)).unzip();
+            PatternStrand {
+                curve: Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None },
+                kind: StrandKind::Course,
+                index: r as u32,
+                coordinates,
+            }
+        };
+        let strands: Vec<_> = (0..self.rows as usize).map(row).collect();
+        Ok(Knitted { colors: vec![0; strands.len()], strands, gauge: [width * diameter, height * diameter] })
     }
 
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
@@ -213,12 +247,15 @@ impl Knit {
     /// # Errors
     /// The chart does not fit the stitches, or asks for more than [`MAX_POINTS`] control points.
     pub fn knitted(&self, diameter: f64) -> Result<Knitted, ChartError> {
+        if self.edges == Edges::Tile {
+            return self.patch(diameter);
+        }
         let rows = self.worked()?;
         let finished = self.edges == Edges::Finished;
         let round = self.form != Form::Flat;
         let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished };
         let ways = self.ways();
-        let backwards = ways.iter().flat_map(|w| &w.rows).any(|r| *r == (rows.len() as i32, true));
+        let backwards = ways.iter().flat_map(|w| &w.rows).any(|s| s.row == rows.len() as i32 && s.backwards);
         let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
         if let Some(colors) = &self.colors {
             loops.dye(colors);

@@ -6,10 +6,12 @@
 //! another. The unit of length is the yarn's diameter, that of force its bending stiffness over the diameter's square.
 //! Sums are taken in a fixed order: the result is the same for any number of threads.
 
+mod search;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::contact::{PointGrid, nearest};
+use super::contact::nearest;
 
 /// One yarn: some of the points, in order.
 #[derive(Clone, Debug)]
@@ -60,7 +62,7 @@ const CONTACT: f64 = 90.0;
 /// press together.
 const APART: f64 = 1.02;
 /// Contacts are looked for this much beyond touching.
-const MARGIN: f64 = 0.4;
+const MARGIN: f64 = 0.8;
 /// If one in so many points has gone half of that, and if any has after so many steps, they are looked for again.
 const MANY: usize = 200;
 const OFTEN: usize = 12;
@@ -73,19 +75,28 @@ const ALONG: f64 = 2.2;
 /// Points that are worked through at once; sums are taken over these, whatever the number of threads.
 const CHUNK: usize = 4096;
 
-/// Another segment that may touch, and by how many periods it must be moved to do so.
+/// Another segment that may touch, with a larger number; each pair is kept once.
 #[derive(Clone, Copy)]
 struct Neighbour {
     segment: u32,
+    /// By how many periods it must be moved.
     cells: [i8; 2],
+    /// How far from contact both were when they were looked for.
+    gap: f32,
 }
 
-/// Pushes of contact on both ends of a segment, and what they do to the size of the cell.
+/// Pushes of contact on both ends of a segment.
 #[derive(Clone, Copy, Default)]
 struct Push {
     from: DVec3,
     to: DVec3,
-    virial: DVec2,
+}
+
+/// Two segments that touch: the push on the second one, and how far along both it acts.
+struct Touch {
+    segments: [u32; 2],
+    by: DVec3,
+    along: [f64; 2],
 }
 
 /// Points, their speeds, the forces on them, and where they were before.
@@ -98,6 +109,8 @@ struct Work {
     pulls: Vec<DVec3>,
     pushes: Vec<Push>,
     forces: Vec<DVec3>,
+    /// How far each segment has gone since neighbours were looked for.
+    gone: Vec<f32>,
     /// Neighbours of segment i are those from `starts[i]` to `starts[i + 1]`.
     starts: Vec<u32>,
     neighbours: Vec<Neighbour>,
@@ -152,6 +165,7 @@ impl Rods {
                 before.clone_from(&self.points);
                 strained = 0.0;
             }
+            self.gone(&before, strained, &mut work.gone);
             let virial = self.forces(&has, apart, CONTACT * run.firm, &mut work);
             let free = |k: usize| f64::from(u8::from(run.free[k]));
             let cell_force = match self.period {
@@ -231,6 +245,68 @@ impl Rods {
         (run.steps, largest)
     }
 
+    /// How far each segment has gone since points were at `before`; half of what its cell has been strained with it.
+    fn gone(&self, before: &[DVec3], strained: f64, gone: &mut Vec<f32>) {
+        gone.clear();
+        let of = |(p, b): (&DVec3, &DVec3)| (p.distance(*b) + 0.5 * strained) as f32 + 1e-4;
+        gone.extend(self.points.iter().zip(before).map(of));
+        for s in &self.strands {
+            let first = gone[s.start];
+            for i in s.start..s.start + s.count {
+                let next = if i + 1 < s.start + s.count { gone[i + 1] } else { first };
+                gone[i] = gone[i].max(next);
+            }
+        }
+    }
+
+    /// Pushes of segments that touch; gives the derivative of their energy by the logarithms of the cell's width and height.
+    fn contact(&self, apart: f64, stiffness: f64, work: &mut Work) -> DVec2 {
+        let n = self.points.len();
+        let (edges, gone, starts, neighbours) = (&work.edges, &work.gone, &work.starts, &work.neighbours);
+        let period = self.period.unwrap_or_default();
+        let touches = |c: usize| -> Vec<Touch> {
+            let mut found = Vec::new();
+            for i in c * CHUNK..((c + 1) * CHUNK).min(n) {
+                let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
+                for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
+                    let j = other.segment as usize;
+                    if other.gap > gone[i] + gone[j] {
+                        continue;
+                    }
+                    let [x, y] = other.cells.map(f64::from);
+                    let q0 = self.points[j] + DVec3::new(x * period.x, y * period.y, 0.0);
+                    let near = nearest(p0, p1, q0, q0 + edges[j]);
+                    let square = near.between.length_squared();
+                    if square < apart * apart {
+                        let distance = square.sqrt().max(1e-6);
+                        let by = near.between * (stiffness * (apart - distance) / distance);
+                        found.push(Touch { segments: [i as u32, other.segment], by, along: [near.s, near.t] });
+                    }
+                }
+            }
+            found
+        };
+        let pushes = &mut work.pushes;
+        pushes.clear();
+        pushes.resize(n, Push::default());
+        let mut virial = DVec2::ZERO;
+        // In their order, whatever the number of threads.
+        let chunks: Vec<Vec<Touch>> =
+            if n <= CHUNK { vec![touches(0)] } else { (0..n.div_ceil(CHUNK)).into_par_iter().map(touches).collect() };
+        for Touch { segments, by, along } in chunks.into_iter().flatten() {
+            let [i, j] = segments.map(|s| s as usize);
+            pushes[i].from -= by * (1.0 - along[0]);
+            pushes[i].to -= by * along[0];
+            pushes[j].from += by * (1.0 - along[1]);
+            pushes[j].to += by * along[1];
+            // As long as `by`, the vector between both is this much of their distance.
+            let distance2 = by.length_squared().max(1e-300);
+            let between = by * (apart / distance2.sqrt() - 1.0 / stiffness);
+            virial -= (by * between).truncate();
+        }
+        virial
+    }
+
     /// Makes a periodic cell wider and higher.
     pub(super) fn scale(&mut self, by: DVec2) {
         let by = by.extend(1.0);
@@ -280,47 +356,8 @@ impl Rods {
                 virial += (pull * e).truncate();
             }
         }
-        // Contact.
-        let pushes = &mut work.pushes;
-        pushes.resize(n, Push::default());
-        let (starts, neighbours) = (&work.starts, &work.neighbours);
-        let period = self.period.unwrap_or_default();
-        let push = |i: usize| -> Push {
-            let mut sum = Push::default();
-            let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
-            for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
-                let j = other.segment as usize;
-                let [x, y] = other.cells.map(f64::from);
-                let q0 = self.points[j] + DVec3::new(x * period.x, y * period.y, 0.0);
-                let near = nearest(p0, p1, q0, q0 + edges[j]);
-                let square = near.between.length_squared();
-                if square >= apart * apart {
-                    continue;
-                }
-                let distance = square.sqrt().max(1e-6);
-                let by = near.between * (contact * (apart - distance) / distance);
-                sum.from -= by * (1.0 - near.s);
-                sum.to -= by * near.s;
-                // Each pair is met from both sides.
-                sum.virial -= 0.5 * (by * near.between).truncate();
-            }
-            sum
-        };
-        let fill = |(c, part): (usize, &mut [Push])| -> DVec2 {
-            let mut virial = DVec2::ZERO;
-            for (k, slot) in part.iter_mut().enumerate() {
-                let i = c * CHUNK + k;
-                *slot = if has[i] { push(i) } else { Push::default() };
-                virial += slot.virial;
-            }
-            virial
-        };
-        virial += if n <= CHUNK {
-            fill((0, pushes))
-        } else {
-            let parts: Vec<DVec2> = pushes.par_chunks_mut(CHUNK).enumerate().map(fill).collect();
-            parts.into_iter().sum::<DVec2>()
-        };
+        virial += self.contact(apart, contact, work);
+        let (pulls, pushes) = (&work.pulls, &work.pushes);
         // What pulls at a point: the segment after it, and the one before it the other way.
         let mut forces = bends;
         for s in &self.strands {
@@ -336,133 +373,6 @@ impl Rods {
         }
         work.forces = forces;
         virial
-    }
-
-    /// Finds what may touch in the steps to come.
-    fn search(&self, has: &[bool], work: &mut Work) {
-        let n = self.points.len();
-        self.edges(&mut work.edges);
-        let edges = &work.edges;
-        let halves: Vec<f64> = edges.iter().map(|e| 0.5 * e.length()).collect();
-        // One that is stretched must not make all cells wide.
-        let longest =
-            2.0 * halves.iter().copied().fold(0.05, f64::max).min(1.5 * halves.iter().sum::<f64>() / n as f64);
-        let reach = APART + MARGIN + longest;
-        let mut middles = Vec::with_capacity(n);
-        // The segment, and by how many periods its image is moved.
-        let mut images: Vec<(u32, [i8; 2])> = Vec::with_capacity(n);
-        let mut own_cells = vec![[0_i32; 2]; if self.period.is_some() { n } else { 0 }];
-        for i in 0..n {
-            let mut middle = self.points[i] + 0.5 * edges[i];
-            if let Some(period) = self.period {
-                let cell = (middle.truncate() / period).floor();
-                own_cells[i] = [cell.x as i32, cell.y as i32];
-                middle -= (cell * period).extend(0.0);
-            }
-            middles.push(middle);
-            images.push((i as u32, [0, 0]));
-        }
-        if let Some(period) = self.period {
-            let around = (DVec2::splat(reach) / period).ceil().as_ivec2();
-            for y in -around.y..=around.y {
-                for x in -around.x..=around.x {
-                    if x == 0 && y == 0 {
-                        continue;
-                    }
-                    let by = DVec2::new(f64::from(x), f64::from(y)) * period;
-                    for i in 0..n {
-                        let at = middles[i].truncate() + by;
-                        if at.cmpgt(DVec2::splat(-reach)).all() && at.cmplt(period + reach).all() {
-                            middles.push(middles[i] + by.extend(0.0));
-                            images.push((i as u32, [x as i8, y as i8]));
-                        }
-                    }
-                }
-            }
-        }
-        let grid = PointGrid::new(&middles, reach, None);
-        // How far along its strand each segment is, and the strand's number.
-        let mut along = vec![0.0; n];
-        let mut strand_of = vec![0_u32; n];
-        let mut lengths = Vec::with_capacity(self.strands.len());
-        for (k, s) in self.strands.iter().enumerate() {
-            let mut sum = 0.0;
-            for i in s.start..s.start + s.count {
-                along[i] = sum;
-                strand_of[i] = k as u32;
-                sum += self.rest[i];
-            }
-            lengths.push(sum);
-        }
-        let touch = APART + MARGIN;
-        let of = |i: usize, found: &mut Vec<Neighbour>, walk: &mut super::contact::Walk<'_>| {
-            if !has[i] {
-                return;
-            }
-            let half = halves[i];
-            let most = (touch + half + 0.5 * longest).powi(2);
-            let (p0, p1) = (middles[i] - 0.5 * edges[i], middles[i] + 0.5 * edges[i]);
-            for near in walk.around(i) {
-                // Most of what cells hold is too far away: tell that before anything else is looked at.
-                let distance = near.at.distance_squared(middles[i]);
-                if distance > most {
-                    continue;
-                }
-                let (j, mut cells) = images[near.index as usize];
-                let j = j as usize;
-                let widest = touch + half + halves[j];
-                if distance > widest * widest || !has[j] || near.index as usize == i {
-                    continue;
-                }
-                if strand_of[i] == strand_of[j] {
-                    let length = lengths[strand_of[i] as usize];
-                    let (by, round) = ((along[j] - along[i]).abs(), self.strands[strand_of[i] as usize].jump.is_some());
-                    let by = if round { by.min(length - by) } else { by };
-                    // Near along the yarn and in space: the same piece of it. (A yarn's image next door is near in space
-                    // alone, unless the period is shorter than this.)
-                    let image = near.at - middles[i];
-                    if by < ALONG && image.length() < by + half + halves[j] {
-                        continue;
-                    }
-                }
-                let half_j = 0.5 * edges[j];
-                if nearest(p0, p1, near.at - half_j, near.at + half_j).between.length_squared() > touch * touch {
-                    continue;
-                }
-                if self.period.is_some() {
-                    for k in 0..2 {
-                        cells[k] += (own_cells[i][k] - own_cells[j][k]) as i8;
-                    }
-                }
-                found.push(Neighbour { segment: j as u32, cells });
-            }
-        };
-        let chunks: Vec<(Vec<u32>, Vec<Neighbour>)> = (0..n.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|c| {
-                let mut walk = grid.walk();
-                let mut found = Vec::new();
-                let counts = (c * CHUNK..((c + 1) * CHUNK).min(n))
-                    .map(|i| {
-                        let before = found.len();
-                        of(i, &mut found, &mut walk);
-                        (found.len() - before) as u32
-                    })
-                    .collect();
-                (counts, found)
-            })
-            .collect();
-        work.starts.clear();
-        work.starts.push(0);
-        work.neighbours.clear();
-        let mut sum = 0;
-        for (counts, found) in chunks {
-            for count in counts {
-                sum += count;
-                work.starts.push(sum);
-            }
-            work.neighbours.extend(found);
-        }
     }
 }
 

@@ -14,7 +14,7 @@ use crate::{
         pattern::{
             MAX_POINTS,
             chart::{Chart, ChartError, PATTERNS},
-            knit::{self, Colors, Edges, Form, Knit, Knitted},
+            knit::{self, Colors, Edges, Form, Knit, Knitted, Work},
             knitspeak,
             overlap::overlap,
         },
@@ -46,7 +46,7 @@ pub(super) struct KnitPlan {
 #[derive(Clone, Copy)]
 enum ColorWork {
     /// A yarn for each colour.
-    Stranded { catch: Option<u32>, carry: u32 },
+    Yarns { work: Work, catch: Option<u32>, carry: u32 },
     /// One yarn that is dyed from place to place.
     Printed,
 }
@@ -61,6 +61,7 @@ impl KnitPlan {
         let Knit { stitches, rows, form, .. } = &self.knit;
         let (width, height) = (f64::from(*stitches) * made.gauge[0], f64::from(*rows) * made.gauge[1]);
         let size = match form {
+            Form::Flat if self.knit.edges == Edges::Tile => format!(", period {width:.4} x {height:.4} mm"),
             Form::Flat => format!(", {width:.0} x {height:.0} mm"),
             Form::Tube => format!(", {width:.0} mm around, {height:.0} mm high"),
             Form::Revolution(_) => String::new(),
@@ -117,17 +118,17 @@ impl KnitPlan {
         of_rows: &dyn Fn(&[u32]) -> Option<StitchColors>,
         warnings: &mut Vec<String>,
     ) -> Option<(Option<Colors>, Vec<usize>)> {
-        let ColorWork::Stranded { catch, carry } = self.work else { return Some((None, Vec::new())) };
+        let ColorWork::Yarns { work, catch, carry } = self.work else { return Some((None, Vec::new())) };
         let widths = self.told(self.knit.widths(), context)?;
         let (rows, yarns) = of_rows(&widths)?;
         if yarns.is_empty() {
             return Some((None, yarns));
         }
-        let colors = Colors { rows, catch, carry };
+        let colors = Colors { rows, work, catch, carry };
         let (most, row) = colors.most_in_a_row();
-        if most > MOST_STRANDED {
+        if most > MOST_STRANDED && work == Work::Stranded {
             warnings.push(format!(
-                "row {} is knitted of {most} yarns, and each floats behind the stitches of the others;                  `color_work = \"printed\"` makes one yarn of them",
+                "row {} is knitted of {most} yarns, and each floats behind the stitches of the others;                  with `color_work = \"intarsia\"` none does",
                 row + 1
             ));
         }
@@ -298,13 +299,24 @@ fn counted(
     let row_height = table.f64("row_height", Range::between(0.5, 20.0));
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
     let edges = table.one_of_or("edges", Edges::Finished, &[("finished", Edges::Finished), ("live", Edges::Live)]);
+    let tile = table.bool_or("tile", false);
+    if tile && (table.has("edges") || form.as_ref().is_some_and(|f| *f != Form::Flat)) {
+        table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));
+    }
+    let edges = if tile { Edges::Tile } else { edges };
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
-    let printed = table.one_of_or("color_work", false, &[("stranded", false), ("printed", true)]);
+    let works = [("stranded", Some(Work::Stranded)), ("intarsia", Some(Work::Intarsia)), ("printed", None)];
+    let work = table.one_of_or("color_work", Some(Work::Stranded), &works);
+    if work == Some(Work::Intarsia) && form.as_ref().is_some_and(|f| *f != Form::Flat) {
+        let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
+        table.error_at("color_work", "intarsia is knitted flat", Some(hint));
+    }
     let catch = table.u64_or("catch_floats", CATCH_FLOATS, 0..=1_000_000) as u32;
     let carry = table.u64_or("carry_rows", CARRY_ROWS, 0..=1_000_000) as u32;
-    let work = match printed {
-        true => ColorWork::Printed,
-        false => ColorWork::Stranded { catch: (catch > 0).then_some(catch), carry },
+    // A tile is of one yarn for each row.
+    let work = match work.filter(|_| !tile) {
+        Some(work) => ColorWork::Yarns { work, catch: (catch > 0).then_some(catch), carry },
+        None => ColorWork::Printed,
     };
     let (chart, form) = (chart?, form?);
     let knit =

@@ -1,10 +1,22 @@
 //! Colour work: which yarn knits which stitch, and where the others are meanwhile.
 //!
-//! Each colour is a yarn of its own. In a row of several colours each one makes its own loops and floats behind those of the
+//! Each colour is a yarn of its own. In stranded work, in a row of several colours each one makes its own loops and floats behind those of the
 //! others, from edge to edge; one that a few rows do not need is carried up the side, or inside of a tube. Floats keep
-//! their order, the first colour's below, so that no two yarns wind around each other.
+//! their order, the first colour's below, so that no two yarns wind around each other. In intarsia each field of a colour has
+//! a yarn, which turns where the field ends and is linked there with its neighbour's.
+
+use std::ops::Range;
 
 use super::loops::{Course, Loops, Visit};
+
+/// How a row of several colours is knitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Yarns float behind stitches of other colours.
+    Stranded,
+    /// Each field of a colour has a yarn of its own; of flat pieces only.
+    Intarsia,
+}
 
 /// The colours of a piece, and how they are worked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,6 +24,8 @@ pub struct Colors {
     /// The colour of each stitch, from 0, by rows from the first. Those of the cast-on edge and of the bind-off are what
     /// most stitches beside them have.
     pub rows: Vec<Vec<u16>>,
+    /// How several are knitted in a row.
+    pub work: Work,
     /// A float over more stitches is caught by the working yarn between two of its stitches.
     pub catch: Option<u32>,
     /// A yarn that more rows do without is cut.
@@ -26,8 +40,81 @@ impl Colors {
         if (0..=last).contains(&row) {
             own.get(column as usize).or(own.last()).copied().unwrap_or(0)
         } else {
-            most(own)
+            self.of_edge(row)
         }
+    }
+
+    /// Colour of the cast-on edge or the bind-off: in intarsia that of the yarn which hangs there.
+    fn of_edge(&self, row: i32) -> u16 {
+        let last = self.rows.len() as i32 - 1;
+        let own = &self.rows[row.clamp(0, last) as usize];
+        match self.work {
+            Work::Stranded => most(own),
+            Work::Intarsia if row > last && row.rem_euclid(2) == 1 => own.last().copied().unwrap_or(0),
+            Work::Intarsia => own.first().copied().unwrap_or(0),
+        }
+    }
+
+    /// Fields of one colour in a row: their colour and columns.
+    fn fields(&self, row: i32) -> Vec<(u16, Range<u32>)> {
+        let last = self.rows.len() as i32 - 1;
+        let own = &self.rows[row.clamp(0, last) as usize];
+        if !(0..=last).contains(&row) {
+            return vec![(self.of_edge(row), 0..own.len() as u32)];
+        }
+        let mut fields: Vec<(u16, Range<u32>)> = Vec::new();
+        for (k, &color) in own.iter().enumerate() {
+            match fields.last_mut() {
+                Some((c, columns)) if *c == color => columns.end += 1,
+                _ => fields.push((color, k as u32..k as u32 + 1)),
+            }
+        }
+        fields
+    }
+
+    /// As [`Self::ways`]: from row to row a yarn goes on in a field of its colour that is above its own.
+    fn ways_of_fields(&self, finished: bool) -> Vec<Way> {
+        let rows = self.rows.len() as i32;
+        let mut ways: Vec<Way> = Vec::new();
+        // The ways of the row below and the columns of their fields.
+        let mut below: Vec<(usize, Range<u32>)> = Vec::new();
+        for row in if finished { -1..rows + 1 } else { 0..rows } {
+            let backwards = row.rem_euclid(2) == 1;
+            let mut taken = vec![false; below.len()];
+            let mut here = Vec::new();
+            for (color, columns) in self.fields(row) {
+                let shared = |other: &Range<u32>| {
+                    let (from, to) = (other.start.max(columns.start), other.end.min(columns.end));
+                    // Fields that touch at a corner only go on too.
+                    if from <= to { Some(to - from) } else { None }
+                };
+                // An edge is knitted with the yarn that hangs at its side.
+                let hangs = |other: &Range<u32>| match row {
+                    0 if finished => columns.start == 0,
+                    r if r == rows && backwards => other.end == columns.end,
+                    r if r == rows => other.start == 0,
+                    _ => true,
+                };
+                let best = (0..below.len())
+                    .filter(|&b| !taken[b] && ways[below[b].0].color == color && hangs(&below[b].1))
+                    .filter_map(|b| shared(&below[b].1).map(|s| (s, b)))
+                    .max_by_key(|&(s, b)| (s, std::cmp::Reverse(b)));
+                let way = match best {
+                    Some((_, b)) => {
+                        taken[b] = true;
+                        below[b].0
+                    }
+                    None => {
+                        ways.push(Way { color, rows: Vec::new() });
+                        ways.len() - 1
+                    }
+                };
+                ways[way].rows.push(Stretch { row, backwards, first: columns.start });
+                here.push((way, columns));
+            }
+            below = here;
+        }
+        ways
     }
 
     /// The most yarns that any row has, and that row, from 0.
@@ -40,19 +127,22 @@ impl Colors {
     /// The ways of all yarns through a piece of so many rows, each a list of rows and whether it goes from right to left there.
     /// They begin where a colour begins or was cut.
     pub(super) fn ways(&self, finished: bool, round: bool) -> Vec<Way> {
+        if self.work == Work::Intarsia {
+            return self.ways_of_fields(finished);
+        }
         let rows = self.rows.len() as i32;
         let mut open: Vec<Option<usize>> = Vec::new();
         let mut ways: Vec<Way> = Vec::new();
         let (first, after) = if finished { (-1, rows + 1) } else { (0, rows) };
         for row in first..after {
             let own = &self.rows[row.clamp(0, rows - 1) as usize];
-            let used = if (0..rows).contains(&row) { in_use(own.iter().copied()) } else { vec![most(own)] };
+            let used = if (0..rows).contains(&row) { in_use(own.iter().copied()) } else { vec![self.of_edge(row)] };
             for color in used {
                 if open.len() <= usize::from(color) {
                     open.resize(usize::from(color) + 1, None);
                 }
                 let slot = &mut open[usize::from(color)];
-                let near = |w: &usize| ways[*w].rows.last().is_some_and(|l| row - l.0 - 1 <= self.carry as i32);
+                let near = |w: &usize| ways[*w].rows.last().is_some_and(|l| row - l.row - 1 <= self.carry as i32);
                 let way = match slot.filter(near) {
                     Some(way) => way,
                     None => {
@@ -64,10 +154,10 @@ impl Colors {
                 // A yarn goes on from the side where it hangs.
                 let backwards = match (round, ways[way].rows.last()) {
                     (true, _) => row == -1,
-                    (false, Some(last)) => !last.1,
+                    (false, Some(last)) => !last.backwards,
                     (false, None) => row.rem_euclid(2) == 1,
                 };
-                ways[way].rows.push((row, backwards));
+                ways[way].rows.push(Stretch { row, backwards, first: 0 });
             }
         }
         ways
@@ -78,8 +168,17 @@ impl Colors {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Way {
     pub(super) color: u16,
-    /// Rows and whether it goes from right to left.
-    pub(super) rows: Vec<(i32, bool)>,
+    pub(super) rows: Vec<Stretch>,
+}
+
+/// A row or a part of it that a yarn goes through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stretch {
+    pub(super) row: i32,
+    /// Whether it goes from right to left.
+    pub(super) backwards: bool,
+    /// The column where it begins on the left.
+    pub(super) first: u32,
 }
 
 /// The colours in a row, each once, in their order.
@@ -103,6 +202,10 @@ impl Loops {
         for course in courses {
             let of = |k: usize| colors.of(course.row, course.visits[k].0);
             let n = course.visits.len();
+            if colors.work == Work::Intarsia {
+                self.courses.extend(fields(&course, &of));
+                continue;
+            }
             let used = in_use((0..n).map(of));
             let holds = caught(&course, &of, &used, colors.catch, self.border.round.is_some());
             for (rank, &color) in used.iter().enumerate() {
@@ -124,12 +227,28 @@ impl Loops {
                     row: course.row,
                     visits: (0..n).map(own).collect(),
                     color,
+                    first: 0,
                     lift: LIFT * (rank as f64 - 0.5 * (used.len() - 1) as f64),
                     holds: if used.len() > 1 { holds.collect() } else { Vec::new() },
                 });
             }
         }
     }
+}
+
+/// A course for each field of a row.
+fn fields(course: &Course, of: &dyn Fn(usize) -> u16) -> Vec<Course> {
+    let n = course.visits.len();
+    let mut starts: Vec<usize> = (0..n).filter(|&k| k == 0 || of(k) != of(k - 1)).collect();
+    starts.push(n);
+    let field = |w: &[usize]| Course {
+        visits: course.visits[w[0]..w[1]].to_vec(),
+        color: of(w[0]),
+        first: w[0],
+        holds: Vec::new(),
+        ..*course
+    };
+    starts.windows(2).map(field).collect()
 }
 
 /// How far apart the floats of two colours lie, in rows.
@@ -195,7 +314,7 @@ mod tests {
 
     fn colors(rows: &[&str]) -> Colors {
         let row = |r: &&str| r.bytes().map(|b| u16::from(b - b'a')).collect();
-        Colors { rows: rows.iter().map(row).collect(), catch: None, carry: 2 }
+        Colors { rows: rows.iter().map(row).collect(), work: Work::Stranded, catch: None, carry: 2 }
     }
 
     #[test]
@@ -203,13 +322,32 @@ mod tests {
         let ways = colors(&["aa", "ab", "ab", "aa", "aa", "aa", "ab"]).ways(false, false);
         assert_eq!(ways.len(), 3);
         let rows = |n: i32| (0..n).map(|r| (r, r % 2 == 1)).collect::<Vec<_>>();
-        assert_eq!(ways[0], Way { color: 0, rows: rows(7) });
-        assert_eq!(ways[1], Way { color: 1, rows: vec![(1, true), (2, false)] });
-        assert_eq!(ways[2], Way { color: 1, rows: vec![(6, false)] });
+        assert_eq!(drawn(&ways[0]), (0, rows(7)));
+        assert_eq!(drawn(&ways[1]), (1, vec![(1, true), (2, false)]));
+        assert_eq!(drawn(&ways[2]), (1, vec![(6, false)]));
         // A row that it does without leaves it on its side.
         let ways = colors(&["aa", "bb", "aa"]).ways(false, false);
-        assert_eq!(ways[0], Way { color: 0, rows: vec![(0, false), (2, true)] });
-        assert_eq!(ways[1], Way { color: 1, rows: vec![(1, true)] });
+        assert_eq!(drawn(&ways[0]), (0, vec![(0, false), (2, true)]));
+        assert_eq!(drawn(&ways[1]), (1, vec![(1, true)]));
+    }
+
+    fn drawn(way: &Way) -> (u16, Vec<(i32, bool)>) {
+        (way.color, way.rows.iter().map(|s| (s.row, s.backwards)).collect())
+    }
+
+    #[test]
+    fn each_field_of_intarsia_has_a_yarn() {
+        let colors = Colors { work: Work::Intarsia, ..colors(&["aaabbb", "aabbbb", "aabbaa"]) };
+        let ways = colors.ways(false, false);
+        let rows = |w: &Way| w.rows.iter().map(|s| (s.row, s.first)).collect::<Vec<_>>();
+        assert_eq!(ways.len(), 3);
+        assert_eq!(rows(&ways[0]), [(0, 0), (1, 0), (2, 0)]);
+        assert_eq!(rows(&ways[1]), [(0, 3), (1, 2), (2, 2)]);
+        assert_eq!(rows(&ways[2]), [(2, 4)]);
+        // Cast on with the yarn on the left; bound off from the right with what hangs there.
+        let ways = colors.ways(true, false);
+        assert_eq!(ways.iter().map(|w| (w.color, w.rows[0].row)).collect::<Vec<_>>(), [(0, -1), (1, 0), (0, 2)]);
+        assert_eq!(ways[2].rows.last().map(|s| s.row), Some(3));
     }
 
     #[test]

@@ -58,6 +58,8 @@ pub(in super::super) struct Course {
     /// What the yarn does, each with the column of the chart.
     pub(in super::super) visits: Vec<(u32, Visit)>,
     pub(in super::super) color: u16,
+    /// Visits of the row before its own, where it is a field of one.
+    pub(in super::super) first: usize,
     /// How far its floats are lifted, in rows: those of several colours lie beside each other.
     pub(in super::super) lift: f64,
     /// What happens after each visit; none where nothing does.
@@ -66,7 +68,7 @@ pub(in super::super) struct Course {
 
 impl Course {
     fn new(row: i32, visits: Vec<(u32, Visit)>) -> Self {
-        Self { row, visits, color: 0, lift: 0.0, holds: Vec::new() }
+        Self { row, visits, color: 0, first: 0, lift: 0.0, holds: Vec::new() }
     }
 
     /// What happens between a visit and the next one.
@@ -89,8 +91,9 @@ pub(in super::super) struct Loops {
     pub(in super::super) loops: Vec<Loop>,
     pub(in super::super) courses: Vec<Course>,
     pub(in super::super) border: Border,
-    /// Rows without edges.
+    /// Rows without edges, and stitches of the first one.
     pub(in super::super) rows: i32,
+    pub(in super::super) wide: usize,
 }
 
 /// What is beside the last stitch of a row, above the last row and below the first one.
@@ -480,6 +483,12 @@ impl<'a> Maker<'a> {
         courses.extend(self.below.take());
         courses.append(&mut self.courses);
         courses.extend(self.above.take());
-        Loops { loops: self.loops, courses, border: self.border, rows: self.rows.len() as i32 }
+        Loops {
+            loops: self.loops,
+            courses,
+            border: self.border,
+            rows: self.rows.len() as i32,
+            wide: self.rows[0].len(),
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::{
         rods::{Rods, Run, Strand},
     },
     cell::Cell,
-    colors::{Hold, Way},
+    colors::{Hold, Stretch, Way},
     loops::{Course, Loop, Loops, Visit},
     shape::{Piece, Place, points_of, spaced},
 };
@@ -92,8 +92,10 @@ impl Laying<'_> {
         let mut all = Thread::default();
         // Where it begins, and where it is.
         let (mut start, mut here): (Option<Place>, Option<(i32, Place)>) = (None, None);
-        for &(row, backwards) in &way.rows {
-            let is_own = |c: &usize| self.loops.courses[*c].color == way.color;
+        for &Stretch { row, backwards, first } in &way.rows {
+            let of = |c: usize| &self.loops.courses[c];
+            let is_own = |c: &usize| of(*c).color == way.color && (of(*c).first == 0) == (first == 0);
+            let is_own = |c: &usize| is_own(c) && (first == 0 || of(*c).visits.iter().any(|v| v.0 == first));
             let Some(c) = self.courses_of(row).find(is_own) else { continue };
             let mut own = self.row(c, &pieces[c]);
             let ends = pieces[c].first().zip(pieces[c].last());
@@ -105,6 +107,9 @@ impl Laying<'_> {
             start.get_or_insert(from);
             match here {
                 Some((before, place)) if row - before > 1 => self.carry(&mut all, place, from, own),
+                Some((_, place)) if self.is_inside(row, c, backwards) => {
+                    self.link(&mut all, place, from, own, backwards)
+                }
                 _ => all.join(own, self.side(backwards)),
             }
             here = Some((row, to));
@@ -112,7 +117,7 @@ impl Laying<'_> {
         if !self.loops.border.finished {
             return all;
         }
-        let is_in = |row: i32| way.rows.iter().any(|r| r.0 == row);
+        let is_in = |row: i32| way.rows.iter().any(|r| r.row == row);
         match here {
             _ if is_in(self.loops.rows) => all.tail(TAIL, DVec3::Y, false),
             Some((_, place)) => all.go_on(&self.hidden(place)),
@@ -133,6 +138,41 @@ impl Laying<'_> {
             (false, true) => 1.0,
             (false, false) => -1.0,
         }
+    }
+
+    /// Whether a field of a row begins beside another one, for a yarn that comes from the row below.
+    fn is_inside(&self, row: i32, c: usize, backwards: bool) -> bool {
+        let all = self.courses_of(row);
+        if backwards { c + 1 < all.end } else { c > all.start }
+    }
+
+    /// A yarn turns where its field ends: behind the cloth, around the neighbour's yarn, which turns half way up and half
+    /// way down from it.
+    fn link(&self, all: &mut Thread, from: Place, to: Place, own: Thread, backwards: bool) {
+        const OUT: f64 = 0.24;
+        const UP: f64 = 0.17;
+        let side = self.side(backwards);
+        let far = if side > 0.0 { from.at.max(to.at) } else { from.at.min(to.at) } + side * OUT;
+        let knots = [
+            from,
+            Place { at: from.at, up: from.up - UP, out: -1.2 },
+            Place { at: 0.5 * (from.at + far), up: from.up - UP, out: -1.2 },
+            Place { at: far, up: from.up + UP, out: -2.2 },
+            Place { at: far, up: to.up - UP, out: -2.2 },
+            Place { at: 0.5 * (to.at + far), up: to.up + UP, out: -1.2 },
+            Place { at: to.at, up: to.up + UP, out: -1.2 },
+            to,
+        ]
+        .map(|p| self.surface.place(&p));
+        let at = |k: usize| knots[k.min(knots.len() - 1)];
+        let line = (0..=8 * (knots.len() - 1)).map(|k| {
+            let (i, t) = (k / 8, (k % 8) as f64 / 8.0);
+            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
+            b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+        });
+        all.go_on(&line.collect::<Vec<_>>());
+        all.pop();
+        all.join(own, 0.0);
     }
 
     /// A yarn goes on some rows higher: up the side of a flat piece, inside of a tube.
@@ -224,10 +264,10 @@ impl Laying<'_> {
         match (cell, &self.surface) {
             // As the cell has it.
             (Some((cell, r)), Surface::Plane { width, height }) if self.even => {
-                let n = self.loops.courses[0].visits.len() as f64;
+                let n = self.loops.wide as f64;
                 let left = DVec3::new(-0.5 * n * width, f64::from(row) * height - r as f64 * height, 0.0);
-                let rest = cell.rest(r, k);
-                for (p, g) in cell.visit(r, k) {
+                let rest = cell.rest(r, course.first + k);
+                for (p, g) in cell.visit(r, course.first + k) {
                     let grid = [g[0], g[1] - r as f32 + row as f32];
                     out.push(p + left, rest, grid, state(grid, !edge));
                 }
@@ -239,8 +279,8 @@ impl Laying<'_> {
                 let Some(own) = own else { return };
                 let [width, height] = cell.gauge();
                 let count = course.visits.len() as f64;
-                let rest = cell.rest(r, k);
-                for (p, g) in cell.visit(r, k) {
+                let rest = cell.rest(r, course.first + k);
+                for (p, g) in cell.visit(r, course.first + k) {
                     let head = f64::from(g[1] - r as f32);
                     let lean = own.foot - own.at + (self.head(own) - own.foot) * head;
                     let at = own.at + lean + (p.x / width - (k as f64 + 0.5)) / count;

@@ -116,8 +116,6 @@ impl Loops {
                         return None;
                     }
                     let round = if next == 0 { self.border.round.unwrap_or(0.0) } else { 0.0 };
-                    // Where the rows are a spiral, the next round begins a row higher.
-                    let climb = if next == 0 && self.border.turns { 1.0 } else { 0.0 };
                     let b = feet[next];
                     // Between two that are behind, the yarn stays behind both.
                     let out = match (a.behind, b.behind) {
@@ -126,10 +124,10 @@ impl Loops {
                         _ => 0.5 * (a.out + b.out),
                     };
                     let (up, out) = match course.hold(k) {
-                        Hold::None => (0.5 * (a.up + b.up + climb), out),
+                        Hold::None => (0.5 * (a.up + b.up), out),
                         // The float dips below the feet of the stitches that hold it, in front of the yarn between them.
-                        Hold::Caught => (f64::from(course.row) + 0.5 * climb - 0.5, -1.0),
-                        Hold::Catches => (f64::from(course.row) + 0.5 * climb - 0.8, -3.0),
+                        Hold::Caught => (f64::from(course.row) - 0.5, -1.0),
+                        Hold::Catches => (f64::from(course.row) - 0.8, -3.0),
                     };
                     Some(Foot { at: 0.5 * (a.at + b.at + round), up, out, behind: 0.0 })
                 };
@@ -140,10 +138,7 @@ impl Loops {
                         let end = |side: f64| Foot { at: own.at + side * 0.5 * step, ..own };
                         let left = match (k, self.border.round) {
                             (0, None) => None,
-                            (0, Some(round)) => joints[n - 1].map(|j| {
-                                let climb = if self.border.turns { 1.0 } else { 0.0 };
-                                Foot { at: j.at - round, up: j.up - climb, ..j }
-                            }),
+                            (0, Some(round)) => joints[n - 1].map(|j| Foot { at: j.at - round, ..j }),
                             _ => joints[k - 1],
                         };
                         let ends = [left.unwrap_or(end(-1.0)), joints[k].unwrap_or(end(1.0))];

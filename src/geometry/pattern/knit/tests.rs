@@ -135,7 +135,10 @@ fn expected(loops: &Loops) -> Passes {
 
 /// A relaxed cell of a chart and its loops.
 fn relaxed(chart: &Chart) -> (Cell, Loops) {
-    let wide = chart.even_width(100).unwrap();
+    relaxed_on(chart, chart.even_width(100).unwrap())
+}
+
+fn relaxed_on(chart: &Chart, wide: u32) -> (Cell, Loops) {
     let rows = chart.work(wide, chart.rows(), 10_000).unwrap();
     let cell = Cell::of_rows(&rows, YARN_PER_STITCH, POINTS, [None; 2]);
     (cell, Loops::new(&rows, wide as usize, Border::cell(wide as usize)))
@@ -143,7 +146,11 @@ fn relaxed(chart: &Chart) -> (Cell, Loops) {
 
 #[track_caller]
 fn holds(name: &str, chart: &Chart) {
-    let (cell, loops) = relaxed(chart);
+    held(name, relaxed(chart));
+}
+
+#[track_caller]
+fn held(name: &str, (cell, loops): (Cell, Loops)) {
     let expected = expected(&loops);
     // The surface that a loop spans may end at its feet or a little above them: where yarns bulge, one of them cuts
     // what is not drawn through it.
@@ -172,9 +179,19 @@ fn every_stitch_is_drawn_through_what_the_chart_says() {
         &["p3", "p2tog yo p"],
         &["k sl", "k2"],
         &["k tuck", "tuck p"],
+        &["k3", "k tuck k", "k3"],
+        &["k3", "k slwyif k"],
+        &["k4", "k4", "yo k3tog yo k"],
+        &["k4", "k4", "yo cdd yo k"],
     ] {
         holds(&rows.join(" / "), &Chart::parse(rows).unwrap());
     }
+}
+
+#[test]
+fn an_increase_is_drawn_through_what_the_chart_says() {
+    // Its rows are of different length: four stitches become five and four again.
+    held("kfb", relaxed_on(&Chart::parse(&["k3 kfb", "k3 k2tog"]).unwrap(), 4));
 }
 
 #[test]
@@ -301,7 +318,7 @@ fn charts_that_do_not_fit_are_refused() {
 /// A piece of stockinette in colours: a sign for each stitch, rows from the bottom.
 fn in_colors(rows: &[&str], form: Form) -> Knit {
     let row = |r: &&str| r.bytes().map(|b| u16::from(b - b'a')).collect();
-    let colors = Colors { rows: rows.iter().map(row).collect(), catch: Some(5), carry: 3 };
+    let colors = Colors { rows: rows.iter().map(row).collect(), work: Work::Stranded, catch: Some(5), carry: 3 };
     let count = rows.len() as u32;
     Knit { colors: Some(colors), form, ..knit("stockinette", rows[0].len() as u32, count) }
 }
@@ -373,4 +390,52 @@ fn a_colour_that_is_not_needed_for_long_is_cut() {
     assert_eq!(carried.colors, [0, 1]);
     let found = measured(&carried.strands);
     assert!(found.share <= 0.02, "{found:?}");
+}
+
+#[test]
+fn a_tile_goes_on_at_one_border_as_it_begins_at_the_other() {
+    let tile = Knit { edges: Edges::Tile, ..knit("rib2x2", 8, 3) };
+    let made = tile.knitted(1.0).unwrap();
+    let period = DVec3::new(8.0 * made.gauge[0], 0.0, 0.0);
+    assert_eq!(made.strands.len(), 3);
+    for strand in &made.strands {
+        let points = &strand.curve.points;
+        assert!((points[points.len() - 1] - points[0]).distance(period) < 1e-9);
+    }
+    // Beside itself and above itself it is the same cloth: no yarn runs into another.
+    let copies = (0..9).flat_map(|k| {
+        let by = DVec3::new(f64::from(k % 3) * period.x, f64::from(k / 3) * 3.0 * made.gauge[1], 0.0);
+        made.strands.iter().map(move |s| {
+            let mut copy = s.clone();
+            copy.curve.points.iter_mut().for_each(|p| *p += by);
+            copy.curve.points.pop();
+            copy.coordinates.pop();
+            copy
+        })
+    });
+    let found = measured(&copies.collect::<Vec<_>>());
+    // Where a row is cut its two ends lie behind each other, within reach along the yarn.
+    assert!(found.share <= 0.03, "{found:?}");
+    let error = Knit { stitches: 10, ..tile }.knitted(1.0).unwrap_err();
+    assert_eq!(error.problem, "a tile of 10 x 3 of what repeats over 4 x 1");
+}
+
+#[test]
+fn fields_of_intarsia_are_linked_where_they_meet() {
+    let knit = in_colors(&["aaaabbbb"; 6], Form::Flat);
+    let colors = knit.colors.map(|c| Colors { work: Work::Intarsia, ..c });
+    let knit = Knit { colors, ..knit };
+    let made = knit.knitted(1.0).unwrap();
+    // The first yarn casts on and binds off.
+    assert_eq!(made.colors, [0, 1]);
+    let found = measured(&made.strands);
+    eprintln!("intarsia: {found:?}");
+    assert!(found.share <= 0.03, "{found:?}");
+    // Where it turns at the border, each yarn is held by the other: it cannot be drawn back to its own side.
+    let reach = |color: usize, side: f64| {
+        let inner = |c: &[f32; 2]| (1.0..5.0).contains(&c[1]) && (3.0..5.0).contains(&c[0]);
+        let points = made.strands[color].curve.points.iter().zip(&made.strands[color].coordinates);
+        points.filter(|(_, c)| inner(c)).map(|(p, _)| p.x * side).fold(f64::MIN, f64::max)
+    };
+    assert!(reach(0, 1.0) > 0.2 && reach(1, -1.0) > 0.2, "{} {}", reach(0, 1.0), reach(1, -1.0));
 }
