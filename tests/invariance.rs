@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec3, Vec3A};
 use yarnray::geometry::{
     curve::{Basis, Curve},
-    section::YarnFrame,
     strand::{StrandOptions, Strands},
+    yarn_frame::YarnFrame,
 };
 
 use crate::support::{difference, render};

@@ -16,4 +16,7 @@ mod spline;
 pub mod stage;
 pub mod strand;
 pub mod tube;
+pub mod walk;
+pub mod way;
 pub mod yarn;
+pub mod yarn_frame;

@@ -1,12 +1,18 @@
-//! A ray in the cross-section of a yarn: which plies it crosses, in order, and how many fibres on the way (paper Sec. 3.2).
+//! A ray in a yarn: which plies it crosses, in order, and how many fibres on the way (paper Sec. 3.2).
 //!
-//! The paper takes the ray as perpendicular to the yarn. Here the section travels along: where the ray is deeper by
-//! x it is farther along the yarn by x tan(theta), where the plies have turned and the yarn has bent. Embree's
-//! filter and the shading both ask [`Section::crossings`] or [`Section::meets_ply`], which place plies by the same
-//! function, so that they cannot disagree.
+//! The paper takes the ray as perpendicular to the yarn and looks at one cross-section. Here the ray is followed through
+//! the yarn. Near the place where it enters, the yarn is its circle of curvature; farther along, where the ray runs
+//! along the yarn, its next circle is looked up ([`Walker`]). What is seen of the ray in the unwound yarn, where plies are
+//! straight cylinders, is a [`Way`]; plies are met by way of it, at any angle and in any bend. A ray that crosses the
+//! yarn has a way of two stations, and one that runs along it one for every 0.8 radians by which the plies turn.
 //!
-//! Frame: z is the yarn's tangent, x points to the camera (projected into the section), y = z x x. Lengths are in
-//! yarn radii. The ray travels towards -x at y = h.
+//! Embree's filter and the shading both ask for that way ([`Section::meets_ply`], [`Section::crossings`]), and so does the
+//! light that leaves from inside ([`Section::plies_ahead`]), so that they cannot disagree.
+//!
+//! Frame: z is the yarn's tangent where the ray enters, x points to the camera (projected into the section), y = z x x;
+//! the origin is on the yarn's axis. Lengths are in yarn radii. In the section the ray travels towards -x at y = h.
+
+use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3A};
@@ -14,91 +20,44 @@ use wide::f32x4;
 
 use super::{
     density::ChordFibers,
-    yarn::{MAX_PLIES, PlyShape, YarnShape, fiber_tangent},
+    walk::{LEAST_STRAIGHTNESS, Walker},
+    way::{self, MOST_TURN, Passage, Station, Way},
+    yarn::{MAX_PLIES, YarnShape, fiber_tangent},
+    yarn_frame::{Pressed, YarnFrame},
 };
 use crate::math::{frame::sin_cos, special::GAUSS_LEGENDRE_4};
 
-/// Slope along the yarn beyond which a ray counts as no steeper.
-const MAX_SLOPE: f32 = 1.0;
-/// How far along the yarn, in yarn radii, turning and bending are followed.
-const MAX_TRAVEL: f32 = 1.2;
+/// How far and how finely a way is followed.
+#[derive(Clone, Copy)]
+struct Reach {
+    /// How far along the yarn it is taken for its circle of curvature, in yarn radii; beyond it is looked up anew.
+    near: f32,
+    /// The longest way, in yarn radii.
+    longest: f32,
+    /// The most by which plies turn from station to station, radians.
+    turn: f32,
+}
 
-/// Turns of the plies, radians per yarn radius, beyond which they are placed with more care: about 28 degrees of twist.
-const FAST_TURN: f32 = 1.0;
+/// A ray: what it meets first is seen.
+const RAY: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN };
+/// Light that leaves from inside: how far it still has to go is felt in all.
+const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN };
+/// The shortest step from one station to the next, in yarn radii.
+const LEAST_STEP: f32 = 0.1;
+/// What may be left of a way without another station, in yarn radii.
+const LEAST_LEFT: f32 = 1e-3;
+/// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
+const AT_SURFACE: f32 = 1e-4;
+/// By how much a bent yarn may bow a way between two stations, in yarn radii.
+const MOST_BOW: f32 = 0.1;
+/// Turns, in radians, below which a way is taken for straight.
+const STRAIGHT: f32 = 1e-3;
+/// The same of a chord on which fibres are counted.
+const STRAIGHT_CHORD: f32 = 0.2;
 
-/// The same for the way of the light, measured to the plies' nearest points.
-const MAX_LIGHT_TRAVEL: f32 = 1.2;
-
-/// The place where a ray meets a yarn.
+/// A place where a ray enters a yarn, as the ray sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct YarnFrame {
-    /// The yarn's centre.
-    pub centre: Vec3A,
-    /// Unit tangent of the yarn.
-    pub tangent: Vec3A,
-    /// Curvature vector: second derivative by arc length, 1/length.
-    pub curvature: Vec3A,
-    /// Outer radius of the yarn.
-    pub radius: f32,
-    /// Unit vector across the yarn that does not turn with the plies (rotation-minimising along the yarn).
-    pub normal: Vec3A,
-    /// Angle of the plies about the tangent, from `normal`, radians.
-    pub phase: f32,
-    /// Along the short axis of the section in the frame of `normal` and `tangent x normal`, as long as the ratio of the
-    /// short axis to the long one: [`ROUND`], or any other vector of length 1, where the yarn is not pressed flat.
-    pub flattening: Vec2,
-    /// By how much that axis turns in the frame along the yarn, radians per yarn radius.
-    pub flattening_turn: f32,
-}
-
-/// [`YarnFrame::flattening`] of a round yarn.
-pub const ROUND: Vec2 = Vec2::X;
-/// A section whose axes differ by less is round.
-const NEARLY_ROUND: f32 = 0.9999;
-
-impl YarnFrame {
-    /// The point of the world at `at` of the round section that this one was pressed from, in yarn radii along `normal`
-    /// and `tangent x normal`.
-    pub fn point(&self, at: Vec2) -> Vec3A {
-        let at = Pressed::new(self.flattening).map_or(at, |pressed| pressed.real(at));
-        let across = self.tangent.cross(self.normal);
-        self.centre + self.radius * (at.x * self.normal + at.y * across)
-    }
-}
-
-/// How a section is pressed flat: an affine map that takes circles to ellipses, and with them the plies inside.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pressed {
-    /// Unit vector along the short axis.
-    axis: Vec2,
-    /// Long over short axis, above 1.
-    stretch: f32,
-}
-
-impl Pressed {
-    /// From [`YarnFrame::flattening`]; `None` where the section is round.
-    #[inline]
-    pub fn new(flattening: Vec2) -> Option<Self> {
-        let ratio = flattening.length();
-        (ratio < NEARLY_ROUND).then(|| Self { axis: flattening / ratio, stretch: 1.0 / ratio })
-    }
-
-    /// A point or a vector of the pressed section in the round one.
-    #[inline]
-    pub fn round(&self, p: Vec2) -> Vec2 {
-        p + (self.stretch - 1.0) * p.dot(self.axis) * self.axis
-    }
-
-    /// A point or a vector of the round section in the pressed one.
-    #[inline]
-    pub fn real(&self, p: Vec2) -> Vec2 {
-        p + (1.0 / self.stretch - 1.0) * p.dot(self.axis) * self.axis
-    }
-}
-
-/// A place seen by one ray.
-#[derive(Clone, Copy, Debug)]
-pub struct Section {
+pub struct Section<'a> {
     /// The frame's x axis in the world: across the yarn, towards the camera.
     pub x: Vec3A,
     /// The frame's y axis in the world: across the yarn and the ray.
@@ -111,69 +70,96 @@ pub struct Section {
     pub radius: f32,
     /// Offset of the ray from the yarn's axis, -1 to 1.
     pub h: f32,
-    /// Where the ray enters the yarn: (`enter`, h).
+    /// x where the ray enters the yarn, at y = h and z = 0.
     pub enter: f32,
     /// Sine of the camera direction's latitude against the yarn.
     pub sin: f32,
     /// Cosine of it, at least 1e-3.
     pub cos: f32,
-    /// Travel along the yarn for each unit of x, towards the camera.
-    pub slope: f32,
-    /// Curvature in the section, 1/yarn radii.
-    pub bend: Vec2,
     /// Whether depth and place along the yarn go together (see [`YarnShape::tilted`]).
     pub tilted: bool,
+    /// Curvature in the section, 1/yarn radii.
+    pub bend: Vec2,
     /// (cos, sin) of the plies' phase in this frame.
     pub phase: Vec2,
-    /// How the section is pressed flat, if it is. Plies are placed in the round section that it was pressed from.
+    /// How that phase grows along the yarn; `None` where it does as the yarn's shape says.
+    pub turn: Option<f32>,
+    /// How the section is pressed flat, if it is.
     pub pressed: Option<Pressed>,
     /// By how much the axis of pressing turns along the yarn, radians per yarn radius.
     pub pressed_turn: f32,
+    /// How far the yarn goes on either way, yarn radii.
+    pub ends: [f32; 2],
+    /// The way to the rest of the yarn, where it is more than this place.
+    pub walker: Option<Walker<'a>>,
 }
 
-/// One ply on the way of a ray.
+/// One passage of a ray through a ply. Depths are distances along the ray from where it enters the yarn, in yarn radii.
 #[derive(Clone, Copy, Debug)]
 pub struct PlyCrossing {
     /// Index of the ply in the yarn's shape.
     pub ply: usize,
-    /// Centre of the ply where the ray passes it, in the round section.
-    pub centre: Vec2,
-    /// Unit vector from the yarn's axis to the ply there, in the round section.
-    pub axis: Vec2,
+    /// Depth at which the ray enters the ply's core; a ray that only grazes its outer fibres has `enter` = `exit`.
+    pub enter: f32,
+    /// Depth at which it leaves the core, beyond `enter`.
+    pub exit: f32,
+    /// Depth of the middle of the chord.
+    pub foot: f32,
+    /// The fibres on the chord if they were not tilted, and where they lie, by distances in the section: x from the middle.
+    pub chord: ChordFibers,
     /// Signed distance of the ray from the ply's axis, in the circle of the ply's radius.
     pub offset: f32,
-    /// x at which the ray enters the ply's core; a ray that only grazes its outer fibres has `enter` = `exit`.
-    pub enter: f32,
-    /// x at which it leaves the core, below `enter`.
-    pub exit: f32,
-    /// The fibres on the chord if they were not tilted, and where they lie.
-    pub chord: ChordFibers,
-    /// x of the point of the chord nearest to the ply's axis.
-    pub foot: f32,
+    /// How far along the yarn the ray is at `enter` and at `exit`.
+    pub travel: [f32; 2],
     /// Expected number of fibres on the chord.
     pub fibers: f32,
 }
 
 impl PlyCrossing {
-    /// Outward normal of the ply where the ray enters, in the section.
-    pub fn normal(&self, section: &Section) -> Vec3A {
-        // The normal of the pressed circle: of the map, the transpose of the inverse, which here is the way back.
-        let n = section.round(section.round(Vec2::new(self.enter, section.h)) - self.centre).normalize_or(Vec2::X);
-        Vec3A::new(n.x, n.y, 0.0)
+    /// How far along the yarn the ray is at a depth of this crossing.
+    #[inline]
+    pub fn travel_at(&self, depth: f32) -> f32 {
+        let length = self.exit - self.enter;
+        let share = if length > 0.0 { (depth - self.enter) / length } else { 0.0 };
+        self.travel[0] + share * (self.travel[1] - self.travel[0])
+    }
+
+    /// Outward unit normal of the ply where the ray enters.
+    pub fn normal(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        let ply = &shape.plies[self.ply];
+        let spot = section.locate(shape, section.point(self.enter), self.travel[0]);
+        let p = spot.at - ply.distance * ply.direction;
+        // The gradient of the distance in the ply's circle, first in the unwound yarn.
+        let (along, across) = (p.dot(ply.direction), ply.direction.perp_dot(p));
+        let stretch = ply.stretch * ply.stretch;
+        let gradient = stretch.x * along * ply.direction + stretch.y * across * ply.direction.perp();
+        // A step along the yarn turns the point back by as much as the plies turn.
+        let rate = section.turn(shape);
+        let rise = -rate * gradient.dot(spot.at.perp()) / spot.straightness;
+        let wound = gradient.rotate(spot.phase);
+        let wound = spot.pressed.map_or(wound, |pressed| pressed.round(wound));
+        spot.out(wound.extend(rise).into()).normalize_or(Vec3A::X)
     }
 
     /// Unit tangent of the fibres where the ray enters.
-    pub fn tangent_at_entry(&self, shape: &YarnShape, section: &Section) -> Vec3A {
-        let at = Vec2::new(self.enter, section.h);
-        let straight = section.fiber_tangent(shape, self.ply, self.centre, self.axis, at);
-        (straight + section.bent(section.travel(at.x))).normalize()
+    pub fn tangent_at_entry(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        section.fiber_tangent(shape, self.ply, section.point(self.enter), self.travel[0]).normalize()
+    }
+
+    /// Unit tangent of the ply's axis where the ray passes it.
+    #[inline]
+    pub fn ply_tangent(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        let depth = self.foot.clamp(self.enter, self.exit);
+        let spot = section.locate(shape, section.point(depth), self.travel_at(depth));
+        let ply = &shape.plies[self.ply];
+        spot.fiber_tangent(shape, section, self.ply, ply.distance * ply.direction).normalize()
     }
 }
 
-/// The plies a ray crosses, nearest first.
+/// The plies a ray crosses, nearest first; a ray along the yarn may cross one more than once.
 pub type Crossings = ArrayVec<PlyCrossing, MAX_PLIES>;
 
-/// A ply on a way through the yarn.
+/// A ply on a way out of a yarn.
 #[derive(Clone, Copy, Debug)]
 pub struct PlyAhead {
     /// Index of the ply in the yarn's shape.
@@ -182,39 +168,115 @@ pub struct PlyAhead {
     pub offset: f32,
     /// Distance in the section from the start to the way's point nearest to the ply's axis; negative behind the start.
     pub foot: f32,
-    /// Length in the circle of one unit of the way.
+    /// Length in the circle of one unit of that distance.
     pub length: f32,
 }
 
-/// A ply where a ray passes it, in the round section.
-struct Passage {
-    /// x of the ray there.
-    x: f32,
-    /// Unit vector from the yarn's axis to the ply.
-    axis: Vec2,
-    /// Centre of the ply.
-    centre: Vec2,
-    /// How the centre moves while the ray goes on by one unit of x: a tilted cylinder, seen in the section.
-    drift: Vec2,
+/// A point inside a yarn, seen in the unwound yarn, and the way back from there.
+struct Spot {
+    /// In the section of the unwound yarn.
+    at: Vec2,
+    /// Axis across the yarn there, in the section's frame.
+    x: Vec3A,
+    /// The other axis across the yarn.
+    y: Vec3A,
+    /// The axis along the yarn.
+    z: Vec3A,
+    /// (cos, sin) of the plies' phase against x and y.
+    phase: Vec2,
+    pressed: Option<Pressed>,
+    straightness: f32,
 }
 
-/// A line and a circle: a ray past a ply.
-struct LineInPly {
-    /// Signed distance of the line from the centre.
-    offset: f32,
-    /// x of the nearest point, from the centre.
-    foot: f32,
-    /// Length in the circle of one unit of x.
-    length: f32,
+impl Spot {
+    /// A vector of the yarn's axes there in the section's frame.
+    #[inline]
+    fn out(&self, v: Vec3A) -> Vec3A {
+        v.x * self.x + v.y * self.y + v.z * self.z
+    }
+
+    /// The tangent of a fibre of a ply, at a point of the unwound yarn, in the section's frame: its part along the yarn is 1.
+    #[inline]
+    fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
+        let of = &shape.plies[ply];
+        let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
+        let mut across = t.truncate().rotate(self.phase);
+        if let Some(pressed) = &self.pressed {
+            // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
+            let round = at.rotate(self.phase);
+            let turned = section.pressed_turn * (pressed.real(round).perp() - pressed.real(round.perp()));
+            across = pressed.real(across) + turned;
+        }
+        let across = across / self.straightness;
+        self.out(across.extend(1.0).into())
+    }
 }
 
+/// A station with what only the making of a way needs: the place in the yarn's real section, and its change with depth.
+#[derive(Clone, Copy)]
+struct Step {
+    station: Station,
+    real: Vec2,
+    real_slope: Vec2,
+}
+
+/// The yarn about one of its places, taken for its circle of curvature.
+#[derive(Clone, Copy)]
+struct Neighbourhood {
+    /// Where the place is, in the section's frame; none at the section itself.
+    place: Option<Placed>,
+    /// How far along the yarn it is.
+    travel: f32,
+    /// As the section's, in the place's axes.
+    bend: Vec2,
+    phase: Vec2,
+    turn: f32,
+    pressed: Option<Pressed>,
+    pressed_turn: f32,
+}
+
+/// A place of the yarn in a section's frame.
+#[derive(Clone, Copy)]
+struct Placed {
+    origin: Vec3A,
+    x: Vec3A,
+    y: Vec3A,
+    z: Vec3A,
+    /// The section's yarn radius over the one there.
+    scale: f32,
+}
+
+impl Placed {
+    #[inline]
+    fn local(&self, v: Vec3A) -> Vec3A {
+        self.scale * Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+}
+
+/// The yarn near its place as a circle: a point and a direction of the section's frame, unbent.
+struct Unbent {
+    /// In the section, and its change along the direction.
+    at: Vec2,
+    slope: Vec2,
+    /// Along the axis, and its change along the direction.
+    travel: f32,
+    advance: f32,
+    straightness: f32,
+    /// By how much z of the point moves for each unit of `straightness`: sine of the yarn's turn over its curvature.
+    lean: f32,
+    /// Cosine of the yarn's turn.
+    cos: f32,
+}
+
+/// Turns `p` back by the angle of (cos, sin).
 #[inline]
-fn rotate(v: Vec2, sin: f32, cos: f32) -> Vec2 {
-    Vec2::new(v.x * cos - v.y * sin, v.x * sin + v.y * cos)
+fn unrotate(p: Vec2, by: Vec2) -> Vec2 {
+    Vec2::new(p.x * by.x + p.y * by.y, p.y * by.x - p.x * by.y)
 }
 
-impl Section {
-    /// The section at `place` for a ray from `origin` along the unit vector `direction`.
+impl<'a> Section<'a> {
+    /// The section at `place` for a ray from `origin` along the unit vector `direction`, which enters the yarn there. The
+    /// yarn goes on as a circle.
     #[inline]
     pub fn new(place: &YarnFrame, origin: Vec3A, direction: Vec3A, tilted: bool) -> Self {
         let z = place.tangent;
@@ -226,17 +288,9 @@ impl Section {
         let x = if length > 1e-6 { across / length } else { place.normal };
         let y = z.cross(x);
         let h = ((origin - place.centre).dot(y) / place.radius).clamp(-1.0, 1.0);
-        let cos = length.max(1e-3);
-        let (bend, slope) = if tilted {
-            let k = place.curvature * place.radius;
-            (Vec2::new(k.dot(x), k.dot(y)), (sin / cos).clamp(-MAX_SLOPE, MAX_SLOPE))
-        } else {
-            (Vec2::ZERO, 0.0)
-        };
+        let k = if tilted { place.curvature * place.radius } else { Vec3A::ZERO };
         let (s, c) = sin_cos(place.phase);
         let normal = Vec2::new(place.normal.dot(x), place.normal.dot(y));
-        let pressed = Pressed::new(place.flattening)
-            .map(|pressed| Pressed { axis: rotate(normal, pressed.axis.y, pressed.axis.x), ..pressed });
         Self {
             x,
             y,
@@ -246,14 +300,39 @@ impl Section {
             h,
             enter: (1.0 - h * h).max(0.0).sqrt(),
             sin,
-            cos,
-            slope,
-            bend,
+            cos: length.max(1e-3),
             tilted,
-            phase: rotate(normal, s, c),
-            pressed,
+            bend: Vec2::new(k.dot(x), k.dot(y)),
+            phase: normal.rotate(Vec2::new(c, s)),
+            turn: place.turn,
+            pressed: Pressed::new(place.flattening)
+                .map(|pressed| Pressed { axis: pressed.axis.rotate(normal), ..pressed }),
             pressed_turn: place.flattening_turn,
+            ends: [f32::NEG_INFINITY, f32::INFINITY],
+            walker: None,
         }
+    }
+
+    /// The section of a yarn where a ray meets it at the distance `t`.
+    #[inline]
+    pub fn at_hit(
+        (walker, place): (Walker<'a>, YarnFrame),
+        origin: Vec3A,
+        direction: Vec3A,
+        t: f32,
+        tilted: bool,
+    ) -> Self {
+        let mut section = Self::new(&place, origin, direction, tilted);
+        if tilted {
+            section.ends = walker.ends();
+            section.walker = Some(walker);
+            if section.ends != [f32::NEG_INFINITY, f32::INFINITY] {
+                // Through the flat end of a yarn a ray enters anywhere.
+                let x = (origin + t * direction - place.centre).dot(section.x) / place.radius;
+                section.enter = x.clamp(-section.enter, section.enter);
+            }
+        }
+        section
     }
 
     /// A vector of this frame in the world.
@@ -268,16 +347,26 @@ impl Section {
         Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
     }
 
-    /// A point or a vector of this section in the round one that it was pressed from.
+    /// The direction of the ray in this frame.
     #[inline]
-    pub fn round(&self, p: Vec2) -> Vec2 {
-        self.pressed.map_or(p, |pressed| pressed.round(p))
+    pub fn direction(&self) -> Vec3A {
+        if self.tilted {
+            Vec3A::new(-(1.0 - self.sin * self.sin).max(0.0).sqrt(), 0.0, -self.sin)
+        } else {
+            Vec3A::new(-self.cos, 0.0, 0.0)
+        }
     }
 
-    /// A point or a vector of that round section in this one.
+    /// The point on the ray at a depth, in this frame.
     #[inline]
-    pub fn real(&self, p: Vec2) -> Vec2 {
-        self.pressed.map_or(p, |pressed| pressed.real(p))
+    pub fn point(&self, depth: f32) -> Vec3A {
+        Vec3A::new(self.enter, self.h, 0.0) + depth * self.direction()
+    }
+
+    /// The world position of the point on the ray at a depth.
+    #[inline]
+    pub fn point_on_ray(&self, depth: f32) -> Vec3A {
+        self.centre + self.radius * self.to_world(self.point(depth))
     }
 
     /// By how much fibres are closer to each other than in the round section: its area over this one's.
@@ -286,428 +375,360 @@ impl Section {
         self.pressed.map_or(1.0, |pressed| pressed.stretch)
     }
 
-    /// The tangent (of z = 1) of a fibre at `at` of this section, on a yarn that is not bent, in a ply with centre `centre`
-    /// and the unit vector `axis` to it, both in the round section.
+    /// The tangent of a fibre of a ply at a `point` of this frame, `travel` farther along the yarn: its part along the yarn
+    /// is 1.
     #[inline]
-    pub fn fiber_tangent(&self, shape: &YarnShape, ply: usize, centre: Vec2, axis: Vec2, at: Vec2) -> Vec3A {
-        let Some(pressed) = self.pressed else {
-            return fiber_tangent(&shape.plies[ply], shape.ply_rate, centre, axis, at);
-        };
-        let round = pressed.round(at);
-        let t = fiber_tangent(&shape.plies[ply], shape.ply_rate, centre, axis, round);
-        // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
-        let turned = self.pressed_turn * (at.perp() - pressed.real(round.perp()));
-        (pressed.real(t.truncate()) + turned).extend(1.0).into()
-    }
-
-    /// The world position of the point on the camera's ray at depth `x`, rebuilt from the yarn's centre. A steep ray is
-    /// taken as less so, which keeps the point inside a yarn that bends away.
-    #[inline]
-    pub fn point_on_ray(&self, x: f32) -> Vec3A {
-        let along = (x - self.enter) * self.slope;
-        self.centre + self.radius * (x * self.x + self.h * self.y + along * self.z)
-    }
-
-    /// How far along the yarn from the frame's origin the ray is when it is at depth `x`.
-    #[inline]
-    pub fn travel(&self, x: f32) -> f32 {
-        ((x - self.enter) * self.slope / self.straightness(Vec2::new(x, self.h))).clamp(-MAX_TRAVEL, MAX_TRAVEL)
-    }
-
-    /// By how much a tangent (of z = 1) turns over a `travel` along the bent yarn.
-    #[inline]
-    pub fn bent(&self, travel: f32) -> Vec3A {
-        Vec3A::new(self.bend.x * travel, self.bend.y * travel, 0.0)
-    }
-
-    /// (sin, cos) of the turn of the plies over a `travel` along the yarn.
-    #[inline]
-    pub fn turn(shape: &YarnShape, travel: f32) -> (f32, f32) {
-        sin_cos(shape.ply_rate * travel)
-    }
-
-    /// Unit vector towards ply `ply` in a section whose plies have turned by (sin, cos) from this one's origin.
-    #[inline]
-    pub fn ply_axis(&self, ply: &PlyShape, turn: (f32, f32)) -> Vec2 {
-        let d = ply.direction;
-        let here = Vec2::new(self.phase.x * d.x - self.phase.y * d.y, self.phase.x * d.y + self.phase.y * d.x);
-        rotate(here, turn.0, turn.1)
-    }
-
-    /// Centre of a ply on the bent yarn, in the round section.
-    #[inline]
-    pub fn ply_centre(&self, ply: &PlyShape, axis: Vec2, travel: f32) -> Vec2 {
-        ply.distance * axis + self.round((0.5 * travel * travel) * self.bend)
-    }
-
-    /// How much of a step along the yarn's axis a point away from it makes: less outside of a bend.
-    #[inline]
-    fn straightness(&self, at: Vec2) -> f32 {
-        (1.0 - self.bend.dot(at)).max(0.4)
-    }
-
-    /// Where the ray passes a ply.
-    ///
-    /// Depth and turning depend on each other; two rounds settle them, three where the ray is steep or the plies turn
-    /// fast.
-    #[inline]
-    fn follow(&self, shape: &YarnShape, ply: &PlyShape) -> Passage {
-        let mut axis = self.ply_axis(ply, (0.0, 1.0));
-        let mut centre = ply.distance * axis;
-        let mut x = self.real(centre).x;
-        if self.slope == 0.0 {
-            return Passage { x, axis, centre, drift: Vec2::ZERO };
-        }
-        let untwisted = shape.ply_rate == 0.0;
-        let mut travel = 0.0;
-        let mut straightness = 1.0;
-        for _ in 0..if self.slope.abs() < 1.0 && shape.ply_rate.abs() < FAST_TURN { 2 } else { 3 } {
-            straightness = self.straightness(Vec2::new(x, self.h));
-            travel = (-(self.enter - x) * self.slope / straightness).clamp(-MAX_TRAVEL, MAX_TRAVEL);
-            if !untwisted {
-                axis = self.ply_axis(ply, Self::turn(shape, travel));
-            }
-            centre = self.ply_centre(ply, axis, travel);
-            x = self.real(centre).x;
-        }
-        if travel.abs() == MAX_TRAVEL {
-            return Passage { x, axis, centre, drift: Vec2::ZERO };
-        }
-        let turning = shape.ply_rate * ply.distance * axis.perp();
-        let drift = self.slope / straightness * (turning + self.round(travel * self.bend));
-        Passage { x, axis, centre, drift }
-    }
-
-    /// The ray's line past the ply's moving centre, in the circle that the ply's section becomes.
-    #[inline]
-    fn line_in_ply(&self, ply: &PlyShape, at: &Passage) -> LineInPly {
-        let along = self.round(Vec2::X) - at.drift;
-        let start = self.round(Vec2::new(at.x, self.h)) - at.centre;
-        let (along, start) = if ply.stretch.x == 1.0 {
-            (along, start)
-        } else {
-            let to_circle = |p: Vec2| Vec2::new(p.dot(at.axis), at.axis.perp_dot(p)) * ply.stretch;
-            (to_circle(along), to_circle(start))
-        };
-        let length = along.length().max(1e-3);
-        LineInPly { offset: along.perp_dot(start) / length, foot: -along.dot(start) / (length * length), length }
+    pub fn fiber_tangent(&self, shape: &YarnShape, ply: usize, point: Vec3A, travel: f32) -> Vec3A {
+        let spot = self.locate(shape, point, travel);
+        spot.fiber_tangent(shape, self, ply, spot.at)
     }
 
     /// Whether the ray meets any ply: what the filter asks of every candidate hit.
     #[inline]
     pub fn meets_ply(&self, shape: &YarnShape) -> bool {
-        shape.plies.iter().any(|ply| self.line_in_ply(ply, &self.follow(shape, ply)).offset.abs() < ply.radius)
+        let mut met = false;
+        self.march(shape, self.point(0.0), 0.0, self.direction(), RAY, |a, b| {
+            met = way::passes(a, b, &shape.plies);
+            if met { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        met
     }
 
     /// Fills `out` with the plies on the ray's way, nearest first.
     #[inline]
     pub fn crossings(&self, shape: &YarnShape, out: &mut Crossings) {
         out.clear();
+        let mut way = Way::new();
+        self.way(shape, self.point(0.0), 0.0, self.direction(), RAY, &mut way);
         for (index, ply) in shape.plies.iter().enumerate() {
-            let at = self.follow(shape, ply);
-            let LineInPly { offset, foot, length } = self.line_in_ply(ply, &at);
-            if offset.abs() >= ply.radius || ply.fibers == 0.0 {
+            if ply.fibers == 0.0 {
                 continue;
             }
-            let half = (ply.core_radius * ply.core_radius - offset * offset).max(0.0).sqrt() / length;
-            let (enter, exit) = (at.x + foot + half, at.x + foot - half);
-            let chord = ply.chord(offset, length);
-            let fibers = chord.total() * self.tilt_factor(shape, index, &at, enter, exit);
-            let (Passage { centre, axis, .. }, foot) = (at, 0.5 * (enter + exit));
-            let crossing = PlyCrossing { ply: index, centre, axis, offset, enter, exit, chord, foot, fibers };
-            let place = out.iter().position(|c| c.enter < enter).unwrap_or(out.len());
-            out.insert(place, crossing);
-        }
-    }
-
-    /// The plies that lie ahead of a point inside the yarn, in a direction `w` of this frame.
-    ///
-    /// `start` is a point of this (not the round) section that is `travel` farther along the yarn than the frame's
-    /// origin. Of a pressed section fibres are closer to each other than of the round one by [`Self::squeeze`]. As for
-    /// rays, each ply is placed where the way passes nearest to it, and moves on from there.
-    #[inline]
-    pub fn plies_ahead(&self, shape: &YarnShape, start: Vec2, travel: f32, w: Vec3A, mut visit: impl FnMut(PlyAhead)) {
-        let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
-        let ahead = Vec2::new(w.x, w.y) / cos;
-        // As far along the yarn as is needed to cross it once and a bit.
-        let slope = if self.tilted { w.z / cos } else { 0.0 };
-        let turn_here = Self::turn(shape, travel);
-        let (round_start, round_ahead) = (self.round(start), self.round(ahead));
-        for (index, ply) in shape.plies.iter().enumerate() {
-            let mut axis = self.ply_axis(ply, turn_here);
-            let mut centre = self.ply_centre(ply, axis, travel);
-            let nearest = ((centre - round_start).dot(round_ahead) / round_ahead.length_squared()).max(0.0);
-            let slope = slope / self.straightness(start + nearest * ahead);
-            let further = (nearest * slope).clamp(-MAX_LIGHT_TRAVEL, MAX_LIGHT_TRAVEL);
-            if further != 0.0 {
-                if shape.ply_rate != 0.0 {
-                    axis = self.ply_axis(ply, Self::turn(shape, travel + further));
+            way::passages::<true>(&way, ply, |passage| {
+                let (enter, exit) = (way::station_at(&way, passage.enter), way::station_at(&way, passage.exit));
+                let chord = ply.chord(passage.offset, passage.speed / self.cos);
+                let fibers = chord.total() * passage.share / self.cos
+                    * self.fibers_over_chord(shape, index, &way, &enter, &exit);
+                let Passage { enter: from, exit: to, offset, .. } = passage;
+                let foot = 0.5 * (from + to);
+                let travel = [enter.travel, exit.travel];
+                // Signed as h is: seen from the camera, towards which x points.
+                let offset = -offset;
+                let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers };
+                let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
+                if out.is_full() {
+                    // What lies deepest is seen least.
+                    out.pop();
                 }
-                centre = self.ply_centre(ply, axis, travel + further);
-            }
-            // The centre moves on while the way goes past it.
-            let drift = if further.abs() < MAX_LIGHT_TRAVEL {
-                let turning = shape.ply_rate * ply.distance * axis.perp();
-                slope * (turning + self.round((travel + further) * self.bend))
-            } else {
-                Vec2::ZERO
-            };
-            let (from, way) = (round_start - centre + nearest * drift, round_ahead - drift);
-            let (from, way) = if ply.stretch.x == 1.0 {
-                (from, way)
-            } else {
-                let to_circle = |p: Vec2| Vec2::new(p.dot(axis), axis.perp_dot(p)) * ply.stretch;
-                (to_circle(from), to_circle(way))
-            };
-            let square = way.length_squared().max(1e-6);
-            let foot = -from.dot(way) / square;
-            let reach = foot * foot - (from.length_squared() - ply.radius * ply.radius) / square;
-            if reach > 0.0 && foot + reach.sqrt() > 0.0 {
-                let length = square.sqrt();
-                visit(PlyAhead { ply: index, offset: way.perp_dot(from) / length, foot, length });
-            }
+                out.insert(place.min(out.len()), crossing);
+            });
         }
     }
 
-    /// How many more fibres a chord meets because they are squeezed and tilted: the chord's mean of
-    /// sqrt(1 - (w.T)^2) / (cos theta_w cos alpha). (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place
-    /// for all: fibres near the ply's axis are not tilted.)
+    /// The plies that lie ahead of a point inside the yarn, in a direction `w` of this frame; one may come more than once.
+    ///
+    /// `start` is a point of this frame and `travel` about how far along the yarn it is from the frame's origin. Of a
+    /// pressed section fibres are closer to each other than of a round one, by [`Self::squeeze`].
     #[inline]
-    fn tilt_factor(&self, shape: &YarnShape, ply: usize, at: &Passage, enter: f32, exit: f32) -> f32 {
-        if shape.plies[ply].fiber_rate == 0.0 && shape.ply_rate == 0.0 {
-            return self.squeeze();
+    pub fn plies_ahead(&self, shape: &YarnShape, start: Vec3A, travel: f32, w: Vec3A, mut visit: impl FnMut(PlyAhead)) {
+        // Distances in the section, of which a steep way has few.
+        let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
+        let w = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
+        let mut way = Way::new();
+        self.way(shape, start, travel, w, LIGHT, &mut way);
+        for (index, ply) in shape.plies.iter().enumerate() {
+            way::passages::<false>(&way, ply, |Passage { offset, foot, speed, .. }| {
+                visit(PlyAhead { ply: index, offset, foot: foot * cos, length: speed / cos });
+            });
         }
-        // With t = (tx, ty, 1) a fibre's tangent and w = (cos, 0, sin), the factor is sqrt(|t|^2 - (w.t)^2) / cos,
-        // by four-point Gauss-Legendre quadrature; t is linear along the chord.
-        let end = |x: f32| {
-            let centre = at.centre + (x - at.x) * at.drift;
-            self.fiber_tangent(shape, ply, centre, at.axis, Vec2::new(x, self.h))
+    }
+
+    /// Turns of the plies, radians per yarn radius.
+    #[inline]
+    fn turn(&self, shape: &YarnShape) -> f32 {
+        if self.tilted { self.turn.unwrap_or(shape.ply_rate) } else { shape.ply_rate }
+    }
+
+    /// The way from `start`, which is about `travel` along the yarn, in a direction, until it leaves the yarn.
+    #[inline]
+    fn way(&self, shape: &YarnShape, start: Vec3A, travel: f32, direction: Vec3A, reach: Reach, way: &mut Way) {
+        self.march(shape, start, travel, direction, reach, |a, b| {
+            if way.is_empty() {
+                way.push(*a);
+            }
+            way.push(*b);
+            if way.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+    }
+
+    /// Goes from station to station, until the way leaves the yarn or `visit` has seen enough.
+    #[inline]
+    fn march(
+        &self,
+        shape: &YarnShape,
+        start: Vec3A,
+        travel: f32,
+        direction: Vec3A,
+        reach: Reach,
+        mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>,
+    ) {
+        let rate = self.turn(shape);
+        let mut near = self.neighbourhood(rate, travel, reach);
+        let mut here = self.step(&mut near, start, direction, 0.0, reach);
+        loop {
+            let Step { station, real, real_slope } = here;
+            // How far it is to the yarn's surface, were the yarn straight; the loop does the rest.
+            let (speed, outward) = (real_slope.length_squared(), real.dot(real_slope));
+            let inside = (1.0 - real.length_squared()).max(0.0);
+            if inside < AT_SURFACE && outward > 0.0 && station.depth > 0.0 {
+                return;
+            }
+            let mut step = reach.longest;
+            if speed > 1e-12 {
+                // A little beyond is no harm, and a way along the surface may bend back.
+                step = ((-outward + (outward * outward + speed * inside).sqrt()) / speed).max(LEAST_STEP);
+            }
+            step = step.min(reach.longest - station.depth);
+            let end = self.ends[usize::from(station.advance > 0.0)];
+            if end.is_finite() && station.advance != 0.0 {
+                step = step.min((end - station.travel) / station.advance);
+            }
+            if step.is_nan() || step <= LEAST_LEFT {
+                return;
+            }
+            let mut turning = (rate.abs() + self.bend.length() + self.pressed_turn.abs()) * station.advance.abs();
+            // Faster inside of the bend.
+            turning *= (station.straightness / (1.0 - self.bend.dot(real + step * real_slope)).max(0.3)).max(1.0);
+            let mut next = here;
+            if turning * step <= STRAIGHT {
+                next.station.depth += step;
+                next.station.at += step * station.slope;
+                next.station.travel += step * station.advance;
+                next.real += step * real_slope;
+            } else {
+                let bowed = station.advance.abs() * step * (self.bend.length() / (8.0 * MOST_BOW)).sqrt();
+                step /= (turning * step / reach.turn).max(bowed).ceil();
+                // Inside of a bend it may turn out faster.
+                for _ in 0..4 {
+                    let depth = station.depth + step;
+                    next = self.step(&mut near, start + depth * direction, direction, depth, reach);
+                    let turned = (rate.abs() + self.bend.length()) * (next.station.travel - station.travel);
+                    if turned.abs() <= 1.3 * reach.turn {
+                        break;
+                    }
+                    step *= 0.5;
+                }
+            }
+            if visit(&station, &next.station).is_break() {
+                return;
+            }
+            here = next;
+        }
+    }
+
+    /// The yarn about the place so far along it: the section itself, if that is near enough.
+    #[inline]
+    fn neighbourhood(&self, rate: f32, travel: f32, reach: Reach) -> Neighbourhood {
+        if travel.abs() > reach.near
+            && let Some(far) = self.walk_to(travel)
+        {
+            return far;
+        }
+        Neighbourhood {
+            place: None,
+            travel: 0.0,
+            bend: self.bend,
+            phase: self.phase,
+            turn: rate,
+            pressed: self.pressed,
+            pressed_turn: self.pressed_turn,
+        }
+    }
+
+    /// The yarn about the place so far along it, from the yarn itself. `None` where there is none, or it does not go so far.
+    #[inline]
+    fn walk_to(&self, travel: f32) -> Option<Neighbourhood> {
+        let mut walker = self.walker?;
+        let place = walker.walk(travel)?;
+        let across = place.tangent.cross(place.normal);
+        let section = |v: Vec3A| Vec2::new(v.dot(place.normal), v.dot(across));
+        Some(Neighbourhood {
+            place: Some(Placed {
+                origin: self.to_local(place.centre - self.centre) / self.radius,
+                x: self.to_local(place.normal),
+                y: self.to_local(across),
+                z: self.to_local(place.tangent),
+                scale: self.radius / place.radius,
+            }),
+            travel,
+            bend: section(place.curvature) * place.radius,
+            phase: angle(place.phase),
+            turn: place.turn.unwrap_or(0.0),
+            pressed: Pressed::new(place.flattening),
+            pressed_turn: place.flattening_turn,
+        })
+    }
+
+    /// The station at a point of this frame, by the neighbourhood known so far or by a nearer one.
+    #[inline]
+    fn step(&self, near: &mut Neighbourhood, point: Vec3A, direction: Vec3A, depth: f32, reach: Reach) -> Step {
+        let mut unbent = near.unbend(point, direction);
+        if unbent.travel.abs() > reach.near
+            && let Some(far) = self.walk_to(near.travel + unbent.travel)
+        {
+            *near = far;
+            unbent = near.unbend(point, direction);
+        }
+        near.unwind(&unbent, depth)
+    }
+
+    /// A point of this frame, which is about `travel` along the yarn, in the unwound yarn.
+    #[inline]
+    fn locate(&self, shape: &YarnShape, point: Vec3A, travel: f32) -> Spot {
+        let near = self.neighbourhood(self.turn(shape), travel, RAY);
+        let Unbent { at, travel, straightness, lean, cos, .. } = near.unbend(point, Vec3A::ZERO);
+        let (phase, pressed) = (near.phase_at(travel), near.pressed_at(travel));
+        // The frame turned with the bend: sin / k = `lean`, and (1 - cos) / k^2 = lean^2 / (1 + cos).
+        let bend = near.bend;
+        let out = |v: Vec3A| near.place.map_or(v, |p| v.x * p.x + v.y * p.y + v.z * p.z);
+        let turned = |v: Vec2| {
+            let part = bend.dot(v);
+            out((v - bend * (part * lean * lean / (1.0 + cos))).extend(-part * lean).into())
         };
-        let (a, b) = (end(enter), end(exit));
+        Spot {
+            at: unrotate(pressed.map_or(at, |p| p.round(at)), phase),
+            x: turned(Vec2::X),
+            y: turned(Vec2::Y),
+            z: out((bend * lean).extend(cos).into()),
+            phase,
+            pressed,
+            straightness,
+        }
+    }
+
+    /// Fibres that a unit of a chord's depth meets over those that it would meet across untwisted round plies: the mean
+    /// from `enter` to `exit` of |w x t| for the unit vector w of the ray and the tangents t (of z = 1) of the fibres, times
+    /// [`Self::squeeze`]. (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place for all: fibres near the ply's
+    /// axis are not tilted.)
+    #[inline]
+    fn fibers_over_chord(&self, shape: &YarnShape, ply: usize, way: &Way, enter: &Station, exit: &Station) -> f32 {
+        let of = &shape.plies[ply];
+        let along = |at: &Station| if self.tilted { at.advance * at.straightness } else { -self.sin };
+        if of.fiber_rate == 0.0 && shape.ply_rate == 0.0 {
+            // Fibres along the yarn.
+            let along = 0.5 * (along(enter) + along(exit));
+            return (1.0 - along * along).max(1e-6).sqrt() * self.squeeze();
+        }
+        // Tangent and ray at both ends; between them both are linear, or the parabola through the middle where the ray is
+        // seen to bend. The mean is by four-point Gauss-Legendre quadrature.
+        let direction = self.direction();
+        let end = |at: &Station| match self.pressed {
+            // In the unwound yarn's axes: the ray moves as it is seen to, and as those axes turn.
+            None => {
+                let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at.at);
+                let w = at.slope + self.turn(shape) * at.advance * at.at.perp();
+                (t.truncate() / at.straightness, w, along(at))
+            }
+            Some(_) => {
+                let t = self.fiber_tangent(shape, ply, self.point(at.depth), at.travel);
+                let t = t / t.z.abs().max(1e-6).copysign(t.z);
+                (t.truncate(), direction.truncate(), -self.sin)
+            }
+        };
+        let ((ta, wa, za), (tb, wb, zb)) = (end(enter), end(exit));
         let nodes = f32x4::new(GAUSS_LEGENDRE_4.map(|(node, _)| node as f32));
         let weights = f32x4::new(GAUSS_LEGENDRE_4.map(|(_, weight)| weight as f32));
-        let tx = f32x4::splat(a.x) + nodes * f32x4::splat(b.x - a.x);
-        let ty = f32x4::splat(a.y) + nodes * f32x4::splat(b.y - a.y);
-        let along = tx * f32x4::splat(self.cos) + f32x4::splat(self.sin);
-        let square = f32x4::ONE + tx * tx + ty * ty - along * along;
-        let root = square.fast_max(f32x4::splat(1e-9)).sqrt() * weights;
-        self.squeeze() * root.reduce_add() / self.cos
+        let (mut tm, mut wm, mut zm) = (Vec2::ZERO, Vec2::ZERO, 0.0);
+        if (shape.ply_rate * (exit.travel - enter.travel)).abs() > STRAIGHT_CHORD {
+            let (t, w, z) = end(&way::station_at(way, 0.5 * (enter.depth + exit.depth)));
+            (tm, wm, zm) = (4.0 * t - 2.0 * (ta + tb), 4.0 * w - 2.0 * (wa + wb), 4.0 * z - 2.0 * (za + zb));
+        }
+        let bow = nodes * (f32x4::ONE - nodes);
+        let mix = |a: f32, b: f32, m: f32| f32x4::splat(a) + nodes * f32x4::splat(b - a) + bow * f32x4::splat(m);
+        let (tx, ty) = (mix(ta.x, tb.x, tm.x), mix(ta.y, tb.y, tm.y));
+        let (wx, wy, wz) = (mix(wa.x, wb.x, wm.x), mix(wa.y, wb.y, wm.y), mix(za, zb, zm));
+        let (cx, cy, cz) = (wy - wz * ty, wz * tx - wx, wx * ty - wy * tx);
+        // Between two places where the unwound yarn's axes have turned, the straight line is shorter than w.
+        let square = (cx * cx + cy * cy + cz * cz) / (wx * wx + wy * wy + wz * wz);
+        (square.sqrt() * weights).reduce_add() * self.squeeze()
+    }
+}
+
+/// (cos, sin) of an angle.
+#[inline]
+fn angle(by: f32) -> Vec2 {
+    let (sin, cos) = sin_cos(by);
+    Vec2::new(cos, sin)
+}
+
+impl Neighbourhood {
+    /// A point and a direction of the section's frame on the unbent yarn. `travel` is from this place.
+    #[inline]
+    fn unbend(&self, point: Vec3A, direction: Vec3A) -> Unbent {
+        let (point, direction) = match &self.place {
+            None => (point, direction),
+            Some(place) => (place.local(point - place.origin), place.local(direction)),
+        };
+        let (p, v) = (point.truncate(), direction.truncate());
+        // In units of the bend's radius the point is at (ahead, k z) from the bend's centre; k stays in products that are
+        // finite for a straight yarn.
+        let bend = self.bend;
+        let square = bend.length_squared();
+        let ahead = (1.0 - bend.dot(p)).max(LEAST_STRAIGHTNESS);
+        let z = point.z;
+        let straightness = (ahead * ahead + square * z * z).sqrt();
+        let half = z / (ahead + straightness);
+        // atan x / x of half the angle, to 1 % at a right angle.
+        let tan_squared = square * half * half;
+        let travel = 2.0 * half * (15.0 + 4.0 * tan_squared) / (15.0 + 9.0 * tan_squared);
+        let fall = bend.dot(v);
+        let inverse = 1.0 / straightness;
+        Unbent {
+            at: p - bend * (z * half),
+            slope: v - bend * ((fall * half + direction.z) * z * inverse),
+            travel,
+            advance: (ahead * direction.z + z * fall) * inverse * inverse,
+            straightness,
+            lean: z * inverse,
+            cos: ahead * inverse,
+        }
+    }
+
+    /// (cos, sin) of the plies' phase so far along from this place.
+    #[inline]
+    fn phase_at(&self, travel: f32) -> Vec2 {
+        let turned = self.turn * travel;
+        if turned == 0.0 { self.phase } else { self.phase.rotate(angle(turned)) }
+    }
+
+    /// How the section is pressed so far along.
+    #[inline]
+    fn pressed_at(&self, travel: f32) -> Option<Pressed> {
+        let pressed = self.pressed?;
+        let turned = self.pressed_turn * travel;
+        Some(if turned == 0.0 { pressed } else { Pressed { axis: pressed.axis.rotate(angle(turned)), ..pressed } })
+    }
+
+    /// The station of an unbent point: pressed round and turned back with the plies.
+    #[inline]
+    fn unwind(&self, unbent: &Unbent, depth: f32) -> Step {
+        let &Unbent { at: real, slope: real_slope, travel, advance, straightness, .. } = unbent;
+        let (round, round_slope) = match self.pressed_at(travel) {
+            None => (real, real_slope),
+            Some(pressed) => {
+                let round = pressed.round(real);
+                // B' = phi' (J B - B J) for the map B that makes round what is pressed along an axis at the angle phi.
+                let turned = self.pressed_turn * (round.perp() - pressed.round(real.perp()));
+                (round, pressed.round(real_slope) + advance * turned)
+            }
+        };
+        let phase = self.phase_at(travel);
+        let at = unrotate(round, phase);
+        let slope = unrotate(round_slope - self.turn * advance * round.perp(), phase);
+        let station = Station { depth, at, slope, travel: self.travel + travel, advance, straightness };
+        Step { station, real, real_slope }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::yarn::{PlyParameters, tests::touching_yarn};
-
-    fn place() -> YarnFrame {
-        YarnFrame {
-            centre: Vec3A::ZERO,
-            tangent: Vec3A::Z,
-            curvature: Vec3A::ZERO,
-            radius: 1.0,
-            normal: Vec3A::X,
-            phase: 0.3,
-            flattening: ROUND,
-            flattening_turn: 0.0,
-        }
-    }
-
-    fn ray(theta: f32, phi: f32, h: f32) -> (Vec3A, Vec3A) {
-        let to_camera = Vec3A::new(theta.cos() * phi.cos(), theta.cos() * phi.sin(), theta.sin());
-        let y = Vec3A::Z.cross(to_camera).normalize();
-        (to_camera * 20.0 + h * y, -to_camera)
-    }
-
-    #[test]
-    fn a_point_on_the_ray_is_on_the_ray() {
-        for (theta, phi, h) in [(0.0, 0.2, 0.4), (0.7, 2.0, -0.7), (-0.6, -1.0, 0.1)] {
-            let (origin, direction) = ray(theta, phi, h);
-            let section = Section::new(&place(), origin, direction, true);
-            assert!((section.h - h).abs() < 1e-5);
-            // The frame's origin is beside the entry point, as Embree's u is.
-            let entry = section.point_on_ray(section.enter);
-            let shifted = place().centre + (origin - entry).dot(direction) * 0.0;
-            let from_entry = section.point_on_ray(-0.2) - entry + shifted;
-            assert!(from_entry.cross(direction).length() < 1e-5, "{from_entry} is off {direction}");
-        }
-    }
-
-    #[test]
-    fn crossings_agree_with_a_brute_force_walk_along_the_ray() {
-        // Walk the ray through the turning plies and note which are entered, in which order, and how deep.
-        let shape = touching_yarn(3, 60, 0.4, 0.35, -0.4);
-        let mut crossings = Crossings::new();
-        let mut seen = 0;
-        for i in 0..600 {
-            let (theta, phi) = (-0.5 + 0.0016 * i as f32, 0.05 * i as f32);
-            let h = -0.99 + 1.98 * ((i * 37 % 600) as f32) / 599.0;
-            let (origin, direction) = ray(theta, phi, h);
-            let section = Section::new(&place(), origin, direction, true);
-            section.crossings(&shape, &mut crossings);
-            let steps = 8000;
-            let mut inside = [0usize; 3];
-            for s in 0..steps {
-                let x = section.enter * (1.0 - 2.0 * (s as f32 + 0.5) / steps as f32);
-                let travel = section.travel(x);
-                for (k, ply) in shape.plies.iter().enumerate() {
-                    let axis = section.ply_axis(ply, Section::turn(&shape, travel));
-                    let d = Vec2::new(x, section.h) - ply.distance * axis;
-                    inside[k] += usize::from(d.length() < ply.core_radius);
-                }
-            }
-            for (k, count) in inside.iter().enumerate() {
-                let walked = *count as f32 / steps as f32 * 2.0 * section.enter;
-                let chord = crossings.iter().find(|c| c.ply == k).map_or(0.0, |c| c.enter - c.exit);
-                // Within a ply the turning is linearised: chords agree to a few percent of the ply's diameter.
-                assert!((walked - chord).abs() < 0.06, "ray {i} ply {k}: walked {walked}, crossing {chord}");
-                seen += usize::from(chord > 0.0);
-            }
-            assert!(crossings.windows(2).all(|w| w[0].enter >= w[1].enter), "nearest first");
-            let meets = shape.plies.iter().any(|_| !crossings.is_empty());
-            assert_eq!(section.meets_ply(&shape), meets, "filter and shading agree");
-        }
-        assert!(seen > 600);
-    }
-
-    #[test]
-    fn pressed_plies_are_the_pressed_image_of_round_ones() {
-        // Points of the ray are in a ply if their image in the round section is.
-        let shape = touching_yarn(3, 60, 0.4, 0.35, -0.4);
-        let mut crossings = Crossings::new();
-        let mut seen = 0;
-        for i in 0..400 {
-            let (theta, phi) = (-0.5 + 0.0024 * i as f32, 0.05 * i as f32);
-            let h = -0.99 + 1.98 * ((i * 37 % 400) as f32) / 399.0;
-            let ratio = 0.4 + 0.0015 * i as f32;
-            let place = YarnFrame { flattening: ratio * Vec2::from_angle(0.7 * i as f32), ..place() };
-            let (origin, direction) = ray(theta, phi, h);
-            let section = Section::new(&place, origin, direction, true);
-            section.crossings(&shape, &mut crossings);
-            let steps = 8000;
-            let mut inside = [0usize; 3];
-            for s in 0..steps {
-                let x = section.enter * (1.0 - 2.0 * (s as f32 + 0.5) / steps as f32);
-                let point = section.round(Vec2::new(x, section.h));
-                for (k, ply) in shape.plies.iter().enumerate() {
-                    let centre = ply.distance * section.ply_axis(ply, Section::turn(&shape, section.travel(x)));
-                    inside[k] += usize::from((point - centre).length() < ply.core_radius);
-                }
-            }
-            for (k, count) in inside.iter().enumerate() {
-                let walked = *count as f32 / steps as f32 * 2.0 * section.enter;
-                let chord = crossings.iter().find(|c| c.ply == k).map_or(0.0, |c| c.enter - c.exit);
-                assert!((walked - chord).abs() < 0.06, "ray {i} ply {k}: walked {walked}, crossing {chord}");
-                seen += usize::from(chord > 0.0);
-            }
-            assert_eq!(section.meets_ply(&shape), !crossings.is_empty(), "filter and shading agree");
-        }
-        assert!(seen > 300);
-    }
-
-    #[test]
-    fn pressing_keeps_the_fibers_that_rays_along_its_axes_meet() {
-        // Across the short axis a ray meets what it met before; across the long one all fibres in less height.
-        let shape = touching_yarn(1, 60, 0.4, 0.0, 0.0);
-        let mut crossings = Crossings::new();
-        let mut count = |flattening: Vec2, h: f32| {
-            let section =
-                Section::new(&YarnFrame { flattening, ..place() }, ray(0.0, 0.0, h).0, ray(0.0, 0.0, h).1, true);
-            section.crossings(&shape, &mut crossings);
-            crossings.iter().map(|c| c.fibers).sum::<f32>()
-        };
-        for h in [0.0, 0.2, -0.4] {
-            let round = count(ROUND, h);
-            assert!((count(Vec2::new(0.5, 0.0), h) / round - 1.0).abs() < 1e-5);
-            assert!((count(Vec2::new(0.0, 0.5), 0.5 * h) / round - 2.0).abs() < 1e-5);
-        }
-        assert_eq!(count(Vec2::new(0.0, 0.5), 0.6), 0.0, "a ray that meets the round tube only passes");
-    }
-
-    #[test]
-    fn perpendicular_rays_see_the_same_with_and_without_tilt() {
-        let mut shape = touching_yarn(3, 60, 0.4, 0.35, -0.4);
-        let (mut a, mut b) = (Crossings::new(), Crossings::new());
-        let (origin, direction) = ray(0.0, 0.7, 0.3);
-        Section::new(&place(), origin, direction, true).crossings(&shape, &mut a);
-        shape.tilted = false;
-        Section::new(&place(), origin, direction, false).crossings(&shape, &mut b);
-        assert_eq!(a.len(), b.len());
-        for (a, b) in a.iter().zip(&b) {
-            assert!((a.enter - b.enter).abs() < 1e-6 && (a.fibers - b.fibers).abs() < 1e-5);
-        }
-    }
-
-    #[test]
-    fn the_picture_does_not_depend_on_where_the_camera_stands() {
-        // Two cameras see the same ply at the same place in the world.
-        let shape = touching_yarn(3, 60, 0.4, 0.0, 0.0);
-        for phi in [0.0f32, 1.0, 2.5, 4.0] {
-            let (origin, direction) = ray(0.0, phi, 0.0);
-            let section = Section::new(&place(), origin, direction, true);
-            for (k, ply) in shape.plies.iter().enumerate() {
-                let axis = section.ply_axis(ply, (0.0, 1.0));
-                let world = section.to_world(Vec3A::new(axis.x, axis.y, 0.0));
-                let angle = 0.3 + std::f32::consts::TAU * k as f32 / 3.0;
-                assert!((world - Vec3A::new(angle.cos(), angle.sin(), 0.0)).length() < 1e-5);
-            }
-        }
-    }
-
-    #[test]
-    fn elliptical_plies_have_the_chords_of_their_ellipse() {
-        let ply = PlyParameters {
-            radius: 0.5,
-            aspect: 0.64,
-            distance: 0.45,
-            angle: 0.4,
-            fibers: 100,
-            fiber_radius: 1e-4,
-            fiber_twist: 0.0,
-        };
-        let shape = YarnShape::new(&[ply], 0.0, true);
-        assert!(shape.elliptical && !shape.filled);
-        let (short, long) = (0.5 * 0.8, 0.5 / 0.8);
-        let mut crossings = Crossings::new();
-        for i in 0..200 {
-            let phi = 0.1 * i as f32;
-            let h = -0.95 + 0.0095 * i as f32;
-            let (origin, direction) = ray(0.0, phi, h);
-            let section = Section::new(&place(), origin, direction, true);
-            section.crossings(&shape, &mut crossings);
-            let axis = section.ply_axis(&shape.plies[0], (0.0, 1.0));
-            let inside = (0..40_000)
-                .filter(|s| {
-                    let x = 1.0 - 2.0 * (*s as f32 + 0.5) / 40_000.0;
-                    let p = Vec2::new(x, h) - 0.45 * axis;
-                    (p.dot(axis) / short).powi(2) + (p.perp_dot(axis) / long).powi(2) < 1.0
-                })
-                .count() as f32
-                / 20_000.0;
-            let chord = crossings.first().map_or(0.0, |c| c.enter - c.exit);
-            assert!((inside - chord).abs() < 2e-3, "ray {i}: {inside} {chord}");
-            if let Some(c) = crossings.first() {
-                // Even fibres: 2 r_f n / area of the ellipse for each unit of chord.
-                let want = 2.0 * 1e-4 * 100.0 / (std::f32::consts::PI * 0.25) * chord;
-                assert!(chord < 0.05 || (c.fibers / want - 1.0).abs() < 2e-2, "ray {i}: {} {want}", c.fibers);
-            }
-        }
-    }
-
-    #[test]
-    fn extreme_rays_stay_finite() {
-        let shape = touching_yarn(3, 60, 0.4, 1.5, -1.5);
-        let mut crossings = Crossings::new();
-        for theta in [std::f32::consts::FRAC_PI_2, 1.57, -1.57, 0.0] {
-            for h in [-1.0, 1.0, 0.0, 0.999_999] {
-                let (origin, direction) = ray(theta, 0.3, h);
-                let section = Section::new(&place(), origin, direction, true);
-                section.crossings(&shape, &mut crossings);
-                for c in &crossings {
-                    assert!(c.fibers.is_finite() && c.enter.is_finite() && c.exit.is_finite(), "{c:?}");
-                    assert!(c.normal(&section).is_finite() && c.tangent_at_entry(&shape, &section).is_finite());
-                }
-            }
-        }
-    }
-}
+mod tests;

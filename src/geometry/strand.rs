@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use super::{
     chain::{Chain, Fit, GAUSS, nearest_indices, resample},
     curve::{Basis, Curve},
-    section::{Pressed, ROUND, YarnFrame},
     spline::{SplinePoint, Weights, evaluate_f32},
     tube::curve_of,
+    yarn_frame::{Pressed, ROUND, YarnFrame},
 };
 
 /// What a curve must satisfy on its way to Embree.
@@ -307,6 +307,31 @@ impl Strands {
         self.first_segments[yarn]..self.first_segments[yarn + 1]
     }
 
+    /// The segment of the same yarn before or behind another, if there is one without going over a seam.
+    #[inline]
+    pub fn neighbour(&self, segment: u32, forward: bool) -> Option<u32> {
+        let next = if forward { segment.checked_add(1)? } else { segment.checked_sub(1)? };
+        let first = *self.segments.get(next as usize)?;
+        // Segments of one yarn begin at consecutive points.
+        (first.abs_diff(self.segments[segment as usize]) == 1).then_some(next)
+    }
+
+    /// Whether a yarn goes on before or behind one of its segments: it ends at the last one, unless it is closed.
+    #[inline]
+    pub fn goes_on(&self, segment: u32, forward: bool) -> bool {
+        self.neighbour(segment, forward).is_some() || {
+            let all = self.segments_of(self.yarn_of(segment));
+            let first = |segment: u32| self.segments[segment as usize] as usize;
+            let (start, end) = (first(all.start), first(all.end - 1));
+            // A closed yarn begins with the points it ends with.
+            let same = |i: usize| {
+                let (a, b) = (self.points[start + i], self.points[end + i + 1]);
+                a.distance_squared(b) <= 1e-8 * a.w * a.w
+            };
+            all.len() > 2 && same(1) && same(2)
+        }
+    }
+
     /// The yarns as curves with radii, to be written to a file; closed ones are cut at their seam.
     pub fn curves(&self) -> impl Iterator<Item = Curve> + '_ {
         (0..self.yarns()).filter(|&yarn| !self.segments_of(yarn).is_empty()).map(|yarn| {
@@ -372,7 +397,9 @@ impl Strands {
     fn frame_of(&self, first: usize, p: &[Vec4; 4], frame: &SegmentFrame, u: f32) -> YarnFrame {
         let (at, d1, d2) = evaluate_f32(self.basis, p, u);
         let speed_squared = d1.length_squared().max(1e-30);
-        let tangent = d1 / speed_squared.sqrt();
+        let speed = speed_squared.sqrt();
+        let tangent = d1 / speed;
+        let stride = speed / at.w.max(1e-30);
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
         let normal = frame.normals[0].lerp(frame.normals[1], u);
         let normal = normal - normal.dot(tangent) * tangent;
@@ -384,7 +411,7 @@ impl Strands {
             // The ratio by itself: between two axes a straight line is shorter than both.
             let ratio = length(from) + u * (length(to) - length(from));
             let turn = from.perp_dot(to) / (length(from) * length(to)).max(1e-12);
-            (ratio * from.lerp(to, u).normalize_or(ROUND), turn / speed_squared.sqrt() * at.w)
+            (ratio * from.lerp(to, u).normalize_or(ROUND), turn / stride)
         };
         YarnFrame {
             centre: Vec3A::from_vec4(at),
@@ -393,6 +420,8 @@ impl Strands {
             radius: at.w,
             normal: normal / normal.length().max(1e-10),
             phase: frame.phase + u * frame.growth,
+            turn: Some(frame.growth / stride),
+            stride,
             flattening,
             flattening_turn,
         }

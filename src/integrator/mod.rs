@@ -194,12 +194,9 @@ impl<'a> Integrator<'a> {
                         cloth_events += 1;
                         if first {
                             sample.alpha = 1.0;
-                            let (centre, radius) = match &hit.place {
-                                HitPlace::Yarn(section) => (section.centre, section.radius),
-                                HitPlace::Fiber(place) => (place.centre, place.radius),
-                                HitPlace::Surface(place) => (place.point, 0.0),
-                            };
-                            sample.depth = (camera - centre - radius * hit.normal).dot(self.back);
+                            if let HitPlace::Fiber(place) = &hit.place {
+                                sample.depth = (camera - place.centre - place.radius * hit.normal).dot(self.back);
+                            }
                         }
                     }
                     go_on
@@ -298,7 +295,7 @@ impl<'a> Integrator<'a> {
     fn scatter_at_yarn(
         &self,
         hit: &Hit,
-        section: &Section,
+        section: &Section<'_>,
         yarns: &YarnGeometry,
         path: &mut Path<'_>,
         sample: &mut Sample,
@@ -312,7 +309,7 @@ impl<'a> Integrator<'a> {
         if u_pass < unscattered {
             path.passes += 1;
             // Behind the surface, so that the same hit is not found again.
-            let behind = section.centre + section.radius * (1.0 - PASS_OFFSET) * hit.normal;
+            let behind = section.point_on_ray(0.0) - PASS_OFFSET * section.radius * hit.normal;
             path.ray = Ray::new(behind, path.ray.direction);
             return (path.passes < MOST_PASSES, false);
         }
@@ -322,7 +319,8 @@ impl<'a> Integrator<'a> {
         if path.bounces == 0
             && let Some(front) = scratch.crossings.first()
         {
-            sample.normal = section.to_world(front.normal(section));
+            sample.normal = section.to_world(front.normal(yarn.shape(), section));
+            sample.depth = (path.from - section.point_on_ray(front.enter)).dot(self.back);
             let ply = yarns.first_ply + front.ply;
             let index = yarns.strands.material_index(hit.segment);
             self.describe(sample, yarns.fabric, index, ply, || yarns.strands.yarn_of(hit.segment));
@@ -383,7 +381,7 @@ impl<'a> Integrator<'a> {
     fn light_at_yarn(
         &self,
         vertex: &YarnVertex<'_>,
-        section: &Section,
+        section: &Section<'_>,
         u_choice: f32,
         u: Vec2,
         u_start: f32,

@@ -40,10 +40,8 @@ impl LobeFrame {
 
     /// About a ply where a ray passes it, on the bent yarn.
     #[inline]
-    pub(crate) fn of_ply(shape: &YarnShape, section: &Section, crossing: &PlyCrossing, camera: Vec3A) -> Self {
-        let centre = section.real(crossing.centre);
-        let axis = section.fiber_tangent(shape, crossing.ply, crossing.centre, crossing.axis, centre);
-        Self::new((axis + section.bent(section.travel(centre.x))).normalize(), camera)
+    pub(crate) fn of_ply(shape: &YarnShape, section: &Section<'_>, crossing: &PlyCrossing, camera: Vec3A) -> Self {
+        Self::new(crossing.ply_tangent(shape, section), camera)
     }
 
     /// A vector of the world in this frame.

@@ -324,7 +324,7 @@ impl<'a> ChordVertex<'a> {
     #[inline]
     pub fn new(
         yarn: &'a ChordYarn,
-        section: &Section,
+        section: &Section<'_>,
         crossings: &[PlyCrossing],
         unscattered: f32,
         throughput: Rgb,
@@ -346,8 +346,8 @@ impl<'a> ChordVertex<'a> {
                 kappa_b: Rgb::ONE,
                 channel_f: [0.0; 3],
                 channel_b: [0.0; 3],
-                node: section.enter,
-                middle: section.enter,
+                node: 0.0,
+                middle: 0.0,
             };
         };
         let out = yarn.aggregate(crossings.iter().map(|c| (c.ply, yarn.fibers(c))));
@@ -473,7 +473,7 @@ impl<'a> ChordVertex<'a> {
         })
     }
 
-    /// Depth (x of the section) from which light of R, D and B leaves.
+    /// Depth from which light of R, D and B leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
         self.node

@@ -106,7 +106,7 @@ pub struct Continuation {
     pub pdf: f32,
     /// To which lobes the light that comes from there belongs; the shares sum to 1.
     pub shares: LobeValues,
-    /// Depth in the section at which the ray leaves.
+    /// Depth on the camera's ray, in yarn radii, at which the path leaves it.
     pub start: f32,
 }
 

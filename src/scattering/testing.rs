@@ -1,9 +1,12 @@
 //! What the tests of the models share.
 
-use glam::{Vec2, Vec3A};
+use glam::Vec3A;
 
 use super::fiber::FiberMaterial;
-use crate::geometry::section::Section;
+use crate::geometry::{
+    section::Section,
+    yarn_frame::{ROUND, YarnFrame},
+};
 
 /// Albedos of R, TT and D.
 pub(super) type Albedos = ([f64; 3], [f64; 3], [f64; 3]);
@@ -24,24 +27,21 @@ pub(super) fn lossless() -> FiberMaterial {
 }
 
 /// The section of a straight yarn along z, seen from latitude `theta` at azimuth 0.
-pub(super) fn section(theta: f32, h: f32, phase: f32) -> Section {
-    Section {
-        x: Vec3A::X,
-        y: Vec3A::Y,
-        z: Vec3A::Z,
+pub(super) fn section(theta: f32, h: f32, phase: f32) -> Section<'static> {
+    let place = YarnFrame {
         centre: Vec3A::ZERO,
+        tangent: Vec3A::Z,
+        curvature: Vec3A::ZERO,
         radius: 1.0,
-        h,
-        enter: (1.0 - h * h).max(0.0).sqrt(),
-        sin: theta.sin(),
-        cos: theta.cos().max(1e-3),
-        slope: theta.tan().clamp(-1.0, 1.0),
-        bend: Vec2::ZERO,
-        tilted: true,
-        phase: Vec2::new(phase.cos(), phase.sin()),
-        pressed: None,
-        pressed_turn: 0.0,
-    }
+        normal: Vec3A::X,
+        phase,
+        turn: None,
+        stride: 1.0,
+        flattening: ROUND,
+        flattening_turn: 0.0,
+    };
+    let towards = Vec3A::new(theta.cos(), 0.0, theta.sin());
+    Section::new(&place, h * Vec3A::Y, -towards, true)
 }
 
 /// Directions over the sphere, about z, each with its solid angle.

@@ -60,7 +60,7 @@ impl YarnScatterer {
     #[inline]
     pub fn vertex<'a>(
         &'a self,
-        section: &'a Section,
+        section: &'a Section<'a>,
         crossings: &Crossings,
         unscattered: f32,
         throughput: Rgb,
@@ -97,7 +97,7 @@ impl YarnVertex<'_> {
         }
     }
 
-    /// Depth in the section from which light of the node leaves.
+    /// Depth on the camera's ray, in yarn radii, from which light of the node leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
         match self {
@@ -106,7 +106,7 @@ impl YarnVertex<'_> {
         }
     }
 
-    /// Depth in the section from which light of lobe F leaves.
+    /// Depth on the camera's ray, in yarn radii, from which light of lobe F leaves.
     #[inline]
     pub fn forward_start(&self) -> f32 {
         match self {

@@ -19,21 +19,21 @@ fn leaves(ray: &Ray, hit: &RawHit) -> bool {
 }
 
 /// Lets rays through between the plies.
-pub(super) struct GapFilter<'a> {
+pub(super) struct GapFilter<'a, 'r> {
     geometries: &'a [CurveGeometry],
-    ray: &'a Ray,
+    ray: &'r Ray,
     /// The hit accepted last and its section: mostly the one that stands in the end.
-    last: Option<(RawHit, Section)>,
+    last: Option<(RawHit, Section<'a>)>,
 }
 
-impl<'a> GapFilter<'a> {
-    pub(super) fn new(geometries: &'a [CurveGeometry], ray: &'a Ray) -> Self {
+impl<'a, 'r> GapFilter<'a, 'r> {
+    pub(super) fn new(geometries: &'a [CurveGeometry], ray: &'r Ray) -> Self {
         Self { geometries, ray, last: None }
     }
 
     /// The section at a hit: the one made when it was accepted, or made anew.
     #[inline]
-    pub(super) fn section(&self, yarns: &YarnGeometry, hit: &RawHit) -> Section {
+    pub(super) fn section(&self, yarns: &'a YarnGeometry, hit: &RawHit) -> Section<'a> {
         match &self.last {
             Some((last, section))
                 if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u =>
@@ -45,7 +45,7 @@ impl<'a> GapFilter<'a> {
     }
 }
 
-impl HitFilter for GapFilter<'_> {
+impl HitFilter for GapFilter<'_, '_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
         // Meshes count from both sides.

@@ -24,6 +24,7 @@ use crate::{
         section::{Crossings, Section},
         strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
+        walk::Walker,
         yarn::YarnShape,
     },
     scattering::{
@@ -105,7 +106,7 @@ pub struct BuildTimes {
 
 /// A place where a ray meets cloth and does not slip between plies, or meets a mesh.
 #[derive(Clone, Copy, Debug)]
-pub struct Hit {
+pub struct Hit<'a> {
     /// Distance along the ray.
     pub t: f32,
     /// Index into [`World::geometries`]; no index of it where a mesh was met.
@@ -115,14 +116,14 @@ pub struct Hit {
     /// Outward unit normal of the yarn, fibre or triangle.
     pub normal: Vec3A,
     /// What was met.
-    pub place: HitPlace,
+    pub place: HitPlace<'a>,
 }
 
 /// What a ray met.
 #[derive(Clone, Copy, Debug)]
-pub enum HitPlace {
+pub enum HitPlace<'a> {
     /// A yarn: its cross-section as this ray sees it.
-    Yarn(Section),
+    Yarn(Section<'a>),
     /// A fibre.
     Fiber(TubePlace),
     /// A mesh.
@@ -229,7 +230,7 @@ impl World {
 
     /// The nearest cloth or mesh on a ray. A ray that is not finite meets nothing.
     #[inline]
-    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+    pub fn intersect<'a>(&'a self, ray: &Ray) -> Option<Hit<'a>> {
         if !ray.is_finite() {
             return None;
         }
@@ -239,7 +240,7 @@ impl World {
     }
 
     #[inline]
-    fn hit(&self, ray: &Ray, raw: &RawHit, filter: &GapFilter<'_>) -> Hit {
+    fn hit<'a>(&'a self, ray: &Ray, raw: &RawHit, filter: &GapFilter<'a, '_>) -> Hit<'a> {
         let geometry = raw.geometry as usize;
         let place = match self.geometries.get(geometry) {
             Some(CurveGeometry::Yarns(yarns)) => HitPlace::Yarn(filter.section(yarns, raw)),
@@ -252,7 +253,7 @@ impl World {
 
     /// The nearest hit and the transmittance of a ray, and how many hits Embree offered to the filter of each: what a ray
     /// costs beyond its traversal.
-    pub fn probe(&self, ray: &Ray, crossings: &mut Crossings) -> (Option<Hit>, f32, [u32; 2]) {
+    pub fn probe<'a>(&'a self, ray: &Ray, crossings: &mut Crossings) -> (Option<Hit<'a>>, f32, [u32; 2]) {
         if !ray.is_finite() {
             return (None, 0.0, [0; 2]);
         }
@@ -293,11 +294,11 @@ fn raw_ray(ray: &Ray) -> RawRay {
     RawRay { origin, direction, t_near, t_far, time }
 }
 
-/// The cross-section at a candidate hit: what filter and shading both look at.
+/// The section at a candidate hit: what filter and shading both look at.
 #[inline]
-fn section_at(yarns: &YarnGeometry, ray: &Ray, raw: &RawHit) -> Section {
-    let place = yarns.strands.frame_at(raw.segment, raw.u, ray.time);
-    Section::new(&place, ray.origin, ray.direction, yarns.yarn.shape().tilted)
+fn section_at<'a>(yarns: &'a YarnGeometry, ray: &Ray, raw: &RawHit) -> Section<'a> {
+    let walker = Walker::new(&yarns.strands, raw.segment, raw.u, ray.time);
+    Section::at_hit(walker, ray.origin, ray.direction, raw.t, yarns.yarn.shape().tilted)
 }
 
 impl FiberGeometry {

@@ -4,7 +4,10 @@ use glam::Vec3A;
 
 use super::{Outcome, View};
 use crate::{
-    geometry::section::{Crossings, ROUND, Section, YarnFrame},
+    geometry::{
+        section::{Crossings, Section},
+        yarn_frame::{ROUND, YarnFrame},
+    },
     math::{Rgb, sampler::Sampler},
     scattering::{
         LobeValues,
@@ -53,7 +56,7 @@ impl Specimen<'_> {
 }
 
 /// A straight yarn along z, seen from `theta` at azimuth 0: the section where a ray of offset `h` meets it.
-pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> Section {
+pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> Section<'static> {
     let place = YarnFrame {
         centre: Vec3A::ZERO,
         tangent: Vec3A::Z,
@@ -61,6 +64,8 @@ pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> 
         radius: 1.0,
         normal: Vec3A::X,
         phase: phase as f32,
+        turn: None,
+        stride: 1.0,
         flattening: ROUND,
         flattening_turn: 0.0,
     };
@@ -70,7 +75,7 @@ pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> 
 
 impl Prepared {
     /// Where a ray meets a yarn, the plies on its way, and the share of light that meets no fibre of them.
-    fn meet(yarn: &YarnScatterer, view: &View, sampler: &mut Sampler) -> (Section, Crossings, f32) {
+    fn meet(yarn: &YarnScatterer, view: &View, sampler: &mut Sampler) -> (Section<'static>, Crossings, f32) {
         let [u_offset, u_phase, _, _] = sampler.next4();
         let h = view.offset.map_or(2.0 * u_offset - 1.0, |h| h as f32);
         let phase = view.phase.unwrap_or(f64::from(u_phase) * std::f64::consts::TAU);

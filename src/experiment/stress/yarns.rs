@@ -491,7 +491,7 @@ struct Counted {
 
 fn count(yarn: &Yarn, model: Model, (theta, h): (f64, f32), n: u32, seed: u32) -> Counted {
     let scatterer = scatterer(yarn, model);
-    let section: Section = straight_section(theta, h, 0.6, true);
+    let section: Section<'_> = straight_section(theta, h, 0.6, true);
     let mut crossings = Crossings::new();
     section.crossings(scatterer.shape(), &mut crossings);
     let unscattered = scatterer.transparency(&crossings);

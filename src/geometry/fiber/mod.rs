@@ -20,10 +20,10 @@ use rayon::prelude::*;
 use super::{
     curve::{Basis, Curve},
     density::PlyPacking,
-    section::YarnFrame,
     strand::Strands,
     tube::{Tubes, spline_through},
     yarn::{PlyParameters, PlyShape, YarnShape},
+    yarn_frame::YarnFrame,
 };
 use crate::math::sampler::{Stream, hash2};
 

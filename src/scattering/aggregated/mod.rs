@@ -19,7 +19,7 @@
 //! set-up time. Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light
 //! sampling and direction sampling (balance heuristic), all given the places and the directions drawn.
 
-use glam::{Vec2, Vec3A};
+use glam::Vec3A;
 
 use super::{Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
 use crate::{
@@ -80,7 +80,7 @@ impl AggregatedYarn {
 #[derive(Clone, Copy, Debug)]
 struct View<'a> {
     yarn: &'a AggregatedYarn,
-    section: &'a Section,
+    section: &'a Section<'a>,
     /// Towards the camera, in the section's frame.
     camera: Vec3A,
 }
@@ -90,9 +90,11 @@ struct View<'a> {
 struct Spot {
     /// The ply.
     ply: usize,
-    /// Where, in the section.
-    point: Vec2,
-    /// How far along the yarn.
+    /// Depth on the camera's ray.
+    depth: f32,
+    /// Where that is, in the section's frame.
+    point: Vec3A,
+    /// About how far along the yarn.
     travel: f32,
     /// Unit tangent of the fibre there.
     tangent: Vec3A,
@@ -101,7 +103,7 @@ struct Spot {
 }
 
 impl<'a> View<'a> {
-    fn new(yarn: &'a AggregatedYarn, section: &'a Section) -> Self {
+    fn new(yarn: &'a AggregatedYarn, section: &'a Section<'a>) -> Self {
         let camera = Vec3A::new((1.0 - section.sin * section.sin).max(0.0).sqrt(), 0.0, section.sin);
         Self { yarn, section, camera }
     }
@@ -110,24 +112,15 @@ impl<'a> View<'a> {
     #[inline]
     fn spot(&self, crossing: &PlyCrossing, x: f32) -> Spot {
         let Self { yarn, section, .. } = self;
-        let ply = &yarn.shape.plies[crossing.ply];
         let depth = if yarn.plain {
             crossing.enter + (crossing.exit - crossing.enter) * x
         } else {
-            crossing.foot + crossing.chord.place(x)
+            (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
         };
-        let point = Vec2::new(depth, section.h);
-        let travel = section.travel(point.x);
-        let (axis, centre) = if section.slope == 0.0 {
-            (crossing.axis, crossing.centre)
-        } else {
-            let axis = section.ply_axis(ply, Section::turn(&yarn.shape, travel));
-            (axis, section.ply_centre(ply, axis, travel))
-        };
-        let straight = section.fiber_tangent(&yarn.shape, crossing.ply, centre, axis, point);
-        let tangent = straight + section.bent(travel);
+        let (point, travel) = (section.point(depth), crossing.travel_at(depth));
+        let tangent = section.fiber_tangent(&yarn.shape, crossing.ply, point, travel);
         let stretch = tangent.length();
-        Spot { ply: crossing.ply, point, travel, tangent: tangent / stretch, stretch }
+        Spot { ply: crossing.ply, depth, point, travel, tangent: tangent / stretch, stretch }
     }
 }
 
@@ -135,7 +128,7 @@ impl Spot {
     /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the
     /// section, times the fibres' width as seen along it, and how much closer they are where the yarn is pressed flat.
     #[inline]
-    fn tilt(&self, section: &Section, w: Vec3A) -> f32 {
+    fn tilt(&self, section: &Section<'_>, w: Vec3A) -> f32 {
         let along = w.dot(self.tangent);
         section.squeeze() * ((1.0 - along * along).max(1e-9) / (1.0 - w.z * w.z).max(1e-12)).sqrt() * self.stretch
     }
@@ -157,7 +150,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     pub fn new(
         yarn: &'a AggregatedYarn,
-        section: &'a Section,
+        section: &'a Section<'a>,
         crossings: &Crossings,
         unscattered: f32,
         throughput: Rgb,
@@ -237,16 +230,16 @@ impl<'a> Vertex<'a> {
         (pdf > 0.0).then(|| Continuation { direction, weight: value / pdf, pdf, shares, start })
     }
 
-    /// Depth (x of the section) from which light of the node's lobes and of B leaves.
+    /// Depth from which light of the node's lobes and of B leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
-        self.node.as_ref().map_or(self.view.section.enter, |n| n.spot.point.x)
+        self.node.as_ref().map_or(0.0, |n| n.spot.depth)
     }
 
     /// Depth from which light of F leaves: that of the first fibre.
     #[inline]
     pub fn forward_start(&self) -> f32 {
-        self.forward.as_ref().map_or(self.view.section.enter, |f| f.spot.point.x)
+        self.forward.as_ref().map_or(0.0, |f| f.spot.depth)
     }
 }
 

@@ -196,7 +196,7 @@ impl Node {
         let shape = &yarn.shape;
         let optics = &yarn.plies[spot.ply];
         let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
-        let start = spot.point + optics.shift * (Vec2::X + ahead);
+        let start = spot.point + optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
         let strip = ClearedStrip::new(2.0 * shape.plies[spot.ply].fiber_radius, ahead);
         // Light that goes on is inside its own fibre first; light that turns back is not.
         let hole = optics.fiber_chord * 0.5 * (1.0 - ahead.x);

@@ -26,7 +26,12 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
 ///
 /// Nodes per ply and channel as given; the share that escapes is a mean over 32 directions across the yarn, as the
 /// specification has it.
-fn quadrature(nodes: &[(f64, f64)], yarn: &AggregatedYarn, section: &Section, directions: &[Vec3A]) -> Vec<[Rgb; 2]> {
+fn quadrature(
+    nodes: &[(f64, f64)],
+    yarn: &AggregatedYarn,
+    section: &Section<'_>,
+    directions: &[Vec3A],
+) -> Vec<[Rgb; 2]> {
     let mut crossings = Crossings::new();
     section.crossings(yarn.shape(), &mut crossings);
     let view = View::new(yarn, section);
@@ -71,7 +76,7 @@ fn quadrature(nodes: &[(f64, f64)], yarn: &AggregatedYarn, section: &Section, di
 
 /// F of the plain form, and T0: the camera's chord alone says how much passes, and the mean number of TT events how far it
 /// is spread. The program has a better F; the chain's rate, the kernel and the wrapped normal are the same.
-fn plain_forward(yarn: &AggregatedYarn, section: &Section, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
+fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
     let mut crossings = Crossings::new();
     section.crossings(yarn.shape(), &mut crossings);
     let view = View::new(yarn, section);
@@ -107,7 +112,7 @@ const CASES: [Case; 7] = [
     (2, 50, 0.2, 0.1, 0.7, 0.25, 0.9, 2.0),
 ];
 
-fn build(case: Case, m: &FiberMaterial) -> (AggregatedYarn, Section) {
+fn build(case: Case, m: &FiberMaterial) -> (AggregatedYarn, Section<'static>) {
     let (plies, fibers, density, ply_twist, fiber_twist, h, theta, phase) = case;
     let mut yarn = yarn(plies, fibers, density, ply_twist, fiber_twist, m);
     // Crowded as fibres that keep out of each other are.

@@ -198,7 +198,7 @@ const CASES: [Case; 6] = [
     (2, 50, 0.2, 0.1, 0.7, 0.25, 0.9, 2.0),
 ];
 
-fn build(case: Case, materials: &[&FiberMaterial], model: ChordModel) -> (ChordYarn, Section, Crossings) {
+fn build(case: Case, materials: &[&FiberMaterial], model: ChordModel) -> (ChordYarn, Section<'static>, Crossings) {
     let (plies, fibers, density, ply_twist, fiber_twist, h, theta, phase) = case;
     let shape = touching_yarn(plies, fibers, density, ply_twist, fiber_twist);
     let materials: Vec<_> = (0..plies as usize).map(|k| materials[k % materials.len()]).collect();
@@ -272,7 +272,7 @@ fn samples_average_to_the_energies_and_light_sampling_joins_without_loss() {
                         *sum += f64::from((share * c.weight).mean()) / f64::from(n);
                     }
                     let (front, back) = (crossings[0].enter, crossings.last().unwrap().exit);
-                    assert!(c.start <= front && c.start >= back, "start {} in {front}..{back}", c.start);
+                    assert!(c.start >= front && c.start <= back, "start {} in {front}..{back}", c.start);
                     // Drawing and evaluating say the same, with a light of any density.
                     let direct = vertex.evaluate(c.direction, f32::INFINITY);
                     assert!(

@@ -1,0 +1,74 @@
+//! A place on a yarn's axis with all that is known there: the frame across the yarn, how it bends, how its plies lie.
+
+use glam::{Vec2, Vec3A};
+
+/// A place on a yarn's axis.
+#[derive(Clone, Copy, Debug)]
+pub struct YarnFrame {
+    /// The yarn's centre.
+    pub centre: Vec3A,
+    /// Unit tangent of the yarn.
+    pub tangent: Vec3A,
+    /// Curvature vector: second derivative by arc length, 1/length.
+    pub curvature: Vec3A,
+    /// Outer radius of the yarn.
+    pub radius: f32,
+    /// Unit vector across the yarn that does not turn with the plies (rotation-minimising along the yarn).
+    pub normal: Vec3A,
+    /// Angle of the plies about the tangent, from `normal`, radians.
+    pub phase: f32,
+    /// How that angle grows along the yarn, radians per yarn radius; `None` where it does as the yarn's shape says.
+    pub turn: Option<f32>,
+    /// Length of the segment that this place is on, in yarn radii, as far as its speed here tells.
+    pub stride: f32,
+    /// Along the short axis of the section in the frame of `normal` and `tangent x normal`, as long as the ratio of the
+    /// short axis to the long one: [`ROUND`], or any other vector of length 1, where the yarn is not pressed flat.
+    pub flattening: Vec2,
+    /// By how much that axis turns in the frame along the yarn, radians per yarn radius.
+    pub flattening_turn: f32,
+}
+
+/// [`YarnFrame::flattening`] of a round yarn.
+pub const ROUND: Vec2 = Vec2::X;
+/// A section whose axes differ by less is round.
+const NEARLY_ROUND: f32 = 0.9999;
+
+impl YarnFrame {
+    /// The point of the world at `at` of the round section that this one was pressed from, in yarn radii along `normal`
+    /// and `tangent x normal`.
+    pub fn point(&self, at: Vec2) -> Vec3A {
+        let at = Pressed::new(self.flattening).map_or(at, |pressed| pressed.real(at));
+        let across = self.tangent.cross(self.normal);
+        self.centre + self.radius * (at.x * self.normal + at.y * across)
+    }
+}
+
+/// How a section is pressed flat: an affine map that takes circles to ellipses, and with them the plies inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pressed {
+    /// Unit vector along the short axis.
+    pub axis: Vec2,
+    /// Long over short axis, above 1.
+    pub stretch: f32,
+}
+
+impl Pressed {
+    /// From [`YarnFrame::flattening`]; `None` where the section is round.
+    #[inline]
+    pub fn new(flattening: Vec2) -> Option<Self> {
+        let ratio = flattening.length();
+        (ratio < NEARLY_ROUND).then(|| Self { axis: flattening / ratio, stretch: 1.0 / ratio })
+    }
+
+    /// A point or a vector of the pressed section in the round one.
+    #[inline]
+    pub fn round(&self, p: Vec2) -> Vec2 {
+        p + (self.stretch - 1.0) * p.dot(self.axis) * self.axis
+    }
+
+    /// A point or a vector of the round section in the pressed one.
+    #[inline]
+    pub fn real(&self, p: Vec2) -> Vec2 {
+        p + (1.0 / self.stretch - 1.0) * p.dot(self.axis) * self.axis
+    }
+}
