@@ -41,19 +41,19 @@ struct Reach {
 /// A ray: what it meets first is seen.
 const RAY: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN };
 /// Light that leaves from inside: how far it still has to go is felt in all.
-const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN };
+const LIGHT: Reach = Reach { near: 2.0, longest: 16.0, turn: 2.0 * MOST_TURN };
 /// The shortest step from one station to the next, in yarn radii.
 const LEAST_STEP: f32 = 0.1;
 /// What may be left of a way without another station, in yarn radii.
 const LEAST_LEFT: f32 = 1e-3;
 /// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
-const AT_SURFACE: f32 = 1e-4;
+const AT_SURFACE: f32 = 0.02;
 /// By how much a bent yarn may bow a way between two stations, in yarn radii.
-const MOST_BOW: f32 = 0.1;
+const MOST_BOW: f32 = 0.2;
 /// Turns, in radians, below which a way is taken for straight.
 const STRAIGHT: f32 = 1e-3;
 /// The same of a chord on which fibres are counted.
-const STRAIGHT_CHORD: f32 = 0.2;
+const STRAIGHT_CHORD: f32 = 0.3;
 
 /// A place where a ray enters a yarn, as the ray sees it.
 #[derive(Clone, Copy, Debug)]
@@ -220,6 +220,15 @@ struct Step {
     real_slope: Vec2,
 }
 
+/// What a way starts from.
+struct Line {
+    start: Vec3A,
+    direction: Vec3A,
+    first: Step,
+    near: Neighbourhood,
+    reach: Reach,
+}
+
 /// The yarn about one of its places, taken for its circle of curvature.
 #[derive(Clone, Copy)]
 struct Neighbourhood {
@@ -233,6 +242,10 @@ struct Neighbourhood {
     turn: f32,
     pressed: Option<Pressed>,
     pressed_turn: f32,
+    /// How fast a way turns in the unwound yarn, radians per yarn radius along the yarn.
+    turning: f32,
+    /// The inverse of how far along the yarn its bend bows a way by [`MOST_BOW`].
+    bowing: f32,
 }
 
 /// A place of the yarn in a section's frame.
@@ -387,8 +400,8 @@ impl<'a> Section<'a> {
     #[inline]
     pub fn meets_ply(&self, shape: &YarnShape) -> bool {
         let mut met = false;
-        self.march(shape, self.point(0.0), 0.0, self.direction(), RAY, |a, b| {
-            met = way::passes(a, b, &shape.plies);
+        self.march(self.ray(shape), |a, b| {
+            met = way::passes(a, b, &shape.fours);
             if met { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         met
@@ -399,30 +412,29 @@ impl<'a> Section<'a> {
     pub fn crossings(&self, shape: &YarnShape, out: &mut Crossings) {
         out.clear();
         let mut way = Way::new();
-        self.way(shape, self.point(0.0), 0.0, self.direction(), RAY, &mut way);
-        for (index, ply) in shape.plies.iter().enumerate() {
+        self.way(self.ray(shape), &mut way);
+        way::passages::<true>(&way, shape, |index, passage| {
+            let ply = &shape.plies[index];
             if ply.fibers == 0.0 {
-                continue;
+                return;
             }
-            way::passages::<true>(&way, ply, |passage| {
-                let (enter, exit) = (way::station_at(&way, passage.enter), way::station_at(&way, passage.exit));
-                let chord = ply.chord(passage.offset, passage.speed / self.cos);
-                let fibers = chord.total() * passage.share / self.cos
-                    * self.fibers_over_chord(shape, index, &way, &enter, &exit);
-                let Passage { enter: from, exit: to, offset, .. } = passage;
-                let foot = 0.5 * (from + to);
-                let travel = [enter.travel, exit.travel];
-                // Signed as h is: seen from the camera, towards which x points.
-                let offset = -offset;
-                let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers };
-                let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
-                if out.is_full() {
-                    // What lies deepest is seen least.
-                    out.pop();
-                }
-                out.insert(place.min(out.len()), crossing);
-            });
-        }
+            let Passage { enter, exit, offset, .. } = passage;
+            let chord = ply.chord(passage.offset, passage.speed / self.cos);
+            let fibers =
+                chord.total() * passage.share / self.cos * self.fibers_over_chord(shape, index, &way, &enter, &exit);
+            let (from, to) = (enter.depth, exit.depth);
+            let foot = 0.5 * (from + to);
+            let travel = [enter.travel, exit.travel];
+            // Signed as h is: seen from the camera, towards which x points.
+            let offset = -offset;
+            let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers };
+            let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
+            if out.is_full() {
+                // What lies deepest is seen least.
+                out.pop();
+            }
+            out.insert(place.min(out.len()), crossing);
+        });
     }
 
     /// The plies that lie ahead of a point inside the yarn, in a direction `w` of this frame; one may come more than once.
@@ -435,12 +447,12 @@ impl<'a> Section<'a> {
         let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
         let w = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
         let mut way = Way::new();
-        self.way(shape, start, travel, w, LIGHT, &mut way);
-        for (index, ply) in shape.plies.iter().enumerate() {
-            way::passages::<false>(&way, ply, |Passage { offset, foot, speed, .. }| {
-                visit(PlyAhead { ply: index, offset, foot: foot * cos, length: speed / cos });
-            });
-        }
+        let mut near = self.neighbourhood(self.turn(shape), travel, LIGHT);
+        let first = self.step(&mut near, start, w, 0.0, LIGHT);
+        self.way(Line { start, direction: w, first, near, reach: LIGHT }, &mut way);
+        way::passages::<false>(&way, shape, |ply, Passage { offset, foot, speed, .. }| {
+            visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos });
+        });
     }
 
     /// Turns of the plies, radians per yarn radius.
@@ -449,10 +461,18 @@ impl<'a> Section<'a> {
         if self.tilted { self.turn.unwrap_or(shape.ply_rate) } else { shape.ply_rate }
     }
 
-    /// The way from `start`, which is about `travel` along the yarn, in a direction, until it leaves the yarn.
+    /// The way of the ray.
     #[inline]
-    fn way(&self, shape: &YarnShape, start: Vec3A, travel: f32, direction: Vec3A, reach: Reach, way: &mut Way) {
-        self.march(shape, start, travel, direction, reach, |a, b| {
+    fn ray(&self, shape: &YarnShape) -> Line {
+        let (start, direction) = (self.point(0.0), self.direction());
+        let near = self.neighbourhood(self.turn(shape), 0.0, RAY);
+        Line { start, direction, first: near.enter(start, direction), near, reach: RAY }
+    }
+
+    /// Keeps the stations of a way.
+    #[inline]
+    fn way(&self, line: Line, way: &mut Way) {
+        self.march(line, |a, b| {
             if way.is_empty() {
                 way.push(*a);
             }
@@ -463,30 +483,24 @@ impl<'a> Section<'a> {
 
     /// Goes from station to station, until the way leaves the yarn or `visit` has seen enough.
     #[inline]
-    fn march(
-        &self,
-        shape: &YarnShape,
-        start: Vec3A,
-        travel: f32,
-        direction: Vec3A,
-        reach: Reach,
-        mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>,
-    ) {
-        let rate = self.turn(shape);
-        let mut near = self.neighbourhood(rate, travel, reach);
-        let mut here = self.step(&mut near, start, direction, 0.0, reach);
+    fn march(&self, line: Line, mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
+        let Line { start, direction, first: mut here, mut near, reach } = line;
         loop {
             let Step { station, real, real_slope } = here;
-            // How far it is to the yarn's surface, were the yarn straight; the loop does the rest.
-            let (speed, outward) = (real_slope.length_squared(), real.dot(real_slope));
-            let inside = (1.0 - real.length_squared()).max(0.0);
+            let (inside, outward) = (1.0 - real.length_squared(), real.dot(real_slope));
             if inside < AT_SURFACE && outward > 0.0 && station.depth > 0.0 {
                 return;
             }
             let mut step = reach.longest;
-            if speed > 1e-12 {
-                // A little beyond is no harm, and a way along the surface may bend back.
-                step = ((-outward + (outward * outward + speed * inside).sqrt()) / speed).max(LEAST_STEP);
+            if real_slope.length_squared() > 1e-12 {
+                // As if the yarn were straight, then as its bend bows the way; the loop does the rest.
+                step = to_surface(real, real_slope);
+                if near.bend != Vec2::ZERO {
+                    let bow = -station.advance * station.advance * near.bend;
+                    let slope = real_slope + step * bow;
+                    step += to_surface(real + (0.5 * step) * (real_slope + slope), slope);
+                }
+                step = step.max(LEAST_STEP);
             }
             step = step.min(reach.longest - station.depth);
             let end = self.ends[usize::from(station.advance > 0.0)];
@@ -496,9 +510,10 @@ impl<'a> Section<'a> {
             if step.is_nan() || step <= LEAST_LEFT {
                 return;
             }
-            let mut turning = (rate.abs() + self.bend.length() + self.pressed_turn.abs()) * station.advance.abs();
+            let rate = near.turning;
+            let mut turning = rate * station.advance.abs();
             // Faster inside of the bend.
-            turning *= (station.straightness / (1.0 - self.bend.dot(real + step * real_slope)).max(0.3)).max(1.0);
+            turning *= (station.straightness / (1.0 - near.bend.dot(real + step * real_slope)).max(0.3)).max(1.0);
             let mut next = here;
             if turning * step <= STRAIGHT {
                 next.station.depth += step;
@@ -506,13 +521,13 @@ impl<'a> Section<'a> {
                 next.station.travel += step * station.advance;
                 next.real += step * real_slope;
             } else {
-                let bowed = station.advance.abs() * step * (self.bend.length() / (8.0 * MOST_BOW)).sqrt();
+                let bowed = station.advance.abs() * step * near.bowing;
                 step /= (turning * step / reach.turn).max(bowed).ceil();
                 // Inside of a bend it may turn out faster.
                 for _ in 0..4 {
                     let depth = station.depth + step;
                     next = self.step(&mut near, start + depth * direction, direction, depth, reach);
-                    let turned = (rate.abs() + self.bend.length()) * (next.station.travel - station.travel);
+                    let turned = rate * (next.station.travel - station.travel);
                     if turned.abs() <= 1.3 * reach.turn {
                         break;
                     }
@@ -542,7 +557,10 @@ impl<'a> Section<'a> {
             turn: rate,
             pressed: self.pressed,
             pressed_turn: self.pressed_turn,
+            turning: 0.0,
+            bowing: 0.0,
         }
+        .rated()
     }
 
     /// The yarn about the place so far along it, from the yarn itself. `None` where there is none, or it does not go so far.
@@ -552,7 +570,7 @@ impl<'a> Section<'a> {
         let place = walker.walk(travel)?;
         let across = place.tangent.cross(place.normal);
         let section = |v: Vec3A| Vec2::new(v.dot(place.normal), v.dot(across));
-        Some(Neighbourhood {
+        let found = Neighbourhood {
             place: Some(Placed {
                 origin: self.to_local(place.centre - self.centre) / self.radius,
                 x: self.to_local(place.normal),
@@ -566,7 +584,10 @@ impl<'a> Section<'a> {
             turn: place.turn.unwrap_or(0.0),
             pressed: Pressed::new(place.flattening),
             pressed_turn: place.flattening_turn,
-        })
+            turning: 0.0,
+            bowing: 0.0,
+        };
+        Some(found.rated())
     }
 
     /// The station at a point of this frame, by the neighbourhood known so far or by a nearer one.
@@ -654,6 +675,14 @@ impl<'a> Section<'a> {
     }
 }
 
+/// How far it is from a point of the section along a slope to the unit circle: negative from outside.
+#[inline]
+fn to_surface(at: Vec2, slope: Vec2) -> f32 {
+    let (speed, outward) = (slope.length_squared().max(1e-12), at.dot(slope));
+    let square = outward * outward + speed * (1.0 - at.length_squared());
+    (square.max(0.0).sqrt() - outward) / speed
+}
+
 /// (cos, sin) of an angle.
 #[inline]
 fn angle(by: f32) -> Vec2 {
@@ -662,6 +691,26 @@ fn angle(by: f32) -> Vec2 {
 }
 
 impl Neighbourhood {
+    /// With how fast it turns and bows ways. A bend turns them as well.
+    #[inline]
+    fn rated(mut self) -> Self {
+        let bend = self.bend.length();
+        self.turning = self.turn.abs() + bend + self.pressed_turn.abs();
+        self.bowing = (bend * (0.125 / MOST_BOW)).sqrt();
+        self
+    }
+
+    /// The station of a point in the section of the place itself.
+    #[inline]
+    fn enter(&self, point: Vec3A, direction: Vec3A) -> Step {
+        let at = point.truncate();
+        let straightness = (1.0 - self.bend.dot(at)).max(LEAST_STRAIGHTNESS);
+        let advance = direction.z / straightness;
+        let unbent =
+            Unbent { at, slope: direction.truncate(), travel: 0.0, advance, straightness, lean: 0.0, cos: 1.0 };
+        self.unwind(&unbent, 0.0)
+    }
+
     /// A point and a direction of the section's frame on the unbent yarn. `travel` is from this place.
     #[inline]
     fn unbend(&self, point: Vec3A, direction: Vec3A) -> Unbent {

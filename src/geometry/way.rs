@@ -5,10 +5,16 @@
 //! [`MOST_TURN`] at most, where that cubic is off by less than 0.005 yarn radii. A way that crosses a yarn steeply needs
 //! two stations, at its ends.
 
+use std::{
+    array,
+    ops::{Add, Mul},
+};
+
 use arrayvec::ArrayVec;
 use glam::Vec2;
+use wide::f32x4;
 
-use super::yarn::PlyShape;
+use super::yarn::{PlyShape, YarnShape};
 
 /// The most by which plies turn between two stations, radians.
 pub(super) const MOST_TURN: f32 = 0.8;
@@ -38,10 +44,10 @@ pub type Way = ArrayVec<Station, MOST_STATIONS>;
 /// A stretch of a way that passes a ply.
 #[derive(Clone, Copy, Debug)]
 pub struct Passage {
-    /// Depth at which it enters the ply's core; where it only grazes the ply's outer fibres, that of the nearest point.
-    pub enter: f32,
-    /// Depth at which it leaves the core.
-    pub exit: f32,
+    /// Where it enters the ply's core; where it only grazes the ply's outer fibres, the nearest point.
+    pub enter: Station,
+    /// Where it leaves the core.
+    pub exit: Station,
     /// Depth where it is nearest to the ply's axis, along the straight line that goes on from there: before the start of the
     /// way if it starts beyond that point.
     pub foot: f32,
@@ -53,22 +59,36 @@ pub struct Passage {
     pub share: f32,
 }
 
-/// What is between two stations, in coordinates in which a ply is a circle about the origin.
+/// What is between two stations: at(u) = from + u (slope + u (square + u cube)), u from 0 to 1.
+#[derive(Clone, Copy)]
 struct Arc {
     from: Vec2,
     to: Vec2,
-    /// at(u) = from + u (slope + u (square + u cube)), u from 0 to 1.
     slope: Vec2,
     square: Vec2,
     cube: Vec2,
     /// How far it is off the line from `from` to `to` at most.
     off: f32,
-    /// 1 / |to - from|^2
-    inverse: f32,
 }
 
+/// Farther off a line an arc counts as bent.
+const BENT: f32 = 1e-5;
+/// Less off a line, one step of Newton's method tells where an arc enters a ply, in yarn radii.
+const LITTLE: f32 = 0.02;
+
 impl Arc {
-    /// As seen from the middle of a ply: from that of the way itself, for all round plies.
+    #[inline]
+    fn between(a: &Station, b: &Station) -> Self {
+        let length = b.depth - a.depth;
+        let (from, to, slope) = (a.at, b.at, a.slope * length);
+        let chord = to - from;
+        let (bow, end_bow) = (slope - chord, b.slope * length - chord);
+        let size = |v: Vec2| v.x.abs().max(v.y.abs()) * 1.42;
+        let off = (4.0 / 27.0) * (size(bow) + size(end_bow));
+        Self { from, to, slope, square: -2.0 * bow - end_bow, cube: bow + end_bow, off }
+    }
+
+    /// As seen from the middle of a ply, in coordinates in which it is a circle.
     #[inline]
     fn about(&self, ply: &PlyShape) -> Self {
         let centre = ply.distance * ply.direction;
@@ -78,25 +98,7 @@ impl Arc {
         }
         let to_circle = |p: Vec2| Vec2::new(p.dot(ply.direction), ply.direction.perp_dot(p)) * ply.stretch;
         let [from, to, slope, square, cube] = [from, to, self.slope, self.square, self.cube].map(to_circle);
-        let chord = to - from;
-        let off = self.off * ply.stretch.max_element();
-        Self { from, to, slope, square, cube, off, inverse: 1.0 / chord.length_squared().max(1e-20) }
-    }
-
-    #[inline]
-    fn between(a: &Station, b: &Station) -> Self {
-        let length = b.depth - a.depth;
-        Self::hermite(a.at, b.at, a.slope * length, b.slope * length)
-    }
-
-    #[inline]
-    fn hermite(from: Vec2, to: Vec2, slope: Vec2, end_slope: Vec2) -> Self {
-        let chord = to - from;
-        let (bow, end_bow) = (slope - chord, end_slope - chord);
-        let size = |v: Vec2| v.x.abs().max(v.y.abs()) * 1.42;
-        let off = (4.0 / 27.0) * (size(bow) + size(end_bow));
-        let inverse = 1.0 / chord.length_squared().max(1e-20);
-        Self { from, to, slope, square: -2.0 * bow - end_bow, cube: bow + end_bow, off, inverse }
+        Self { from, to, slope, square, cube, off: self.off * ply.stretch.max_element() }
     }
 
     #[inline]
@@ -109,27 +111,53 @@ impl Arc {
         self.slope + u * (2.0 * self.square + 3.0 * u * self.cube)
     }
 
-    /// Where it is nearest to the origin, if that is nearer than `radius`.
+    /// The station at `u` of the arc from `a` to `b`.
     #[inline]
-    fn nearest(&self, radius: f32) -> Option<(f32, Vec2)> {
-        let chord = self.to - self.from;
-        let mut u = (-self.from.dot(chord) * self.inverse).clamp(0.0, 1.0);
-        let reach = radius + self.off;
-        if (self.from + u * chord).length_squared() >= reach * reach {
-            return None;
+    fn station(&self, a: &Station, b: &Station, u: f32) -> Station {
+        let length = b.depth - a.depth;
+        Station {
+            depth: a.depth + u * length,
+            at: self.at(u),
+            slope: self.slope_at(u) / length.max(1e-12),
+            travel: a.travel + u * (b.travel - a.travel),
+            advance: a.advance + u * (b.advance - a.advance),
+            straightness: a.straightness + u * (b.straightness - a.straightness),
         }
-        // Newton for at . slope = 0; a line needs none.
-        let mut at = self.at(u);
-        if self.off > 1e-5 {
-            for _ in 0..2 {
-                let slope = self.slope_at(u);
-                let bend = 2.0 * self.square + 6.0 * u * self.cube;
-                let speed = slope.length_squared();
-                u = (u - at.dot(slope) / (speed + at.dot(bend)).max(0.2 * speed + 1e-20)).clamp(0.0, 1.0);
-                at = self.at(u);
-            }
+    }
+
+    /// Where it is nearest to the middles of four plies, each in coordinates in which it is a circle: a bit for each ply that
+    /// it passes, and u.
+    #[inline]
+    fn nearest(&self, plies: &FourPlies) -> (u32, f32x4) {
+        let from = plies.to_circle(plies.seen(self.from));
+        let chord = plies.to_circle(Four::splat(self.to - self.from));
+        let inverse = f32x4::ONE / chord.dot(chord).fast_max(f32x4::splat(1e-20));
+        let between = |u: f32x4| u.fast_max(f32x4::ZERO).fast_min(f32x4::ONE);
+        let mut u = between(-from.dot(chord) * inverse);
+        let at = from + chord * u;
+        let off = f32x4::splat(self.off) * plies.largest_stretch;
+        let reach = plies.radius + off;
+        let near = at.dot(at).simd_lt(reach * reach) & plies.present;
+        if self.off <= BENT || near.none() {
+            return (near.to_bitmask(), u);
         }
-        (at.length_squared() < radius * radius).then_some((u, at))
+        // Newton for at . slope = 0.
+        let slope = plies.to_circle(Four::splat(self.slope));
+        let square = plies.to_circle(Four::splat(self.square));
+        let cube = plies.to_circle(Four::splat(self.cube));
+        let at = |u: f32x4| from + (slope + (square + cube * u) * u) * u;
+        let (two, three) = (f32x4::splat(2.0), f32x4::splat(3.0));
+        for _ in 0..2 {
+            let at = at(u);
+            let slope = slope + (square * two + cube * (three * u)) * u;
+            let bend = (square + cube * (three * u)) * two;
+            let speed = slope.dot(slope);
+            let rise = (speed + at.dot(bend)).fast_max(f32x4::splat(0.2) * speed + f32x4::splat(1e-20));
+            u = between(u - at.dot(slope) / rise);
+        }
+        let at = at(u);
+        let inside = at.dot(at).simd_lt(plies.radius * plies.radius) & plies.present;
+        (inside.to_bitmask(), u)
     }
 
     /// Where before (`sign` -1) or behind (1) the place `u`, which is nearer to the origin, it is at the distance `radius`.
@@ -142,10 +170,10 @@ impl Arc {
         let foot = -at.dot(slope) * inverse;
         let half = (foot * foot + (radius * radius - at.length_squared()) * inverse).max(0.0).sqrt();
         let mut u = (u + foot + sign * half).clamp(low, high);
-        if self.off <= 1e-5 {
+        if self.off <= BENT {
             return u;
         }
-        for _ in 0..2 {
+        for _ in 0..if self.off < LITTLE { 1 } else { 2 } {
             let (at, slope) = (self.at(u), self.slope_at(u));
             let rise = 2.0 * at.dot(slope);
             if rise.abs() < 1e-12 {
@@ -157,11 +185,99 @@ impl Arc {
     }
 }
 
+/// Four points or vectors of the section.
+#[derive(Clone, Copy)]
+struct Four {
+    x: f32x4,
+    y: f32x4,
+}
+
+impl Four {
+    #[inline]
+    fn splat(v: Vec2) -> Self {
+        Self { x: f32x4::splat(v.x), y: f32x4::splat(v.y) }
+    }
+
+    #[inline]
+    fn dot(self, other: Self) -> f32x4 {
+        self.x * other.x + self.y * other.y
+    }
+}
+
+impl Add for Four {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y }
+    }
+}
+
+impl Mul<f32x4> for Four {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, by: f32x4) -> Self {
+        Self { x: self.x * by, y: self.y * by }
+    }
+}
+
+/// Four plies, or fewer, of a yarn's section, side by side.
+#[derive(Clone, Debug)]
+pub(super) struct FourPlies {
+    /// Index of the first.
+    first: usize,
+    /// Set for each that there is.
+    present: f32x4,
+    /// Centres.
+    centre: [f32x4; 2],
+    /// As [`PlyShape::radius`].
+    radius: f32x4,
+    /// Unless all are round: directions and stretches, as those of [`PlyShape`].
+    ellipses: Option<[f32x4; 4]>,
+    /// The largest stretch of each.
+    largest_stretch: f32x4,
+}
+
+impl FourPlies {
+    /// All plies of a yarn.
+    pub(super) fn of(plies: &[PlyShape]) -> Vec<Self> {
+        let four = |(index, some): (usize, &[PlyShape])| {
+            let lanes = |of: &dyn Fn(&PlyShape) -> f32| f32x4::new(array::from_fn(|k| some.get(k).map_or(0.0, of)));
+            let ellipses = some.iter().any(|ply| ply.stretch.x != 1.0).then(|| {
+                [lanes(&|p| p.direction.x), lanes(&|p| p.direction.y), lanes(&|p| p.stretch.x), lanes(&|p| p.stretch.y)]
+            });
+            Self {
+                first: 4 * index,
+                present: lanes(&|_| 1.0).simd_gt(f32x4::ZERO),
+                centre: [lanes(&|p| p.distance * p.direction.x), lanes(&|p| p.distance * p.direction.y)],
+                radius: lanes(&|p| p.radius),
+                ellipses,
+                largest_stretch: lanes(&|p| p.stretch.max_element()),
+            }
+        };
+        plies.chunks(4).enumerate().map(four).collect()
+    }
+
+    /// A point as seen from the middle of each.
+    #[inline]
+    fn seen(&self, at: Vec2) -> Four {
+        Four { x: f32x4::splat(at.x) - self.centre[0], y: f32x4::splat(at.y) - self.centre[1] }
+    }
+
+    /// Vectors in coordinates in which each ply is a circle.
+    #[inline]
+    fn to_circle(&self, v: Four) -> Four {
+        let Some([x, y, along, across]) = self.ellipses else { return v };
+        Four { x: (v.x * x + v.y * y) * along, y: (x * v.y - y * v.x) * across }
+    }
+}
+
 /// Whether the way from one station to the next passes any ply.
 #[inline]
-pub(super) fn passes(a: &Station, b: &Station, plies: &[PlyShape]) -> bool {
+pub(super) fn passes(a: &Station, b: &Station, plies: &[FourPlies]) -> bool {
     let arc = Arc::between(a, b);
-    plies.iter().any(|ply| arc.about(ply).nearest(ply.radius).is_some())
+    plies.iter().any(|four| arc.nearest(four).0 != 0)
 }
 
 /// Share of the core's radius below which the length of a chord does not tell how fast it is passed.
@@ -171,6 +287,7 @@ const SHORT_CHORD: f32 = 0.01;
 const FARTHEST_FOOT: f32 = 16.0;
 
 /// A passage that has begun.
+#[derive(Clone, Copy)]
 struct Open {
     /// Square of the least distance so far, and its depth.
     nearest: f32,
@@ -184,11 +301,53 @@ struct Open {
 
 impl Open {
     #[inline]
+    fn at(a: &Station) -> Self {
+        let passage = Passage { enter: *a, exit: *a, foot: a.depth, offset: 0.0, speed: 0.0, share: 1.0 };
+        Self { nearest: f32::INFINITY, depth: a.depth, passage, core: false, whole: [false; 2] }
+    }
+
+    /// Goes on along an arc from `a` to `b`, which is nearest to the ply's axis at `u`. Whether it stays in the ply.
+    #[inline]
+    fn follow<const ENDS: bool>(&mut self, way: &Arc, ply: &PlyShape, a: &Station, b: &Station, u: f32) -> bool {
+        let length = b.depth - a.depth;
+        let arc = way.about(ply);
+        let (at, slope) = (arc.at(u), arc.slope_at(u));
+        let distance = at.length_squared();
+        let passage = &mut self.passage;
+        if distance < self.nearest {
+            let square = slope.length_squared().max(1e-24);
+            let size = square.sqrt();
+            self.nearest = distance;
+            self.depth = a.depth + length * u;
+            passage.offset = slope.perp_dot(at) / size;
+            let ahead = length * (u - at.dot(slope) / square);
+            passage.foot = a.depth + ahead.clamp(-FARTHEST_FOOT, FARTHEST_FOOT);
+            passage.speed = size / length;
+            if ENDS && !self.core {
+                passage.enter = way.station(a, b, u);
+                passage.exit = passage.enter;
+            }
+        }
+        let inside = ply.core_radius * ply.core_radius;
+        if ENDS && distance < inside {
+            if !self.core {
+                let begins = arc.from.length_squared() >= inside;
+                let enter = if begins { arc.crossing(ply.core_radius, u, -1.0) } else { 0.0 };
+                passage.enter = way.station(a, b, enter);
+                self.core = true;
+                self.whole[0] = begins;
+            }
+            let ends = arc.to.length_squared() >= inside;
+            let exit = if ends { arc.crossing(ply.core_radius, u, 1.0) } else { 1.0 };
+            passage.exit = way.station(a, b, exit);
+            self.whole[1] = ends;
+        }
+        arc.to.length_squared() < ply.radius * ply.radius
+    }
+
+    #[inline]
     fn closed(mut self, core_radius: f32) -> Passage {
         let p = &mut self.passage;
-        if !self.core {
-            (p.enter, p.exit) = (self.depth, self.depth);
-        }
         p.speed = p.speed.max(1e-4);
         if !self.core {
             return self.passage;
@@ -196,72 +355,54 @@ impl Open {
         // The chord as if straight, over the depth that it really takes; by the slope where there is next to no chord.
         let chord = 2.0 * (core_radius * core_radius - p.offset * p.offset).max(0.0).sqrt();
         let short = SHORT_CHORD * core_radius;
+        let depth = p.exit.depth - p.enter.depth;
         if self.whole == [true; 2] {
-            p.speed = (chord + short) / (p.exit - p.enter + short / p.speed);
+            p.speed = (chord + short) / (depth + short / p.speed);
         } else {
-            p.share = ((p.exit - p.enter) * p.speed / chord.max(1e-6)).min(1.0);
+            p.share = (depth * p.speed / chord.max(1e-6)).min(1.0);
         }
         self.passage
     }
 }
 
-/// Calls `visit` with every passage of a way through a ply, in order; without `ENDS` where it enters and leaves is not asked.
+/// Calls `visit` with every passage of a way through a ply and the ply's index; without `ENDS` where it enters and leaves is
+/// not asked.
 #[inline]
-pub(super) fn passages<const ENDS: bool>(way: &[Station], ply: &PlyShape, mut visit: impl FnMut(Passage)) {
-    let (outer, core) = (ply.radius, ply.core_radius);
-    let mut open: Option<Open> = None;
-    for pair in way.windows(2) {
-        let (a, b) = (&pair[0], &pair[1]);
-        let arc = Arc::between(a, b).about(ply);
-        let Some((u, at)) = arc.nearest(outer) else {
-            if let Some(open) = open.take() {
-                visit(open.closed(core));
-            }
-            continue;
-        };
-        let length = b.depth - a.depth;
-        let slope = arc.slope_at(u);
-        let size = slope.length();
-        let distance = at.length_squared();
-        let now = open.get_or_insert(Open {
-            nearest: f32::INFINITY,
-            depth: a.depth,
-            passage: Passage { enter: a.depth, exit: a.depth, foot: a.depth, offset: 0.0, speed: 0.0, share: 1.0 },
-            core: false,
-            whole: [false; 2],
-        });
-        if distance < now.nearest {
-            now.nearest = distance;
-            now.depth = a.depth + length * u;
-            now.passage.offset = slope.perp_dot(at) / size.max(1e-12);
-            let ahead = length * (u - at.dot(slope) / (size * size).max(1e-12));
-            now.passage.foot = a.depth + ahead.clamp(-FARTHEST_FOOT, FARTHEST_FOOT);
-            now.passage.speed = size / length;
-        }
-        let inside = core * core;
-        if ENDS && distance < inside {
-            if !now.core {
-                let begins = arc.from.length_squared() >= inside;
-                let enter = if begins { arc.crossing(core, u, -1.0) } else { 0.0 };
-                now.passage.enter = a.depth + length * enter;
-                now.core = true;
-                now.whole[0] = begins;
-            }
-            let ends = arc.to.length_squared() >= inside;
-            let exit = if ends { arc.crossing(core, u, 1.0) } else { 1.0 };
-            now.passage.exit = a.depth + length * exit;
-            now.whole[1] = ends;
-        }
-        if arc.to.length_squared() >= outer * outer
-            && let Some(open) = open.take()
-        {
-            visit(open.closed(core));
-        }
-    }
-    // A way that ends before it comes to the core has not passed the ply.
+pub(super) fn passages<const ENDS: bool>(way: &[Station], shape: &YarnShape, mut visit: impl FnMut(usize, Passage)) {
     let end = way.last().map_or(0.0, |last| last.depth);
-    if let Some(open) = open.filter(|open| !ENDS || open.core || open.depth < end) {
-        visit(open.closed(core));
+    // A way that ends before it comes to the core has not passed the ply.
+    let passed = |open: &Open| !ENDS || open.core || open.depth < end;
+    for four in &shape.fours {
+        let plies = &shape.plies[four.first..];
+        let mut open = [None; 4];
+        let mut opened = 0;
+        for pair in way.windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            let arc = Arc::between(a, b);
+            let (met, u) = arc.nearest(four);
+            let mut left = met | opened;
+            if left == 0 {
+                continue;
+            }
+            let u = u.to_array();
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let stays = met >> lane & 1 != 0
+                    && open[lane].get_or_insert_with(|| Open::at(a)).follow::<ENDS>(&arc, &plies[lane], a, b, u[lane]);
+                if stays {
+                    opened |= 1 << lane;
+                } else if let Some(open) = open[lane].take() {
+                    opened &= !(1 << lane);
+                    visit(four.first + lane, open.closed(plies[lane].core_radius));
+                }
+            }
+        }
+        for (lane, open) in open.iter().enumerate() {
+            if let Some(open) = open.as_ref().filter(|open| passed(open)) {
+                visit(four.first + lane, open.closed(plies[lane].core_radius));
+            }
+        }
     }
 }
 
@@ -273,13 +414,5 @@ pub(super) fn station_at(way: &[Station], depth: f32) -> Station {
     let (a, b) = (&way[i], &way[(i + 1).min(last)]);
     let length = b.depth - a.depth;
     let u = if length > 0.0 { ((depth - a.depth) / length).clamp(0.0, 1.0) } else { 0.0 };
-    let arc = Arc::between(a, b);
-    Station {
-        depth,
-        at: arc.at(u),
-        slope: if length > 0.0 { arc.slope_at(u) / length } else { a.slope },
-        travel: a.travel + u * (b.travel - a.travel),
-        advance: a.advance + u * (b.advance - a.advance),
-        straightness: a.straightness + u * (b.straightness - a.straightness),
-    }
+    Arc::between(a, b).station(a, b, u)
 }

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3A};
 
-use super::density::PlyPacking;
+use super::{density::PlyPacking, way::FourPlies};
 
 /// The most plies a yarn can have.
 pub const MAX_PLIES: usize = 64;
@@ -82,6 +82,8 @@ pub struct PlyShape {
 pub struct YarnShape {
     /// The plies, at most [`MAX_PLIES`].
     pub plies: Vec<PlyShape>,
+    /// Where they are, four by four.
+    pub(super) fours: Vec<FourPlies>,
     /// Turns of the plies around the yarn's axis, radians per yarn radius along the yarn.
     pub ply_rate: f32,
     /// Whether any ply is elliptical.
@@ -133,6 +135,7 @@ impl YarnShape {
             elliptical: plies.iter().any(|p| (p.aspect - 1.0).abs() > 1e-6),
             filled: plies.len() == 1 && plies[0].distance == 0.0 && plies[0].aspect == 1.0 && plies[0].radius >= 1.0,
             symmetry: if equal { TAU / plies.len() as f64 } else { TAU },
+            fours: FourPlies::of(&shapes),
             plies: shapes,
             ply_rate: ply_rate as f32,
             tilted,
