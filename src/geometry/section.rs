@@ -50,6 +50,10 @@ const LEAST_LEFT: f32 = 1e-3;
 const AT_SURFACE: f32 = 0.02;
 /// By how much a bent yarn may bow a way between two stations, in yarn radii.
 const MOST_BOW: f32 = 0.2;
+/// Angle, in radians, up to which a bend bows a ray as a third-order curve.
+const MOST_BENT: f32 = 0.35;
+/// The same of light that leaves from inside.
+const MOST_BENT_OUT: f32 = 0.8;
 /// Turns, in radians, below which a way is taken for straight.
 const STRAIGHT: f32 = 1e-3;
 /// The same of a chord on which fibres are counted.
@@ -127,7 +131,7 @@ impl PlyCrossing {
     /// Outward unit normal of the ply where the ray enters.
     pub fn normal(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
         let ply = &shape.plies[self.ply];
-        let spot = section.locate(shape, section.point(self.enter), self.travel[0]);
+        let spot = section.inside(shape, section.point(self.enter), self.travel[0]);
         let p = spot.at - ply.distance * ply.direction;
         // The gradient of the distance in the ply's circle, first in the unwound yarn.
         let (along, across) = (p.dot(ply.direction), ply.direction.perp_dot(p));
@@ -150,9 +154,9 @@ impl PlyCrossing {
     #[inline]
     pub fn ply_tangent(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
         let depth = self.foot.clamp(self.enter, self.exit);
-        let spot = section.locate(shape, section.point(depth), self.travel_at(depth));
+        let spot = section.inside(shape, section.point(depth), self.travel_at(depth));
         let ply = &shape.plies[self.ply];
-        spot.fiber_tangent(shape, section, self.ply, ply.distance * ply.direction).normalize()
+        spot.tangent_at(shape, section, self.ply, ply.distance * ply.direction).normalize()
     }
 }
 
@@ -173,7 +177,12 @@ pub struct PlyAhead {
 }
 
 /// A point inside a yarn, seen in the unwound yarn, and the way back from there.
-struct Spot {
+#[derive(Clone, Copy, Debug)]
+pub struct Inside {
+    /// In the section's frame.
+    pub point: Vec3A,
+    /// About how far along the yarn.
+    travel: f32,
     /// In the section of the unwound yarn.
     at: Vec2,
     /// Axis across the yarn there, in the section's frame.
@@ -186,18 +195,34 @@ struct Spot {
     phase: Vec2,
     pressed: Option<Pressed>,
     straightness: f32,
+    /// The yarn's curvature along x and y, 1/yarn radii.
+    bend: Vec2,
+    /// Turns of the plies, radians per yarn radius.
+    turn: f32,
 }
 
-impl Spot {
+impl Inside {
     /// A vector of the yarn's axes there in the section's frame.
     #[inline]
     fn out(&self, v: Vec3A) -> Vec3A {
         v.x * self.x + v.y * self.y + v.z * self.z
     }
 
-    /// The tangent of a fibre of a ply, at a point of the unwound yarn, in the section's frame: its part along the yarn is 1.
+    /// A vector of the section's frame across the unwound yarn there.
     #[inline]
-    fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
+    fn across(&self, v: Vec3A) -> Vec2 {
+        unrotate(Vec2::new(v.dot(self.x), v.dot(self.y)), self.phase)
+    }
+
+    /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
+    #[inline]
+    pub fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize) -> Vec3A {
+        self.tangent_at(shape, section, ply, self.at)
+    }
+
+    /// The same at another point of the unwound yarn's section.
+    #[inline]
+    fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
         let of = &shape.plies[ply];
         let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
         let mut across = t.truncate().rotate(self.phase);
@@ -210,6 +235,99 @@ impl Spot {
         let across = across / self.straightness;
         self.out(across.extend(1.0).into())
     }
+
+    /// The two stations of a way out from `shift` beside this point in a direction `w` of the section's frame: `None` unless it
+    /// turns and bends little.
+    #[inline]
+    fn way_out(&self, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
+        if self.pressed.is_some() {
+            return None;
+        }
+        let advance = w.dot(self.z) / self.straightness;
+        let from = Bowed {
+            at: self.at + self.across(shift),
+            slope: self.across(w),
+            advance,
+            straightness: self.straightness,
+            bend: unrotate(self.bend, self.phase),
+        };
+        let depth = from.to_surface();
+        let to = from.ahead(depth, MOST_BENT_OUT)?;
+        let turned = self.turn * to.travel;
+        if turned.abs() > LIGHT.turn || !(depth > LEAST_LEFT) {
+            return None;
+        }
+        let phase = angle(turned);
+        let unwound = |at: Vec2, slope: Vec2, advance: f32| slope - self.turn * advance * at.perp();
+        let straightness = self.straightness;
+        let start = Station {
+            depth: 0.0,
+            at: from.at,
+            slope: unwound(from.at, from.slope, advance),
+            travel: self.travel,
+            advance,
+            straightness,
+        };
+        let end = Station {
+            depth,
+            at: unrotate(to.at, phase),
+            slope: unrotate(unwound(to.at, to.slope, to.advance), phase),
+            travel: self.travel + to.travel,
+            advance: to.advance,
+            straightness,
+        };
+        Some([start, end])
+    }
+}
+
+/// A straight way from a point in the section of a place, as the bend there bows it.
+struct Bowed {
+    at: Vec2,
+    slope: Vec2,
+    advance: f32,
+    straightness: f32,
+    bend: Vec2,
+}
+
+impl Bowed {
+    /// How fast the bow begins.
+    #[inline]
+    fn bow(&self) -> Vec2 {
+        -(self.advance * self.advance * self.straightness) * self.bend
+    }
+
+    /// How far it is to the yarn's surface: as if it were straight, then as it bows.
+    #[inline]
+    fn to_surface(&self) -> f32 {
+        let depth = to_surface(self.at, self.slope);
+        if self.bend == Vec2::ZERO {
+            return depth;
+        }
+        let slope = self.slope + depth * self.bow();
+        depth + to_surface(self.at + (0.5 * depth) * (self.slope + slope), slope)
+    }
+
+    /// The way so much deeper: to third order, were the yarn a circle. `None` if the yarn bends by more than `most` on it.
+    #[inline]
+    fn ahead(&self, depth: f32, most: f32) -> Option<Unbent> {
+        let bent = depth * self.advance;
+        if bent * bent * self.bend.length_squared() > most * most {
+            return None;
+        }
+        // r'' = L^2 / r^3 and the angle's change L / r^2, for the distance r from the centre of the circle.
+        let nearer = self.bend.dot(self.slope) / self.straightness;
+        let bow = self.bow();
+        let more = 3.0 * nearer * bow;
+        Some(Unbent {
+            at: self.at + depth * (self.slope + depth * (0.5 * bow + depth / 6.0 * more)),
+            slope: self.slope + depth * (bow + 0.5 * depth * more),
+            travel: bent * (1.0 + depth * nearer),
+            advance: self.advance * (1.0 + 2.0 * depth * nearer),
+            straightness: self.straightness * (1.0 - depth * nearer),
+            lean: 0.0,
+            cos: 1.0,
+        })
+    }
 }
 
 /// A station with what only the making of a way needs: the place in the yarn's real section, and its change with depth.
@@ -220,12 +338,11 @@ struct Step {
     real_slope: Vec2,
 }
 
-/// What a way starts from.
+/// A straight line through a yarn.
+#[derive(Clone, Copy)]
 struct Line {
     start: Vec3A,
     direction: Vec3A,
-    first: Step,
-    near: Neighbourhood,
     reach: Reach,
 }
 
@@ -392,15 +509,14 @@ impl<'a> Section<'a> {
     /// is 1.
     #[inline]
     pub fn fiber_tangent(&self, shape: &YarnShape, ply: usize, point: Vec3A, travel: f32) -> Vec3A {
-        let spot = self.locate(shape, point, travel);
-        spot.fiber_tangent(shape, self, ply, spot.at)
+        self.inside(shape, point, travel).fiber_tangent(shape, self, ply)
     }
 
     /// Whether the ray meets any ply: what the filter asks of every candidate hit.
     #[inline]
     pub fn meets_ply(&self, shape: &YarnShape) -> bool {
         let mut met = false;
-        self.march(self.ray(shape), |a, b| {
+        self.march_ray(shape, |a, b| {
             met = way::passes(a, b, &shape.fours);
             if met { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
@@ -412,7 +528,7 @@ impl<'a> Section<'a> {
     pub fn crossings(&self, shape: &YarnShape, out: &mut Crossings) {
         out.clear();
         let mut way = Way::new();
-        self.way(self.ray(shape), &mut way);
+        self.march_ray(shape, |a, b| keep(&mut way, a, b));
         way::passages::<true>(&way, shape, |index, passage| {
             let ply = &shape.plies[index];
             if ply.fibers == 0.0 {
@@ -437,22 +553,34 @@ impl<'a> Section<'a> {
         });
     }
 
-    /// The plies that lie ahead of a point inside the yarn, in a direction `w` of this frame; one may come more than once.
-    ///
-    /// `start` is a point of this frame and `travel` about how far along the yarn it is from the frame's origin. Of a
-    /// pressed section fibres are closer to each other than of a round one, by [`Self::squeeze`].
+    /// The plies that lie ahead of a point `shift` beside one inside the yarn, in a direction `w` of this frame; one may come
+    /// more than once. Of a pressed section fibres are closer to each other than of a round one, by [`Self::squeeze`].
     #[inline]
-    pub fn plies_ahead(&self, shape: &YarnShape, start: Vec3A, travel: f32, w: Vec3A, mut visit: impl FnMut(PlyAhead)) {
+    pub fn plies_ahead(
+        &self,
+        shape: &YarnShape,
+        from: &Inside,
+        shift: Vec3A,
+        w: Vec3A,
+        mut visit: impl FnMut(PlyAhead),
+    ) {
         // Distances in the section, of which a steep way has few.
         let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
-        let w = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
-        let mut way = Way::new();
-        let mut near = self.neighbourhood(self.turn(shape), travel, LIGHT);
-        let first = self.step(&mut near, start, w, 0.0, LIGHT);
-        self.way(Line { start, direction: w, first, near, reach: LIGHT }, &mut way);
-        way::passages::<false>(&way, shape, |ply, Passage { offset, foot, speed, .. }| {
+        let direction = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
+        let mut pass = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
             visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos });
-        });
+        };
+        if self.ends == [f32::NEG_INFINITY, f32::INFINITY]
+            && let Some(way) = from.way_out(shift, direction)
+        {
+            return way::passages::<false>(&way, shape, pass);
+        }
+        let line = Line { start: from.point + shift, direction, reach: LIGHT };
+        let mut near = self.neighbourhood(self.turn(shape), from.travel, LIGHT);
+        let first = self.step(&mut near, line.start, direction, 0.0, LIGHT);
+        let mut way = Way::new();
+        self.march(&line, first, &mut near, |a, b| keep(&mut way, a, b));
+        way::passages::<false>(&way, shape, &mut pass);
     }
 
     /// Turns of the plies, radians per yarn radius.
@@ -461,46 +589,42 @@ impl<'a> Section<'a> {
         if self.tilted { self.turn.unwrap_or(shape.ply_rate) } else { shape.ply_rate }
     }
 
-    /// The way of the ray.
+    /// Goes along the ray from station to station, until it leaves the yarn or `visit` has seen enough.
     #[inline]
-    fn ray(&self, shape: &YarnShape) -> Line {
-        let (start, direction) = (self.point(0.0), self.direction());
-        let near = self.neighbourhood(self.turn(shape), 0.0, RAY);
-        Line { start, direction, first: near.enter(start, direction), near, reach: RAY }
-    }
-
-    /// Keeps the stations of a way.
-    #[inline]
-    fn way(&self, line: Line, way: &mut Way) {
-        self.march(line, |a, b| {
-            if way.is_empty() {
-                way.push(*a);
-            }
-            way.push(*b);
-            if way.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+    fn march_ray(&self, shape: &YarnShape, visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
+        let line = Line { start: self.point(0.0), direction: self.direction(), reach: RAY };
+        let mut near = self.neighbourhood(self.turn(shape), 0.0, RAY);
+        let first = near.enter(line.start, line.direction);
+        self.march(&line, first, &mut near, visit);
     }
 
     /// Goes from station to station, until the way leaves the yarn or `visit` has seen enough.
     #[inline]
-    fn march(&self, line: Line, mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
-        let Line { start, direction, first: mut here, mut near, reach } = line;
+    fn march(
+        &self,
+        line: &Line,
+        first: Step,
+        near: &mut Neighbourhood,
+        mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>,
+    ) {
+        let Line { start, direction, reach } = *line;
+        let mut here = first;
         loop {
             let Step { station, real, real_slope } = here;
             let (inside, outward) = (1.0 - real.length_squared(), real.dot(real_slope));
             if inside < AT_SURFACE && outward > 0.0 && station.depth > 0.0 {
                 return;
             }
+            let bowed = Bowed {
+                at: real,
+                slope: real_slope,
+                advance: station.advance,
+                straightness: station.straightness,
+                bend: near.bend,
+            };
             let mut step = reach.longest;
             if real_slope.length_squared() > 1e-12 {
-                // As if the yarn were straight, then as its bend bows the way; the loop does the rest.
-                step = to_surface(real, real_slope);
-                if near.bend != Vec2::ZERO {
-                    let bow = -station.advance * station.advance * near.bend;
-                    let slope = real_slope + step * bow;
-                    step += to_surface(real + (0.5 * step) * (real_slope + slope), slope);
-                }
-                step = step.max(LEAST_STEP);
+                step = bowed.to_surface().max(LEAST_STEP);
             }
             step = step.min(reach.longest - station.depth);
             let end = self.ends[usize::from(station.advance > 0.0)];
@@ -521,12 +645,19 @@ impl<'a> Section<'a> {
                 next.station.travel += step * station.advance;
                 next.real += step * real_slope;
             } else {
-                let bowed = station.advance.abs() * step * near.bowing;
-                step /= (turning * step / reach.turn).max(bowed).ceil();
+                let bows = station.advance.abs() * step * near.bowing;
+                step /= (turning * step / reach.turn).max(bows).ceil();
                 // Inside of a bend it may turn out faster.
                 for _ in 0..4 {
                     let depth = station.depth + step;
-                    next = self.step(&mut near, start + depth * direction, direction, depth, reach);
+                    next = match bowed.ahead(step, MOST_BENT) {
+                        Some(ahead)
+                            if station.depth == 0.0 && near.place.is_none() && ahead.travel.abs() <= reach.near =>
+                        {
+                            near.unwind(&ahead, depth)
+                        }
+                        _ => self.step(near, start + depth * direction, direction, depth, reach),
+                    };
                     let turned = rate * (next.station.travel - station.travel);
                     if turned.abs() <= 1.3 * reach.turn {
                         break;
@@ -605,10 +736,10 @@ impl<'a> Section<'a> {
 
     /// A point of this frame, which is about `travel` along the yarn, in the unwound yarn.
     #[inline]
-    fn locate(&self, shape: &YarnShape, point: Vec3A, travel: f32) -> Spot {
-        let near = self.neighbourhood(self.turn(shape), travel, RAY);
-        let Unbent { at, travel, straightness, lean, cos, .. } = near.unbend(point, Vec3A::ZERO);
-        let (phase, pressed) = (near.phase_at(travel), near.pressed_at(travel));
+    pub fn inside(&self, shape: &YarnShape, point: Vec3A, travel: f32) -> Inside {
+        let near = self.neighbourhood(self.turn(shape), travel, LIGHT);
+        let Unbent { at, travel: beyond, straightness, lean, cos, .. } = near.unbend(point, Vec3A::ZERO);
+        let (phase, pressed) = (near.phase_at(beyond), near.pressed_at(beyond));
         // The frame turned with the bend: sin / k = `lean`, and (1 - cos) / k^2 = lean^2 / (1 + cos).
         let bend = near.bend;
         let out = |v: Vec3A| near.place.map_or(v, |p| v.x * p.x + v.y * p.y + v.z * p.z);
@@ -616,7 +747,9 @@ impl<'a> Section<'a> {
             let part = bend.dot(v);
             out((v - bend * (part * lean * lean / (1.0 + cos))).extend(-part * lean).into())
         };
-        Spot {
+        Inside {
+            point,
+            travel: near.travel + beyond,
             at: unrotate(pressed.map_or(at, |p| p.round(at)), phase),
             x: turned(Vec2::X),
             y: turned(Vec2::Y),
@@ -624,6 +757,8 @@ impl<'a> Section<'a> {
             phase,
             pressed,
             straightness,
+            bend,
+            turn: near.turn,
         }
     }
 
@@ -681,6 +816,16 @@ fn to_surface(at: Vec2, slope: Vec2) -> f32 {
     let (speed, outward) = (slope.length_squared().max(1e-12), at.dot(slope));
     let square = outward * outward + speed * (1.0 - at.length_squared());
     (square.max(0.0).sqrt() - outward) / speed
+}
+
+/// Keeps the stations of a way.
+#[inline]
+fn keep(way: &mut Way, a: &Station, b: &Station) -> ControlFlow<()> {
+    if way.is_empty() {
+        way.push(*a);
+    }
+    way.push(*b);
+    if way.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 /// (cos, sin) of an angle.

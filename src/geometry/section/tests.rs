@@ -429,6 +429,41 @@ fn the_picture_does_not_depend_on_where_the_camera_stands() {
 }
 
 #[test]
+fn short_ways_out_are_those_that_are_followed() {
+    // Light that leaves from inside: two stations from the place itself against the march from station to station.
+    let mut stream = Stream::new(17);
+    let mut next = |from: f32, to: f32| from + (to - from) * stream.next();
+    let (mut off, mut short) = (Vec::new(), 0);
+    for i in 0..2000 {
+        let shape = touching_yarn(1 + i % 4, 60, 0.4, f64::from(next(-0.5, 0.5)), -0.4);
+        let bend = Vec2::from_angle(next(0.0, std::f32::consts::TAU)) * next(0.0, 0.6);
+        let place = YarnFrame { curvature: bend.extend(0.0).into(), ..place() };
+        let section = section_of(&place, next(-0.8, 0.8), next(0.0, std::f32::consts::TAU), next(-0.9, 0.9));
+        let depth = next(0.1, 0.9) * section.enter;
+        let from = section.inside(&shape, section.point(depth), depth * section.direction().z);
+        let z = next(-0.98, 0.98);
+        let w: Vec3A = (Vec2::from_angle(next(0.0, std::f32::consts::TAU)) * (1.0 - z * z).sqrt()).extend(z).into();
+        let Some(way) = from.way_out(Vec3A::ZERO, w) else { continue };
+        short += 1;
+        let line = Line { start: from.point, direction: w, reach: RAY };
+        let mut near = section.neighbourhood(section.turn(&shape), 0.0, RAY);
+        let first = section.step(&mut near, line.start, w, 0.0, RAY);
+        let mut long = Way::new();
+        section.march(&line, first, &mut near, |a, b| keep(&mut long, a, b));
+        // The length inside of all cores.
+        let cores = |way: &[Station]| {
+            let mut sum = 0.0;
+            way::passages::<true>(way, &shape, |_, p| sum += p.exit.depth - p.enter.depth);
+            sum
+        };
+        off.push((cores(&way) - cores(&long)).abs());
+    }
+    println!("{short} short ways: within .05 {:.4}, .2 {:.4}", share_within(&off, 0.05), share_within(&off, 0.2));
+    assert!(short > 1200, "{short}");
+    assert!(share_within(&off, 0.05) > 0.9 && share_within(&off, 0.2) > 0.98);
+}
+
+#[test]
 fn normals_stand_on_the_plies() {
     // Points moved a little along the normal's plane stay on the ply's surface: the normal is that of the walk's distance.
     let mut stream = Stream::new(3);
@@ -448,7 +483,7 @@ fn normals_stand_on_the_plies() {
         let Some(c) = crossings.iter().find(|c| c.exit - c.enter > 0.2 && c.travel[0].abs() < 0.5) else { continue };
         let ply = &shape.plies[c.ply];
         let distance = |p: Vec3A| {
-            let spot = section.locate(&shape, p, 0.01);
+            let spot = section.inside(&shape, p, 0.01);
             (spot.at - ply.distance * ply.direction).length()
         };
         let (at, e) = (section.point(c.enter), 2e-3);

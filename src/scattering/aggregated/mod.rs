@@ -24,7 +24,7 @@ use glam::Vec3A;
 use super::{Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
 use crate::{
     geometry::{
-        section::{Crossings, PlyCrossing, Section},
+        section::{Crossings, Inside, PlyCrossing, Section},
         yarn::YarnShape,
     },
     math::{Rgb, sampler::Stream},
@@ -92,10 +92,8 @@ struct Spot {
     ply: usize,
     /// Depth on the camera's ray.
     depth: f32,
-    /// Where that is, in the section's frame.
-    point: Vec3A,
-    /// About how far along the yarn.
-    travel: f32,
+    /// Where that is.
+    inside: Inside,
     /// Unit tangent of the fibre there.
     tangent: Vec3A,
     /// 1 / z of `tangent`.
@@ -117,10 +115,10 @@ impl<'a> View<'a> {
         } else {
             (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
         };
-        let (point, travel) = (section.point(depth), crossing.travel_at(depth));
-        let tangent = section.fiber_tangent(&yarn.shape, crossing.ply, point, travel);
+        let inside = section.inside(&yarn.shape, section.point(depth), crossing.travel_at(depth));
+        let tangent = inside.fiber_tangent(&yarn.shape, section, crossing.ply);
         let stretch = tangent.length();
-        Spot { ply: crossing.ply, depth, point, travel, tangent: tangent / stretch, stretch }
+        Spot { ply: crossing.ply, depth, inside, tangent: tangent / stretch, stretch }
     }
 }
 

@@ -196,13 +196,13 @@ impl Node {
         let shape = &yarn.shape;
         let optics = &yarn.plies[spot.ply];
         let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
-        let start = spot.point + optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
+        let shift = optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
         let strip = ClearedStrip::new(2.0 * shape.plies[spot.ply].fiber_radius, ahead);
         // Light that goes on is inside its own fibre first; light that turns back is not.
         let hole = optics.fiber_chord * 0.5 * (1.0 - ahead.x);
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
-        view.section.plies_ahead(shape, start, spot.travel, w, |way| {
+        view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let (ply, passed) = (&shape.plies[way.ply], &yarn.plies[way.ply]);
             if yarn.plain {
                 let depth = passed.rho * plain_fibers(ply, &way, &strip, optics.lead);
