@@ -15,12 +15,14 @@ pub struct Ray {
     pub t_far: f32,
     /// When it is there, from 0 to 1: where what moves is.
     pub time: f32,
+    /// Whether what it meets first is looked at, and not only lit by or shaded from.
+    pub looks: bool,
 }
 
 impl Ray {
     /// A ray without an end.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        Self { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0 }
+        Self { origin, direction, t_near: 0.0, t_far: f32::INFINITY, time: 0.0, looks: true }
     }
 
     /// Whether it can be traced: a NaN in a ray makes one query of Embree four hundred times as slow.

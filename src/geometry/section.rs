@@ -36,12 +36,16 @@ struct Reach {
     longest: f32,
     /// The most by which plies turn from station to station, radians.
     turn: f32,
+    /// How much a bend counts as a turn.
+    bend: f32,
 }
 
-/// A ray: what it meets first is seen.
-const RAY: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN };
+/// A ray that looks: off by less than 0.02 yarn radii.
+const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+/// A ray that gathers light.
+const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
 /// Light that leaves from inside: how far it still has to go is felt in all.
-const LIGHT: Reach = Reach { near: 2.0, longest: 16.0, turn: 2.0 * MOST_TURN };
+const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
 /// The shortest step from one station to the next, in yarn radii.
 const LEAST_STEP: f32 = 0.1;
 /// What may be left of a way without another station, in yarn radii.
@@ -50,10 +54,8 @@ const LEAST_LEFT: f32 = 1e-3;
 const AT_SURFACE: f32 = 0.02;
 /// By how much a bent yarn may bow a way between two stations, in yarn radii.
 const MOST_BOW: f32 = 0.2;
-/// Angle, in radians, up to which a bend bows a ray as a third-order curve.
-const MOST_BENT: f32 = 0.35;
-/// The same of light that leaves from inside.
-const MOST_BENT_OUT: f32 = 0.8;
+/// Angle, in radians, up to which a bend bows light that leaves from inside as a third-order curve.
+const MOST_BENT: f32 = 0.6;
 /// Turns, in radians, below which a way is taken for straight.
 const STRAIGHT: f32 = 1e-3;
 /// The same of a chord on which fibres are counted.
@@ -84,6 +86,8 @@ pub struct Section<'a> {
     pub tilted: bool,
     /// Curvature in the section, 1/yarn radii.
     pub bend: Vec2,
+    /// Whether what the ray meets is looked at: plies are followed more finely then.
+    pub looked_at: bool,
     /// (cos, sin) of the plies' phase in this frame.
     pub phase: Vec2,
     /// How that phase grows along the yarn; `None` where it does as the yarn's shape says.
@@ -140,8 +144,7 @@ impl PlyCrossing {
         // A step along the yarn turns the point back by as much as the plies turn.
         let rate = section.turn(shape);
         let rise = -rate * gradient.dot(spot.at.perp()) / spot.straightness;
-        let wound = gradient.rotate(spot.phase);
-        let wound = spot.pressed.map_or(wound, |pressed| pressed.round(wound));
+        let wound = spot.pressed.map_or(gradient, |pressed| pressed.round(gradient));
         spot.out(wound.extend(rise).into()).normalize_or(Vec3A::X)
     }
 
@@ -185,14 +188,12 @@ pub struct Inside {
     travel: f32,
     /// In the section of the unwound yarn.
     at: Vec2,
-    /// Axis across the yarn there, in the section's frame.
+    /// The axes of that section, which turn with the plies, in the section's frame.
     x: Vec3A,
-    /// The other axis across the yarn.
     y: Vec3A,
     /// The axis along the yarn.
     z: Vec3A,
-    /// (cos, sin) of the plies' phase against x and y.
-    phase: Vec2,
+    /// How the section is pressed flat, against these axes.
     pressed: Option<Pressed>,
     straightness: f32,
     /// The yarn's curvature along x and y, 1/yarn radii.
@@ -208,10 +209,10 @@ impl Inside {
         v.x * self.x + v.y * self.y + v.z * self.z
     }
 
-    /// A vector of the section's frame across the unwound yarn there.
+    /// A vector of the section's frame across the yarn there.
     #[inline]
     fn across(&self, v: Vec3A) -> Vec2 {
-        unrotate(Vec2::new(v.dot(self.x), v.dot(self.y)), self.phase)
+        Vec2::new(v.dot(self.x), v.dot(self.y))
     }
 
     /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
@@ -225,11 +226,10 @@ impl Inside {
     fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
         let of = &shape.plies[ply];
         let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
-        let mut across = t.truncate().rotate(self.phase);
+        let mut across = t.truncate();
         if let Some(pressed) = &self.pressed {
             // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
-            let round = at.rotate(self.phase);
-            let turned = section.pressed_turn * (pressed.real(round).perp() - pressed.real(round.perp()));
+            let turned = section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
             across = pressed.real(across) + turned;
         }
         let across = across / self.straightness;
@@ -249,10 +249,10 @@ impl Inside {
             slope: self.across(w),
             advance,
             straightness: self.straightness,
-            bend: unrotate(self.bend, self.phase),
+            bend: self.bend,
         };
         let depth = from.to_surface();
-        let to = from.ahead(depth, MOST_BENT_OUT)?;
+        let to = from.ahead(depth)?;
         let turned = self.turn * to.travel;
         if turned.abs() > LIGHT.turn || !(depth > LEAST_LEFT) {
             return None;
@@ -307,11 +307,11 @@ impl Bowed {
         depth + to_surface(self.at + (0.5 * depth) * (self.slope + slope), slope)
     }
 
-    /// The way so much deeper: to third order, were the yarn a circle. `None` if the yarn bends by more than `most` on it.
+    /// The way so much deeper: to third order, were the yarn a circle. `None` if the yarn bends more on it.
     #[inline]
-    fn ahead(&self, depth: f32, most: f32) -> Option<Unbent> {
+    fn ahead(&self, depth: f32) -> Option<Unbent> {
         let bent = depth * self.advance;
-        if bent * bent * self.bend.length_squared() > most * most {
+        if bent * bent * self.bend.length_squared() > MOST_BENT * MOST_BENT {
             return None;
         }
         // r'' = L^2 / r^3 and the angle's change L / r^2, for the distance r from the centre of the circle.
@@ -433,6 +433,7 @@ impl<'a> Section<'a> {
             cos: length.max(1e-3),
             tilted,
             bend: Vec2::new(k.dot(x), k.dot(y)),
+            looked_at: true,
             phase: normal.rotate(Vec2::new(c, s)),
             turn: place.turn,
             pressed: Pressed::new(place.flattening)
@@ -592,8 +593,9 @@ impl<'a> Section<'a> {
     /// Goes along the ray from station to station, until it leaves the yarn or `visit` has seen enough.
     #[inline]
     fn march_ray(&self, shape: &YarnShape, visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
-        let line = Line { start: self.point(0.0), direction: self.direction(), reach: RAY };
-        let mut near = self.neighbourhood(self.turn(shape), 0.0, RAY);
+        let reach = if self.looked_at { LOOK } else { GATHER };
+        let line = Line { start: self.point(0.0), direction: self.direction(), reach };
+        let mut near = self.neighbourhood(self.turn(shape), 0.0, reach);
         let first = near.enter(line.start, line.direction);
         self.march(&line, first, &mut near, visit);
     }
@@ -650,14 +652,7 @@ impl<'a> Section<'a> {
                 // Inside of a bend it may turn out faster.
                 for _ in 0..4 {
                     let depth = station.depth + step;
-                    next = match bowed.ahead(step, MOST_BENT) {
-                        Some(ahead)
-                            if station.depth == 0.0 && near.place.is_none() && ahead.travel.abs() <= reach.near =>
-                        {
-                            near.unwind(&ahead, depth)
-                        }
-                        _ => self.step(near, start + depth * direction, direction, depth, reach),
-                    };
+                    next = self.step(near, start + depth * direction, direction, depth, reach);
                     let turned = rate * (next.station.travel - station.travel);
                     if turned.abs() <= 1.3 * reach.turn {
                         break;
@@ -676,7 +671,7 @@ impl<'a> Section<'a> {
     #[inline]
     fn neighbourhood(&self, rate: f32, travel: f32, reach: Reach) -> Neighbourhood {
         if travel.abs() > reach.near
-            && let Some(far) = self.walk_to(travel)
+            && let Some(far) = self.walk_to(travel, reach)
         {
             return far;
         }
@@ -691,12 +686,12 @@ impl<'a> Section<'a> {
             turning: 0.0,
             bowing: 0.0,
         }
-        .rated()
+        .rated(reach)
     }
 
     /// The yarn about the place so far along it, from the yarn itself. `None` where there is none, or it does not go so far.
     #[inline]
-    fn walk_to(&self, travel: f32) -> Option<Neighbourhood> {
+    fn walk_to(&self, travel: f32, reach: Reach) -> Option<Neighbourhood> {
         let mut walker = self.walker?;
         let place = walker.walk(travel)?;
         let across = place.tangent.cross(place.normal);
@@ -718,7 +713,7 @@ impl<'a> Section<'a> {
             turning: 0.0,
             bowing: 0.0,
         };
-        Some(found.rated())
+        Some(found.rated(reach))
     }
 
     /// The station at a point of this frame, by the neighbourhood known so far or by a nearer one.
@@ -726,7 +721,7 @@ impl<'a> Section<'a> {
     fn step(&self, near: &mut Neighbourhood, point: Vec3A, direction: Vec3A, depth: f32, reach: Reach) -> Step {
         let mut unbent = near.unbend(point, direction);
         if unbent.travel.abs() > reach.near
-            && let Some(far) = self.walk_to(near.travel + unbent.travel)
+            && let Some(far) = self.walk_to(near.travel + unbent.travel, reach)
         {
             *near = far;
             unbent = near.unbend(point, direction);
@@ -751,13 +746,12 @@ impl<'a> Section<'a> {
             point,
             travel: near.travel + beyond,
             at: unrotate(pressed.map_or(at, |p| p.round(at)), phase),
-            x: turned(Vec2::X),
-            y: turned(Vec2::Y),
+            x: turned(phase),
+            y: turned(phase.perp()),
             z: out((bend * lean).extend(cos).into()),
-            phase,
-            pressed,
+            pressed: pressed.map(|p| Pressed { axis: unrotate(p.axis, phase), ..p }),
             straightness,
-            bend,
+            bend: unrotate(bend, phase),
             turn: near.turn,
         }
     }
@@ -838,9 +832,9 @@ fn angle(by: f32) -> Vec2 {
 impl Neighbourhood {
     /// With how fast it turns and bows ways. A bend turns them as well.
     #[inline]
-    fn rated(mut self) -> Self {
+    fn rated(mut self, reach: Reach) -> Self {
         let bend = self.bend.length();
-        self.turning = self.turn.abs() + bend + self.pressed_turn.abs();
+        self.turning = self.turn.abs() + reach.bend * bend + self.pressed_turn.abs();
         self.bowing = (bend * (0.125 / MOST_BOW)).sqrt();
         self
     }

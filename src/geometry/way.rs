@@ -126,9 +126,9 @@ impl Arc {
     }
 
     /// Where it is nearest to the middles of four plies, each in coordinates in which it is a circle: a bit for each ply that
-    /// it passes, and u.
+    /// it passes, and u, by so many rounds of Newton's method.
     #[inline]
-    fn nearest(&self, plies: &FourPlies) -> (u32, f32x4) {
+    fn nearest<const ROUNDS: u32>(&self, plies: &FourPlies) -> (u32, f32x4) {
         let from = plies.to_circle(plies.seen(self.from));
         let chord = plies.to_circle(Four::splat(self.to - self.from));
         let inverse = f32x4::ONE / chord.dot(chord).fast_max(f32x4::splat(1e-20));
@@ -147,7 +147,7 @@ impl Arc {
         let cube = plies.to_circle(Four::splat(self.cube));
         let at = |u: f32x4| from + (slope + (square + cube * u) * u) * u;
         let (two, three) = (f32x4::splat(2.0), f32x4::splat(3.0));
-        for _ in 0..2 {
+        for _ in 0..ROUNDS {
             let at = at(u);
             let slope = slope + (square * two + cube * (three * u)) * u;
             let bend = (square + cube * (three * u)) * two;
@@ -277,7 +277,7 @@ impl FourPlies {
 #[inline]
 pub(super) fn passes(a: &Station, b: &Station, plies: &[FourPlies]) -> bool {
     let arc = Arc::between(a, b);
-    plies.iter().any(|four| arc.nearest(four).0 != 0)
+    plies.iter().any(|four| arc.nearest::<2>(four).0 != 0)
 }
 
 /// Share of the core's radius below which the length of a chord does not tell how fast it is passed.
@@ -379,7 +379,7 @@ pub(super) fn passages<const ENDS: bool>(way: &[Station], shape: &YarnShape, mut
         for pair in way.windows(2) {
             let (a, b) = (&pair[0], &pair[1]);
             let arc = Arc::between(a, b);
-            let (met, u) = arc.nearest(four);
+            let (met, u) = if ENDS { arc.nearest::<2>(four) } else { arc.nearest::<1>(four) };
             let mut left = met | opened;
             if left == 0 {
                 continue;

@@ -163,6 +163,7 @@ impl<'a> Integrator<'a> {
         scratch.time = ray.time;
         loop {
             path.ray.time = scratch.time;
+            path.ray.looks = path.bounces == 0;
             let hit = self.world.intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;
@@ -411,7 +412,7 @@ impl<'a> Integrator<'a> {
         if self.ground.is_some_and(|g| distance_to_ground(&g, ray).is_some()) {
             return 0.0;
         }
-        self.world.transmittance(&Ray { time: scratch.time, ..*ray }, &mut scratch.shadow_crossings)
+        self.world.transmittance(&Ray { time: scratch.time, looks: false, ..*ray }, &mut scratch.shadow_crossings)
     }
 }
 

@@ -290,7 +290,7 @@ impl World {
 /// The ray as Embree takes it.
 #[inline]
 fn raw_ray(ray: &Ray) -> RawRay {
-    let &Ray { origin, direction, t_near, t_far, time } = ray;
+    let &Ray { origin, direction, t_near, t_far, time, .. } = ray;
     RawRay { origin, direction, t_near, t_far, time }
 }
 
@@ -298,7 +298,8 @@ fn raw_ray(ray: &Ray) -> RawRay {
 #[inline]
 fn section_at<'a>(yarns: &'a YarnGeometry, ray: &Ray, raw: &RawHit) -> Section<'a> {
     let walker = Walker::new(&yarns.strands, raw.segment, raw.u, ray.time);
-    Section::at_hit(walker, ray.origin, ray.direction, raw.t, yarns.yarn.shape().tilted)
+    let section = Section::at_hit(walker, ray.origin, ray.direction, raw.t, yarns.yarn.shape().tilted);
+    Section { looked_at: ray.looks, ..section }
 }
 
 impl FiberGeometry {
