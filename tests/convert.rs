@@ -118,7 +118,7 @@ fn garments_are_laid_on_meshes_of_stages() {
     assert_eq!(garment(&abc)["stitches"], garment(&usd)["stitches"]);
     info("garment.usda", "prim = \"/figure/tube\", ", &[]);
     // z points up in the one file, y in the other.
-    yarnray(at, &["make", "garment", "s.toml", "-o", "g.txt", "-q"]).good();
+    yarnray(at, &["make", "garment", "s.toml", "-o", "g.txt"]).good();
     let made = yarnray(at, &["info", "g.txt", "--json"]);
     let bounds = serde_json::from_str::<serde_json::Value>(&made.good().stdout).unwrap()["bounds"].clone();
     let size = [0, 1, 2].map(|k| bounds[1][k].as_f64().unwrap() - bounds[0][k].as_f64().unwrap());

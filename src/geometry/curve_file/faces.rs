@@ -90,6 +90,7 @@ pub(super) type Library = HashMap<String, Face>;
 pub(super) fn parse(bytes: &[u8]) -> Result<Library, CurveFileError> {
     let mut library = Library::new();
     let mut open: Option<(String, Face, u64)> = None;
+    let mut to_derive: Vec<(u64, String)> = Vec::new();
     for Line { number, content, .. } in lines(bytes) {
         let (word, rest) = content.split_once(char::is_whitespace).unwrap_or((&content, ""));
         let wrong =
@@ -116,13 +117,30 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Library, CurveFileError> {
             }
             ("derive", _) => {
                 close(&mut library, open.take())?;
-                let (key, face) = derived(rest, &library).map_err(|problem| CurveFileError::line(number, problem))?;
-                library.insert(key, face);
+                to_derive.push((number, rest.to_owned()));
             }
             _ => return Err(wrong("a line that begins with face, edge, yarn or derive")),
         }
     }
     close(&mut library, open)?;
+    // A line may name a face that a later one makes.
+    while !to_derive.is_empty() {
+        let before = to_derive.len();
+        let mut wrong = None;
+        to_derive.retain(|(number, rest)| match derived(rest, &library) {
+            Ok((key, face)) => {
+                library.insert(key, face);
+                false
+            }
+            Err(problem) => {
+                wrong.get_or_insert(CurveFileError::line(*number, problem));
+                true
+            }
+        });
+        if let Some(error) = wrong.filter(|_| to_derive.len() == before) {
+            return Err(error);
+        }
+    }
     Ok(library)
 }
 
@@ -171,7 +189,7 @@ fn derived(text: &str, library: &Library) -> Result<(String, Face), String> {
     let (key, (operations, from)) = parts.ok_or("expected derive FACE by OPERATIONS from FACE")?;
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let (key, from) = (words(key), words(from).join(" "));
-    let source = library.get(&from).ok_or_else(|| format!("there is no face {} before this line", quoted(&from)))?;
+    let source = library.get(&from).ok_or_else(|| format!("there is no face {}", quoted(&from)))?;
     let operations = words(operations);
     if let Some(other) = operations.iter().find(|o| !["mirror-x", "mirror-z", "reverse-yarn"].contains(&o.as_str())) {
         return Err(format!("unknown operation {}; mirror-x, mirror-z and reverse-yarn are known", quoted(other)));
@@ -215,7 +233,8 @@ mod tests {
     #[test]
     fn faces_are_mirrored_and_reversed() {
         let text = format!(
-            "{KNIT}derive knit- -l1 -y1 +l1 +y1 by mirror-x from knit+ -l1 +y1 +l1 -y1\n\
+            "derive again -l1 +y1 +l1 -y1 by mirror-x from knit- -l1 -y1 +l1 +y1\n\
+             {KNIT}derive knit- -l1 -y1 +l1 +y1 by mirror-x from knit+ -l1 +y1 +l1 -y1\n\
              derive purl+ -l1 -y1 +l1 +y1 by mirror-z reverse-yarn from knit+ -l1 +y1 +l1 -y1\n"
         );
         let library = parse(text.as_bytes()).unwrap();
@@ -224,6 +243,8 @@ mod tests {
         let crossing = |edge, share, height| Crossing { edge, share, height };
         assert_eq!(left.yarns[0].ends, [crossing(1, 0.6, 0.0), crossing(2, 1.0 - 0.7, 0.2)]);
         assert_eq!(left.yarns[0].points, [DVec3::new(0.5, 0.0, 0.1)]);
+        // Twice mirrored is the same, made of a face that comes later.
+        assert_eq!(library["again -l1 +y1 +l1 -y1"].corners, left.corners);
         let purl = &library["purl+ -l1 -y1 +l1 +y1"].yarns[0];
         assert_eq!((purl.ends[0].edge, purl.ends[0].height, purl.points[0].z), (2, -0.2, -0.1));
     }

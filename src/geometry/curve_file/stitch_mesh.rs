@@ -31,7 +31,7 @@ struct Piece {
 
 /// Reads a mesh.
 pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    let mut kinds: Vec<Option<&Face>> = Vec::new();
+    let mut kinds: Vec<(String, Option<&Face>)> = Vec::new();
     let mut corners: Vec<DVec3> = Vec::new();
     let mut polygons: Vec<Polygon<'_>> = Vec::new();
     let mut joints: Vec<([usize; 2], [usize; 2], bool, u64)> = Vec::new();
@@ -41,7 +41,11 @@ pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> R
             |expected: &str| CurveFileError::line(line, format!("expected {expected}, found {}", quoted(&content)));
         let mut words = content.split_whitespace();
         match words.next() {
-            Some("L") => kinds.push(library.get(&words.collect::<Vec<_>>().join(" "))),
+            Some("L") => {
+                let key = words.collect::<Vec<_>>().join(" ");
+                let face = library.get(&key);
+                kinds.push((key, face));
+            }
             Some("v") => {
                 let mut p = [0.0; 3];
                 for (value, name) in p.iter_mut().zip(["x", "y", "z"]) {
@@ -61,10 +65,10 @@ pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> R
             Some("T") => {
                 let kind =
                     words.next().and_then(|w| w.parse::<usize>().ok()).and_then(|k| kinds.get(k.checked_sub(1)?));
-                let kind = *kind.ok_or_else(|| wrong("the number of a line L above"))?;
+                let (key, face) = kind.ok_or_else(|| wrong("the number of a line L above"))?;
                 let polygon = polygons.last_mut().ok_or_else(|| wrong("a face before its type"))?;
-                let face = kind.ok_or_else(|| {
-                    let problem = "the face of this type is not in the library";
+                let face = face.ok_or_else(|| {
+                    let problem = format!("the face {} is not in the library", quoted(key));
                     CurveFileError::line(line, problem).hint("`faces` names another library (.sf)")
                 })?;
                 if face.corners.len() != polygon.corners.len() {

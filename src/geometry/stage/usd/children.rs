@@ -154,6 +154,6 @@ mod tests {
         assert_eq!((read.curves.len(), read.ids[6]), (7, Some(6)));
         let again = as_usd_core_writes(&bytes).unwrap();
         assert_eq!(kinds(&again), kinds(&bytes));
-        assert!(as_usd_core_writes(b"PXR-USDC").is_err() && as_usd_core_writes(&bytes[..bytes.len() - 9]).is_err());
+        assert!(as_usd_core_writes(b"PXR-USDC").is_err() && as_usd_core_writes(&bytes[..40]).is_err());
     }
 }
