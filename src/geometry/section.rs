@@ -4,10 +4,12 @@
 //! the yarn. Near the place where it enters, the yarn is its circle of curvature; farther along, where the ray runs
 //! along the yarn, its next circle is looked up ([`Walker`]). What is seen of the ray in the unwound yarn, where plies are
 //! straight cylinders, is a [`Way`]; plies are met by way of it, at any angle and in any bend. A ray that crosses the
-//! yarn has a way of two stations, and one that runs along it one for every 0.8 radians by which the plies turn.
+//! yarn has a way of two stations, and one that runs along it one for every 0.8 radians by which the plies turn. Rays that
+//! do not look but gather light are followed more coarsely, and light that leaves from inside takes its two stations from its
+//! own place where it turns little.
 //!
 //! Embree's filter and the shading both ask for that way ([`Section::meets_ply`], [`Section::crossings`]), and so does the
-//! light that leaves from inside ([`Section::plies_ahead`]), so that they cannot disagree.
+//! light that leaves from inside ([`Section::plies_ahead`]).
 //!
 //! Frame: z is the yarn's tangent where the ray enters, x points to the camera (projected into the section), y = z x x;
 //! the origin is on the yarn's axis. Lengths are in yarn radii. In the section the ray travels towards -x at y = h.
@@ -254,7 +256,7 @@ impl Inside {
         let depth = from.to_surface();
         let to = from.ahead(depth)?;
         let turned = self.turn * to.travel;
-        if turned.abs() > LIGHT.turn || !(depth > LEAST_LEFT) {
+        if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT {
             return None;
         }
         let phase = angle(turned);
