@@ -94,11 +94,22 @@ impl PointGrid {
 
     /// What finds neighbours: quickest of points that follow each other in space.
     pub(super) fn walk(&self) -> Walk<'_> {
-        Walk { grid: self, cell: None, runs: Vec::with_capacity(9) }
+        Walk { grid: self, ahead: false, cell: None, runs: Vec::with_capacity(9) }
+    }
+
+    /// What finds neighbours in a point's own cell and in one of each two opposite cells beside it, so that every pair of points
+    /// in two cells is found once: of a grid without a period.
+    pub(super) fn walk_ahead(&self) -> Walk<'_> {
+        Walk { ahead: true, ..self.walk() }
+    }
+
+    /// Whether two points are in one cell.
+    pub(super) fn share_cell(&self, a: usize, b: usize) -> bool {
+        self.cell_of[a] == self.cell_of[b]
     }
 
     /// The entries of the 27 cells around a cell, as few runs.
-    fn runs_around(&self, cell: u32, runs: &mut Vec<Range<u32>>) {
+    fn runs_around(&self, cell: u32, ahead: bool, runs: &mut Vec<Range<u32>>) {
         runs.clear();
         let [z, y, x] = self::cell(self.cells[cell as usize].0);
         let mut run = |z: i32, y: i32, from: i32, to: i32| {
@@ -110,8 +121,12 @@ impl PointGrid {
         };
         for dz in -1..=1 {
             for dy in -1..=1 {
+                if ahead && (dz, dy) < (0, 0) {
+                    continue;
+                }
+                let own = ahead && (dz, dy) == (0, 0);
                 let z = z.saturating_add(dz);
-                let (from, to) = (x.saturating_sub(1), x.saturating_add(1));
+                let (from, to) = (if own { x } else { x.saturating_sub(1) }, x.saturating_add(1));
                 match self.wrap {
                     None => run(z, y.saturating_add(dy), from, to),
                     Some([nx, ny]) => {
@@ -133,6 +148,7 @@ impl PointGrid {
 /// Finds the neighbours of points in a [`PointGrid`].
 pub(super) struct Walk<'a> {
     grid: &'a PointGrid,
+    ahead: bool,
     /// The cell last asked for, and the entries around it.
     cell: Option<u32>,
     runs: Vec<Range<u32>>,
@@ -143,7 +159,7 @@ impl<'a> Walk<'a> {
     pub(super) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
         let cell = self.grid.cell_of[point];
         if self.cell != Some(cell) {
-            self.grid.runs_around(cell, &mut self.runs);
+            self.grid.runs_around(cell, self.ahead, &mut self.runs);
             self.cell = Some(cell);
         }
         let entries = &self.grid.entries;
@@ -170,6 +186,28 @@ mod tests {
                 best = best.min(p.distance(q0.lerp(q1, t)));
             }
             assert!(found <= best + 1e-12 && found > best - 0.01, "{found} {best}");
+        }
+    }
+
+    #[test]
+    fn looking_ahead_finds_every_pair_once() {
+        let mut stream = Stream::new(9);
+        let points: Vec<DVec3> = (0..400)
+            .map(|_| DVec3::new(f64::from(stream.next()) * 4.0, f64::from(stream.next()) * 5.0, stream.next().into()))
+            .collect();
+        let grid = PointGrid::new(&points, 0.8, None);
+        let mut walk = grid.walk_ahead();
+        let mut found = vec![0; points.len() * points.len()];
+        for i in 0..points.len() {
+            for j in walk.around(i).map(|e| e.index as usize).filter(|j| !grid.share_cell(i, *j) || *j > i) {
+                found[i.min(j) * points.len() + i.max(j)] += 1;
+            }
+        }
+        for i in 0..points.len() {
+            for j in i + 1..points.len() {
+                let count = found[i * points.len() + j];
+                assert!(count <= 1 && (count == 1 || points[i].distance(points[j]) > 0.8), "{i} {j} {count}");
+            }
         }
     }
 

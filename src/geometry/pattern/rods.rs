@@ -75,7 +75,7 @@ const ALONG: f64 = 2.2;
 /// Points that are worked through at once; sums are taken over these, whatever the number of threads.
 const CHUNK: usize = 4096;
 
-/// Another segment that may touch, with a larger number; each pair is kept once.
+/// Another segment that may touch; each pair is kept once.
 #[derive(Clone, Copy)]
 struct Neighbour {
     segment: u32,

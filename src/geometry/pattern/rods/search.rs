@@ -66,6 +66,7 @@ impl Rods {
             lengths.push(sum);
         }
         let touch = APART + MARGIN;
+        let periodic = self.period.is_some();
         let of = |i: usize, found: &mut Vec<Neighbour>, walk: &mut Walk<'_>| {
             if !has[i] {
                 return;
@@ -81,8 +82,9 @@ impl Rods {
                 }
                 let (j, mut cells) = images[near.index as usize];
                 let j = j as usize;
-                // Each pair once; of a segment and its own image next door too.
-                if j < i || (j == i && cells <= [0, 0]) {
+                // Each pair once. (Images do not lie in the grid as what they are of does.)
+                let both = periodic || grid.share_cell(i, near.index as usize);
+                if both && (j < i || (j == i && cells <= [0, 0])) {
                     continue;
                 }
                 let widest = touch + half + halves[j];
@@ -116,7 +118,7 @@ impl Rods {
         let chunks: Vec<(Vec<u32>, Vec<Neighbour>)> = (0..n.div_ceil(CHUNK))
             .into_par_iter()
             .map(|c| {
-                let mut walk = grid.walk();
+                let mut walk = if periodic { grid.walk() } else { grid.walk_ahead() };
                 let mut found = Vec::new();
                 let counts = (c * CHUNK..((c + 1) * CHUNK).min(n))
                     .map(|i| {
