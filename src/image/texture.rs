@@ -10,6 +10,7 @@ pub struct Texture {
     #[cfg(feature = "oiio")]
     file: crate::ffi::oiio::TextureFile,
     /// Of the file's bytes.
+    #[cfg(feature = "oiio")]
     hash: u128,
     /// Holds the copy that OpenImageIO reads, until this is dropped.
     #[cfg(feature = "oiio")]
