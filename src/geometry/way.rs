@@ -1,7 +1,7 @@
 //! A straight way through a yarn, seen in the unwound yarn: unbent, round, its plies untwisted.
 //!
 //! There plies are straight cylinders along the yarn and the way is a curve. It is known, with its slope, at a few
-//! stations, and goes from each to the next as the cubic that has both slopes. Where plies turn by [`MOST_TURN`] between two
+//! stations, and goes from each to the next as the cubic that has both slopes. Where plies turn by `MOST_TURN` between two
 //! stations that cubic is off by less than 0.01 yarn radii. A way that crosses a yarn steeply needs two stations, at its ends.
 //! Plies are looked for four at a time.
 

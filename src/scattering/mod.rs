@@ -7,7 +7,7 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | Eq. 2, fibres on a chord | [`crate::geometry::yarn::PlyShape::fibers_on_chord`] |
+//! | Eq. 2, fibres on a chord | `fibers` of [`crate::geometry::section::PlyCrossing`] |
 //! | Eqs. 3 and 4, averaged lobes | [`lobes`] (the paper's models), [`medium`] (the chain of TT) |
 //! | Eqs. 5 and 6, one fibre | [`fiber`], with the kernel of [`kernel`] |
 //! | Eqs. 8 to 11 and 15, forward lobes | [`aggregated`], lobe F; [`lobes`], [`closed_forms`] as printed |

@@ -26,7 +26,7 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
 /// 2 <r^2> - 1 of the centres' distances r from the middle, over some of the packings that [`hard_discs`] makes; 0 where
 /// they are even over the core. `radius` is in core radii.
 ///
-/// Of more than [`MOST_MEASURED`] discs some are packed as densely in their stead: the crowding is at the wall only, so it
+/// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
 pub fn crowding(count: u32, radius: f64) -> f64 {
     let packed = count.min(MOST_MEASURED);

@@ -2,7 +2,7 @@
 //!
 //! A stage is a tree of objects with transforms, some of which change in time. Here it becomes plain values in the space
 //! of the stage: transforms, visibility and instances are applied, a time is chosen. Lengths stay in the stage's unit.
-//! [`curves`] and [`polygons`] say what curves and meshes of both formats have in common, [`select`] which objects are
+//! `curves` and `polygons` say what curves and meshes of both formats have in common, `select` which objects are
 //! meant. Files come from strangers: memory is bounded by the file's size, and damage is an error that says where.
 
 mod alembic;

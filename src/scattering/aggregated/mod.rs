@@ -3,10 +3,10 @@
 //! Light on its way along the camera's chord through the plies
 //! * meets no fibre at all (the unscattered share T0, a delta, [`AggregatedYarn::transparency`]),
 //! * or meets a first fibre. From there it passes on forward as TT through that one and all it meets on its own way out
-//!   (lobe F, [`forward`]),
+//!   (lobe F, `forward`),
 //! * or ends its chain of TT at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
-//!   light ([`single`]). On the way there it is dimmed by the plies ahead; what stays scatters on and leaves in the
-//!   end as lobe B ([`backward`]).
+//!   light (`single`). On the way there it is dimmed by the plies ahead; what stays scatters on and leaves in the
+//!   end as lobe B (`backward`).
 //!
 //! F takes the place of the paper's forward lobes (Eqs. 8 to 11, 15), B of its backward lobes without the single
 //! scattering that R and D already hold (Eqs. 12 to 14); the paper counts that twice and can double the energy.

@@ -1,4 +1,4 @@
-//! Woven cloth: one repeat of the draft is brought to equilibrium ([`unit_cell`]) and repeated.
+//! Woven cloth: one repeat of the draft is brought to equilibrium (`unit_cell`) and repeated.
 //!
 //! Yarns touch where they cross, share their crimp by stiffness as in Peirce's geometry ("The Geometry of Cloth
 //! Structure", 1937), flatten at the same area (Kemp, "An Extension of Peirce's Cloth Geometry", 1958), and are as close
