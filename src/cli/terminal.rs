@@ -25,7 +25,7 @@ pub(super) fn say(line: &str) {
     say_bytes(format!("{line}\n").as_bytes());
 }
 
-/// As [`say`], of whole lines.
+/// Says whole lines beside the work.
 pub(super) fn say_bytes(lines: &[u8]) {
     // There is nowhere left to complain.
     let _ = io::stderr().write_all(lines);

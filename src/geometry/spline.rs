@@ -74,7 +74,7 @@ impl Weights {
         Self(weights_f64(basis, u))
     }
 
-    /// As [`evaluate`].
+    /// The curve's point and its first derivative at that place.
     #[inline]
     pub(crate) fn evaluate(&self, p: &[DVec4; 4]) -> SplinePoint {
         let sum = |w: &[f64; 4]| w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3];

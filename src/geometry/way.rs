@@ -231,7 +231,7 @@ pub(super) struct FourPlies {
     present: f32x4,
     /// Centres.
     centre: [f32x4; 2],
-    /// As [`PlyShape::radius`].
+    /// Radii of circles of the same area.
     radius: f32x4,
     /// Unless all are round: directions and stretches, as those of [`PlyShape`].
     ellipses: Option<[f32x4; 4]>,

@@ -170,7 +170,7 @@ pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
 /// Reads the first part of a film file, and goes through the rest without keeping it: whether all of it is sound.
 ///
 /// # Errors
-/// As [`read`].
+/// [`ImageError`]: the file cannot be read, or is damaged.
 pub fn check(path: &Path) -> Result<Header, ImageError> {
     let (header, file) = open(path)?;
     read_tiles(path, &header, file, |_| true)?;
@@ -217,7 +217,7 @@ fn read_tiles(
 /// Reads the first part of a film file, and checks that the rest can be there.
 ///
 /// # Errors
-/// As [`read`].
+/// [`ImageError`]: the file cannot be read, or its first part is damaged.
 pub fn read_header(path: &Path) -> Result<Header, ImageError> {
     open(path).map(|(header, _)| header)
 }

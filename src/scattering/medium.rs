@@ -70,11 +70,11 @@ pub struct PlyOptics {
     pub rho_unscattered: f32,
     /// Weight that TT keeps on its way forward, at each fibre.
     pub chain: Rgb,
-    /// Energy of single scattering by R, D and the part of TT that leaves the chain, over what leaves the chain.
+    /// Energy of single scattering by R, over what leaves the chain.
     pub single_r: Rgb,
-    /// As `single_r`, for D.
+    /// Energy of single scattering by D, over what leaves the chain.
     pub single_d: Rgb,
-    /// As `single_r`, for TT.
+    /// Energy of single scattering by the part of TT that leaves the chain, over what leaves it.
     pub single_tt: Rgb,
     /// Their sum: the albedo of an event that ends a chain.
     pub albedo: Rgb,

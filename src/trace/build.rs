@@ -18,13 +18,13 @@ use crate::{
 
 /// Bytes of Embree's BVH for a cubic segment: compact and fast, measured on fibres and on yarns.
 const BVH_BYTES: [f64; 2] = [44.0, 119.0];
-/// Bytes of a control point with its radius, of what a yarn keeps beside it, and of a segment's index.
+/// Bytes of a control point with its radius.
 const POINT_BYTES: u64 = 16;
-/// As `POINT_BYTES`.
+/// Bytes that a yarn keeps beside each point.
 const FRAME_BYTES: u64 = 12;
 /// Of what presses a point's section flat, in yarns that are.
 const FLATTENING_BYTES: u64 = 8;
-/// As `POINT_BYTES`.
+/// Bytes of a segment's index.
 const SEGMENT_BYTES: u64 = 4;
 /// Bytes of the material index of each segment, in a fabric with variants.
 const MATERIAL_INDEX_BYTES: u64 = 2;

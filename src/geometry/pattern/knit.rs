@@ -94,9 +94,9 @@ pub struct Knitted {
 
 /// Yarn in a stitch of plain knit of middling tightness, in diameters: Peirce's closed loop has 16.7, firm cloth 14.
 pub const YARN_PER_STITCH: f64 = 16.2;
-/// Proportions of stockinette as it relaxes, in yarn diameters.
+/// Width of a stitch of stockinette as it relaxes, in yarn diameters.
 pub const STITCH_WIDTH: f64 = 4.15;
-/// As [`STITCH_WIDTH`].
+/// Height of a row of stockinette as it relaxes, in yarn diameters.
 pub const ROW_HEIGHT: f64 = 2.9;
 /// Stitches in the square of the length of yarn that one of them has: Munden's constant of fully relaxed plain knit.
 pub const STITCHES_PER_SQUARE: f64 = 5.5 * 4.2;
@@ -186,7 +186,7 @@ impl Knit {
     /// How many stitches each row has.
     ///
     /// # Errors
-    /// As [`Self::knitted`].
+    /// A chart that does not fit the stitches or the rows, or that makes too many control points.
     pub fn widths(&self) -> Result<Vec<u32>, ChartError> {
         Ok(self.worked()?.iter().map(|row| row.len() as u32).collect())
     }
@@ -237,7 +237,7 @@ impl Knit {
     /// The yarns of the piece, in the unit of `diameter`.
     ///
     /// # Errors
-    /// As [`Self::knitted`].
+    /// A chart that does not fit the stitches or the rows, or that makes too many control points.
     pub fn strands(&self, diameter: f64) -> Result<Vec<PatternStrand>, ChartError> {
         Ok(self.knitted(diameter)?.strands)
     }

@@ -84,7 +84,7 @@ impl Tile {
     /// The repeat of a weave, its yarns round and without pile; its numbers of warps and wefts do not matter.
     ///
     /// # Errors
-    /// As [`Weave::relax`].
+    /// Spacings or a cover that leave yarns no room; too many control points.
     pub fn of_weave(weave: &Weave) -> Result<Self, Impossible> {
         let (warps, wefts) = (weave.draft.warps() as u32, weave.draft.wefts() as u32);
         // The one in the middle of three repeats has its like on both sides.

@@ -227,7 +227,7 @@ impl Stage {
     /// without subsets are a group of its name.
     ///
     /// # Errors
-    /// As [`Self::curves`].
+    /// What is chosen is damaged, or is more than is read at once.
     pub fn mesh(&self, pattern: &PrimPattern, frame: Option<f64>) -> Result<PolygonMesh, StageError> {
         let mut all = PolygonMesh::default();
         let mut add = |path: &str, mesh: PolygonMesh| {

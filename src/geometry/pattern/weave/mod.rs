@@ -247,7 +247,7 @@ impl Weave {
     /// The warps, from left to right, then the wefts, from bottom to top; each an open curve.
     ///
     /// # Errors
-    /// As [`Self::relax`].
+    /// Spacings or a cover that leave yarns no room; too many control points.
     pub fn strands(&self) -> Result<Vec<PatternStrand>, Impossible> {
         Ok(self.relax()?.strands())
     }
