@@ -14,6 +14,9 @@
 //! Frame: z is the yarn's tangent where the ray enters, x points to the camera (projected into the section), y = z x x;
 //! the origin is on the yarn's axis. Lengths are in yarn radii. In the section the ray travels towards -x at y = h.
 
+mod inside;
+mod neighbourhood;
+
 use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
@@ -27,6 +30,10 @@ use super::{
     yarn::{MAX_PLIES, YarnShape, fiber_tangent},
     yarn_frame::{Pressed, YarnFrame},
 };
+use inside::Bowed;
+pub use inside::Inside;
+use neighbourhood::{Neighbourhood, Placed, Unbent};
+
 use crate::math::{frame::sin_cos, special::GAUSS_LEGENDRE_4};
 
 /// How far and how finely a way is followed.
@@ -181,157 +188,6 @@ pub struct PlyAhead {
     pub length: f32,
 }
 
-/// A point inside a yarn, seen in the unwound yarn, and the way back from there.
-#[derive(Clone, Copy, Debug)]
-pub struct Inside {
-    /// In the section's frame.
-    pub point: Vec3A,
-    /// About how far along the yarn.
-    travel: f32,
-    /// In the section of the unwound yarn.
-    at: Vec2,
-    /// The axes of that section, which turn with the plies, in the section's frame.
-    x: Vec3A,
-    y: Vec3A,
-    /// The axis along the yarn.
-    z: Vec3A,
-    /// How the section is pressed flat, against these axes.
-    pressed: Option<Pressed>,
-    straightness: f32,
-    /// The yarn's curvature along x and y, 1/yarn radii.
-    bend: Vec2,
-    /// Turns of the plies, radians per yarn radius.
-    turn: f32,
-}
-
-impl Inside {
-    /// A vector of the yarn's axes there in the section's frame.
-    #[inline]
-    fn out(&self, v: Vec3A) -> Vec3A {
-        v.x * self.x + v.y * self.y + v.z * self.z
-    }
-
-    /// A vector of the section's frame across the yarn there.
-    #[inline]
-    fn across(&self, v: Vec3A) -> Vec2 {
-        Vec2::new(v.dot(self.x), v.dot(self.y))
-    }
-
-    /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
-    #[inline]
-    pub fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize) -> Vec3A {
-        self.tangent_at(shape, section, ply, self.at)
-    }
-
-    /// The same at another point of the unwound yarn's section.
-    #[inline]
-    fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
-        let of = &shape.plies[ply];
-        let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
-        let mut across = t.truncate();
-        if let Some(pressed) = &self.pressed {
-            // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
-            let turned = section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
-            across = pressed.real(across) + turned;
-        }
-        let across = across / self.straightness;
-        self.out(across.extend(1.0).into())
-    }
-
-    /// The two stations of a way out from `shift` beside this point in a direction `w` of the section's frame: `None` unless it
-    /// turns and bends little.
-    #[inline]
-    fn way_out(&self, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
-        if self.pressed.is_some() {
-            return None;
-        }
-        let advance = w.dot(self.z) / self.straightness;
-        let from = Bowed {
-            at: self.at + self.across(shift),
-            slope: self.across(w),
-            advance,
-            straightness: self.straightness,
-            bend: self.bend,
-        };
-        let depth = from.to_surface();
-        let to = from.ahead(depth)?;
-        let turned = self.turn * to.travel;
-        if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT {
-            return None;
-        }
-        let phase = angle(turned);
-        let unwound = |at: Vec2, slope: Vec2, advance: f32| slope - self.turn * advance * at.perp();
-        let straightness = self.straightness;
-        let start = Station {
-            depth: 0.0,
-            at: from.at,
-            slope: unwound(from.at, from.slope, advance),
-            travel: self.travel,
-            advance,
-            straightness,
-        };
-        let end = Station {
-            depth,
-            at: unrotate(to.at, phase),
-            slope: unrotate(unwound(to.at, to.slope, to.advance), phase),
-            travel: self.travel + to.travel,
-            advance: to.advance,
-            straightness,
-        };
-        Some([start, end])
-    }
-}
-
-/// A straight way from a point in the section of a place, as the bend there bows it.
-struct Bowed {
-    at: Vec2,
-    slope: Vec2,
-    advance: f32,
-    straightness: f32,
-    bend: Vec2,
-}
-
-impl Bowed {
-    /// How fast the bow begins.
-    #[inline]
-    fn bow(&self) -> Vec2 {
-        -(self.advance * self.advance * self.straightness) * self.bend
-    }
-
-    /// How far it is to the yarn's surface: as if it were straight, then as it bows.
-    #[inline]
-    fn to_surface(&self) -> f32 {
-        let depth = to_surface(self.at, self.slope);
-        if self.bend == Vec2::ZERO {
-            return depth;
-        }
-        let slope = self.slope + depth * self.bow();
-        depth + to_surface(self.at + (0.5 * depth) * (self.slope + slope), slope)
-    }
-
-    /// The way so much deeper: to third order, were the yarn a circle. `None` if the yarn bends more on it.
-    #[inline]
-    fn ahead(&self, depth: f32) -> Option<Unbent> {
-        let bent = depth * self.advance;
-        if bent * bent * self.bend.length_squared() > MOST_BENT * MOST_BENT {
-            return None;
-        }
-        // r'' = L^2 / r^3 and the angle's change L / r^2, for the distance r from the centre of the circle.
-        let nearer = self.bend.dot(self.slope) / self.straightness;
-        let bow = self.bow();
-        let more = 3.0 * nearer * bow;
-        Some(Unbent {
-            at: self.at + depth * (self.slope + depth * (0.5 * bow + depth / 6.0 * more)),
-            slope: self.slope + depth * (bow + 0.5 * depth * more),
-            travel: bent * (1.0 + depth * nearer),
-            advance: self.advance * (1.0 + 2.0 * depth * nearer),
-            straightness: self.straightness * (1.0 - depth * nearer),
-            lean: 0.0,
-            cos: 1.0,
-        })
-    }
-}
-
 /// A station with what only the making of a way needs: the place in the yarn's real section, and its change with depth.
 #[derive(Clone, Copy)]
 struct Step {
@@ -346,58 +202,6 @@ struct Line {
     start: Vec3A,
     direction: Vec3A,
     reach: Reach,
-}
-
-/// The yarn about one of its places, taken for its circle of curvature.
-#[derive(Clone, Copy)]
-struct Neighbourhood {
-    /// Where the place is, in the section's frame; none at the section itself.
-    place: Option<Placed>,
-    /// How far along the yarn it is.
-    travel: f32,
-    /// As the section's, in the place's axes.
-    bend: Vec2,
-    phase: Vec2,
-    turn: f32,
-    pressed: Option<Pressed>,
-    pressed_turn: f32,
-    /// How fast a way turns in the unwound yarn, radians per yarn radius along the yarn.
-    turning: f32,
-    /// The inverse of how far along the yarn its bend bows a way by [`MOST_BOW`].
-    bowing: f32,
-}
-
-/// A place of the yarn in a section's frame.
-#[derive(Clone, Copy)]
-struct Placed {
-    origin: Vec3A,
-    x: Vec3A,
-    y: Vec3A,
-    z: Vec3A,
-    /// The section's yarn radius over the one there.
-    scale: f32,
-}
-
-impl Placed {
-    #[inline]
-    fn local(&self, v: Vec3A) -> Vec3A {
-        self.scale * Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
-    }
-}
-
-/// The yarn near its place as a circle: a point and a direction of the section's frame, unbent.
-struct Unbent {
-    /// In the section, and its change along the direction.
-    at: Vec2,
-    slope: Vec2,
-    /// Along the axis, and its change along the direction.
-    travel: f32,
-    advance: f32,
-    straightness: f32,
-    /// By how much z of the point moves for each unit of `straightness`: sine of the yarn's turn over its curvature.
-    lean: f32,
-    /// Cosine of the yarn's turn.
-    cos: f32,
 }
 
 /// Turns `p` back by the angle of (cos, sin).
@@ -829,95 +633,6 @@ fn keep(way: &mut Way, a: &Station, b: &Station) -> ControlFlow<()> {
 fn angle(by: f32) -> Vec2 {
     let (sin, cos) = sin_cos(by);
     Vec2::new(cos, sin)
-}
-
-impl Neighbourhood {
-    /// With how fast it turns and bows ways. A bend turns them as well.
-    #[inline]
-    fn rated(mut self, reach: Reach) -> Self {
-        let bend = self.bend.length();
-        self.turning = self.turn.abs() + reach.bend * bend + self.pressed_turn.abs();
-        self.bowing = (bend * (0.125 / MOST_BOW)).sqrt();
-        self
-    }
-
-    /// The station of a point in the section of the place itself.
-    #[inline]
-    fn enter(&self, point: Vec3A, direction: Vec3A) -> Step {
-        let at = point.truncate();
-        let straightness = (1.0 - self.bend.dot(at)).max(LEAST_STRAIGHTNESS);
-        let advance = direction.z / straightness;
-        let unbent =
-            Unbent { at, slope: direction.truncate(), travel: 0.0, advance, straightness, lean: 0.0, cos: 1.0 };
-        self.unwind(&unbent, 0.0)
-    }
-
-    /// A point and a direction of the section's frame on the unbent yarn. `travel` is from this place.
-    #[inline]
-    fn unbend(&self, point: Vec3A, direction: Vec3A) -> Unbent {
-        let (point, direction) = match &self.place {
-            None => (point, direction),
-            Some(place) => (place.local(point - place.origin), place.local(direction)),
-        };
-        let (p, v) = (point.truncate(), direction.truncate());
-        // In units of the bend's radius the point is at (ahead, k z) from the bend's centre; k stays in products that are
-        // finite for a straight yarn.
-        let bend = self.bend;
-        let square = bend.length_squared();
-        let ahead = (1.0 - bend.dot(p)).max(LEAST_STRAIGHTNESS);
-        let z = point.z;
-        let straightness = (ahead * ahead + square * z * z).sqrt();
-        let half = z / (ahead + straightness);
-        // atan x / x of half the angle, to 1 % at a right angle.
-        let tan_squared = square * half * half;
-        let travel = 2.0 * half * (15.0 + 4.0 * tan_squared) / (15.0 + 9.0 * tan_squared);
-        let fall = bend.dot(v);
-        let inverse = 1.0 / straightness;
-        Unbent {
-            at: p - bend * (z * half),
-            slope: v - bend * ((fall * half + direction.z) * z * inverse),
-            travel,
-            advance: (ahead * direction.z + z * fall) * inverse * inverse,
-            straightness,
-            lean: z * inverse,
-            cos: ahead * inverse,
-        }
-    }
-
-    /// (cos, sin) of the plies' phase so far along from this place.
-    #[inline]
-    fn phase_at(&self, travel: f32) -> Vec2 {
-        let turned = self.turn * travel;
-        if turned == 0.0 { self.phase } else { self.phase.rotate(angle(turned)) }
-    }
-
-    /// How the section is pressed so far along.
-    #[inline]
-    fn pressed_at(&self, travel: f32) -> Option<Pressed> {
-        let pressed = self.pressed?;
-        let turned = self.pressed_turn * travel;
-        Some(if turned == 0.0 { pressed } else { Pressed { axis: pressed.axis.rotate(angle(turned)), ..pressed } })
-    }
-
-    /// The station of an unbent point: pressed round and turned back with the plies.
-    #[inline]
-    fn unwind(&self, unbent: &Unbent, depth: f32) -> Step {
-        let &Unbent { at: real, slope: real_slope, travel, advance, straightness, .. } = unbent;
-        let (round, round_slope) = match self.pressed_at(travel) {
-            None => (real, real_slope),
-            Some(pressed) => {
-                let round = pressed.round(real);
-                // B' = phi' (J B - B J) for the map B that makes round what is pressed along an axis at the angle phi.
-                let turned = self.pressed_turn * (round.perp() - pressed.round(real.perp()));
-                (round, pressed.round(real_slope) + advance * turned)
-            }
-        };
-        let phase = self.phase_at(travel);
-        let at = unrotate(round, phase);
-        let slope = unrotate(round_slope - self.turn * advance * round.perp(), phase);
-        let station = Station { depth, at, slope, travel: self.travel + travel, advance, straightness };
-        Step { station, real, real_slope }
-    }
 }
 
 #[cfg(test)]

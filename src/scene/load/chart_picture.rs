@@ -40,13 +40,8 @@ pub(super) fn rows(table: Reader<'_>, context: &Context<'_>) -> Option<Vec<Strin
         symbols = None;
     }
     table.finish();
-    match read(&path?, &symbols?) {
-        Ok(rows) => Some(rows),
-        Err(problem) => {
-            context.error(span, problem, None);
-            None
-        }
-    }
+    let path = path?;
+    read(&path, &symbols?).map_err(|problem| context.wrong_file(&path, span, problem)).ok()
 }
 
 fn symbol(stitches: &Reader<'_>, sign: &str, context: &Context<'_>) -> Option<Symbol> {

@@ -113,6 +113,12 @@ impl Context<'_> {
         path
     }
 
+    /// Tells what is wrong with a file that is read with the text; it is not told again as a missing one.
+    fn wrong_file(&self, path: &Path, span: Span, problem: String) {
+        self.named.borrow_mut().retain(|(named, _)| named != path);
+        self.error(span, problem, None);
+    }
+
     /// Tells which of the named files are not there. Where the text has mistakes, no file is read; this at least is found
     /// out with them.
     fn tell_missing_files(&self) {

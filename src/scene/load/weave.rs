@@ -1,6 +1,6 @@
 //! `source = { type = "weave" }`: woven cloth that the program makes.
 
-use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
+use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates, in_words};
 use crate::{
     geometry::{
         curve::Curve,
@@ -313,8 +313,10 @@ fn from_file(table: Reader<'_>, context: &Context<'_>) -> (String, Option<Drafte
     };
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
-        // Missing files are told with all others.
-        Err(error) => return wrong(error.to_string(), None),
+        Err(error) => {
+            context.wrong_file(&path, span, format!("{}: {}", path.display(), in_words(&error)));
+            return (String::new(), None);
+        }
     };
     let file = match wif::parse(&bytes) {
         Ok(file) => file,

@@ -1,0 +1,161 @@
+//! A point inside a yarn, and the short way out from there for light that leaves.
+
+use glam::{Vec2, Vec3A};
+
+use super::{LEAST_LEFT, LIGHT, MOST_BENT, Section, angle, neighbourhood::Unbent, to_surface, unrotate};
+use crate::geometry::{
+    way::Station,
+    yarn::{YarnShape, fiber_tangent},
+    yarn_frame::Pressed,
+};
+
+/// A point inside a yarn, seen in the unwound yarn, and the way back from there.
+#[derive(Clone, Copy, Debug)]
+pub struct Inside {
+    /// In the section's frame.
+    pub point: Vec3A,
+    /// About how far along the yarn.
+    pub(super) travel: f32,
+    /// In the section of the unwound yarn.
+    pub(super) at: Vec2,
+    /// The axes of that section, which turn with the plies, in the section's frame.
+    pub(super) x: Vec3A,
+    pub(super) y: Vec3A,
+    /// The axis along the yarn.
+    pub(super) z: Vec3A,
+    /// How the section is pressed flat, against these axes.
+    pub(super) pressed: Option<Pressed>,
+    pub(super) straightness: f32,
+    /// The yarn's curvature along x and y, 1/yarn radii.
+    pub(super) bend: Vec2,
+    /// Turns of the plies, radians per yarn radius.
+    pub(super) turn: f32,
+}
+
+impl Inside {
+    /// A vector of the yarn's axes there in the section's frame.
+    #[inline]
+    pub(super) fn out(&self, v: Vec3A) -> Vec3A {
+        v.x * self.x + v.y * self.y + v.z * self.z
+    }
+
+    /// A vector of the section's frame across the yarn there.
+    #[inline]
+    pub(super) fn across(&self, v: Vec3A) -> Vec2 {
+        Vec2::new(v.dot(self.x), v.dot(self.y))
+    }
+
+    /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
+    #[inline]
+    pub fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize) -> Vec3A {
+        self.tangent_at(shape, section, ply, self.at)
+    }
+
+    /// The same at another point of the unwound yarn's section.
+    #[inline]
+    pub(super) fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
+        let of = &shape.plies[ply];
+        let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
+        let mut across = t.truncate();
+        if let Some(pressed) = &self.pressed {
+            // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
+            let turned = section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
+            across = pressed.real(across) + turned;
+        }
+        let across = across / self.straightness;
+        self.out(across.extend(1.0).into())
+    }
+
+    /// The two stations of a way out from `shift` beside this point in a direction `w` of the section's frame: `None` unless it
+    /// turns and bends little.
+    #[inline]
+    pub(super) fn way_out(&self, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
+        if self.pressed.is_some() {
+            return None;
+        }
+        let advance = w.dot(self.z) / self.straightness;
+        let from = Bowed {
+            at: self.at + self.across(shift),
+            slope: self.across(w),
+            advance,
+            straightness: self.straightness,
+            bend: self.bend,
+        };
+        let depth = from.to_surface();
+        let to = from.ahead(depth)?;
+        let turned = self.turn * to.travel;
+        if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT {
+            return None;
+        }
+        let phase = angle(turned);
+        let unwound = |at: Vec2, slope: Vec2, advance: f32| slope - self.turn * advance * at.perp();
+        let straightness = self.straightness;
+        let start = Station {
+            depth: 0.0,
+            at: from.at,
+            slope: unwound(from.at, from.slope, advance),
+            travel: self.travel,
+            advance,
+            straightness,
+        };
+        let end = Station {
+            depth,
+            at: unrotate(to.at, phase),
+            slope: unrotate(unwound(to.at, to.slope, to.advance), phase),
+            travel: self.travel + to.travel,
+            advance: to.advance,
+            straightness,
+        };
+        Some([start, end])
+    }
+}
+
+/// A straight way from a point in the section of a place, as the bend there bows it.
+pub(super) struct Bowed {
+    pub(super) at: Vec2,
+    pub(super) slope: Vec2,
+    pub(super) advance: f32,
+    pub(super) straightness: f32,
+    pub(super) bend: Vec2,
+}
+
+impl Bowed {
+    /// How fast the bow begins.
+    #[inline]
+    pub(super) fn bow(&self) -> Vec2 {
+        -(self.advance * self.advance * self.straightness) * self.bend
+    }
+
+    /// How far it is to the yarn's surface: as if it were straight, then as it bows.
+    #[inline]
+    pub(super) fn to_surface(&self) -> f32 {
+        let depth = to_surface(self.at, self.slope);
+        if self.bend == Vec2::ZERO {
+            return depth;
+        }
+        let slope = self.slope + depth * self.bow();
+        depth + to_surface(self.at + (0.5 * depth) * (self.slope + slope), slope)
+    }
+
+    /// The way so much deeper: to third order, were the yarn a circle. `None` if the yarn bends more on it.
+    #[inline]
+    pub(super) fn ahead(&self, depth: f32) -> Option<Unbent> {
+        let bent = depth * self.advance;
+        if bent * bent * self.bend.length_squared() > MOST_BENT * MOST_BENT {
+            return None;
+        }
+        // r'' = L^2 / r^3 and the angle's change L / r^2, for the distance r from the centre of the circle.
+        let nearer = self.bend.dot(self.slope) / self.straightness;
+        let bow = self.bow();
+        let more = 3.0 * nearer * bow;
+        Some(Unbent {
+            at: self.at + depth * (self.slope + depth * (0.5 * bow + depth / 6.0 * more)),
+            slope: self.slope + depth * (bow + 0.5 * depth * more),
+            travel: bent * (1.0 + depth * nearer),
+            advance: self.advance * (1.0 + 2.0 * depth * nearer),
+            straightness: self.straightness * (1.0 - depth * nearer),
+            lean: 0.0,
+            cos: 1.0,
+        })
+    }
+}
