@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, files::Files, log, make::write_curves};
+use super::{Failure, files::Files, log, make::write_curves, positive};
 use crate::geometry::{
     curve::{Basis, CurveSet},
     curve_file::{self, ReadOptions},
@@ -57,10 +57,6 @@ pub(super) struct ConvertArgs {
 fn counts(text: &str) -> Result<[u32; 2], String> {
     let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n| *n > 0)).collect();
     numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| "expected two whole numbers, as in 8,12".to_owned())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 /// Millimetres of a unit by its name, which clap has checked.

@@ -6,7 +6,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, terminal::print};
+use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, positive, terminal::print};
 use crate::{
     geometry::{
         curve::{Basis, Curve, CurveSet},
@@ -104,10 +104,6 @@ impl std::fmt::Display for Figure {
         let size = if self.0 == 0.0 { 0 } else { self.0.abs().log10().floor() as i32 };
         write!(f, "{:.*}", (digits - 1 - size).max(0) as usize, self.0)
     }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 /// Overlap as JSON: shares of the length and mean diameters.

@@ -10,7 +10,7 @@ use super::{
     fibers::{self, FibersArgs},
     files::{Attempts, Files},
     garment::{self, GarmentArgs},
-    log,
+    log, positive,
 };
 use crate::{
     geometry::{
@@ -164,10 +164,6 @@ const YARNS: u32 = 20;
 const FRINGE: f64 = 24.0;
 /// Height of a pile, in the same.
 const PILE: f64 = 8.0;
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
-}
 
 fn share(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())

@@ -284,6 +284,11 @@ struct SceneArgs {
     frame: bool,
 }
 
+/// Reads a length or another number that must be above 0.
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())
+}
+
 /// Reads four numbers with commas between them.
 fn crop(text: &str) -> Result<[u32; 4], String> {
     let numbers: Result<Vec<u32>, _> = text.split(',').map(|n| n.trim().parse()).collect();

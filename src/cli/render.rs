@@ -72,7 +72,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
     /// Seconds between two checkpoints.
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = positive, requires = "checkpoint")]
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds, requires = "checkpoint")]
     checkpoint_every: f64,
     /// Go on from the checkpoint if there is one; more --spp than it has extends it.
     #[arg(long, requires = "checkpoint")]
@@ -414,7 +414,7 @@ fn shard(text: &str) -> Result<Shard, String> {
 }
 
 /// Reads a number of seconds.
-fn positive(text: &str) -> Result<f64, String> {
+fn seconds(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|s| (1e-3..1e9).contains(s))

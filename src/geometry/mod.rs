@@ -16,6 +16,7 @@ mod spline;
 pub mod stage;
 pub mod strand;
 pub mod tube;
+pub(crate) mod unreadable;
 pub mod walk;
 pub mod way;
 pub mod yarn;

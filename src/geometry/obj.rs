@@ -11,7 +11,7 @@ use std::{
 use glam::{DVec2, DVec3};
 use tobj::LoadError;
 
-use super::mesh::Mesh;
+use super::{mesh::Mesh, unreadable::in_words};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 31;
@@ -70,13 +70,8 @@ impl<R: BufRead> BufRead for Counting<'_, R> {
 /// What is wrong with the file, and in which line.
 pub fn read(path: &Path) -> Result<Mesh, MeshError> {
     let fail = |line: usize, reason: String| MeshError { path: path.into(), line, reason };
-    let unreadable = |e: &io::Error| match e.kind() {
-        io::ErrorKind::NotFound => "no such file".to_owned(),
-        io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
-        _ => e.to_string(),
-    };
-    let file = File::open(path).map_err(|e| fail(0, unreadable(&e)))?;
-    let meta = file.metadata().map_err(|e| fail(0, unreadable(&e)))?;
+    let file = File::open(path).map_err(|e| fail(0, in_words(&e)))?;
+    let meta = file.metadata().map_err(|e| fail(0, in_words(&e)))?;
     if !meta.is_file() {
         return Err(fail(0, "not a file".to_owned()));
     }

@@ -29,6 +29,7 @@ use super::{
     curve::{Basis, CurveSet},
     pattern::tile::Tile,
     stage::{self, PrimPattern, Stage},
+    unreadable::hindrance,
 };
 
 pub use bcc::write_bcc;
@@ -173,11 +174,7 @@ pub fn read_tile(path: &Path) -> Result<Tile, CurveFileError> {
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
     let unreadable = |error: std::io::Error| {
-        let problem = match error.kind() {
-            std::io::ErrorKind::NotFound => "no such file".to_owned(),
-            std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
-            _ => format!("cannot be read: {error}"),
-        };
+        let problem = hindrance(&error).map_or_else(|| format!("cannot be read: {error}"), str::to_owned);
         CurveFileError::new(FileLocation::File, problem)
     };
     let metadata = fs::metadata(path).map_err(|error| unreadable(error).hint("is the path right?"))?;

@@ -12,7 +12,7 @@ use std::{
 
 use glam::{DVec2, DVec3};
 
-use crate::geometry::stage::PolygonMesh;
+use crate::geometry::{stage::PolygonMesh, unreadable::in_words};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 30;
@@ -103,21 +103,16 @@ impl GarmentMesh {
     /// # Errors
     /// What is wrong with it, and in which line.
     pub fn read(path: &Path) -> Result<Self, GarmentError> {
-        let unreadable = |e: &std::io::Error| match e.kind() {
-            std::io::ErrorKind::NotFound => "no such file".to_owned(),
-            std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
-            _ => e.to_string(),
-        };
         let fail =
             |problem: String| GarmentError::new(problem, "a mesh in OBJ format with texture coordinates").of(path);
-        let meta = std::fs::metadata(path).map_err(|e| fail(unreadable(&e)))?;
+        let meta = std::fs::metadata(path).map_err(|e| fail(in_words(&e)))?;
         if !meta.is_file() {
             return Err(fail("not a file".to_owned()));
         }
         if meta.len() > MAX_BYTES {
             return Err(fail(format!("{} bytes; at most {MAX_BYTES} are read", meta.len())));
         }
-        let bytes = std::fs::read(path).map_err(|e| fail(unreadable(&e)))?;
+        let bytes = std::fs::read(path).map_err(|e| fail(in_words(&e)))?;
         Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|e| e.of(path))
     }
 

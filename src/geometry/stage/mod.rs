@@ -24,7 +24,7 @@ pub use polygons::{FaceGroup, PolygonMesh};
 pub use select::PrimPattern;
 pub use usd::write::{CurvesOut, Interpolated, write};
 
-use super::curve::CurveSet;
+use super::{curve::CurveSet, unreadable::hindrance};
 
 /// Why a stage could not be read. Displays as one line: file, object, problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -256,11 +256,8 @@ type AddMesh<'a> = dyn FnMut(&str, PolygonMesh) -> Result<(), Problem> + 'a;
 
 /// The bytes of a regular file that is not too large.
 fn readable(path: &Path) -> Result<Vec<u8>, Problem> {
-    let words = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => Problem::new("no such file"),
-        std::io::ErrorKind::PermissionDenied => Problem::new("no permission to read it"),
-        _ => Problem::new(format!("cannot be read: {e}")),
-    };
+    let words =
+        |e: std::io::Error| Problem::new(hindrance(&e).map_or_else(|| format!("cannot be read: {e}"), str::to_owned));
     let metadata = std::fs::metadata(path).map_err(words)?;
     if !metadata.is_file() {
         return Err(Problem::new("expected a regular file, found a folder, pipe or device"));

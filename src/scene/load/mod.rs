@@ -39,7 +39,7 @@ use super::{
     defaults,
     view::CameraSetup,
 };
-use crate::geometry::curve_file;
+use crate::geometry::{curve_file, unreadable::in_words};
 use crate::input::{
     diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},
@@ -205,15 +205,6 @@ pub fn read_text(path: &Path) -> Result<String, String> {
     }
     let bytes = std::fs::read(path).map_err(|e| in_words(&e))?;
     String::from_utf8(bytes).map_err(|e| format!("byte {}: not UTF-8 text", e.utf8_error().valid_up_to()))
-}
-
-/// An input error without its number.
-fn in_words(error: &std::io::Error) -> String {
-    match error.kind() {
-        std::io::ErrorKind::NotFound => "no such file".to_owned(),
-        std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
-        _ => error.to_string(),
-    }
 }
 
 fn load_text(

@@ -1,6 +1,6 @@
 //! `source = { type = "weave" }`: woven cloth that the program makes.
 
-use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates, in_words};
+use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
 use crate::{
     geometry::{
         curve::Curve,
@@ -10,6 +10,7 @@ use crate::{
             weave::{self, Edges, Extent, Impossible, Measures, Weave},
             wif::{self, WifUse, WovenWif},
         },
+        unreadable::in_words,
     },
     input::{
         diagnostic::Span,

@@ -32,6 +32,25 @@ pub(in super::super) struct Loop {
     pub(in super::super) foot: f64,
 }
 
+impl Loop {
+    /// A loop with nothing around it yet, laid over the needle with a stitch's yarn.
+    fn laid(row: i32, at: f64) -> Self {
+        Self {
+            row,
+            at,
+            sign: 0.0,
+            parents: Vec::new(),
+            children: Vec::new(),
+            held: None,
+            rank: 0,
+            twist: 0.0,
+            layer: 0.0,
+            yarn: 1.0,
+            foot: at,
+        }
+    }
+}
+
 /// What the yarn does on its way along a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) enum Visit {
@@ -317,26 +336,11 @@ impl<'a> Maker<'a> {
     }
 
     fn draw(&mut self) {
-        let plain = Loop {
-            row: 0,
-            at: 0.0,
-            sign: 0.0,
-            parents: Vec::new(),
-            children: Vec::new(),
-            held: None,
-            rank: 0,
-            twist: 0.0,
-            layer: 0.0,
-            yarn: 1.0,
-            foot: 0.0,
-        };
         if self.border.finished {
             let first = &self.middles[0];
             let at: Vec<f64> = if first.len() == self.cast_on { first.clone() } else { self.even(self.cast_on) };
-            self.cast = at
-                .iter()
-                .map(|&at| self.push(Loop { row: -1, at, foot: at, twist: 1.0, yarn: CAST_ON, ..plain.clone() }))
-                .collect();
+            self.cast =
+                at.iter().map(|&at| self.push(Loop { twist: 1.0, yarn: CAST_ON, ..Loop::laid(-1, at) })).collect();
             let visits = self.cast.iter().enumerate().map(|(j, &c)| (j as u32, Visit::Loop(c))).collect();
             self.below = Some(Course::new(-1, visits));
         }
@@ -346,7 +350,7 @@ impl<'a> Maker<'a> {
             let mut visits = Vec::with_capacity(row.len());
             for (j, s) in row.iter().enumerate() {
                 let at = self.middles[r][j];
-                let base = Loop { row: r as i32, at, foot: at, layer: s.layer.into(), ..plain.clone() };
+                let base = Loop { layer: s.layer.into(), ..Loop::laid(r as i32, at) };
                 let new = match s.act {
                     Act::Draw | Act::Lift { .. } => Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base }),
                     Act::Over => Some(Loop { yarn: OVER, ..base }),
@@ -374,7 +378,7 @@ impl<'a> Maker<'a> {
                 match (s.act, self.under(r)) {
                     (Act::Lift { left }, under) => {
                         let twist = if left { -1.0 } else { 1.0 };
-                        self.lift(own, under, s, twist, &plain);
+                        self.lift(own, under, s, twist);
                         continue;
                     }
                     (Act::Draw, Some((below, down))) => {
@@ -422,14 +426,14 @@ impl<'a> Maker<'a> {
     }
 
     /// A loop is drawn through the strand between two stitches of the row below.
-    fn lift(&mut self, own: u32, under: Option<(usize, i32)>, s: Stitch, twist: f64, plain: &Loop) {
+    fn lift(&mut self, own: u32, under: Option<(usize, i32)>, s: Stitch, twist: f64) {
         let near = self.loops[own as usize].at;
         let r = self.loops[own as usize].row;
         let (row, down, at) = match under {
             Some((below, down)) => (below as i32, down, self.parent_middle(&self.middles[below], &s, near)),
             None => (-1, 0, near),
         };
-        let strand = self.push(Loop { row, at, foot: at, twist, yarn: LIFTED, ..plain.clone() });
+        let strand = self.push(Loop { twist, yarn: LIFTED, ..Loop::laid(row, at) });
         let column = s.first_parent;
         let course = match under {
             Some((below, _)) => Some(&mut self.courses[below]),
@@ -452,19 +456,7 @@ impl<'a> Maker<'a> {
         for k in 0..n {
             let j = if backwards { n - 1 - k } else { k };
             let at = self.middles[last][j];
-            let own = self.push(Loop {
-                row,
-                at,
-                sign: 1.0,
-                parents: Vec::new(),
-                children: Vec::new(),
-                held: None,
-                rank: 0,
-                twist: 0.0,
-                layer: 0.0,
-                yarn: 1.0,
-                foot: at,
-            });
+            let own = self.push(Loop { sign: 1.0, ..Loop::laid(row, at) });
             let mut content: Vec<(u32, i32)> = before.map(|b| (b, 0)).into_iter().collect();
             self.content(last, j, 0, &mut content);
             self.link(own, &content, row, false);

@@ -123,12 +123,12 @@ pub struct Cloth<'a> {
 /// closer, so that its floats close up and hide the other: denim has 1.5 times as many ends as picks, warp satin twice.
 fn sett(draft: &Draft) -> f64 {
     const MOST: f64 = 2.0;
-    let crossings = (0..draft.wefts()).flat_map(|weft| (0..draft.warps()).map(move |warp| (weft, warp)));
-    let over = crossings.clone().filter(|&(weft, warp)| draft.warp_over(weft, warp)).count() as f64;
-    let under = crossings.count() as f64 - over;
     if draft.layers() > 1 {
         return 1.0;
     }
+    let crossings = (0..draft.wefts()).flat_map(|weft| (0..draft.warps()).map(move |warp| (weft, warp)));
+    let over = crossings.clone().filter(|&(weft, warp)| draft.warp_over(weft, warp)).count() as f64;
+    let under = crossings.count() as f64 - over;
     (over / under.max(1.0)).sqrt().clamp(1.0 / MOST, MOST)
 }
 

@@ -87,7 +87,9 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
     let draft = &cloth.weave.draft;
     let Some(pile) = draft.pile() else { return vec![Standing::ground(strand)] };
     let side = usize::from(strand.kind == StrandKind::Weft);
-    let Some(back) = pile.stands(side, number.rem_euclid([draft.warps(), draft.wefts()][side] as i64) as usize) else {
+    let [own, size] = [side, 1 - side].map(|side| [draft.warps(), draft.wefts()][side] as i64);
+    let own = number.rem_euclid(own) as usize;
+    let Some(back) = pile.stands(side, own) else {
         return vec![Standing::ground(strand)];
     };
     let nodes = cloth.cell.nodes as i64;
@@ -96,10 +98,7 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
     let first = if side == 0 { -hem } else { 0 };
     let crossings = (way.len() as i64 - 1) / nodes;
     let held = |c: i64| {
-        let size = [draft.warps(), draft.wefts()][1 - side] as i64;
-        let (other, own) = ((c + first).rem_euclid(size) as usize, number.max(0) as usize);
-        let own =
-            if number < 0 { number.rem_euclid([draft.warps(), draft.wefts()][side] as i64) as usize } else { own };
+        let other = (c + first).rem_euclid(size) as usize;
         let warp_over = if side == 0 { draft.warp_over(other, own) } else { draft.warp_over(own, other) };
         let on_top = warp_over == (side == 0);
         on_top == back

@@ -1,0 +1,17 @@
+//! Why a file cannot be read, in the words that all formats share.
+
+use std::io;
+
+/// The usual hindrances; `None` for the others, which the operating system has its own words for.
+pub(crate) fn hindrance(error: &io::Error) -> Option<&'static str> {
+    match error.kind() {
+        io::ErrorKind::NotFound => Some("no such file"),
+        io::ErrorKind::PermissionDenied => Some("no permission to read it"),
+        _ => None,
+    }
+}
+
+/// The hindrance, or else the operating system's words.
+pub(crate) fn in_words(error: &io::Error) -> String {
+    hindrance(error).map_or_else(|| error.to_string(), str::to_owned)
+}
