@@ -2,12 +2,20 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::{LEAST_LEFT, LIGHT, MOST_BENT, Section, angle, neighbourhood::Unbent, to_surface, unrotate};
+use super::{
+    Section,
+    march::{LEAST_LEFT, LIGHT, angle},
+    neighbourhood::Unbent,
+    unrotate,
+};
 use crate::geometry::{
     way::Station,
     yarn::{YarnShape, fiber_tangent},
     yarn_frame::Pressed,
 };
+
+/// Angle, in radians, up to which a bend bows light that leaves from inside as a third-order curve.
+const MOST_BENT: f32 = 0.6;
 
 /// A point inside a yarn, seen in the unwound yarn, and the way back from there.
 #[derive(Clone, Copy, Debug)]
@@ -158,4 +166,12 @@ impl Bowed {
             cos: 1.0,
         })
     }
+}
+
+/// How far it is from a point of the section along a slope to the unit circle: negative from outside.
+#[inline]
+fn to_surface(at: Vec2, slope: Vec2) -> f32 {
+    let (speed, outward) = (slope.length_squared().max(1e-12), at.dot(slope));
+    let square = outward * outward + speed * (1.0 - at.length_squared());
+    (square.max(0.0).sqrt() - outward) / speed
 }

@@ -2,8 +2,14 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::{LEAST_STRAIGHTNESS, MOST_BOW, Reach, Step, angle, unrotate};
-use crate::geometry::{way::Station, yarn_frame::Pressed};
+use super::{
+    march::{Reach, Step, angle},
+    unrotate,
+};
+use crate::geometry::{walk::LEAST_STRAIGHTNESS, way::Station, yarn_frame::Pressed};
+
+/// By how much a bent yarn may bow a way between two stations, in yarn radii.
+const MOST_BOW: f32 = 0.2;
 
 /// The yarn about one of its places, taken for its circle of curvature.
 #[derive(Clone, Copy)]

@@ -2,7 +2,10 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::*;
+use super::{
+    march::{LOOK, angle},
+    *,
+};
 use crate::{
     geometry::{
         curve::{Basis, Curve},

@@ -1,0 +1,190 @@
+//! Contact of yarns as soft elliptical tubes: neighbours of one side, and warps with the wefts that they cross.
+
+use glam::DVec3;
+
+use super::energy::{Energy, PER_NODE, Tangent, local, world};
+
+/// Stiffness of contact.
+const CONTACT: f64 = 250.0;
+/// How much harder yarns on the wrong side of each other are pushed back.
+const BEHIND: f64 = 20.0;
+
+/// A node as crossing yarns meet it.
+pub(super) struct Spheroid {
+    /// Squared half axes: wide, high.
+    wide: f64,
+    high: f64,
+    /// The level part of its matrix: xx, xy, yy.
+    level: [f64; 3],
+    /// Level unit vector across the yarn.
+    across: [f64; 2],
+}
+
+impl Spheroid {
+    pub(super) fn new(axes: [f64; 2], tangent: DVec3) -> Self {
+        let flat = tangent.truncate().length().max(1e-3);
+        let across = [-tangent.y / flat, tangent.x / flat];
+        let [wide, high] = axes.map(|v| v * v);
+        let more = wide - high;
+        let level =
+            [high + more * across[0] * across[0], more * across[0] * across[1], high + more * across[1] * across[1]];
+        Self { wide, high, level, across }
+    }
+
+    /// Of w' Q w by the logarithm of the flattening and by the yarn's heading, for the level part of w and its height.
+    fn gradient(&self, way: [f64; 2], up: f64) -> (f64, f64) {
+        let across = way[0] * self.across[0] + way[1] * self.across[1];
+        let along = way[0] * self.across[1] - way[1] * self.across[0];
+        let by_flattening = 2.0 * (self.wide * across * across - self.high * (along * along + up * up));
+        (by_flattening, -2.0 * (self.wide - self.high) * across * along)
+    }
+}
+
+/// What the gradient of the energy is gathered in.
+pub(super) struct Gradient<'a> {
+    pub(super) nodes: &'a mut [f64],
+    pub(super) spacing: [f64; 2],
+    pub(super) tangents: Vec<DVec3>,
+    /// By the angle of each node's tangent in the plane.
+    pub(super) headings: Vec<f64>,
+}
+
+impl Energy<'_> {
+    /// Contact of yarns of one side that lie beside or upon each other, in planes across the cloth.
+    pub(super) fn neighbours(
+        &self,
+        side: usize,
+        x: &[f64],
+        spacing: [f64; 2],
+        tangents: &[Tangent],
+        axes: &[[f64; 2]],
+        gradient: &mut Gradient<'_>,
+    ) -> f64 {
+        let n = self.length(side);
+        let count = self.count[side];
+        let thickest = self.thickness[side].iter().fold(1.0, |m: f64, t| m.max(*t));
+        let far = ((3.2 * thickest * self.radius[side] / spacing[side]).ceil() as usize).clamp(1, 5);
+        // Half height of a sloping yarn's cut, over its own.
+        let steep = |at: usize| 1.0 / local(side, tangents[at / PER_NODE].unit)[0].max(0.2);
+        let mut sum = 0.0;
+        for yarn in 0..count {
+            for apart in 1..=far {
+                let size = self.round(side, yarn) + self.round(side, (yarn + apart) % count);
+                let stiff = 4.0 * CONTACT * size * size / self.nodes as f64;
+                for k in 0..n {
+                    let (a, b) = (self.at(side, yarn, k), self.at(side, (yarn + apart) % count, k));
+                    let d = [apart as f64 * spacing[side] + x[b] - x[a], x[b + 1] - x[a + 1]];
+                    if d[0].abs() > 2.0 * size || d[1].abs() > 2.0 * size {
+                        continue;
+                    }
+                    let (s, t) = (axes[a / PER_NODE], axes[b / PER_NODE]);
+                    let (steep_s, steep_t) = (steep(a), steep(b));
+                    let axes = [s[0] + t[0], s[1] * steep_s + t[1] * steep_t];
+                    let scaled = [d[0] / axes[0], d[1] / axes[1]];
+                    let f = scaled[0] * scaled[0] + scaled[1] * scaled[1];
+                    if f >= 1.0 {
+                        continue;
+                    }
+                    let root = f.sqrt().max(1e-6);
+                    let depth = 1.0 - root;
+                    sum += 0.5 * stiff * depth * depth;
+                    let by_f = -0.5 * stiff * depth / root;
+                    let by_d = [0, 1].map(|c| by_f * 2.0 * scaled[c] / axes[c]);
+                    for (c, by) in by_d.into_iter().enumerate() {
+                        gradient.nodes[b + c] += by;
+                        gradient.nodes[a + c] -= by;
+                    }
+                    gradient.spacing[side] += by_d[0] * apart as f64;
+                    let by_axes = [0, 1].map(|c| -by_f * 2.0 * scaled[c] * scaled[c] / axes[c]);
+                    gradient.nodes[a + 2] += by_axes[0] * s[0] - by_axes[1] * s[1] * steep_s;
+                    gradient.nodes[b + 2] += by_axes[0] * t[0] - by_axes[1] * t[1] * steep_t;
+                    let along = world(side, [1.0, 0.0, 0.0]);
+                    gradient.tangents[a / PER_NODE] -= by_axes[1] * s[1] * steep_s * steep_s * along;
+                    gradient.tangents[b / PER_NODE] -= by_axes[1] * t[1] * steep_t * steep_t * along;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Contact of warps with wefts, the warp on the side that the draft says. Nodes are spheroids: as wide as the yarn
+    /// level and across it, as high as it all else. Two spheroids touch about where an ellipsoid around the sum of both
+    /// is reached, whose matrix (squared half axes) is (1 + 1/r) P + (1 + r) Q with r the ratio of the radii: exact for
+    /// round yarns.
+    pub(super) fn crossings(
+        &self,
+        x: &[f64],
+        spacing: [f64; 2],
+        spheroids: &[Spheroid],
+        gradient: &mut Gradient<'_>,
+    ) -> f64 {
+        let per_node = 1.0 / self.nodes as f64;
+        let (step_x, step_y) = (spacing[0] * per_node, spacing[1] * per_node);
+        let (warp_length, weft_length) = (self.length(0) as isize, self.length(1) as isize);
+        let g = &mut *gradient.nodes;
+        let mut sum = 0.0;
+        for i in 0..self.count[1] {
+            for j in 0..self.count[0] {
+                let sign = if self.draft.warp_over(i, j) { 1.0 } else { -1.0 };
+                let (own, other) = (self.round(0, j), self.round(1, i));
+                let (size, ratio) = (own + other, own / other);
+                let parts = [1.0 + ratio.recip(), 1.0 + ratio];
+                // A crossing has more pairs the more nodes there are.
+                let stiff = CONTACT * size * size * (4.0 * per_node).powi(2);
+                let limit = 1.6 * size;
+                let reach_y = (limit / step_y).ceil() as isize;
+                for b in -reach_y..=reach_y {
+                    let node = ((i * self.nodes) as isize + b).rem_euclid(warp_length) as usize;
+                    let w = self.at(0, j, node);
+                    let warp = &spheroids[w / PER_NODE];
+                    // Nodes of the weft near this one of the warp.
+                    let (from, to) = (((x[w] - limit) / step_x).ceil() as isize, ((x[w] + limit) / step_x) as isize);
+                    for a in from..=to {
+                        let node = ((j * self.nodes) as isize + a).rem_euclid(weft_length) as usize;
+                        let v = self.at(1, i, node);
+                        let weft = &spheroids[v / PER_NODE];
+                        let d = [x[w] - a as f64 * step_x, b as f64 * step_y - x[v]];
+                        if d[1].abs() > limit {
+                            continue;
+                        }
+                        let m = [0, 1, 2].map(|c| parts[0] * warp.level[c] + parts[1] * weft.level[c]);
+                        let det = 1.0 / (m[0] * m[2] - m[1] * m[1]);
+                        let way = [(m[2] * d[0] - m[1] * d[1]) * det, (m[0] * d[1] - m[1] * d[0]) * det];
+                        let flat = d[0] * way[0] + d[1] * way[1];
+                        if flat >= 1.0 {
+                            continue;
+                        }
+                        let pz = 1.0 / (parts[0] * warp.high + parts[1] * weft.high);
+                        let dz = sign * (x[w + 1] - x[v + 1]);
+                        // On the wrong side: back through the middle.
+                        let (inside, behind) = (dz.max(0.0), BEHIND * (-dz).max(0.0) / size);
+                        let f = flat + inside * inside * pz;
+                        if f >= 1.0 {
+                            continue;
+                        }
+                        let root = f.sqrt().max(1e-6);
+                        let depth = (1.0 - root) * (1.0 + behind);
+                        sum += 0.5 * stiff * depth * depth;
+                        let by_f = -0.5 * stiff * depth * (1.0 + behind) / root;
+                        let (gx, gy) = (2.0 * by_f * way[0], 2.0 * by_f * way[1]);
+                        let back = -stiff * depth * (1.0 - root) * BEHIND / size;
+                        let gz = sign * if behind > 0.0 { back } else { 2.0 * by_f * inside * pz };
+                        g[w] += gx;
+                        g[v] -= gy;
+                        g[w + 1] += gz;
+                        g[v + 1] -= gz;
+                        gradient.spacing[0] -= gx * a as f64 * per_node;
+                        gradient.spacing[1] += gy * b as f64 * per_node;
+                        let up = inside * pz;
+                        for ((node, at), part) in [(warp, w), (weft, v)].into_iter().zip(parts) {
+                            let (by_flattening, by_heading) = node.gradient(way, up);
+                            g[at + 2] -= by_f * part * by_flattening;
+                            gradient.headings[at / PER_NODE] -= by_f * part * by_heading;
+                        }
+                    }
+                }
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,322 @@
+//! The energy of a repeat by the places and sections of its nodes and by its spacings, with its gradient.
+
+use glam::DVec3;
+
+use super::{
+    super::super::draft::Draft,
+    CellOptions, Node,
+    contact::{Gradient, Spheroid},
+    full,
+};
+
+/// Resistance of a section to being flattened, energy per crossing and squared logarithm of its width.
+const SECTION: f64 = 20.0;
+/// The same of yarns that stay round.
+const ROUND: f64 = 2000.0;
+/// Resistance to spacings below what fills the reed.
+const WALL: f64 = 200.0;
+/// A yarn's node in the vector of variables: `[aside, height, ln(width / round)]`.
+pub(super) const PER_NODE: usize = 3;
+
+pub(super) struct Energy<'a> {
+    pub(super) draft: &'a Draft,
+    /// Mean of each side, in mean radii.
+    pub(super) radius: [f64; 2],
+    /// Thickness of each yarn over the mean of its side.
+    pub(super) thickness: [Vec<f64>; 2],
+    pub(super) rest: [f64; 2],
+    /// Tension and bending of warp and weft relative to the mean.
+    pub(super) stiffness: [f64; 2],
+    /// Resistance of sections to being flattened.
+    pub(super) section: f64,
+    pub(super) beat: f64,
+    pub(super) nodes: usize,
+    pub(super) count: [usize; 2],
+    pub(super) fixed: [Option<f64>; 2],
+    /// Distance of wefts over that of warps, where it is fixed.
+    pub(super) sett: Option<f64>,
+    /// Spacings at which the reed is full.
+    pub(super) densest: [f64; 2],
+    /// How much a variable of spacing moves it.
+    pub(super) gear: f64,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Tangent {
+    pub(super) unit: DVec3,
+    /// Length of the way from the node before to the one after.
+    pub(super) length: f64,
+}
+
+/// From along, aside and height of a warp or a weft to x, y, z.
+pub(super) fn world(side: usize, [along, aside, height]: [f64; 3]) -> DVec3 {
+    if side == 0 { DVec3::new(aside, along, height) } else { DVec3::new(along, aside, height) }
+}
+
+pub(super) fn local(side: usize, v: DVec3) -> [f64; 3] {
+    if side == 0 { [v.y, v.x, v.z] } else { [v.x, v.y, v.z] }
+}
+
+impl<'a> Energy<'a> {
+    /// What is minimised for one repeat of `draft`, in lengths of `unit`.
+    pub(super) fn new(draft: &'a Draft, options: &CellOptions, unit: f64) -> Self {
+        let count = [draft.warps(), draft.wefts()];
+        let crimp = options.crimp.clamp(0.04, 0.96);
+        let total = count[0] * count[1] * options.nodes;
+        let mut energy = Self {
+            draft,
+            radius: options.radius.map(|r| r / unit),
+            thickness: [0, 1].map(|side| match options.thickness[side].as_slice() {
+                [] => vec![1.0; count[side]],
+                given => given.to_vec(),
+            }),
+            rest: options.aspect.map(|a| 0.5 * a.ln()),
+            // The stiffer side bends less: h1 / h2 = B2 / B1.
+            stiffness: [2.0 * (1.0 - crimp), 2.0 * crimp],
+            // What shall stay round does not give way.
+            section: if options.aspect == [1.0; 2] { ROUND } else { SECTION },
+            beat: options.beat,
+            nodes: options.nodes,
+            count,
+            fixed: options.spacing.map(|s| s.map(|s| s / unit)),
+            sett: options.sett.filter(|_| options.spacing == [None; 2] && !draft.twines()),
+            densest: [0, 1].map(|side| full(draft, options, side) / unit),
+            gear: 0.5 / (total as f64).sqrt(),
+        };
+        if draft.twines() {
+            // An open cloth: warps in pairs, hardly flattened, and room for a warp to pass between wefts.
+            let [warp, weft] = energy.radius;
+            energy.densest = [3.4 * warp, 3.4 * warp + 3.0 * weft];
+            energy.rest[0] *= 0.3;
+        }
+        energy
+    }
+
+    /// Variables to start from: every yarn in its dent, above and below the others as the draft says, in an open cloth.
+    pub(super) fn start(&self) -> Vec<f64> {
+        let mut x = vec![0.0; self.variables()];
+        let half = 0.5 * (self.radius[0] + self.radius[1]);
+        for side in 0..2 {
+            for (yarn, node) in (0..self.count[side]).flat_map(|y| (0..self.length(side)).map(move |n| (y, n))) {
+                let over = |crossing: usize| {
+                    let crossing = crossing % self.count[1 - side];
+                    let (weft, warp) = if side == 0 { (crossing, yarn) } else { (yarn, crossing) };
+                    if self.draft.warp_over(weft, warp) == (side == 0) { half } else { -half }
+                };
+                let share = (node % self.nodes) as f64 / self.nodes as f64;
+                let smooth = 0.5 - 0.5 * (std::f64::consts::PI * share).cos();
+                let crossing = node / self.nodes;
+                x[self.at(side, yarn, node) + 1] = over(crossing) * (1.0 - smooth) + over(crossing + 1) * smooth;
+            }
+        }
+        let n = x.len();
+        x[n - 2..].fill(4.4 * half / self.gear);
+        if self.draft.twines() {
+            self.twine(&mut x);
+        }
+        x
+    }
+
+    /// Leads every even warp from one side of its right neighbour to the other after each weft, below it.
+    fn twine(&self, x: &mut [f64]) {
+        let r = self.radius[0];
+        // Both move from their dents to the middle between them.
+        let together = 0.5 * self.spacing(x)[0];
+        for warp in (0..self.count[0]).step_by(2) {
+            for k in 0..self.length(0) {
+                let turn = std::f64::consts::PI * k as f64 / self.nodes as f64;
+                let (crossing, straight) = (self.at(0, warp, k), self.at(0, warp + 1, k));
+                x[crossing] = together - 2.2 * r * turn.cos();
+                x[straight] = -together;
+                // At the top over each weft, at the bottom between two.
+                x[crossing + 1] = 2.6 * r * (2.0 * turn).cos();
+                x[straight + 1] = -r;
+            }
+        }
+    }
+
+    /// The nodes of the yarns of a side.
+    pub(super) fn nodes_of(&self, side: usize, x: &[f64], unit: f64) -> Vec<Vec<Node>> {
+        let node = |yarn: usize, node: usize| {
+            let at = self.at(side, yarn, node);
+            let axes = self.axes(side, yarn, x[at + 2].max(0.0));
+            Node { aside: x[at] * unit, height: x[at + 1] * unit, axes: axes.map(|v| v * unit) }
+        };
+        let yarn = |yarn: usize| (0..self.length(side)).map(|n| node(yarn, n)).collect();
+        (0..self.count[side]).map(yarn).collect()
+    }
+
+    /// Nodes of one yarn of a side.
+    pub(super) fn length(&self, side: usize) -> usize {
+        self.count[1 - side] * self.nodes
+    }
+
+    fn base(&self, side: usize) -> usize {
+        if side == 0 { 0 } else { PER_NODE * self.count[0] * self.length(0) }
+    }
+
+    pub(super) fn at(&self, side: usize, yarn: usize, node: usize) -> usize {
+        self.base(side) + PER_NODE * (yarn * self.length(side) + node)
+    }
+
+    pub(super) fn variables(&self) -> usize {
+        self.base(1) + PER_NODE * self.count[1] * self.length(1) + 2
+    }
+
+    pub(super) fn spacing(&self, x: &[f64]) -> [f64; 2] {
+        let n = x.len();
+        if let Some(sett) = self.sett {
+            return [1.0, sett].map(|share| share * x[n - 2] * self.gear);
+        }
+        [0, 1].map(|side| self.fixed[side].unwrap_or(x[n - 2 + side] * self.gear))
+    }
+
+    pub(super) fn value(&self, x: &[f64], g: &mut [f64]) -> f64 {
+        g.fill(0.0);
+        let spacing = self.spacing(x);
+        let tangents = self.tangents(x, spacing);
+        let axes = self.all_axes(x);
+        let mut gradient = Gradient {
+            nodes: g,
+            spacing: [0.0; 2],
+            tangents: vec![DVec3::ZERO; tangents.len()],
+            headings: vec![0.0; tangents.len()],
+        };
+        let mut sum = 0.0;
+        for side in 0..2 {
+            sum += self.rods(side, x, spacing, gradient.nodes, &mut gradient.spacing);
+            sum += self.neighbours(side, x, spacing, &tangents, &axes, &mut gradient);
+            // Each yarn of the other side is pressed together by the spacings of this one.
+            let yarns = (self.count[0] * self.count[1]) as f64;
+            let tight = (self.densest[side] - spacing[side]).max(0.0);
+            sum += yarns * (self.beat * spacing[side] + 0.5 * WALL * tight * tight);
+            gradient.spacing[side] += yarns * (self.beat - WALL * tight);
+        }
+        let spheroids: Vec<Spheroid> = axes.iter().zip(&tangents).map(|(a, t)| Spheroid::new(*a, t.unit)).collect();
+        sum += self.crossings(x, spacing, &spheroids, &mut gradient);
+        let Gradient { nodes: g, spacing: mut by_spacing, tangents: mut by_tangent, headings } = gradient;
+        for ((by, heading), tangent) in by_tangent.iter_mut().zip(headings).zip(&tangents) {
+            let t = tangent.unit;
+            *by += heading / t.truncate().length_squared().max(1e-6) * DVec3::new(-t.y, t.x, 0.0);
+        }
+        self.hand_on_tangents(&by_tangent, &tangents, g, &mut by_spacing);
+        let n = g.len();
+        if let Some(sett) = self.sett {
+            g[n - 2] = (by_spacing[0] + sett * by_spacing[1]) * self.gear;
+            g[n - 1] = 0.0;
+            return sum;
+        }
+        for side in 0..2 {
+            g[n - 2 + side] = if self.fixed[side].is_some() { 0.0 } else { by_spacing[side] * self.gear };
+        }
+        sum
+    }
+
+    /// Radius of a yarn where it is round.
+    pub(super) fn round(&self, side: usize, yarn: usize) -> f64 {
+        self.radius[side] * self.thickness[side][yarn]
+    }
+
+    fn axes(&self, side: usize, yarn: usize, flat: f64) -> [f64; 2] {
+        [self.round(side, yarn) * flat.exp(), self.round(side, yarn) * (-flat).exp()]
+    }
+
+    /// Half width and half height of all nodes.
+    fn all_axes(&self, x: &[f64]) -> Vec<[f64; 2]> {
+        let nodes = x[..x.len() - 2].chunks_exact(PER_NODE);
+        let warps = self.base(1) / PER_NODE;
+        let place = |i: usize| if i < warps { (0, i / self.length(0)) } else { (1, (i - warps) / self.length(1)) };
+        let axes = |(side, yarn): (usize, usize), flat: f64| self.axes(side, yarn, flat);
+        nodes.enumerate().map(|(i, node)| axes(place(i), node[2])).collect()
+    }
+
+    /// Unit tangents of all nodes, in the world, with half the way between their neighbours along the yarn.
+    fn tangents(&self, x: &[f64], spacing: [f64; 2]) -> Vec<Tangent> {
+        let mut all = Vec::with_capacity(x.len() / PER_NODE);
+        for side in 0..2 {
+            let n = self.length(side);
+            let along = 2.0 * spacing[1 - side] / self.nodes as f64;
+            for yarn in 0..self.count[side] {
+                for k in 0..n {
+                    let (a, b) = (self.at(side, yarn, (k + n - 1) % n), self.at(side, yarn, (k + 1) % n));
+                    let way = world(side, [along, x[b] - x[a], x[b + 1] - x[a + 1]]);
+                    let length = way.length();
+                    all.push(Tangent { unit: way / length, length });
+                }
+            }
+        }
+        all
+    }
+
+    /// Hands the gradient by tangents on to nodes and spacings.
+    fn hand_on_tangents(&self, by_tangent: &[DVec3], tangents: &[Tangent], g: &mut [f64], by_spacing: &mut [f64; 2]) {
+        for side in 0..2 {
+            let n = self.length(side);
+            for yarn in 0..self.count[side] {
+                for k in 0..n {
+                    let (a, b) = (self.at(side, yarn, (k + n - 1) % n), self.at(side, yarn, (k + 1) % n));
+                    let node = self.at(side, yarn, k) / PER_NODE;
+                    let t = &tangents[node];
+                    let by = by_tangent[node];
+                    let [along, aside, height] = local(side, (by - by.dot(t.unit) * t.unit) / t.length);
+                    by_spacing[1 - side] += 2.0 * along / self.nodes as f64;
+                    g[b] += aside;
+                    g[a] -= aside;
+                    g[b + 1] += height;
+                    g[a + 1] -= height;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gradient_is_that_of_the_energy() {
+        let draft = Draft::named("twill 2/1").unwrap();
+        let energy = Energy {
+            draft: &draft,
+            radius: [0.8, 1.2],
+            thickness: [vec![1.3, 0.7, 1.0], vec![1.0, 0.9, 1.1]],
+            rest: [0.2, 0.1],
+            stiffness: [1.2, 0.8],
+            section: SECTION,
+            beat: 1.0,
+            nodes: 4,
+            count: [3, 3],
+            fixed: [None; 2],
+            sett: None,
+            densest: [1.6, 2.4],
+            gear: 0.1,
+        };
+        let n = energy.variables();
+        let mut x: Vec<f64> = (0..n).map(|i| 0.3 * (i as f64 * 1.7).sin()).collect();
+        for yarn in 0..3 {
+            for k in 0..12 {
+                let over = |side: usize, k: usize| {
+                    if side == 0 { draft.warp_over(k / 4, yarn) } else { !draft.warp_over(yarn, k / 4) }
+                };
+                for side in 0..2 {
+                    x[energy.at(side, yarn, k) + 1] += if over(side, k) { 0.8 } else { -0.8 };
+                }
+            }
+        }
+        (x[n - 2], x[n - 1]) = (22.0, 28.0);
+        let mut g = vec![0.0; n];
+        energy.value(&x, &mut g);
+        let mut other = vec![0.0; n];
+        for i in 0..n {
+            let h = 1e-5;
+            let mut at = |d: f64| {
+                let mut y = x.clone();
+                y[i] += d;
+                energy.value(&y, &mut other)
+            };
+            let want = (at(h) - at(-h)) / (2.0 * h);
+            assert!((g[i] - want).abs() < 1e-3 * (1.0 + want.abs()), "variable {i} of {n}: {} {want}", g[i]);
+        }
+    }
+}

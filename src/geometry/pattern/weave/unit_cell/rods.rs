@@ -1,0 +1,101 @@
+//! What a yarn by itself resists: stretching, bending, steepness, flattening, and leaving its dent of the reed.
+
+use super::energy::Energy;
+
+/// Axial tension of a yarn; the unit of all forces here.
+const TENSION: f64 = 1.0;
+/// Length over which tension straightens what bending resists, sqrt(B / T).
+const STIFF_LENGTH: f64 = 2.0;
+/// Resistance to changing its shape along the yarn.
+const SECTION_GRADIENT: f64 = 2.0;
+/// What holds a yarn at its dent of the reed, energy per crossing and squared distance.
+const REED: f64 = 0.2;
+/// What keeps the cloth flat: the rollers of loom and finish.
+const FLAT: f64 = 0.2;
+/// Length of yarn over length of cloth between two nodes from which on yarns resist: about as steep as in Peirce's jammed
+/// cloth (60 degrees). Steeper ones would slip through each other between their nodes.
+const STEEPEST: f64 = 2.2;
+/// How much they resist.
+const STEEP: f64 = 200.0;
+
+impl Energy<'_> {
+    /// Bending, tension, sections and the reed.
+    pub(super) fn rods(
+        &self,
+        side: usize,
+        x: &[f64],
+        spacing: [f64; 2],
+        g: &mut [f64],
+        by_spacing: &mut [f64; 2],
+    ) -> f64 {
+        let per_node = 1.0 / self.nodes as f64;
+        let along = spacing[1 - side] * per_node;
+        let n = self.length(side);
+        let mut sum = 0.0;
+        for yarn in 0..self.count[side] {
+            // A yarn is as stiff as its fibres are many.
+            let tension = TENSION * self.stiffness[side] * self.thickness[side][yarn].powi(2);
+            let bending = tension * STIFF_LENGTH * STIFF_LENGTH;
+            let edge = |k: usize| {
+                let (a, b) = (self.at(side, yarn, k), self.at(side, yarn, (k + 1) % n));
+                let e = [along, x[b] - x[a], x[b + 1] - x[a + 1]];
+                let length = (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt();
+                (e.map(|v| v / length), length)
+            };
+            let mut before = edge(n - 1);
+            for k in 0..n {
+                let (a, b) = (self.at(side, yarn, k), self.at(side, yarn, (k + 1) % n));
+                let p = self.at(side, yarn, (k + n - 1) % n);
+                let (t2, l2) = edge(k);
+                let (t1, l1) = before;
+                before = (t2, l2);
+                // Tension.
+                sum += tension * l2;
+                by_spacing[1 - side] += tension * t2[0] * per_node;
+                for c in 0..2 {
+                    g[b + c] += tension * t2[1 + c];
+                    g[a + c] -= tension * t2[1 + c];
+                }
+                // Steepness.
+                let over = (l2 / along - STEEPEST).max(0.0);
+                sum += 0.5 * STEEP * per_node * over * over;
+                let by_length = STEEP * per_node * over / along;
+                by_spacing[1 - side] += by_length * (t2[0] - l2 / along) * per_node;
+                for c in 0..2 {
+                    g[b + c] += by_length * t2[1 + c];
+                    g[a + c] -= by_length * t2[1 + c];
+                }
+                // Bending: B |t2 - t1|^2 / (2 l) with l the mean of both lengths.
+                let cos = t1[0] * t2[0] + t1[1] * t2[1] + t1[2] * t2[2];
+                let (q, mean) = (1.0 - cos, 0.5 * (l1 + l2));
+                sum += bending * q / mean;
+                let half = 0.5 * q / (mean * mean);
+                for c in 0..3 {
+                    let d1 = bending * (-(t2[c] - cos * t1[c]) / (l1 * mean) - half * t1[c]);
+                    let d2 = bending * (-(t1[c] - cos * t2[c]) / (l2 * mean) - half * t2[c]);
+                    if c == 0 {
+                        by_spacing[1 - side] += (d1 + d2) * per_node;
+                    } else {
+                        g[a + c - 1] += d1 - d2;
+                        g[p + c - 1] -= d1;
+                        g[b + c - 1] += d2;
+                    }
+                }
+                // Section.
+                let off = x[a + 2] - self.rest[side];
+                let below = x[a + 2].min(0.0);
+                sum += per_node * self.section * (0.5 * off * off + 10.0 * below * below);
+                g[a + 2] += per_node * self.section * (off + 20.0 * below);
+                let change = x[b + 2] - x[a + 2];
+                let stiff = SECTION_GRADIENT / per_node;
+                sum += 0.5 * stiff * change * change;
+                g[b + 2] += stiff * change;
+                g[a + 2] -= stiff * change;
+                sum += 0.5 * per_node * (REED * x[a] * x[a] + FLAT * x[a + 1] * x[a + 1]);
+                g[a] += per_node * REED * x[a];
+                g[a + 1] += per_node * FLAT * x[a + 1];
+            }
+        }
+        sum
+    }
+}

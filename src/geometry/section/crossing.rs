@@ -1,0 +1,151 @@
+//! What a ray's way through a yarn is made of: passages through plies, and the fibres on them.
+
+use arrayvec::ArrayVec;
+use glam::{Vec2, Vec3A};
+use wide::f32x4;
+
+use super::Section;
+use crate::{
+    geometry::{
+        density::ChordFibers,
+        way::{self, Station, Way},
+        yarn::{MAX_PLIES, YarnShape, fiber_tangent},
+    },
+    math::special::GAUSS_LEGENDRE_4,
+};
+
+/// The same of a chord on which fibres are counted.
+const STRAIGHT_CHORD: f32 = 0.3;
+
+/// One passage of a ray through a ply. Depths are distances along the ray from where it enters the yarn, in yarn radii.
+#[derive(Clone, Copy, Debug)]
+pub struct PlyCrossing {
+    /// Index of the ply in the yarn's shape.
+    pub ply: usize,
+    /// Depth at which the ray enters the ply's core; a ray that only grazes its outer fibres has `enter` = `exit`.
+    pub enter: f32,
+    /// Depth at which it leaves the core, beyond `enter`.
+    pub exit: f32,
+    /// Depth of the middle of the chord.
+    pub foot: f32,
+    /// The fibres on the chord if they were not tilted, and where they lie, by distances in the section: x from the middle.
+    pub chord: ChordFibers,
+    /// Signed distance of the ray from the ply's axis, in the circle of the ply's radius.
+    pub offset: f32,
+    /// How far along the yarn the ray is at `enter` and at `exit`.
+    pub travel: [f32; 2],
+    /// Expected number of fibres on the chord.
+    pub fibers: f32,
+}
+
+impl PlyCrossing {
+    /// How far along the yarn the ray is at a depth of this crossing.
+    #[inline]
+    pub fn travel_at(&self, depth: f32) -> f32 {
+        let length = self.exit - self.enter;
+        let share = if length > 0.0 { (depth - self.enter) / length } else { 0.0 };
+        self.travel[0] + share * (self.travel[1] - self.travel[0])
+    }
+
+    /// Outward unit normal of the ply where the ray enters.
+    pub fn normal(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        let ply = &shape.plies[self.ply];
+        let spot = section.inside(shape, section.point(self.enter), self.travel[0]);
+        let p = spot.at - ply.distance * ply.direction;
+        // The gradient of the distance in the ply's circle, first in the unwound yarn.
+        let (along, across) = (p.dot(ply.direction), ply.direction.perp_dot(p));
+        let stretch = ply.stretch * ply.stretch;
+        let gradient = stretch.x * along * ply.direction + stretch.y * across * ply.direction.perp();
+        // A step along the yarn turns the point back by as much as the plies turn.
+        let rate = section.turn(shape);
+        let rise = -rate * gradient.dot(spot.at.perp()) / spot.straightness;
+        let wound = spot.pressed.map_or(gradient, |pressed| pressed.round(gradient));
+        spot.out(wound.extend(rise).into()).normalize_or(Vec3A::X)
+    }
+
+    /// Unit tangent of the fibres where the ray enters.
+    pub fn tangent_at_entry(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        section.fiber_tangent(shape, self.ply, section.point(self.enter), self.travel[0]).normalize()
+    }
+
+    /// Unit tangent of the ply's axis where the ray passes it.
+    #[inline]
+    pub fn ply_tangent(&self, shape: &YarnShape, section: &Section<'_>) -> Vec3A {
+        let depth = self.foot.clamp(self.enter, self.exit);
+        let spot = section.inside(shape, section.point(depth), self.travel_at(depth));
+        let ply = &shape.plies[self.ply];
+        spot.tangent_at(shape, section, self.ply, ply.distance * ply.direction).normalize()
+    }
+}
+
+/// The plies a ray crosses, nearest first; a ray along the yarn may cross one more than once.
+pub type Crossings = ArrayVec<PlyCrossing, MAX_PLIES>;
+
+/// A ply on a way out of a yarn.
+#[derive(Clone, Copy, Debug)]
+pub struct PlyAhead {
+    /// Index of the ply in the yarn's shape.
+    pub ply: usize,
+    /// Signed distance of the way from the ply's axis, in the circle of the ply's radius.
+    pub offset: f32,
+    /// Distance in the section from the start to the way's point nearest to the ply's axis; negative behind the start.
+    pub foot: f32,
+    /// Length in the circle of one unit of that distance.
+    pub length: f32,
+}
+
+impl Section<'_> {
+    /// Fibres that a unit of a chord's depth meets over those that it would meet across untwisted round plies: the mean
+    /// from `enter` to `exit` of |w x t| for the unit vector w of the ray and the tangents t (of z = 1) of the fibres, times
+    /// [`Self::squeeze`]. (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place for all: fibres near the ply's
+    /// axis are not tilted.)
+    #[inline]
+    pub(super) fn fibers_over_chord(
+        &self,
+        shape: &YarnShape,
+        ply: usize,
+        way: &Way,
+        enter: &Station,
+        exit: &Station,
+    ) -> f32 {
+        let of = &shape.plies[ply];
+        let along = |at: &Station| if self.tilted { at.advance * at.straightness } else { -self.sin };
+        if of.fiber_rate == 0.0 && shape.ply_rate == 0.0 {
+            // Fibres along the yarn.
+            let along = 0.5 * (along(enter) + along(exit));
+            return (1.0 - along * along).max(1e-6).sqrt() * self.squeeze();
+        }
+        // Tangent and ray at both ends; between them both are linear, or the parabola through the middle where the ray is
+        // seen to bend. The mean is by four-point Gauss-Legendre quadrature.
+        let direction = self.direction();
+        let end = |at: &Station| match self.pressed {
+            // In the unwound yarn's axes: the ray moves as it is seen to, and as those axes turn.
+            None => {
+                let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at.at);
+                let w = at.slope + self.turn(shape) * at.advance * at.at.perp();
+                (t.truncate() / at.straightness, w, along(at))
+            }
+            Some(_) => {
+                let t = self.fiber_tangent(shape, ply, self.point(at.depth), at.travel);
+                let t = t / t.z.abs().max(1e-6).copysign(t.z);
+                (t.truncate(), direction.truncate(), -self.sin)
+            }
+        };
+        let ((ta, wa, za), (tb, wb, zb)) = (end(enter), end(exit));
+        let nodes = f32x4::new(GAUSS_LEGENDRE_4.map(|(node, _)| node as f32));
+        let weights = f32x4::new(GAUSS_LEGENDRE_4.map(|(_, weight)| weight as f32));
+        let (mut tm, mut wm, mut zm) = (Vec2::ZERO, Vec2::ZERO, 0.0);
+        if (shape.ply_rate * (exit.travel - enter.travel)).abs() > STRAIGHT_CHORD {
+            let (t, w, z) = end(&way::station_at(way, 0.5 * (enter.depth + exit.depth)));
+            (tm, wm, zm) = (4.0 * t - 2.0 * (ta + tb), 4.0 * w - 2.0 * (wa + wb), 4.0 * z - 2.0 * (za + zb));
+        }
+        let bow = nodes * (f32x4::ONE - nodes);
+        let mix = |a: f32, b: f32, m: f32| f32x4::splat(a) + nodes * f32x4::splat(b - a) + bow * f32x4::splat(m);
+        let (tx, ty) = (mix(ta.x, tb.x, tm.x), mix(ta.y, tb.y, tm.y));
+        let (wx, wy, wz) = (mix(wa.x, wb.x, wm.x), mix(wa.y, wb.y, wm.y), mix(za, zb, zm));
+        let (cx, cy, cz) = (wy - wz * ty, wz * tx - wx, wx * ty - wy * tx);
+        // Between two places where the unwound yarn's axes have turned, the straight line is shorter than w.
+        let square = (cx * cx + cy * cy + cz * cz) / (wx * wx + wy * wy + wz * wz);
+        (square.sqrt() * weights).reduce_add() * self.squeeze()
+    }
+}

@@ -1,0 +1,224 @@
+//! A straight line followed through a yarn, from station to station.
+
+use std::ops::ControlFlow;
+
+use glam::{Vec2, Vec3A};
+
+use super::{
+    Section,
+    inside::Bowed,
+    neighbourhood::{Neighbourhood, Placed},
+};
+use crate::{
+    geometry::{
+        way::{MOST_TURN, Station},
+        yarn::YarnShape,
+        yarn_frame::Pressed,
+    },
+    math::frame::sin_cos,
+};
+
+/// How far and how finely a way is followed.
+#[derive(Clone, Copy)]
+pub(super) struct Reach {
+    /// How far along the yarn it is taken for its circle of curvature, in yarn radii; beyond it is looked up anew.
+    pub(super) near: f32,
+    /// The longest way, in yarn radii.
+    pub(super) longest: f32,
+    /// The most by which plies turn from station to station, radians.
+    pub(super) turn: f32,
+    /// How much a bend counts as a turn.
+    pub(super) bend: f32,
+}
+
+/// A ray that looks: off by less than 0.02 yarn radii.
+pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+/// A ray that gathers light.
+pub(super) const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
+/// Light that leaves from inside: how far it still has to go is felt in all.
+pub(super) const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
+/// The shortest step from one station to the next, in yarn radii.
+const LEAST_STEP: f32 = 0.1;
+/// What may be left of a way without another station, in yarn radii.
+pub(super) const LEAST_LEFT: f32 = 1e-3;
+/// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
+const AT_SURFACE: f32 = 0.02;
+/// Turns, in radians, below which a way is taken for straight.
+const STRAIGHT: f32 = 1e-3;
+
+/// A station with what only the making of a way needs: the place in the yarn's real section, and its change with depth.
+#[derive(Clone, Copy)]
+pub(super) struct Step {
+    pub(super) station: Station,
+    pub(super) real: Vec2,
+    pub(super) real_slope: Vec2,
+}
+
+/// A straight line through a yarn.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    pub(super) start: Vec3A,
+    pub(super) direction: Vec3A,
+    pub(super) reach: Reach,
+}
+
+impl Section<'_> {
+    /// Turns of the plies, radians per yarn radius.
+    #[inline]
+    pub(super) fn turn(&self, shape: &YarnShape) -> f32 {
+        if self.tilted { self.turn.unwrap_or(shape.ply_rate) } else { shape.ply_rate }
+    }
+
+    /// Goes along the ray from station to station, until it leaves the yarn or `visit` has seen enough.
+    #[inline]
+    pub(super) fn march_ray(&self, shape: &YarnShape, visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
+        let reach = if self.looked_at { LOOK } else { GATHER };
+        let line = Line { start: self.point(0.0), direction: self.direction(), reach };
+        let mut near = self.neighbourhood(self.turn(shape), 0.0, reach);
+        let first = near.enter(line.start, line.direction);
+        self.march(&line, first, &mut near, visit);
+    }
+
+    /// Goes from station to station, until the way leaves the yarn or `visit` has seen enough.
+    #[inline]
+    pub(super) fn march(
+        &self,
+        line: &Line,
+        first: Step,
+        near: &mut Neighbourhood,
+        mut visit: impl FnMut(&Station, &Station) -> ControlFlow<()>,
+    ) {
+        let Line { start, direction, reach } = *line;
+        let mut here = first;
+        loop {
+            let Step { station, real, real_slope } = here;
+            let (inside, outward) = (1.0 - real.length_squared(), real.dot(real_slope));
+            if inside < AT_SURFACE && outward > 0.0 && station.depth > 0.0 {
+                return;
+            }
+            let bowed = Bowed {
+                at: real,
+                slope: real_slope,
+                advance: station.advance,
+                straightness: station.straightness,
+                bend: near.bend,
+            };
+            let mut step = reach.longest;
+            if real_slope.length_squared() > 1e-12 {
+                step = bowed.to_surface().max(LEAST_STEP);
+            }
+            step = step.min(reach.longest - station.depth);
+            let end = self.ends[usize::from(station.advance > 0.0)];
+            if end.is_finite() && station.advance != 0.0 {
+                step = step.min((end - station.travel) / station.advance);
+            }
+            if step.is_nan() || step <= LEAST_LEFT {
+                return;
+            }
+            let rate = near.turning;
+            let mut turning = rate * station.advance.abs();
+            // Faster inside of the bend.
+            turning *= (station.straightness / (1.0 - near.bend.dot(real + step * real_slope)).max(0.3)).max(1.0);
+            let mut next = here;
+            if turning * step <= STRAIGHT {
+                next.station.depth += step;
+                next.station.at += step * station.slope;
+                next.station.travel += step * station.advance;
+                next.real += step * real_slope;
+            } else {
+                let bows = station.advance.abs() * step * near.bowing;
+                step /= (turning * step / reach.turn).max(bows).ceil();
+                // Inside of a bend it may turn out faster.
+                for _ in 0..4 {
+                    let depth = station.depth + step;
+                    next = self.step(near, start + depth * direction, direction, depth, reach);
+                    let turned = rate * (next.station.travel - station.travel);
+                    if turned.abs() <= 1.3 * reach.turn {
+                        break;
+                    }
+                    step *= 0.5;
+                }
+            }
+            if visit(&station, &next.station).is_break() {
+                return;
+            }
+            here = next;
+        }
+    }
+
+    /// The yarn about the place so far along it: the section itself, if that is near enough.
+    #[inline]
+    pub(super) fn neighbourhood(&self, rate: f32, travel: f32, reach: Reach) -> Neighbourhood {
+        if travel.abs() > reach.near
+            && let Some(far) = self.walk_to(travel, reach)
+        {
+            return far;
+        }
+        Neighbourhood {
+            place: None,
+            travel: 0.0,
+            bend: self.bend,
+            phase: self.phase,
+            turn: rate,
+            pressed: self.pressed,
+            pressed_turn: self.pressed_turn,
+            turning: 0.0,
+            bowing: 0.0,
+        }
+        .rated(reach)
+    }
+
+    /// The yarn about the place so far along it, from the yarn itself. `None` where there is none, or it does not go so far.
+    #[inline]
+    fn walk_to(&self, travel: f32, reach: Reach) -> Option<Neighbourhood> {
+        let mut walker = self.walker?;
+        let place = walker.walk(travel)?;
+        let across = place.tangent.cross(place.normal);
+        let section = |v: Vec3A| Vec2::new(v.dot(place.normal), v.dot(across));
+        let found = Neighbourhood {
+            place: Some(Placed {
+                origin: self.to_local(place.centre - self.centre) / self.radius,
+                x: self.to_local(place.normal),
+                y: self.to_local(across),
+                z: self.to_local(place.tangent),
+                scale: self.radius / place.radius,
+            }),
+            travel,
+            bend: section(place.curvature) * place.radius,
+            phase: angle(place.phase),
+            turn: place.turn.unwrap_or(0.0),
+            pressed: Pressed::new(place.flattening),
+            pressed_turn: place.flattening_turn,
+            turning: 0.0,
+            bowing: 0.0,
+        };
+        Some(found.rated(reach))
+    }
+
+    /// The station at a point of this frame, by the neighbourhood known so far or by a nearer one.
+    #[inline]
+    pub(super) fn step(
+        &self,
+        near: &mut Neighbourhood,
+        point: Vec3A,
+        direction: Vec3A,
+        depth: f32,
+        reach: Reach,
+    ) -> Step {
+        let mut unbent = near.unbend(point, direction);
+        if unbent.travel.abs() > reach.near
+            && let Some(far) = self.walk_to(near.travel + unbent.travel, reach)
+        {
+            *near = far;
+            unbent = near.unbend(point, direction);
+        }
+        near.unwind(&unbent, depth)
+    }
+}
+
+/// (cos, sin) of an angle.
+#[inline]
+pub(super) fn angle(by: f32) -> Vec2 {
+    let (sin, cos) = sin_cos(by);
+    Vec2::new(cos, sin)
+}
