@@ -162,8 +162,6 @@ const RADIUS: f64 = 0.5;
 const YARNS: u32 = 20;
 /// Length of a fringe, in radii of the warp.
 const FRINGE: f64 = 24.0;
-/// Height of a pile, in the same.
-const PILE: f64 = 8.0;
 
 fn share(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
@@ -268,7 +266,6 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let radius = own(args.output.radius, 0).unwrap_or(RADIUS);
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let piece = Weave {
-        draft,
         warps: Extent::Yarns(args.warps.unwrap_or(warps)),
         wefts: Extent::Yarns(args.wefts.unwrap_or(wefts)),
         warp_radius: radius,
@@ -286,7 +283,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
             "fringe" => weave::Edges::Fringe(FRINGE * radius),
             _ => weave::Edges::Live,
         }),
-        pile_height: args.pile_height.unwrap_or(PILE * radius),
+        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
+        draft,
         threads: file.map(|f| f.threads).unwrap_or_default(),
     };
     let cloth = match piece.relax() {

@@ -24,9 +24,6 @@ const YARNS: u32 = 20;
 /// Length of a fringe unless given, in radii of the warp.
 const FRINGE: f64 = 24.0;
 
-/// Height of a pile unless given, in the same.
-const PILE: f64 = 8.0;
-
 /// A weave that is checked.
 pub(super) struct WeavePlan {
     weave: Weave,
@@ -153,6 +150,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let pile = table.f64("pile_height", Range::POSITIVE).map(|h| h * context.unit);
     let Drafted { draft, wif } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
+    let default_pile = weave::pile_height(&draft, own);
     let weave = Weave {
         draft,
         warps,
@@ -166,7 +164,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
         flatten,
         points,
         edges,
-        pile_height: pile.unwrap_or(PILE * own),
+        pile_height: pile.unwrap_or(default_pile),
         threads,
     };
     if pile.is_some() && weave.draft.pile().is_none() {

@@ -106,6 +106,13 @@ pub struct Measures {
 pub const POINTS: u32 = 8;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
 pub const FLATTEN: f64 = 1.5;
+/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut; loops, which
+/// fall over, are twice as high.
+pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
+    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
+    2.0 * diameters * radius
+}
+
 /// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
 /// have no room.
 const MOST_OVERLAP: f64 = 0.03;
@@ -136,7 +143,6 @@ impl Weave {
     /// A weave of one yarn as it comes by itself, cut all around: 20 by 20 yarns.
     pub fn of(draft: Draft, radius: f64) -> Self {
         Self {
-            draft,
             warps: Extent::Yarns(20),
             wefts: Extent::Yarns(20),
             warp_radius: radius,
@@ -148,7 +154,8 @@ impl Weave {
             flatten: FLATTEN,
             points: POINTS,
             edges: Edges::Live,
-            pile_height: 8.0 * radius,
+            pile_height: pile_height(&draft, radius),
+            draft,
             threads: <[Threads; 2]>::default(),
         }
     }

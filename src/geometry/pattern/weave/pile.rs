@@ -188,17 +188,24 @@ impl Raised<'_> {
         (1..=steps).map(leg).collect()
     }
 
-    /// A loop from `from` to `to`, without both.
+    /// A loop from `from` to `to`, without both: a drop, which yarn that wants to untwist turns out of the warp's plane, and
+    /// which falls over as it likes.
     fn arch(&self, from: Point, to: Point, place: u32) -> Vec<Point> {
         let (r, height) = (self.radius(), self.cloth.weave.pile_height);
         let height = height * (1.0 + 0.1 * self.random(place, 2));
-        let (lean, aside) = (0.2 * height * self.random(place, 0), 0.35 * height * self.random(place, 1));
+        let (lean, aside) = (0.45 * height * self.random(place, 0), 0.45 * height * self.random(place, 1));
+        let twist = 0.35 * PI * self.random(place, 3);
+        let wide = (0.16 * height).max(1.2 * r);
         let steps = (2.4 * height / (STEP * r)).ceil().max(6.0) as usize;
         let arch = |k: usize| {
             let s = k as f64 / steps as f64;
-            let (sin, double) = ((PI * s).sin(), (2.0 * PI * s).sin());
-            // Wider at the top than at the foot.
-            let p = from.0.lerp(to.0, s) + self.direction(lean * sin - 1.2 * r * double, aside * sin, height * sin);
+            let up = (PI * s).sin();
+            // Wider at the top than at the foot, and turned more.
+            let across = -wide * (2.0 * PI * s).sin();
+            let (sin, cos) = (twist * up).sin_cos();
+            let fallen = up * up;
+            let p = from.0.lerp(to.0, s)
+                + self.direction(lean * fallen + across * cos, aside * fallen + across * sin, height * up);
             self.at(p, if s < 0.5 { from } else { to })
         };
         (1..steps).map(arch).collect()
