@@ -19,6 +19,8 @@ mod compare;
 mod convert;
 // Error against run time: files, slopes, converged pictures that are kept.
 mod converge;
+// Licences and sources of what the program links, and the compiler that it asks for.
+mod dependencies;
 // Sequences: numbered files, moving cameras and yarns, the shutter.
 mod frames;
 // What bad input is answered with: whole messages, exit status 2, no output.
