@@ -1,8 +1,9 @@
 //! Scattering at an explicit fibre: the reference that every aggregate is compared with.
 
-use glam::Vec2;
-
-use super::{Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Scratch, add};
+use super::{
+    Counters, Integrator, Path, ROULETTE_AFTER_FIBERS, Scratch,
+    direct::{Response, Scattered},
+};
 use crate::{
     film::Sample,
     geometry::ray::Ray,
@@ -41,30 +42,11 @@ impl Integrator<'_> {
         let frame = LobeFrame::new(place.tangent, -path.ray.direction);
 
         let here = place.centre + place.radius * hit.normal;
-        if let Some((light, chance)) = self.lights.choose(here, u_choice)
-            && let Some(towards) = light.sample(here, Vec2::new(u_x, u_y))
-        {
-            let local = frame.to_local(towards.direction);
-            let (lobes, pdf) = fiber.evaluate(frame.sin, frame.cos, local, path.throughput);
-            if lobes.sum().max_channel() > 0.0 {
-                let mut ray = Ray::new(place.leave(hit.normal, towards.direction), towards.direction);
-                ray.t_far = towards.distance;
-                counters.shadow += 1;
-                let passed = self.shadow(&ray, scratch);
-                if passed > 0.0 {
-                    let weight = mis_weight(towards.pdf * chance, pdf) * passed / chance;
-                    let light = path.throughput * towards.weight * weight;
-                    match path.shares {
-                        None => {
-                            let found = lobes.scaled(light);
-                            sample.radiance += found.sum();
-                            sample.parts.add_lobes(path.bounces + 1, found);
-                        }
-                        Some(_) => add(sample, path.bounces + 1, path, lobes.sum() * light),
-                    }
-                }
-            }
-        }
+        self.next_event(here, [u_choice, u_x, u_y], path, sample, scratch, counters, |direction, pdf| {
+            let (lobes, own_pdf) = fiber.evaluate(frame.sin, frame.cos, frame.to_local(direction), path.throughput);
+            let start = place.leave(hit.normal, direction);
+            Some(Response { value: Scattered::Cloth(lobes), weight: mis_weight(pdf, own_pdf), start })
+        });
 
         let mut stream = path.sampler.stream(path.sampler.position());
         let Some(next) = fiber.sample(frame.sin, frame.cos, path.throughput, u, &mut stream) else {

@@ -1,8 +1,11 @@
 //! Scattering at what is no cloth: the ground and meshes.
 
-use glam::{Vec2, Vec3A};
+use glam::Vec3A;
 
-use super::{Counters, Integrator, Path, ROULETTE_AFTER, Scratch, add};
+use super::{
+    Counters, Integrator, Path, ROULETTE_AFTER, Scratch,
+    direct::{Response, Scattered},
+};
 use crate::{
     film::Sample,
     geometry::ray::Ray,
@@ -52,20 +55,13 @@ impl Integrator<'_> {
         let wo = to_local(-path.ray.direction);
         let start = place.point + OFFSET * (1.0 + place.point.abs().max_element().max(t)) * place.normal;
 
-        if let Some((light, chance)) = self.lights.choose(start, u_choice)
-            && let Some(towards) = light.sample(start, Vec2::new(light_x, light_y))
-            && towards.direction.dot(place.normal) > 0.0
-        {
-            let (value, pdf) = material.surface.evaluate(albedo, wo, to_local(towards.direction));
-            if value.max_channel() > 0.0 {
-                let mut ray = Ray::new(start, towards.direction);
-                ray.t_far = towards.distance;
-                counters.shadow += 1;
-                let passed = self.shadow(&ray, scratch);
-                let weight = mis_weight(towards.pdf * chance, pdf) * passed / chance;
-                add(sample, path.bounces + 1, path, path.throughput * value * towards.weight * weight);
+        self.next_event(start, [u_choice, light_x, light_y], path, sample, scratch, counters, |direction, pdf| {
+            if direction.dot(place.normal) <= 0.0 {
+                return None;
             }
-        }
+            let (value, own_pdf) = material.surface.evaluate(albedo, wo, to_local(direction));
+            Some(Response { value: Scattered::Surface(value), weight: mis_weight(pdf, own_pdf), start })
+        });
         let Some(next) = material.surface.sample(albedo, wo, [u_part, x, y]) else { return false };
         let direction = next.wi.x * tangent + next.wi.y * bitangent + next.wi.z * normal;
         if direction.dot(place.normal) <= 0.0 {
