@@ -6,6 +6,8 @@
 //! another. The unit of length is the yarn's diameter, that of force its bending stiffness over the diameter's square.
 //! Sums are taken in a fixed order: the result is the same for any number of threads.
 
+#[cfg(test)]
+pub(super) mod passing;
 mod search;
 
 use glam::{DVec2, DVec3};
@@ -58,6 +60,8 @@ pub(super) struct Run {
 const STRETCH: f64 = 80.0;
 /// Stiffness of contact, for each pair of segments.
 const CONTACT: f64 = 90.0;
+/// Nearer than this, contact becomes firmer by the square of the distance.
+const DEEP: f64 = 0.4;
 /// Yarns are kept this far apart: a little more than they need, for what a spline does between points and what forces
 /// press together.
 const APART: f64 = 1.02;
@@ -92,9 +96,10 @@ struct Push {
     to: DVec3,
 }
 
-/// Two segments that touch: the push on the second one, and how far along both it acts.
+/// Two segments that touch: the way between them, the push on the second one, and how far along both it acts.
 struct Touch {
     segments: [u32; 2],
+    between: DVec3,
     by: DVec3,
     along: [f64; 2],
 }
@@ -209,6 +214,8 @@ impl Rods {
                 true => (1.0 - alpha, alpha * speed / force),
                 false => (0.0, 0.0),
             };
+            #[cfg(test)]
+            let last = passing::before(self);
             let limit = STEP / dt;
             let far = (0.5 * MARGIN - strained).max(0.0).powi(2);
             let advance = |(points, speeds, forces, before): Moving<'_>| -> usize {
@@ -240,6 +247,10 @@ impl Rods {
                 strained += (by * period).abs().max_element();
                 self.scale(DVec2::ONE + by);
                 before.iter_mut().for_each(|p| *p *= (DVec2::ONE + by).extend(1.0));
+            }
+            #[cfg(test)]
+            if let Some(last) = last {
+                passing::watch(&last, self, &has, &work);
             }
         }
         (run.steps, largest)
@@ -279,8 +290,11 @@ impl Rods {
                     let square = near.between.length_squared();
                     if square < apart * apart {
                         let distance = square.sqrt().max(1e-6);
-                        let by = near.between * (stiffness * (apart - distance) / distance);
-                        found.push(Touch { segments: [i as u32, other.segment], by, along: [near.s, near.t] });
+                        // Firmer where they are deep in each other, so that they do not pass.
+                        let firm = (DEEP / distance).max(1.0).powi(2);
+                        let by = near.between * (stiffness * firm * (apart - distance) / distance);
+                        let segments = [i as u32, other.segment];
+                        found.push(Touch { segments, between: near.between, by, along: [near.s, near.t] });
                     }
                 }
             }
@@ -293,15 +307,12 @@ impl Rods {
         // In their order, whatever the number of threads.
         let chunks: Vec<Vec<Touch>> =
             if n <= CHUNK { vec![touches(0)] } else { (0..n.div_ceil(CHUNK)).into_par_iter().map(touches).collect() };
-        for Touch { segments, by, along } in chunks.into_iter().flatten() {
+        for Touch { segments, between, by, along } in chunks.into_iter().flatten() {
             let [i, j] = segments.map(|s| s as usize);
             pushes[i].from -= by * (1.0 - along[0]);
             pushes[i].to -= by * along[0];
             pushes[j].from += by * (1.0 - along[1]);
             pushes[j].to += by * along[1];
-            // As long as `by`, the vector between both is this much of their distance.
-            let distance2 = by.length_squared().max(1e-300);
-            let between = by * (apart / distance2.sqrt() - 1.0 / stiffness);
             virial -= (by * between).truncate();
         }
         virial

@@ -10,7 +10,7 @@ use super::{
         rods::{Rods, Run, Strand},
     },
     loops::{Border, Loops, Visit},
-    shape::{points_of, spaced},
+    shape::{Piece, Place, points_of, spaced},
 };
 
 /// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
@@ -18,6 +18,8 @@ use super::{
 const BLOCKING: DVec2 = DVec2::new(0.03, 0.015);
 /// Points of a stitch while a cell finds its form; as many as are asked for after that.
 const COARSE: u32 = 12;
+/// A loop that is laid longer than so many of them has more points.
+const CLOSE: f64 = 1.1;
 /// Steps with coarse points, with fine ones, and while contact becomes firm.
 const STEPS: [usize; 3] = [3000, 400, 200];
 
@@ -36,6 +38,19 @@ pub(super) struct Cell {
     pub(super) grid: Vec<[f32; 2]>,
 }
 
+fn length(line: &[DVec3]) -> f64 {
+    line.windows(2).map(|w| w[0].distance(w[1])).sum()
+}
+
+/// Yarn of the pieces of a course, in shares of a stitch's: a loop that is laid long, as in cables, draws some from others.
+fn shares(course: &[Piece], lines: &[Vec<DVec3>], yarn: f64) -> Vec<f64> {
+    const LONG: f64 = 1.4;
+    let want = |(piece, line): (&Piece, &Vec<DVec3>)| piece.yarn * (length(line) / (LONG * piece.yarn * yarn)).max(1.0);
+    let wanted: Vec<f64> = course.iter().zip(lines).map(want).collect();
+    let scale = course.iter().map(|p| p.yarn).sum::<f64>() / wanted.iter().sum::<f64>();
+    wanted.iter().map(|w| w * scale).collect()
+}
+
 impl Cell {
     /// Relaxes one repeat of a chart whose rows all fit `wide` stitches. `size` fixes the width of a stitch and the
     /// distance of rows; what it leaves open follows from the yarn.
@@ -47,11 +62,19 @@ impl Cell {
 
     /// The same of rows that have been worked.
     pub(super) fn of_rows(rows: &[Vec<Stitch>], yarn: f64, points: u32, size: [Option<f64>; 2]) -> Self {
+        let wide = rows[0].len();
+        let loops = Loops::new(rows, wide, Border::cell(wide));
+        let mut cell = Self::laid(rows, &loops, yarn, size);
+        cell.relax(&loops, points, size);
+        cell
+    }
+
+    /// Loops as they are drawn through each other, before they relax.
+    pub(super) fn laid(rows: &[Vec<Stitch>], loops: &Loops, yarn: f64, size: [Option<f64>; 2]) -> Self {
         let (wide, high) = (rows[0].len() as u32, rows.len() as u32);
-        let loops = Loops::new(rows, wide as usize, Border::cell(wide as usize));
         // Rather too large: yarns find room as the cell draws together.
         let scale = yarn / 13.9;
-        let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale));
+        let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale * loops.room()));
         let period = start * DVec2::new(wide.into(), high.into());
         let mut cell = Self {
             wide,
@@ -64,14 +87,16 @@ impl Cell {
         for course in loops.pieces() {
             let first = cell.rods.points.len();
             let mut visits = Vec::with_capacity(course.len() + 1);
-            for piece in course {
+            let place = |p: &Place| DVec3::new(p.at * start.x, p.up * start.y, p.out);
+            let lines: Vec<Vec<DVec3>> = course.iter().map(|c| c.places.iter().map(place).collect()).collect();
+            let shares = shares(&course, &lines, yarn);
+            for ((piece, line), own) in course.iter().zip(&lines).zip(shares) {
                 visits.push(cell.rods.points.len());
-                let line: Vec<DVec3> =
-                    piece.places.iter().map(|p| DVec3::new(p.at * start.x, p.up * start.y, p.out)).collect();
-                let count = points_of(piece.yarn, COARSE);
-                for (point, k, share) in spaced(&line, count) {
+                // Points are near each other where a loop is laid long, for it must not cut its bends short.
+                let count = points_of(own.max(piece.yarn).max(length(line) / (CLOSE * yarn)), COARSE);
+                for (point, k, share) in spaced(line, count) {
                     cell.rods.points.push(point);
-                    cell.rods.rest.push(piece.yarn * yarn / count as f64);
+                    cell.rods.rest.push(own * yarn / count as f64);
                     let (a, b) = (piece.grid[k], piece.grid[k + 1]);
                     cell.grid.push([0, 1].map(|c| a[c] + share as f32 * (b[c] - a[c])));
                 }
@@ -81,20 +106,23 @@ impl Cell {
             cell.rods.strands.push(Strand { start: first, count, jump: Some(DVec3::X * period.x) });
             cell.visits.push(visits);
         }
+        cell
+    }
+
+    fn relax(&mut self, loops: &Loops, points: u32, size: [Option<f64>; 2]) {
         let free = size.map(|s| s.is_none());
         let run =
             Run { steps: STEPS[0], growing: STEPS[0] / 5, thin: 0.5, free, load: BLOCKING, firm: 1.0, calm: 0.01 };
-        cell.rods.relax(&run);
-        cell.refine(points);
+        self.rods.relax(&run);
+        self.refine(points);
         let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };
-        cell.rods.relax(&run);
-        cell.rods.relax(&Run { steps: STEPS[2], firm: 4.0, ..run });
-        cell.period = cell.rods.period.unwrap_or(period);
-        cell.mark(&loops);
+        self.rods.relax(&run);
+        self.rods.relax(&Run { steps: STEPS[2], firm: 4.0, ..run });
+        self.period = self.rods.period.unwrap_or(self.period);
+        self.mark(loops);
         // The middle of its thickness is in the plane.
-        let middle = cell.rods.points.iter().map(|p| p.z).sum::<f64>() / cell.rods.points.len() as f64;
-        cell.rods.points.iter_mut().for_each(|p| p.z -= middle);
-        cell
+        let middle = self.rods.points.iter().map(|p| p.z).sum::<f64>() / self.rods.points.len() as f64;
+        self.rods.points.iter_mut().for_each(|p| p.z -= middle);
     }
 
     /// Other points on the same curves, so many in a stitch of [`COARSE`].

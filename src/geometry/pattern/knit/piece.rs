@@ -284,7 +284,9 @@ impl Laying<'_> {
                     let head = f64::from(g[1] - r as f32);
                     let lean = own.foot - own.at + (self.head(own) - own.foot) * head;
                     let at = own.at + lean + (p.x / width - (k as f64 + 0.5)) / count;
-                    let up = f64::from(row) + p.y / height - r as f64;
+                    // A cell of several rows has its own room for what passes.
+                    let base = if cell.high > 1 { f64::from(row) } else { self.loops.up(row) };
+                    let up = base + p.y / height - r as f64;
                     let grid = [g[0], g[1] - r as f32 + row as f32];
                     out.push(
                         self.surface.place(&Place { at, up, out: p.z }),

@@ -39,7 +39,9 @@ const REACH: f64 = 0.775 / 2.28;
 const LEAN: f64 = 0.982 / 4.13;
 /// Distance of loops that lie over each other, and of cables that pass each other.
 const LAYER: f64 = 0.85;
-const CABLE: f64 = 1.3;
+const CABLE: f64 = 2.6;
+/// Width of a strand that is lifted between two stitches.
+const NARROW: f64 = 0.9;
 /// How far yarn lies off the cloth where it passes stitches.
 const FLOAT: f64 = 1.7;
 /// Places of a piece.
@@ -79,24 +81,25 @@ impl Loops {
 
     /// Where the feet of a visit are: its middle, and how far up and out.
     fn foot(&self, course: &Course, visit: &Visit) -> Foot {
-        let row = course.row;
+        let row = self.up(course.row);
         match visit {
             Visit::Loop(i) => {
                 let l = &self.loops[*i as usize];
                 let stack = l.parents.len().saturating_sub(1) as f64;
                 let (reach, out) = match l.sign {
+                    // Behind the stitches that it lies between, or in front of purl ones.
+                    0.0 if l.is_lifted() => (REACH, DEPTH * l.layer + if l.layer > 0.0 { 0.6 } else { 0.0 }),
                     0.0 => (0.0, 0.0),
                     sign => (REACH + 0.12 * stack, -sign * self.foot_depth(l)),
                 };
-                Foot { at: l.foot, up: f64::from(row) - reach, out: out + CABLE * l.layer, behind: l.sign }
+                let behind = if l.is_lifted() { -l.layer } else { l.sign };
+                Foot { at: l.foot, up: row - reach, out, behind }
             }
             Visit::Pass { at, front } => {
                 let out = if *front { FLOAT } else { -FLOAT };
-                Foot { at: *at, up: f64::from(row) - 0.5 * REACH, out, behind: 0.0 }
+                Foot { at: *at, up: row - 0.5 * REACH, out, behind: 0.0 }
             }
-            Visit::Float { at } => {
-                Foot { at: *at, up: f64::from(row) - 0.5 * REACH + course.lift, out: -FLOAT, behind: 0.0 }
-            }
+            Visit::Float { at } => Foot { at: *at, up: row - 0.5 * REACH + course.lift, out: -FLOAT, behind: 0.0 },
         }
     }
 
@@ -126,8 +129,8 @@ impl Loops {
                     let (up, out) = match course.hold(k) {
                         Hold::None => (0.5 * (a.up + b.up), out),
                         // The float dips below the feet of the stitches that hold it, in front of the yarn between them.
-                        Hold::Caught => (f64::from(course.row) - 0.5, -1.0),
-                        Hold::Catches => (f64::from(course.row) - 0.8, -3.0),
+                        Hold::Caught => (self.up(course.row) - 0.5, -1.0),
+                        Hold::Catches => (self.up(course.row) - 0.8, -3.0),
                     };
                     Some(Foot { at: 0.5 * (a.at + b.at + round), up, out, behind: 0.0 })
                 };
@@ -156,12 +159,8 @@ impl Loops {
     /// Whether a visit takes a place of its own in its row.
     fn is_stitch(&self, visit: &Visit) -> bool {
         match visit {
-            Visit::Loop(i) => {
-                !(self.loops[*i as usize].sign == 0.0 && self.loops[*i as usize].twist != 0.0) || {
-                    // Lifted strands lie between stitches; the loops of a cast-on edge are stitches.
-                    self.border.finished && self.loops[*i as usize].row == -1
-                }
-            }
+            // Lifted strands lie between stitches.
+            Visit::Loop(i) => !self.loops[*i as usize].is_lifted(),
             Visit::Pass { .. } | Visit::Float { .. } => true,
         }
     }
@@ -175,15 +174,19 @@ impl Loops {
         let mean = |of: &dyn Fn(&Loop) -> f64| children().map(of).sum::<f64>() / count;
         let head_at =
             if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
-        let head_layer = CABLE * mean(&|c: &Loop| c.layer);
         let bound = own.held == Some(own.row);
-        let head_up = f64::from(own.held.unwrap_or(own.row + 1)) + REACH + if bound { 0.5 } else { 0.0 };
-        let rank = f64::from(own.rank);
-        let head_depth = DEPTH + LAYER * rank;
+        let head_up = self.up(own.held.unwrap_or(own.row + 1)) + REACH + if bound { 0.5 } else { 0.0 };
+        let swap = self.swap(own, head_up - foot.up, head_at - foot.at);
+        let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
         let foot_depth = self.foot_depth(own);
         let spread = 1.0 + 0.8 * (count - 1.0);
-        let foot_layer = CABLE * own.layer;
-        let crossing = if over { 0.35 } else { 0.5 };
+        let crossing = match over {
+            true if own.is_lifted() => 0.46,
+            true => 0.35,
+            false => 0.5,
+        };
+        // A tuck stays on its side of the stitch that it is worked with.
+        let reach = if over && own.rank > 0 { TAU / 14.0 } else { TAU / 6.0 };
         let piece = |k: usize| {
             let t = TAU * k as f64 / STEPS as f64;
             let head = 0.5 - 0.5 * t.cos();
@@ -191,21 +194,24 @@ impl Loops {
             let upper = smooth((head - 0.3) / 0.4);
             let mix = |low: f64, high: f64| low + (high - low) * upper;
             // At its ends a foot goes over into the neighbour's.
-            let inside = smooth(t.min(TAU - t) / (TAU / 6.0));
+            let inside = smooth(t.min(TAU - t) / reach);
             let (side, end) = if k <= STEPS / 2 { (-1.0, ends[0]) } else { (1.0, ends[1]) };
             let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth((head - crossing) / 0.24 + 0.5) };
-            let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * mix(1.0, spread) * turned;
-            let at = mix(foot.at, head_at) + step * across + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step));
+            let wide = if own.is_lifted() { NARROW } else { mix(1.0, spread) };
+            let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * wide * turned;
+            let moved = swap.map_or(upper, |s| s.moved(head));
+            let at = foot.at
+                + (head_at - foot.at) * moved
+                + step * across
+                + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step));
             let up = foot.up + (head_up - foot.up) * head + (1.0 - inside) * (end.up - foot.up);
             let mut out = if over {
-                let legs = 0.06;
-                let (low, high) = (smooth(2.0 * head), smooth(2.0 * head - 1.0));
-                -child * (legs * low + (head_depth - legs) * high)
+                laid_over(own, child, [foot.out, head_depth], head)
             } else {
                 let deep = |depth: f64| if cos2 > 0.0 { depth } else { DEPTH };
                 mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
             };
-            out += foot_layer + (head_layer - foot_layer) * smooth(head);
+            out += swap.map_or(0.0, |s| s.raised(head));
             if own.twist != 0.0 {
                 let bump = 1.0 - smooth((head - crossing).abs() / 0.25);
                 out += side * own.twist * 0.55 * bump;
@@ -216,6 +222,75 @@ impl Loops {
         };
         let (places, grid) = (0..=STEPS).map(piece).unzip();
         Piece { places, grid, yarn: own.yarn }
+    }
+}
+
+/// How far out a loop is that was laid over the needle, at a share of its height.
+fn laid_over(own: &Loop, child: f64, [foot, head_depth]: [f64; 2], head: f64) -> f64 {
+    let legs = if own.rank > 0 { 0.12 } else { 0.06 };
+    // A lifted strand stays on its side of the heads of the row below.
+    let [from, over] = match own.is_lifted() {
+        true if own.layer == child => [0.5, 0.25],
+        true => [0.3, 0.2],
+        false => [0.0, 0.5],
+    };
+    let (low, high) = (smooth((head - from) / over), smooth(2.0 * head - 1.0));
+    foot * (1.0 - low) - child * (legs * low + (head_depth - legs) * high)
+}
+
+/// A loop on its way to where it is worked passes others, between the heads of its own row and the feet of that above.
+#[derive(Clone, Copy)]
+struct Swap {
+    /// From which share of its height on; it ends as far from the other end.
+    from: f64,
+    /// How far in front of the others it passes.
+    front: f64,
+    /// How far it lies over the last of those that are worked together with it, up to its head.
+    over: f64,
+    /// How deep its head dives without that.
+    depth: f64,
+}
+
+impl Swap {
+    /// The share of its height in which it comes forward, and goes back again.
+    fn ramp(self) -> f64 {
+        0.25 * (1.0 - 2.0 * self.from)
+    }
+
+    /// How much of the way across is behind it at a share of its height.
+    fn moved(self, head: f64) -> f64 {
+        smooth((head - self.from - self.ramp()) / (2.0 * self.ramp()))
+    }
+
+    /// How far it is in front there.
+    fn raised(self, head: f64) -> f64 {
+        let by = |off: f64| smooth((off - self.from) / self.ramp());
+        self.front * by(head.min(1.0 - head)) + self.over * by(head)
+    }
+}
+
+impl Loops {
+    /// How a loop so many rows high, worked so far across from its feet, passes those that it changes places with, or that are
+    /// worked together with it.
+    fn swap(&self, own: &Loop, high: f64, across: f64) -> Option<Swap> {
+        const FAR: f64 = 0.6;
+        let child = &self.loops[*own.children.first()? as usize];
+        let stitches = |d: f64| d.abs() * if self.border.turns { self.wide as f64 } else { 1.0 };
+        let together = || child.parents.iter().map(|p| &self.loops[*p as usize]);
+        let beside = together().any(|l| stitches(self.border.short(l.at - own.at)) > 0.25);
+        let bound = together().any(|l| l.row == child.row);
+        let last = (child.parents.len() - 1) as f64;
+        let (mut front, mut over, mut depth) = (0.0, 0.0, DEPTH + LAYER * f64::from(own.rank));
+        if child.layer != 0.0 {
+            front = CABLE * child.layer.max(0.0);
+        } else if beside && !bound {
+            over = child.sign * LAYER * (last - f64::from(own.rank));
+            depth = DEPTH + LAYER * last;
+        } else if stitches(across) < FAR {
+            return None;
+        }
+        // Heads reach so far up from the row below, and feet down from that above.
+        Some(Swap { from: (2.0 * REACH / high).min(0.4), front, over, depth })
     }
 }
 

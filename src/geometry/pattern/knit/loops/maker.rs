@@ -1,0 +1,329 @@
+//! Makes the loops of a chart's stitches: where they are, what they are drawn through, and the edges.
+
+use super::{
+    super::super::chart::{Act, Stitch, Top},
+    Border, Course, Loop, Loops, Visit,
+};
+
+/// Yarn of what is no whole loop, in shares of a stitch's.
+const OVER: f64 = 0.8;
+const TUCKED: f64 = 0.75;
+pub(super) const LIFTED: f64 = 0.6;
+const CAST_ON: f64 = 0.75;
+
+/// The loop of each stitch, before there are any.
+const NONE: u32 = u32::MAX;
+
+pub(super) struct Maker<'a> {
+    rows: &'a [Vec<Stitch>],
+    cast_on: usize,
+    border: Border,
+    /// Middles of the stitches of each row, and those of the cast-on edge before them.
+    middles: Vec<Vec<f64>>,
+    loops: Vec<Loop>,
+    /// The loop made at each stitch.
+    made: Vec<Vec<u32>>,
+    cast: Vec<u32>,
+    courses: Vec<Course>,
+    below: Option<Course>,
+    above: Option<Course>,
+}
+
+impl<'a> Maker<'a> {
+    pub(super) fn new(rows: &'a [Vec<Stitch>], cast_on: usize, border: Border) -> Self {
+        Self {
+            rows,
+            cast_on,
+            border,
+            middles: Vec::new(),
+            loops: Vec::new(),
+            made: Vec::new(),
+            cast: Vec::new(),
+            courses: Vec::new(),
+            below: None,
+            above: None,
+        }
+    }
+
+    /// Row r - 1, and whether it is one period down.
+    fn under(&self, r: usize) -> Option<(usize, i32)> {
+        match r.checked_sub(1) {
+            Some(below) => Some((below, 0)),
+            None => self.border.stacked.then(|| (self.rows.len() - 1, 1)),
+        }
+    }
+
+    fn even(&self, count: usize) -> Vec<f64> {
+        let n = count as f64;
+        let at = |j: usize| match (self.border.turns, self.border.round) {
+            (true, _) => (j as f64 + 0.5) / n,
+            (false, Some(_)) => j as f64 + 0.5,
+            (false, None) => j as f64 + 0.5 - 0.5 * n,
+        };
+        (0..count).map(at).collect()
+    }
+
+    /// Mean place of what a stitch is made of in the row below, measured from `near`.
+    fn parent_middle(&self, below: &[f64], stitch: &Stitch, near: f64) -> f64 {
+        let at = |p: u32| near + self.border.short(below[p as usize % below.len()] - near);
+        if stitch.parents == 0 {
+            // Between two stitches.
+            let (p, n) = (stitch.first_parent as usize, below.len());
+            let (left, right) = (at(((p + n - 1) % n) as u32), at((p % n) as u32));
+            return match (p, self.border.round) {
+                (0, None) => right,
+                (p, None) if p >= n => left,
+                _ => 0.5 * (left + right),
+            };
+        }
+        let last = stitch.first_parent + u32::from(stitch.parents);
+        (stitch.first_parent..last).map(at).sum::<f64>() / f64::from(stitch.parents)
+    }
+
+    /// Where stitches are across the cloth: evenly.
+    pub(super) fn positions(&mut self) {
+        self.middles = self.rows.iter().map(|r| self.even(r.len())).collect();
+        if self.border.round.is_none() {
+            // Each row of a shaped piece lies over the one below.
+            let mut shift = 0.0;
+            for r in 1..self.rows.len() {
+                let (row, below) = (&self.rows[r], self.even(self.rows[r - 1].len()));
+                let own = self.even(row.len());
+                let worked: Vec<f64> = row
+                    .iter()
+                    .zip(&own)
+                    .filter(|(s, _)| s.parents > 0)
+                    .map(|(s, at)| self.parent_middle(&below, s, *at) - at)
+                    .collect();
+                shift += worked.iter().sum::<f64>() / worked.len().max(1) as f64;
+                self.middles[r].iter_mut().for_each(|at| *at += shift);
+            }
+        }
+    }
+
+    fn push(&mut self, made: Loop) -> u32 {
+        self.loops.push(made);
+        self.loops.len() as u32 - 1
+    }
+
+    /// The loops on the needle at a stitch, those made first at first, each with the periods down to it.
+    fn content(&self, r: usize, j: usize, down: i32, out: &mut Vec<(u32, i32)>) {
+        let (mut r, mut j, mut down) = (r, j, down);
+        let mut later = Vec::new();
+        // A stitch that is never worked is let go after a whole period.
+        for _ in 0..=2 * self.rows.len() {
+            let stitch = &self.rows[r][j];
+            match stitch.act {
+                Act::Pass { .. } | Act::Tuck => {
+                    if stitch.act == Act::Tuck {
+                        later.push((self.made[r][j], down));
+                    }
+                    j = stitch.first_parent as usize;
+                    match self.under(r) {
+                        Some((below, more)) => (r, down) = (below, down + more),
+                        None => {
+                            out.extend(self.cast.get(j).map(|&c| (c, 0)));
+                            break;
+                        }
+                    }
+                }
+                _ => {
+                    out.push((self.made[r][j], down));
+                    break;
+                }
+            }
+        }
+        out.extend(later.into_iter().rev());
+    }
+
+    pub(super) fn draw(&mut self) {
+        if self.border.finished {
+            let first = &self.middles[0];
+            let at: Vec<f64> = if first.len() == self.cast_on { first.clone() } else { self.even(self.cast_on) };
+            self.cast =
+                at.iter().map(|&at| self.push(Loop { twist: 1.0, yarn: CAST_ON, ..Loop::laid(-1, at) })).collect();
+            let visits = self.cast.iter().enumerate().map(|(j, &c)| (j as u32, Visit::Loop(c))).collect();
+            self.below = Some(Course::new(-1, visits));
+        }
+        // Loops first, for at a periodic border they are drawn through those of the last row.
+        for (r, row) in self.rows.iter().enumerate() {
+            let mut made = Vec::with_capacity(row.len());
+            let mut visits = Vec::with_capacity(row.len());
+            for (j, s) in row.iter().enumerate() {
+                let at = self.middles[r][j];
+                let base = Loop { layer: s.layer.into(), ..Loop::laid(r as i32, at) };
+                let new = match s.act {
+                    Act::Draw | Act::Lift { .. } => Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base }),
+                    Act::Over => Some(Loop { yarn: OVER, ..base }),
+                    Act::Tuck => Some(Loop { yarn: TUCKED, ..base }),
+                    Act::Pass { front } => {
+                        visits.push((j as u32, Visit::Pass { at, front }));
+                        None
+                    }
+                };
+                made.push(new.map_or(NONE, |new| {
+                    self.loops.push(new);
+                    let i = self.loops.len() as u32 - 1;
+                    visits.push((j as u32, Visit::Loop(i)));
+                    i
+                }));
+            }
+            self.made.push(made);
+            self.courses.push(Course::new(r as i32, visits));
+        }
+        let mut content = Vec::new();
+        for r in 0..self.rows.len() {
+            for j in 0..self.rows[r].len() {
+                let (s, own) = (self.rows[r][j], self.made[r][j]);
+                content.clear();
+                match (s.act, self.under(r)) {
+                    (Act::Lift { left }, under) => {
+                        let twist = if left { -1.0 } else { 1.0 };
+                        self.lift(own, under, s, twist);
+                        continue;
+                    }
+                    (Act::Draw, Some((below, down))) => {
+                        let all = s.first_parent..s.first_parent + u32::from(s.parents);
+                        let order: Vec<u32> = match s.top {
+                            Top::Left => all.collect(),
+                            Top::Right => all.rev().collect(),
+                            Top::Middle => {
+                                let middle = s.first_parent + u32::from(s.parents) / 2;
+                                [middle].into_iter().chain(all.filter(|p| *p != middle)).collect()
+                            }
+                        };
+                        order.into_iter().for_each(|p| self.content(below, p as usize, down, &mut content));
+                    }
+                    (Act::Draw, None) => {
+                        let all = s.first_parent..s.first_parent + u32::from(s.parents);
+                        content.extend(all.filter_map(|p| self.cast.get(p as usize)).map(|&c| (c, 0)));
+                    }
+                    _ => continue,
+                }
+                self.link(own, &content, r as i32, s.twisted);
+            }
+        }
+    }
+
+    /// A loop is drawn through others.
+    fn link(&mut self, own: u32, through: &[(u32, i32)], row: i32, twisted: bool) {
+        let at = self.loops[own as usize].at;
+        let mut mean = 0.0;
+        for (rank, &(p, down)) in through.iter().enumerate() {
+            let held = row + down * self.rows.len() as i32;
+            let parent = &mut self.loops[p as usize];
+            parent.held = Some(held);
+            parent.rank = rank as u8;
+            parent.children.push(own);
+            if twisted {
+                parent.twist = 1.0;
+            }
+            mean += self.border.short(parent.at - at);
+            self.loops[own as usize].parents.push(p);
+        }
+        // Where others come from far or pass each other they have done so when they are worked.
+        const FAR: f64 = 0.8;
+        let stitches = if self.border.turns { self.rows[0].len() as f64 } else { 1.0 };
+        mean /= through.len().max(1) as f64;
+        if self.loops[own as usize].layer == 0.0 && mean.abs() * stitches < FAR {
+            self.loops[own as usize].foot = at + 0.5 * mean;
+        }
+    }
+
+    /// A loop is drawn through the strand between two stitches of the row below.
+    fn lift(&mut self, own: u32, under: Option<(usize, i32)>, s: Stitch, twist: f64) {
+        let near = self.loops[own as usize].at;
+        let r = self.loops[own as usize].row;
+        let (row, down, at) = match under {
+            Some((below, down)) => (below as i32, down, self.parent_middle(&self.middles[below], &s, near)),
+            None => (-1, 0, near),
+        };
+        let strand = self.push(Loop { twist, yarn: LIFTED, ..Loop::laid(row, at) });
+        let column = s.first_parent;
+        let course = match under {
+            Some((below, _)) => Some(&mut self.courses[below]),
+            None => self.below.as_mut(),
+        };
+        if let Some(course) = course {
+            let place = course.visits.iter().position(|(j, _)| *j >= column).unwrap_or(course.visits.len());
+            let purl =
+                |v: Option<&(u32, Visit)>| matches!(v, Some((_, Visit::Loop(i))) if self.loops[*i as usize].sign < 0.0);
+            let between = place.checked_sub(1).is_none_or(|k| purl(course.visits.get(k)));
+            let front = between && (purl(course.visits.get(place)) || place == course.visits.len());
+            self.loops[strand as usize].layer = if front { 1.0 } else { -1.0 };
+            course.visits.insert(place, (column, Visit::Loop(strand)));
+            self.link(own, &[(strand, down)], r, false);
+        }
+    }
+
+    /// Each stitch of the last row is drawn through it and through the one before it.
+    pub(super) fn bind_off(&mut self, backwards: bool) {
+        let last = self.rows.len() - 1;
+        let row = self.rows.len() as i32;
+        let n = self.rows[last].len();
+        let mut visits = Vec::with_capacity(n);
+        let mut before: Option<u32> = None;
+        for k in 0..n {
+            let j = if backwards { n - 1 - k } else { k };
+            let at = self.middles[last][j];
+            let own = self.push(Loop { sign: 1.0, ..Loop::laid(row, at) });
+            let mut content: Vec<(u32, i32)> = before.map(|b| (b, 0)).into_iter().collect();
+            self.content(last, j, 0, &mut content);
+            self.link(own, &content, row, false);
+            self.loops[own as usize].foot = at;
+            visits.push((j as u32, Visit::Loop(own)));
+            before = Some(own);
+        }
+        if backwards {
+            visits.reverse();
+        }
+        self.above = Some(Course::new(row, visits));
+    }
+
+    /// How far up each row begins, in mean rows, and how much higher rows are than without room to change places: three
+    /// stitches that become one take it, cables, and stitches that lean far.
+    fn heights(&self) -> (Vec<f64>, f64) {
+        const TRIPLE: f64 = 0.8;
+        const CROSSING: f64 = 0.5;
+        let room = |r: usize| {
+            let Some((below, _)) = self.under(r) else { return 0.0 };
+            let turn = if self.border.turns { self.rows[r].len() as f64 } else { 1.0 };
+            let of = |(s, at): (&Stitch, &f64)| {
+                let lean = self.parent_middle(&self.middles[below], s, *at) - at;
+                let lean = CROSSING * turn * self.border.short(lean).abs();
+                match s.layer {
+                    0 => (2.0 * lean - 0.5).max(if s.parents > 2 { TRIPLE } else { 0.0 }),
+                    _ => lean,
+                }
+            };
+            self.rows[r].iter().zip(&self.middles[r]).map(of).fold(0.0, f64::max)
+        };
+        let mut up = 0.0;
+        let mut heights: Vec<f64> = Vec::with_capacity(self.rows.len());
+        for r in 0..self.rows.len() {
+            up += room(r);
+            heights.push(up);
+            up += 1.0;
+        }
+        let room = up / self.rows.len() as f64;
+        heights.iter_mut().for_each(|h| *h /= room);
+        (heights, room)
+    }
+
+    pub(super) fn finish(mut self) -> Loops {
+        let (heights, room) = self.heights();
+        let mut courses = Vec::new();
+        courses.extend(self.below.take());
+        courses.append(&mut self.courses);
+        courses.extend(self.above.take());
+        Loops {
+            loops: self.loops,
+            courses,
+            border: self.border,
+            rows: self.rows.len() as i32,
+            wide: self.rows[0].len(),
+            heights,
+            room,
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Which loop passes through which, measured on yarns and not on what was meant: as they are laid, by linking numbers; and
+//! from there on no yarn may pass through another.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{
+    super::{super::rods::passing::passed, loops::Visit},
+    *,
+};
+
+/// How a way is linked with a ring: how often it passes the ring towards the front less towards the back. The ring is closed far
+/// below, the way far above, and crossings are counted as seen from the front (Gauss' linking number as a sum of signs where
+/// the way is in front).
+fn linked(ring: &[DVec3], way: &[DVec3]) -> i32 {
+    const FAR: f64 = 1e3;
+    let closed = |line: &[DVec3], by: f64| -> Vec<DVec3> {
+        let (first, last) = (line[0], line[line.len() - 1]);
+        let far = [last, first].map(|p| DVec3::new(p.x, by, p.z));
+        line.iter().copied().chain(far).chain([first]).collect()
+    };
+    // Heads of one height may meet in a point as seen from the front.
+    const ASIDE: DVec3 = DVec3::new(1.3e-3, 0.7e-3, 0.0);
+    let (ring, way) = (closed(ring, -FAR), closed(&way.iter().map(|p| *p + ASIDE).collect::<Vec<_>>(), FAR));
+    let mut sum = 0;
+    for a in ring.windows(2) {
+        for b in way.windows(2) {
+            let (u, v, w) = ((a[1] - a[0]).truncate(), (b[1] - b[0]).truncate(), (b[0] - a[0]).truncate());
+            let turn = u.perp_dot(v);
+            if turn == 0.0 {
+                continue;
+            }
+            let (s, t) = (w.perp_dot(v) / turn, w.perp_dot(u) / turn);
+            if (0.0..1.0).contains(&s) && (0.0..1.0).contains(&t) {
+                let (below, above) = (a[0].z + s * (a[1].z - a[0].z), b[0].z + t * (b[1].z - b[0].z));
+                sum += if above < below {
+                    0
+                } else if turn > 0.0 {
+                    1
+                } else {
+                    -1
+                };
+            }
+        }
+    }
+    sum
+}
+
+/// How often the yarn passes a loop, net, on its way from the head of one loop to that of the next in its row: by the loop
+/// passed, the course and the visit that the way leads to.
+type Passes = BTreeMap<(u32, usize, usize), i32>;
+
+/// The loops of a course, as their visits.
+fn visits_of(loops: &Loops, course: usize) -> Vec<(usize, u32)> {
+    let visits = loops.courses[course].visits.iter().enumerate();
+    visits.filter_map(|(k, (_, v))| if let Visit::Loop(i) = v { Some((k, *i)) } else { None }).collect()
+}
+
+/// The way of a course from the head of visit `from` to that of `end`.
+fn way(cell: &Cell, course: usize, from: usize, end: usize) -> Vec<DVec3> {
+    let mut way: Vec<DVec3> = Vec::new();
+    for k in from..=end {
+        let points: Vec<DVec3> = cell.visit(course, k).map(|(p, _)| p).collect();
+        let half = points.len() / 2;
+        way.extend(match k {
+            k if k == from && k == end => &points[..],
+            k if k == from => &points[half..],
+            k if k == end => &points[..=half],
+            _ => &points[..],
+        });
+    }
+    way
+}
+
+/// What the chart says: a loop is passed towards the front on the way to a knit stitch, towards the back on the way from it;
+/// the other way round for purl; and a twisted loop turns its back.
+fn expected(loops: &Loops) -> Passes {
+    let mut sums = Passes::new();
+    for (parent, child) in loops.links() {
+        let (p, c) = (&loops.loops[parent as usize], &loops.loops[child as usize]);
+        let sign = c.sign as i32 * if p.twist == 0.0 { 1 } else { -1 };
+        let course = loops.courses.iter().position(|course| course.row == c.row).unwrap();
+        let row = visits_of(loops, course);
+        let n = row.iter().position(|(_, i)| *i == child).unwrap();
+        *sums.entry((parent, course, row[n].0)).or_default() += sign;
+        *sums.entry((parent, course, row[(n + 1) % row.len()].0)).or_default() -= sign;
+    }
+    sums.retain(|_, sum| *sum != 0);
+    sums
+}
+
+/// The links of loops with ways of later rows, and of their own row two stitches away or more.
+fn links_of(cell: &Cell, loops: &Loops) -> Passes {
+    let mut found = Passes::new();
+    let high = cell.high as i32;
+    let visit = |c: usize, k: usize| cell.visit(c, k).map(|(p, _)| p).collect::<Vec<DVec3>>();
+    for c in 0..loops.courses.len() {
+        for (k, i) in visits_of(loops, c) {
+            let mut ring = visit(c, k);
+            ring.extend(visit(c, k + 1).first());
+            for d in 0..loops.courses.len() {
+                let row = visits_of(loops, d);
+                let count = loops.courses[d].visits.len();
+                for (n, &(to, _)) in row.iter().enumerate() {
+                    let (from, end) = if n > 0 { (row[n - 1].0, to) } else { (row[row.len() - 1].0, to + count) };
+                    let way = way(cell, d, from, end);
+                    let mut sum = 0;
+                    for (x, y) in (-2..=2).flat_map(|x| (0..=2).map(move |y| (x, y))) {
+                        let later = d as i32 + y * high - c as i32;
+                        let beside = [from, end].iter().any(|v| (x * count as i32 + *v as i32 - k as i32).abs() <= 2);
+                        if later < 0 || (later == 0 && beside) {
+                            continue;
+                        }
+                        let by = DVec3::new(f64::from(x) * cell.period.x, f64::from(y) * cell.period.y, 0.0);
+                        sum += linked(&ring, &way.iter().map(|p| *p + by).collect::<Vec<_>>());
+                    }
+                    if sum != 0 {
+                        found.insert((i, d, to), sum);
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+#[track_caller]
+fn drawn(name: &str, rows: &[&str], wide: u32) {
+    let chart = Chart::parse(rows).unwrap();
+    let rows = chart.work(wide, chart.rows(), 10_000).unwrap();
+    let loops = Loops::new(&rows, wide as usize, Border::cell(wide as usize));
+    let laid = Cell::laid(&rows, &loops, YARN_PER_STITCH, [None; 2]);
+    let (expected, found) = (expected(&loops), links_of(&laid, &loops));
+    let keys: BTreeSet<_> = expected.keys().chain(found.keys()).collect();
+    let differ: Vec<_> = keys.into_iter().filter(|k| found.get(k) != expected.get(k)).collect();
+    for key in &differ {
+        eprintln!("{name}: {key:?} is {:?}, not {:?}", found.get(key), expected.get(key));
+    }
+    assert!(differ.is_empty(), "{name}: {} of {} differ", differ.len(), expected.len());
+    let relax = || drop(Cell::of_rows(&rows, YARN_PER_STITCH, POINTS, [None; 2]));
+    assert_eq!(passed(relax), 0, "{name}: yarns passed through each other");
+}
+
+/// Charts in which every stitch stands beside others, with stitches of their cell.
+fn all_drawn(charts: &[(&[&str], u32)]) {
+    charts.iter().for_each(|(rows, wide)| drawn(&rows.join(" / "), rows, *wide));
+}
+
+#[test]
+fn stitches_and_decreases() {
+    all_drawn(&[
+        (&["k3"], 3),
+        (&["p3"], 3),
+        (&["k p", "p k"], 4),
+        (&["k2 p2"], 4),
+        (&["k3", "p3"], 3),
+        (&["ktbl2"], 4),
+        (&["ktbl ptbl", "k p"], 4),
+        (&["k3", "k2tog yo k"], 3),
+        (&["k3", "yo ssk k"], 3),
+        (&["k4", "yo p2tog k2"], 4),
+        (&["k4", "k yo k3tog yo"], 4),
+        (&["k4", "k yo sssk yo"], 4),
+        (&["k4", "k yo cdd yo"], 4),
+        (&["p4", "p yo p3tog yo"], 4),
+    ]);
+}
+
+#[test]
+fn increases_slips_and_tucks() {
+    all_drawn(&[
+        (&["k3 kfb", "k3 k2tog"], 4),
+        (&["k4", "k2 m1l k2tog"], 4),
+        (&["k4", "k2 m1r k2tog"], 4),
+        (&["k5", "k3tog yo k m1l k"], 5),
+        (&["k3 p3", "k2tog m1l k p2tog m1r p"], 6),
+        (&["k sl", "k2"], 4),
+        (&["k4", "k sl k slwyif"], 4),
+        (&["k tuck", "tuck p"], 4),
+    ]);
+}
+
+#[test]
+fn cables() {
+    all_drawn(&[
+        (&["k3", "k 1/1lc"], 3),
+        (&["k3 p", "2/1rc p"], 4),
+        (&["k6", "k c4f k", "2: k6"], 6),
+        (&["k6", "k c4b k", "2: k6"], 6),
+        (&["p k3 p", "p t3f p", "p2 k2 p", "p t3b p"], 5),
+        (&["p k2 p", "1/1lpc 1/1rpc", "k p2 k", "1/1rpc 1/1lpc"], 4),
+        (&["p k6 p", "p c6b p", "4: p k6 p"], 8),
+        (&["k8", "4/4lc", "2: k8"], 8),
+    ]);
+}
+
+#[test]
+fn patterns_with_a_name() {
+    for (name, rows) in PATTERNS {
+        let wide = Chart::named(name).and_then(|c| c.even_width(100)).unwrap();
+        drawn(name, rows, wide * 3_u32.div_ceil(wide));
+    }
+}
+
+#[test]
+fn strands_of_a_cable_that_pass_in_front_are_in_front() {
+    for (rows, front, back) in
+        [(&["p k4 p", "p c4f p", "2: p k4 p"][..], 3.5, 1.5), (&["p k4 p", "p c4b p", "2: p k4 p"], 1.5, 3.5)]
+    {
+        let chart = Chart::parse(rows).unwrap();
+        let cell = Cell::relaxed(&chart, 6, YARN_PER_STITCH, POINTS, [None; 2]);
+        // Legs of the loops below the crossing, by the middle of their columns.
+        let depth = |column: f64| {
+            let legs = (0..6).flat_map(|k| cell.visit(0, k));
+            let near = |g: &[f32; 2]| (f64::from(g[0]) - column - 0.5).abs() < 1.0 && (0.4..0.7).contains(&g[1]);
+            let z: Vec<f64> = legs.filter(|(_, g)| near(g)).map(|(p, _)| p.z).collect();
+            z.iter().sum::<f64>() / z.len() as f64
+        };
+        let (front, back) = (depth(front), depth(back));
+        eprintln!("{rows:?}: {front:.2} {back:.2}");
+        assert!(front > back + 1.0, "{rows:?}: {front} {back}");
+    }
+}
