@@ -6,7 +6,10 @@
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
-use super::surface::{Anchor, BorderEdge, Finder, Pose, Surface, single};
+use super::{
+    strain::{Strain, UNSTRAINED},
+    surface::{Anchor, BorderEdge, Finder, Pose, Surface, single},
+};
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
 const PAD: usize = 2;
@@ -372,14 +375,17 @@ impl Sheet<'_> {
         self.lattice.index(x, y).filter(|&i| !self.points[i].is_nan())
     }
 
-    /// How much longer a stitch is across and up than it is cut.
-    pub(super) fn stretch(&self, x: isize, y: isize) -> [f32; 2] {
+    /// How a stitch is strained against its cut.
+    pub(super) fn strain(&self, x: isize, y: isize) -> Strain {
         let corner = |dx, dy| self.corner(x + dx, y + dy).map(|i| self.points[i]);
         let (Some(a), Some(b), Some(c), Some(d)) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)) else {
-            return [1.0; 2];
+            return UNSTRAINED;
         };
         let size = self.lattice.stitch.as_vec2();
-        [0.5 * (b - a + d - c).length() / size.x, 0.5 * (c - a + d - b).length() / size.y]
+        let (across, up) = (0.5 * (b - a + d - c), 0.5 * (c - a + d - b));
+        let lengths = [across.length(), up.length()];
+        let sine = across.dot(up) / (lengths[0] * lengths[1]).max(1e-12);
+        [lengths[0] / size.x, lengths[1] / size.y, sine]
     }
 
     /// Position and unit normal at a place, in stitches across and rows up.

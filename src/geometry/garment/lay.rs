@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     lattice::{Lattice, Sheet},
-    strain::{Shape, Shapes},
+    strain::{Shape, Shapes, Strain, UNSTRAINED},
 };
 use crate::{
     geometry::pattern::StrandKind,
@@ -193,17 +193,17 @@ impl<'a> Layer<'a> {
     /// All control points of a run's stitches.
     fn stitches(&mut self, run: &Run) {
         let (sheet, axis) = (self.sheet, self.axis);
-        let stretch = |s: usize| {
+        let strain = |s: usize| {
             let (x, y) = if axis == 0 { (s, run.line) } else { (run.line, s) };
-            sheet.stretch(x as isize, y as isize)
+            sheet.strain(x as isize, y as isize)
         };
         let per_stitch = self.shape(run.line).per_stitch;
         let count = run.last - run.first;
         let order = |i: usize| if run.backwards { run.last - 1 - i } else { run.first + i };
-        let (mut before, mut here) = (stretch(order(0)), stretch(order(0)));
+        let (mut before, mut here) = (strain(order(0)), strain(order(0)));
         // The end of a run's last stitch is the start of one that is not there.
-        let far_end = |layer: &mut Self, stretch| {
-            let place = layer.place(run.line, run.last, 0, stretch);
+        let far_end = |layer: &mut Self, strain| {
+            let place = layer.place(run.line, run.last, 0, strain);
             layer.push(place, run);
         };
         if run.backwards {
@@ -211,12 +211,12 @@ impl<'a> Layer<'a> {
         }
         for i in 0..count {
             let s = order(i);
-            let next = stretch(order((i + 1).min(count - 1)));
+            let next = strain(order((i + 1).min(count - 1)));
             for k in 0..per_stitch {
-                // Stretch changes evenly from the middle of a stitch to that of the next.
+                // Strain changes evenly from the middle of a stitch to that of the next.
                 let t = (k as f32 + 0.5) / per_stitch as f32 - 0.5;
                 let (other, share) = if t < 0.0 { (before, -t) } else { (next, t) };
-                let mixed = [0, 1].map(|a| here[a] + share * (other[a] - here[a]));
+                let mixed = [0, 1, 2].map(|a| here[a] + share * (other[a] - here[a]));
                 let k = if run.backwards { per_stitch - 1 - k } else { k };
                 let place = self.place(run.line, s, k, mixed);
                 self.push(place, run);
@@ -229,11 +229,11 @@ impl<'a> Layer<'a> {
     }
 
     /// Control point k of stitch s of a line.
-    fn place(&self, line: usize, s: usize, k: usize, stretch: [f32; 2]) -> Vec3 {
+    fn place(&self, line: usize, s: usize, k: usize, strain: Strain) -> Vec3 {
         let shape = self.shape(line);
         let count = self.shapes.counts[self.axis];
         let stitch = s + self.shift[self.axis];
-        let mut p = self.shapes.control(shape, (stitch % count) * shape.per_stitch + k, stretch);
+        let mut p = self.shapes.control(shape, (stitch % count) * shape.per_stitch + k, strain);
         p[self.axis] += (stitch / count * count) as f32 - self.shift[self.axis] as f32;
         p[1 - self.axis] += line as f32 - shape.index as f32;
         if let Some(tension) = self.tension {
@@ -263,8 +263,8 @@ impl<'a> Layer<'a> {
         let sewn = !self.sheet.lattice.is_free(corner[0], corner[1]);
         let bulge = self.bulge() * outward * if sewn { 0.3 } else { 1.0 };
         let deep = if sewn { 1.5 * self.shapes.diameter as f32 } else { 0.0 };
-        let from = self.place(run.line, run.end(), 0, [1.0; 2]);
-        let to = self.place(next.line, next.start(), 0, [1.0; 2]);
+        let from = self.place(run.line, run.end(), 0, UNSTRAINED);
+        let to = self.place(next.line, next.start(), 0, UNSTRAINED);
         for (share, out) in [(0.12_f32, 0.62), (0.5, 1.0), (0.88, 0.62)] {
             let mut p = from.lerp(to, share);
             p[self.axis] += bulge * out;
@@ -277,7 +277,7 @@ impl<'a> Layer<'a> {
     fn tail(&mut self, run: &Run, first: bool) {
         let corner = if first { run.start() } else { run.end() };
         let outward = if (corner == run.last) == (run.last > run.first) { 1.0_f32 } else { -1.0 };
-        let from = self.place(run.line, corner, 0, [1.0; 2]);
+        let from = self.place(run.line, corner, 0, UNSTRAINED);
         let bulge = self.bulge();
         let d = self.shapes.diameter as f32;
         let inward = (run.last - run.first).min(3) as f32;

@@ -1,7 +1,7 @@
 //! Yarns on garments: a mesh whose texture coordinates are its flat panels, and cloth that repeats, laid over them.
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
-//! divides each panel into stitches, `strain` relaxes the cloth's tile at the stretches that occur, `lay` lays its yarns
+//! divides each panel into stitches, `strain` relaxes the cloth's tile at the strains that occur, `lay` lays its yarns
 //! from row to row, `edges` ends them, and `body` keeps them outside of who wears them. All lengths are millimetres.
 
 mod body;
@@ -139,14 +139,14 @@ impl Garment {
             );
             return Err(GarmentError::new(problem, "a coarser gauge, or another `gauge_per` or `unit`"));
         }
-        let ranges: Vec<[[f64; 2]; 2]> = (0..options.cloths.len()).map(|_| panels.stretches).collect();
+        let points = panels.points(mesh, options.unit_mm);
+        let ranges = panels.strains(&points, &cloth, options.cloths.len());
         let shapes: Vec<Shapes> = options
             .cloths
             .iter()
             .zip(ranges)
             .map(|(c, range)| Shapes::new(&c.tile, c.points, range))
             .collect::<Result<_, _>>()?;
-        let points = panels.points(mesh, options.unit_mm);
         let widest = options.cloths.iter().map(|c| c.tile.stitch().x).fold(0.0, f64::max);
         let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
         let borders = surface.borders(panels.panels.len());
@@ -158,6 +158,11 @@ impl Garment {
                 Lattice::new(&surface, panel as u32, border, &division(own, shapes))
             })
             .collect();
+        if lattices.iter().all(|l| l.stitches == 0) {
+            let stitch = options.cloths[0].tile.stitch();
+            let problem = format!("no panel has room for a stitch of {:.3} x {:.3} mm", stitch.x, stitch.y);
+            return Err(GarmentError::new(problem, "a finer gauge, another `unit`, or is the mesh cut short?"));
+        }
         let mut notes = panels.notes.clone();
         for (lattice, panel) in lattices.iter().zip(&panels.panels) {
             if lattice.stitches == 0 {

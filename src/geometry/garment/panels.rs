@@ -4,7 +4,10 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::mesh::{Counted, Face, GarmentError, GarmentMesh};
+use super::{
+    mesh::{Counted, Face, GarmentError, GarmentMesh},
+    strain::{StrainRange, UNSTRAINED},
+};
 
 /// A connected piece of flat cloth.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,8 +52,6 @@ pub(super) struct Panels {
     pub(super) of_face: Vec<u32>,
     pub(super) panels: Vec<Panel>,
     pub(super) ratio: LengthRatio,
-    /// The least and the largest stretch, but for a hundredth, along u and along v.
-    pub(super) stretches: [[f64; 2]; 2],
     /// Share of the area that is stretched by more than a tenth along one of them.
     pub(super) stretched: f64,
     /// Millimetres per unit of the texture coordinates.
@@ -184,15 +185,13 @@ impl Panels {
         let along = along_axes(mesh, &faces, unit_mm, uv_mm);
         let ratio =
             LengthRatio { p5: percentile(&along, 0.05), p50: percentile(&along, 0.5), p95: percentile(&along, 0.95) };
-        let of_axis = |axis: usize| along.iter().skip(axis).step_by(2).copied().collect::<Vec<_>>();
-        let stretches = [0, 1].map(|axis| [0.01, 0.99].map(|share| percentile(&of_axis(axis), share)));
         let (mut long, mut all) = (0.0, 0.0);
         for pair in along.chunks_exact(2) {
             all += pair[0].1;
             long += if pair[0].0.max(pair[1].0) > 1.1 { pair[0].1 } else { 0.0 };
         }
         let stretched = long / all;
-        Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretches, stretched, uv_mm, notes })
+        Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretched, uv_mm, notes })
     }
 
     /// Turns the texture coordinates of each panel by an angle, radians.
@@ -206,6 +205,27 @@ impl Panels {
                 }
             }
         }
+    }
+
+    /// The least and the largest strain, but for a hundredth, of panels of each kind, of `kinds`; `points` are welded, mm.
+    pub(super) fn strains(&self, points: &[DVec3], kind: &[usize], kinds: usize) -> Vec<StrainRange> {
+        let mut all: Vec<[Vec<(f64, f64)>; 3]> = vec![Default::default(); kinds];
+        for (i, panel) in self.of_face.iter().enumerate() {
+            let [across, up] =
+                axes(self.sewn[i].map(|p| points[p as usize]), self.cut[i].map(|c| self.uvs[c as usize]));
+            let (lengths, area) = ([across.length(), up.length()], across.cross(up).length());
+            let sine = across.dot(up) / (lengths[0] * lengths[1]).max(1e-300);
+            let own = &mut all[kind[*panel as usize]];
+            for (values, value) in own.iter_mut().zip([lengths[0], lengths[1], sine]) {
+                values.push((value, area));
+            }
+        }
+        let ends = |values: Vec<(f64, f64)>| [0.01, 0.99].map(|share| percentile(&values, share));
+        let of_kind = |values: [Vec<_>; 3]| {
+            // No panel may be of a kind.
+            if values[0].is_empty() { UNSTRAINED.map(|v| [f64::from(v); 2]) } else { values.map(ends) }
+        };
+        all.into_iter().map(of_kind).collect()
     }
 
     /// Welded points of a frame, mm.
@@ -307,16 +327,19 @@ fn along_axes(mesh: &GarmentMesh, faces: &[Face], unit_mm: f64, uv_mm: f64) -> V
     faces
         .iter()
         .flat_map(|f| {
-            let [p, q, r] = f.points.map(|i| mesh.points[i as usize] * unit_mm);
-            let [a, b, c] = f.uvs.map(|i| mesh.uvs[i as usize] * uv_mm);
-            let (d1, d2) = (b - a, c - a);
-            let det = d1.perp_dot(d2);
-            let across = ((q - p) * d2.y - (r - p) * d1.y) / det;
-            let up = ((r - p) * d1.x - (q - p) * d2.x) / det;
-            let area = (q - p).cross(r - p).length();
+            let points = f.points.map(|i| mesh.points[i as usize] * unit_mm);
+            let [across, up] = axes(points, f.uvs.map(|i| mesh.uvs[i as usize] * uv_mm));
+            let area = (points[1] - points[0]).cross(points[2] - points[0]).length();
             [(across.length(), area), (up.length(), area)]
         })
         .collect()
+}
+
+/// Where a step along u and one along v go in space, of a triangle.
+fn axes([p, q, r]: [DVec3; 3], [a, b, c]: [DVec2; 3]) -> [DVec3; 2] {
+    let (d1, d2) = (b - a, c - a);
+    let det = d1.perp_dot(d2);
+    [((q - p) * d2.y - (r - p) * d1.y) / det, ((r - p) * d1.x - (q - p) * d2.x) / det]
 }
 
 /// The value below which a share of the weight lies.

@@ -1,9 +1,9 @@
-//! A tile at several stretches, relaxed at each, to be looked up where cloth is laid.
+//! A tile at several strains, relaxed at each, to be looked up where cloth is laid.
 //!
-//! Yarn is not elastic to speak of: cloth that is stretched opens its loops and turns them, while the yarn keeps its
-//! length and thickness. So a tile is relaxed anew at a few periods, and in between what is known is mixed (as Sperl,
-//! Narain and Wojtan do with simulated patterns in "Mechanics-Aware Deformation of Yarn Pattern Geometry", 2021). Shear
-//! turns loops with the cloth.
+//! Yarn is not elastic to speak of: cloth that is stretched or sheared opens its loops and turns them, while the yarn
+//! keeps its length and thickness. So a tile is relaxed anew over a grid of two stretches and a shear, and in between
+//! what is known is mixed (as Sperl, Narain and Wojtan do with simulated patterns in "Mechanics-Aware Deformation of Yarn
+//! Pattern Geometry", 2021).
 
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
@@ -15,13 +15,23 @@ use crate::geometry::pattern::{
 
 use super::mesh::GarmentError;
 
-/// A tile as it is laid: control points of B-splines at some stretches.
+/// Stretch across and up, as new length over length as cut, and the sine of the angle by which rows and wales are off
+/// from a right one.
+pub(super) type Strain = [f32; 3];
+
+/// Cloth as it is cut.
+pub(super) const UNSTRAINED: Strain = [1.0, 1.0, 0.0];
+
+/// The least and the largest of each part of a [`Strain`].
+pub(super) type StrainRange = [[f64; 2]; 3];
+
+/// A tile as it is laid: control points of B-splines at some strains.
 pub(super) struct Shapes {
     /// Stitches and rows that repeat.
     pub(super) counts: [usize; 2],
     pub(super) strands: Vec<Shape>,
-    /// Stretches across and up at which it is known, rising.
-    nodes: [Vec<f32>; 2],
+    /// Stretches across and up and shears at which it is known, rising.
+    nodes: [Vec<f32>; 3],
     /// How far yarns reach beyond their stitches, across and up, in stitches; and over and under the cloth, mm.
     pub(super) reach: DVec2,
     /// Length of yarn of a stitch, mm.
@@ -40,7 +50,8 @@ pub(super) struct Shape {
     pub(super) per_stitch: usize,
     /// Control points of a tile.
     count: usize,
-    /// For each pair of stretches all control points: stitches across and rows up from the tile's corner, mm out.
+    /// For each node all control points, shears of the same stretches side by side: stitches across and rows up from the
+    /// tile's corner, mm out.
     control: Vec<Vec3>,
 }
 
@@ -51,34 +62,26 @@ impl Shape {
     }
 }
 
-/// Rounds in which a pulled tile settles.
+/// Rounds in which a strained tile settles.
 const ROUNDS: usize = 120;
 
 impl Shapes {
-    /// Relaxes `tile` (mm) between the stretches of the cloth, `per_stitch` control points for each stitch.
+    /// Relaxes `tile` (mm) at the strains of the cloth, `per_stitch` control points for each stitch.
     ///
     /// # Errors
     /// A tile whose yarns go slantwise or in rings.
-    pub(super) fn new(tile: &Tile, per_stitch: usize, range: [[f64; 2]; 2]) -> Result<Self, GarmentError> {
+    pub(super) fn new(tile: &Tile, per_stitch: usize, range: StrainRange) -> Result<Self, GarmentError> {
         if tile.strands.iter().any(|s| s.step != [1, 0] && s.step != [0, 1]) {
             let problem = "this cloth has yarns that go slantwise or in rings; only rows and warps can be laid";
             return Err(GarmentError::new(problem, "a knit, a weave, or a file of one of them"));
         }
-        let nodes = range.map(|[low, high]| {
-            let mut nodes = vec![1.0];
-            if low < 0.985 {
-                nodes.insert(0, low.max(0.8));
-            }
-            if high > 1.015 {
-                nodes.push(high.min(1.6));
-            }
-            nodes
-        });
-        let stretches: Vec<DVec2> =
-            nodes[0].iter().flat_map(|&x| nodes[1].iter().map(move |&y| DVec2::new(x, y))).collect();
-        let pulled: Vec<Tile> = stretches
+        let nodes = nodes(range);
+        let [across, up, shears] = &nodes;
+        let strains: Vec<[f64; 3]> =
+            across.iter().flat_map(|&x| up.iter().flat_map(move |&y| shears.iter().map(move |&s| [x, y, s]))).collect();
+        let pulled: Vec<Tile> = strains
             .par_iter()
-            .map(|&s| if s == DVec2::ONE { tile.clone() } else { tile.pulled(tile.period * s, ROUNDS) })
+            .map(|&strain| if strain == [1.0, 1.0, 0.0] { tile.clone() } else { strained(tile, strain) })
             .collect();
         let counts = tile.counts.map(|n| n as usize);
         let strands: Vec<Shape> = tile
@@ -114,7 +117,7 @@ impl Shapes {
         Ok(Self {
             counts,
             strands,
-            nodes: nodes.map(|n| n.iter().map(|&v| v as f32).collect()),
+            nodes: nodes.map(|n| n.into_iter().map(|v| v as f32).collect()),
             reach,
             length: tile.length() / (counts[0] * counts[1]) as f64,
             diameter: tile.diameter(),
@@ -132,16 +135,42 @@ impl Shapes {
         self.strands.iter().any(|s| s.axis() == axis)
     }
 
-    /// Control point k of the tile's yarn where the cloth is stretched so.
+    /// Control point k of the tile's yarn where the cloth is strained so.
     #[inline]
-    pub(super) fn control(&self, shape: &Shape, k: usize, stretch: [f32; 2]) -> Vec3 {
-        let ((x, u), (y, v)) = (between(&self.nodes[0], stretch[0]), between(&self.nodes[1], stretch[1]));
-        let rows = self.nodes[1].len();
-        let at = |i: usize, j: usize| {
-            shape.control[(i.min(self.nodes[0].len() - 1) * rows + j.min(rows - 1)) * shape.count + k]
+    pub(super) fn control(&self, shape: &Shape, k: usize, strain: Strain) -> Vec3 {
+        let [(x, u), (y, v), (z, w)] = [0, 1, 2].map(|i| between(&self.nodes[i], strain[i]));
+        let [columns, rows, shears] = [0, 1, 2].map(|i| self.nodes[i].len());
+        let node = |i: usize, j: usize, l: usize| {
+            let place = (i.min(columns - 1) * rows + j.min(rows - 1)) * shears + l.min(shears - 1);
+            shape.control[place * shape.count + k]
         };
-        at(x, y).lerp(at(x + 1, y), u).lerp(at(x, y + 1).lerp(at(x + 1, y + 1), u), v)
+        let at = |l: usize| {
+            node(x, y, l).lerp(node(x + 1, y, l), u).lerp(node(x, y + 1, l).lerp(node(x + 1, y + 1, l), u), v)
+        };
+        if shears == 1 { at(0) } else { at(z).lerp(at(z + 1), w) }
     }
+}
+
+/// Strains at which a tile is relaxed: as it is cut, and at the ends of what occurs.
+fn nodes([across, up, shear]: StrainRange) -> [Vec<f64>; 3] {
+    let stretch = |[low, high]: [f64; 2]| {
+        let mut nodes = vec![1.0];
+        if low < 0.985 {
+            nodes.insert(0, low.max(0.8));
+        }
+        if high > 1.015 {
+            nodes.push(high.min(1.6));
+        }
+        nodes
+    };
+    let most = shear[0].abs().max(shear[1].abs()).min(0.7);
+    [stretch(across), stretch(up), if most < 0.02 { vec![0.0] } else { vec![-most, 0.0, most] }]
+}
+
+/// A tile relaxed at a strain, its yarns in the tile drawn upright.
+fn strained(tile: &Tile, [across, up, sine]: [f64; 3]) -> Tile {
+    let cosine = (1.0 - sine * sine).sqrt();
+    tile.strained(tile.period * DVec2::new(across, up * cosine), sine / cosine, ROUNDS)
 }
 
 /// Places of control points: as many in each stitch, evenly.

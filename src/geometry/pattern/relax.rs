@@ -36,6 +36,8 @@ pub(super) struct Relaxation {
     pub(super) ropes: Vec<Rope>,
     /// Size of the cell that repeats along x and y.
     pub(super) period: Option<DVec2>,
+    /// How far along x the cell above begins, for its height: the tangent of the angle by which the cell is sheared.
+    pub(super) shear: f64,
 }
 
 /// Two segments that may touch: segment i of a rope goes from its point i to the next.
@@ -118,7 +120,9 @@ impl Relaxation {
         }));
         let longest = halves.iter().copied().fold(0.1, f64::max).min(0.5);
         let touch = 1.0 + MARGIN;
-        let grid = PointGrid::new(&middles, touch + 2.0 * longest, self.period);
+        // The grid is of a cell with right angles: what is near in a sheared one is a little further off there.
+        let upright: Vec<DVec3> = middles.iter().map(|p| sheared(*p, -self.shear)).collect();
+        let grid = PointGrid::new(&upright, (touch + 2.0 * longest) * (1.0 + self.shear.abs()), self.period);
         let of_rope = |r: usize| -> Vec<Contacts> {
             let mut found: Vec<Contacts> = Vec::new();
             let mut walk = grid.walk();
@@ -134,12 +138,12 @@ impl Relaxation {
                     let mut cells = [0.0; 2];
                     let mut shift = DVec3::ZERO;
                     if let Some(period) = self.period {
-                        let d = near.at - middle;
+                        let d = near.at - upright[own];
                         cells = [-(d.x / period.x).round(), -(d.y / period.y).round()];
-                        shift = shift_by(cells, period);
+                        shift = shift_by(cells, period, self.shear);
                     }
                     // Most of what cells hold is too far away: tell that before anything is computed.
-                    let distance = (near.at + shift - middle).length_squared();
+                    let distance = (sheared(near.at, self.shear) + shift - middle).length_squared();
                     if distance > widest || other <= own || distance > (touch + half + halves[other]).powi(2) {
                         continue;
                     }
@@ -190,6 +194,7 @@ impl Relaxation {
                 second: usize::from(contacts.ropes[0] != contacts.ropes[1]),
                 ropes: contacts.ropes.map(|r| &self.ropes[r]),
                 period: self.period.unwrap_or_default(),
+                shear: self.shear,
             };
             if backwards {
                 contacts.pairs.iter_mut().rev().for_each(|pair| sides.part(pair));
@@ -230,9 +235,14 @@ fn independent(contacts: Vec<Contacts>) -> Vec<Vec<Contacts>> {
     groups.into_iter().map(|(_, group)| group).collect()
 }
 
-/// The vector of so many periods.
-fn shift_by(cells: [f64; 2], period: DVec2) -> DVec3 {
-    DVec3::new(cells[0] * period.x, cells[1] * period.y, 0.0)
+/// The vector of so many periods of a sheared cell.
+fn shift_by(cells: [f64; 2], period: DVec2, shear: f64) -> DVec3 {
+    sheared(DVec3::new(cells[0] * period.x, cells[1] * period.y, 0.0), shear)
+}
+
+/// A place moved along x by so much of its height.
+pub(super) fn sheared(p: DVec3, shear: f64) -> DVec3 {
+    DVec3::new(p.x + shear * p.y, p.y, p.z)
 }
 
 impl Rope {
@@ -341,6 +351,7 @@ struct Sides<'a> {
     second: usize,
     ropes: [&'a Rope; 2],
     period: DVec2,
+    shear: f64,
 }
 
 impl Sides<'_> {
@@ -354,7 +365,7 @@ impl Sides<'_> {
         let (a, b) = (pair.first as usize, pair.second as usize);
         let (a_next, a_jump) = self.ropes[0].next(a, self.points[0].len());
         let (b_next, b_jump) = self.ropes[1].next(b, self.points[self.second].len());
-        let shift = shift_by(pair.shift.map(f64::from), self.period);
+        let shift = shift_by(pair.shift.map(f64::from), self.period, self.shear);
         let (p0, p1) = (self.points[0][a], self.points[0][a_next] + a_jump);
         let (q0, q1) = (self.points[self.second][b], self.points[self.second][b_next] + b_jump);
         let near = nearest(p0, p1, q0 + shift, q1 + shift);
@@ -393,7 +404,7 @@ mod tests {
             ends: Ends::Open,
             rest: 0.5,
         };
-        Relaxation { ropes: vec![rope(DVec3::X, 0.5 * gap), rope(DVec3::Y, -0.5 * gap)], period: None }
+        Relaxation { ropes: vec![rope(DVec3::X, 0.5 * gap), rope(DVec3::Y, -0.5 * gap)], period: None, shear: 0.0 }
     }
 
     #[test]
@@ -426,7 +437,7 @@ mod tests {
             ends: Ends::Joined(DVec3::X * period.x),
             rest: 0.5,
         };
-        let mut r = Relaxation { ropes: vec![rope(8.9, 0.0), rope(0.1, 0.3)], period: Some(period) };
+        let mut r = Relaxation { ropes: vec![rope(8.9, 0.0), rope(0.1, 0.3)], period: Some(period), shear: 0.0 };
         r.run(100, |_| {});
         for i in 0..n as usize {
             let gap = (r.ropes[1].points[i] + DVec3::Y * period.y).distance(r.ropes[0].points[i]);
@@ -477,7 +488,7 @@ mod tests {
         let at = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
         let points: Vec<DVec3> = (0..n).map(|i| DVec3::new(3.0 * at(i).cos(), 2.0 * at(i).sin(), 0.0)).collect();
         let ring = Rope { points, pinned: vec![false; n], ends: Ends::Joined(DVec3::ZERO), rest: 16.0 / n as f64 };
-        let mut r = Relaxation { ropes: vec![ring], period: None };
+        let mut r = Relaxation { ropes: vec![ring], period: None, shear: 0.0 };
         r.run(6000, |_| {});
         let points = &r.ropes[0].points;
         let middle = points.iter().sum::<DVec3>() / n as f64;

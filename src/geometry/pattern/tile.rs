@@ -10,7 +10,7 @@ use super::{
     chart::ChartError,
     knit::Knit,
     overlap::{Overlap, overlap},
-    relax::{Ends, Relaxation, Rope},
+    relax::{Ends, Relaxation, Rope, sheared},
     weave::{Extent, Impossible, Weave},
 };
 use crate::geometry::{
@@ -193,6 +193,12 @@ impl Tile {
     /// The same cloth pulled to another period: yarns keep length and thickness, loops open, close and turn. Yarns of
     /// unequal thickness are only moved apart.
     pub fn pulled(&self, period: DVec2, rounds: usize) -> Self {
+        self.strained(period, 0.0, rounds)
+    }
+
+    /// As [`Self::pulled`], and sheared: the tile above begins `shear` times its height further along x. The yarns are given
+    /// as they lie where the tile is drawn back upright, so that it repeats along x and y as any other does.
+    pub fn strained(&self, period: DVec2, shear: f64, rounds: usize) -> Self {
         let stretch = period / self.period;
         let mut out = self.clone();
         out.period = period;
@@ -207,16 +213,16 @@ impl Tile {
             return out;
         }
         let rope = |(moved, at_rest): (&TileStrand, &TileStrand)| Rope {
-            points: moved.points.iter().map(|p| *p / diameter).collect(),
+            points: moved.points.iter().map(|p| sheared(*p, shear) / diameter).collect(),
             pinned: vec![false; moved.points.len()],
-            ends: Ends::Joined(moved.jump(period) / diameter),
+            ends: Ends::Joined(sheared(moved.jump(period), shear) / diameter),
             rest: at_rest.length(self.period) / diameter / moved.points.len() as f64,
         };
         let ropes = out.strands.iter().zip(&self.strands).map(rope).collect();
-        let mut relaxation = Relaxation { ropes, period: Some(period / diameter) };
+        let mut relaxation = Relaxation { ropes, period: Some(period / diameter), shear };
         relaxation.run(rounds, |_| {});
         for (strand, rope) in out.strands.iter_mut().zip(relaxation.ropes) {
-            strand.points = rope.points.into_iter().map(|p| p * diameter).collect();
+            strand.points = rope.points.into_iter().map(|p| sheared(p, -shear) * diameter).collect();
         }
         out
     }
@@ -402,7 +408,7 @@ pub fn chain(link: f64) -> Vec<DVec3> {
         rest: length / count as f64,
         points: fine.points.clone(),
     };
-    let mut relaxation = Relaxation { ropes: vec![rope], period: Some(period) };
+    let mut relaxation = Relaxation { ropes: vec![rope], period: Some(period), shear: 0.0 };
     relaxation.run(300, |_| {});
     let relaxed = TileStrand { points: relaxation.ropes.swap_remove(0).points, ..fine };
     let places = relaxed.evenly(LINKS * POINTS, period);
@@ -496,6 +502,34 @@ mod tests {
             assert!((grown - 1.0).abs() < 0.045, "{x} {y}: {grown}");
             assert_eq!(pulled.diameter(), tile.diameter());
         }
+    }
+
+    #[test]
+    fn shearing_keeps_length_and_parts_yarns() {
+        let tile = stockinette();
+        for sine in [-0.4_f64, 0.4] {
+            let cosine = (1.0 - sine * sine).sqrt();
+            let shear = sine / cosine;
+            let at = |rounds: usize| {
+                let mut cloth = tile.strained(tile.period * DVec2::new(1.0, cosine), shear, rounds).repeated(3, 3);
+                cloth.strands.iter_mut().flat_map(|s| &mut s.points).for_each(|p| *p = sheared(*p, shear));
+                let length = cloth.length() / 9.0 / tile.length();
+                let curve = |s: TileStrand| {
+                    let radii = vec![s.radius; s.points.len()];
+                    let basis = Basis::CatmullRom;
+                    (Curve { basis, closed: false, points: s.points, radii: None, flattening: None }, radii)
+                };
+                let curves: Vec<_> = cloth.strands.into_iter().map(curve).collect();
+                (length, overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap())
+            };
+            let ((given, as_drawn), (length, found)) = (at(0), at(150));
+            println!("{sine}: {given} {as_drawn:?}, {length} {found:?}");
+            assert!((length - 1.0).abs() < 0.045, "{sine}: {length}");
+            assert!(found.share < 0.5 * as_drawn.share && found.deepest < as_drawn.deepest, "{found:?} {as_drawn:?}");
+        }
+        // Upright it is what pulling gives.
+        let (a, b) = (tile.strained(tile.period, 0.0, 20), tile.pulled(tile.period, 20));
+        assert!(a.strands.iter().zip(&b.strands).all(|(a, b)| a.points == b.points));
     }
 
     #[test]

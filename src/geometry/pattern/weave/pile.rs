@@ -71,7 +71,7 @@ pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStra
     if yarns.iter().any(|yarn| !yarn.free.is_empty()) {
         let places: Vec<Vec<usize>> = yarns.iter().map(|yarn| yarn.places(0.5 * STEP * diameter)).collect();
         let ropes = yarns.iter().zip(&places).map(|(yarn, places)| yarn.rope(places, diameter)).collect();
-        let mut relaxation = Relaxation { ropes, period: None };
+        let mut relaxation = Relaxation { ropes, period: None, shear: 0.0 };
         relaxation.run(ROUNDS, |_| {});
         for ((yarn, places), rope) in yarns.iter_mut().zip(&places).zip(relaxation.ropes) {
             for (&i, point) in places.iter().zip(rope.points).filter(|(i, _)| yarn.free.get(**i) == Some(&true)) {
