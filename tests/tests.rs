@@ -31,6 +31,8 @@ mod builder;
 mod fabric_truth;
 // White cloth under a white sky is as bright as the sky.
 mod furnace;
+// Cloth laid on garment meshes: movement, prints, seams, and what cannot be laid.
+mod garments;
 // Damaged scene files give errors, never panics.
 mod fuzz;
 // Yarns, plies or fibres as curves: the same cloth, its memory told beforehand.

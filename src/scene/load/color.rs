@@ -16,6 +16,7 @@ use super::{
     Context, Range, Reader,
     dyes::Dyes,
     radians,
+    tint::{Print, Tint, tint},
     yarns::Library,
 };
 use crate::{
@@ -24,7 +25,7 @@ use crate::{
         garment::Tension,
         pattern::{PatternStrand, StrandKind},
     },
-    image::{self, texture::Texture},
+    image,
     input::diagnostic::Span,
     math::{
         sampler::{Stream, hash2},
@@ -50,6 +51,8 @@ pub(super) struct FabricCoordinates {
     kinds: Vec<StrandKind>,
     /// Columns and rows.
     extent: [f32; 2],
+    /// Width and height of a stitch, mm, where that is known.
+    stitch: Option<[f32; 2]>,
     /// The yarn of each curve in the library, where each is of one colour; else empty.
     own: Vec<usize>,
 }
@@ -57,13 +60,14 @@ pub(super) struct FabricCoordinates {
 impl FabricCoordinates {
     /// That of curves of which nothing is known: `columns` along each, and one row each.
     pub(super) fn along(columns: f32, fabric: &Fabric) -> Self {
-        Self { points: Vec::new(), kinds: Vec::new(), extent: [columns, fabric.curves.len() as f32], own: Vec::new() }
+        let extent = [columns, fabric.curves.len() as f32];
+        Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new() }
     }
 
     /// That of cloth that the program makes, and its curves.
     pub(super) fn of(strands: Vec<PatternStrand>, extent: [u32; 2]) -> (Vec<Curve>, Self) {
         let extent = extent.map(|n| n as f32);
-        let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent, own: Vec::new() };
+        let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new() };
         let curves = strands.into_iter().map(PatternStrand::smooth).map(|strand| {
             grid.points.push(strand.coordinates);
             grid.kinds.push(strand.kind);
@@ -72,11 +76,11 @@ impl FabricCoordinates {
         (curves.collect(), grid)
     }
 
-    /// That of yarns laid on a garment, by stitches and rows from the corner of each panel.
-    pub(super) fn laid(points: Vec<Vec<[f32; 2]>>, kinds: Vec<StrandKind>) -> Self {
+    /// That of yarns laid on a garment, by stitches and rows from the corner of each panel; a stitch is so wide and high, mm.
+    pub(super) fn laid(points: Vec<Vec<[f32; 2]>>, kinds: Vec<StrandKind>, stitch: [f32; 2]) -> Self {
         let most = |k: usize| points.iter().flatten().map(|c| c[k]).fold(1.0, f32::max).ceil();
         let extent = [most(0), most(1)];
-        Self { points, kinds, extent, own: Vec::new() }
+        Self { points, kinds, extent, stitch: Some(stitch), own: Vec::new() }
     }
 
     /// The same of curves each of which is of one yarn of the library.
@@ -125,6 +129,8 @@ struct Motif {
     /// Of an image: drawn once over the whole fabric, not a pixel for each stitch.
     stretched: bool,
     offset: [i64; 2],
+    /// Where its lower left corner is from that of a panel, mm, in place of the offset.
+    place: Option<[f64; 2]>,
     /// Whether it begins anew across and up.
     again: [bool; 2],
     span: Span,
@@ -144,12 +150,6 @@ struct Layout {
     /// From the left; of a weave its warps.
     columns: Vec<String>,
     motif: Option<Motif>,
-}
-
-struct Tint {
-    path: PathBuf,
-    span: Span,
-    repeat: [f64; 2],
 }
 
 /// How much yarns differ; standard deviations.
@@ -199,15 +199,7 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
         columns: names("columns"),
         motif: table.table("motif").and_then(|t| motif(t, context, &known)),
     };
-    let tint = table.table("tint").and_then(|tint| {
-        if !tint.has("image") {
-            tint.error("missing key `image` in the tint", Some("tint = { image = \"pattern.png\" }"));
-        }
-        let path = tint.string("image").map(|p| (p, tint.span("image").unwrap_or(tint.header())));
-        let repeat = tint.vec2("repeat", Range::POSITIVE).unwrap_or([1.0; 2]);
-        tint.finish();
-        path.map(|(path, span)| Tint { path: context.resolve(path, span), span, repeat })
-    });
+    let tint = table.table("tint").and_then(|table| tint(table, context));
     let variation = table.table("vary").map(|vary| {
         let seed = vary.u64_or("seed", 0, 0..=u64::from(u32::MAX)) as u32;
         let radius = vary.f64_or("radius", 0.0, Range::between(0.0, 0.5));
@@ -235,6 +227,10 @@ fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&str, Span)) -
     let repeats = [("both", [true; 2]), ("across", [true, false]), ("up", [false, true]), ("none", [false; 2])];
     let again = table.one_of_or("repeat", [true; 2], &repeats);
     let offset = table.vec2("offset", Range::between(-1e6, 1e6)).unwrap_or([0.0; 2]).map(|o| o.round() as i64);
+    let place = table.vec2("place", Range::FINITE).map(|p| p.map(|v| v * context.unit));
+    if table.has("offset") && table.has("place") {
+        table.error_at("offset", "give `offset` or `place`, not both", None);
+    }
     let mut key = Vec::new();
     if let Some(yarns) = table.required_table("yarns") {
         for sign in yarns.keys().collect::<Vec<_>>() {
@@ -280,7 +276,7 @@ fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&str, Span)) -
         }
     };
     table.finish();
-    Some(Motif { cells: cells?, key, stretched, offset, again, span })
+    Some(Motif { cells: cells?, key, stretched, offset, place, again, span })
 }
 
 /// `#rrggbb`, as sRGB.
@@ -316,6 +312,23 @@ impl CellMap {
 }
 
 impl Motif {
+    /// Its cells where they are drawn; `stitch` is the size of a stitch, mm, where that is known.
+    fn placed(
+        &self,
+        extent: [f32; 2],
+        stitch: Option<[f32; 2]>,
+        yarns: &[usize],
+        ground: usize,
+    ) -> Result<CellMap, String> {
+        let mut map = self.cells(extent, yarns, ground)?;
+        if let Some(place) = self.place {
+            let stitch = stitch
+                .ok_or("`place` needs the panels of a garment, whose stitches have a size; elsewhere `offset`")?;
+            map.offset = [0, 1].map(|k| (place[k] / f64::from(stitch[k])).round() as i64);
+        }
+        Ok(map)
+    }
+
     fn cells(&self, extent: [f32; 2], yarns: &[usize], ground: usize) -> Result<CellMap, String> {
         match &self.cells {
             Cells::Text(rows) => {
@@ -413,7 +426,7 @@ impl ColorPlan {
         library: &Library,
     ) -> Option<StitchColors> {
         let widest = widths.iter().copied().max().unwrap_or(1);
-        let cells = self.cells([widest as f32, widths.len() as f32], false, base, context, library)?;
+        let cells = self.cells([widest as f32, widths.len() as f32], None, false, base, context, library)?;
         let map = cells.of_rows();
         let at = |(row, width): (usize, &u32)| -> Vec<usize> {
             (0..*width).map(|column| map.at(column as f32 + 0.5, row as f32 + 0.5)).collect()
@@ -458,7 +471,7 @@ impl ColorPlan {
         let coordinates = coordinates(fabric);
         let yarns: Vec<&Yarn> = library.yarns.values().collect();
         let woven = coordinates.kinds.iter().any(|kind| *kind != StrandKind::Course);
-        let cells = self.cells(coordinates.extent, woven, base, context, library)?;
+        let cells = self.cells(coordinates.extent, coordinates.stitch, woven, base, context, library)?;
         for map in cells.maps() {
             let asked = (0..fabric.curves.len()).any(|curve| std::ptr::eq(cells.of(curve, &coordinates), map));
             let wrong = map.cells.iter().find_map(|&yarn| other_build(yarns[yarn], yarns[base]));
@@ -467,17 +480,11 @@ impl ColorPlan {
                 return None;
             }
         }
-        let texture = match &self.tint {
+        let print = match &self.tint {
             None => None,
-            Some(tint) => match Texture::open(&tint.path) {
-                Ok(texture) => Some((texture, tint.repeat)),
-                Err(error) => {
-                    context.error(tint.span, error.to_string(), None);
-                    return None;
-                }
-            },
+            Some(tint) => Some(tint.open(coordinates.extent, coordinates.stitch, context)?),
         };
-        let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, texture, shades, yarns: &yarns };
+        let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, print, shades, yarns: &yarns };
         let mut variants = Variants::default();
         let curves = fabric.curves.iter().enumerate();
         let material_indices =
@@ -496,6 +503,7 @@ impl ColorPlan {
     fn cells(
         &self,
         extent: [f32; 2],
+        stitch: Option<[f32; 2]>,
         woven: bool,
         base: usize,
         context: &Context<'_>,
@@ -517,7 +525,7 @@ impl ColorPlan {
             None => None,
             Some(motif) => {
                 let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| index_of(name)).collect();
-                match motif.cells(extent, &yarns, base) {
+                match motif.placed(extent, stitch, &yarns, base) {
                     Ok(cells) => Some(cells),
                     Err(problem) => {
                         context.error(motif.span, problem, None);
@@ -573,8 +581,8 @@ struct Painter<'a> {
     cells: &'a LaidCells,
     /// Colours that came with the curves.
     dyes: Option<&'a Dyes>,
-    /// A picture over the cloth, and how often it is repeated.
-    texture: Option<(Texture, [f64; 2])>,
+    /// A picture over the cloth.
+    print: Option<Print>,
     /// How yarns differ in colour, if they do.
     shades: Option<Variation>,
     yarns: &'a [&'a Yarn],
@@ -596,18 +604,13 @@ impl Painter<'_> {
             let kind = self.coordinates.kinds.get(index).copied();
             let dye = self.dyes.and_then(|d| d.at(index, kind, [x, y]));
             let dyed = self.dyes.map_or(Vec3::ONE, |d| d.color(dye));
-            let (key, color) = match &self.texture {
+            let (key, color) = match &self.print {
                 None => (Key { yarn, shade, dye, levels: [0; 3] }, dyed * shine),
-                Some((texture, repeat)) => {
-                    let extent = self.coordinates.extent;
-                    let uv = |[x, y]: [f32; 2]| [x / extent[0] * repeat[0] as f32, y / extent[1] * repeat[1] as f32];
+                Some(print) => {
                     let next = self.coordinates.between(index, place + 1, steps, count);
-                    let (here, next) = (uv([x, y]), uv(next));
-                    // As wide as to the next place, but for a jump from one end of a round to its other.
-                    let width = (next[0] - here[0]).hypot(next[1] - here[1]).min(0.25);
                     let mut stream = Stream::new(hash2(index as u32, place as u32));
-                    let levels = texture
-                        .sample(here[0], here[1], width)
+                    let levels = print
+                        .color([x, y], next)
                         .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
                     let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
                     (Key { yarn, shade: None, dye, levels }, dyed * Vec3::from(color))
@@ -682,7 +685,7 @@ mod tests {
 
     fn motif(cells: Cells, key: [&str; 2], stretched: bool) -> Motif {
         let key = key.map(|k| (k.to_owned(), String::new())).to_vec();
-        Motif { cells, key, stretched, offset: [0; 2], again: [true; 2], span: span() }
+        Motif { cells, key, stretched, offset: [0; 2], place: None, again: [true; 2], span: span() }
     }
 
     /// The cells of a map as they are seen, the top row first.
@@ -703,6 +706,11 @@ mod tests {
         letter.offset = [1, 0];
         let map = letter.cells([8.0, 5.0], &[0, 1], 0).unwrap();
         assert_eq!(drawn(&map, 4, 1), [".#.."]);
+        // The same in millimetres, of stitches of 4 x 3.
+        letter.place = Some([4.5, -0.5]);
+        let map = letter.placed([8.0, 5.0], Some([4.0, 3.0]), &[0, 1], 0).unwrap();
+        assert_eq!(drawn(&map, 4, 1), [".#.."]);
+        assert!(letter.placed([8.0, 5.0], None, &[0, 1], 0).is_err_and(|problem| problem.contains("`offset`")));
     }
 
     #[test]

@@ -362,6 +362,7 @@ impl GarmentPlan {
         let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
         let rest = &read[&frames.rest];
         let cloths = cloths?;
+        let sizes: Vec<DVec2> = cloths.iter().map(|c| c.tile.stitch()).collect();
         let overlap = cloths.iter().filter_map(|c| c.tile.overlap()).max_by(|a, b| a.share.total_cmp(&b.share));
         let options = Options {
             unit_mm: unit,
@@ -452,11 +453,11 @@ impl GarmentPlan {
         facts.yarn_length = lengths.iter().sum();
         facts.weight = weight(&lengths);
         facts.repairs = notes;
-        Some((self.made(first, later, at_rest), facts))
+        Some((self.made(first, later, at_rest, &sizes), facts))
     }
 
-    /// Yarns as curves, for each rule that has any.
-    fn made(self, first: Laid, later: Vec<Laid>, rest: Option<Laid>) -> Vec<MadePanels> {
+    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm.
+    fn made(self, first: Laid, later: Vec<Laid>, rest: Option<Laid>, sizes: &[DVec2]) -> Vec<MadePanels> {
         let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
             std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
         };
@@ -487,7 +488,7 @@ impl GarmentPlan {
                 yarn: rule.yarn,
                 color: rule.color,
                 curves,
-                coordinates: FabricCoordinates::laid(places, kinds),
+                coordinates: FabricCoordinates::laid(places, kinds, sizes[i].as_vec2().to_array()),
                 motion,
             });
         }

@@ -9,7 +9,7 @@ use std::{
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
-    super::{AlbedoTexture, Material, Object, defaults},
+    super::{AlbedoTexture, Material, Object, animation::numbered, defaults},
     Context, Range, Reader, UNITS, placement,
     stages::Stages,
 };
@@ -283,6 +283,7 @@ impl MeshPlan {
         let (origin, mut mesh) = match self.source {
             Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
             Source::File(MeshFile { path, span, unit, z_up, prim, frame }) => {
+                let path = numbered(&path, frame).filter(|_| !path.exists()).unwrap_or(path);
                 let read = if stage::is_stage(&path) {
                     of_stage(&context.stages, &path, prim.as_ref(), f64::from(frame))
                 } else {

@@ -18,6 +18,7 @@ mod sequence;
 mod settings;
 mod stage_camera;
 mod stages;
+mod tint;
 mod view;
 mod weave;
 mod yarns;

@@ -1,0 +1,223 @@
+//! Garments from outside: cloth that moves with its mesh, prints, seams, and what cannot be laid.
+
+use std::{fmt::Write as _, path::Path};
+
+use yarnray::{
+    scene::{
+        Scene,
+        load::{LoadOptions, load},
+    },
+    trace::{CurveGeometry, World},
+};
+
+use crate::support::{directory, write, yarnray};
+
+type Point = [f64; 3];
+
+/// Two panels of 80 x 80 mm, sewn side by side and placed in space by `at`.
+fn mesh(at: &dyn Fn(f64, f64) -> Point) -> String {
+    const CELLS: usize = 8;
+    let mut text = String::new();
+    for (panel, name) in ["left", "right"].into_iter().enumerate() {
+        for j in 0..=CELLS {
+            for i in 0..=CELLS {
+                let (u, v) = (10.0 * i as f64, 10.0 * j as f64);
+                let [x, y, z] = at(80.0 * panel as f64 + u, v);
+                writeln!(text, "v {x} {y} {z}\nvt {} {v}", 200.0 * panel as f64 + u).unwrap();
+            }
+        }
+        writeln!(text, "g {name}").unwrap();
+        for j in 0..CELLS {
+            for i in 0..CELLS {
+                let a = (CELLS + 1) * ((CELLS + 1) * panel + j) + i + 1;
+                let corners = [a, a + 1, a + CELLS + 2, a + CELLS + 1].map(|c| format!("{c}/{c}"));
+                writeln!(text, "f {}", corners.join(" ")).unwrap();
+            }
+        }
+    }
+    text
+}
+
+fn flat(u: f64, v: f64) -> Point {
+    [u, v, 0.0]
+}
+
+/// Turned about a slanting axis and moved, as it is.
+fn turned(u: f64, v: f64) -> Point {
+    let (s, c) = 0.7_f64.sin_cos();
+    let [x, y, z] = [c * u - s * v, s * u + c * v, 0.0];
+    [x + 30.0, c * y - s * z, s * y + c * z - 20.0]
+}
+
+/// Bent: about as long as before.
+fn bent(u: f64, v: f64) -> Point {
+    [u, v, 8.0 * (u / 30.0).sin()]
+}
+
+/// A garment of loops of 4 x 3 mm, and what the test adds.
+fn scene(source: &str, fabric: &str, camera: &str) -> String {
+    format!(
+        "[render]\nwidth = 32\nheight = 24\nspp = 4\n[camera]\n{camera}\n\
+         [fiber.wool]\nr = 0.1\ntt = 0.3\nd = 0.3\nbeta_r = 10\nbeta_tt = 10\nbeta_n = 25\n\
+         [yarn.two]\nradius = 0.6\nplies = 2\nply_twist = 20\nfiber = \"wool\"\nfibers = 50\ndensity = 0.5\n\
+         [yarn.dark]\nradius = 0.6\nplies = 2\nply_twist = 20\nfiber = \"wool\"\nfibers = 50\ndensity = 0.5\n\
+         [[fabric]]\nyarn = \"two\"\ngauge = [25, 33.3333]\n{fabric}\n\
+         source = {{ type = \"garment\", unit = \"mm\", cloth = {{ type = \"knit\", pattern = \"stockinette\" }}, {source} }}\n\
+         [[light]]\ntype = \"environment\"\n"
+    )
+}
+
+const STILL: &str = "type = \"perspective\"\nposition = [80, 40, 300]\ntarget = [80, 40, 0]";
+
+fn at_frame(path: &Path, frame: u32) -> Scene {
+    let options = LoadOptions { assignments: vec![format!("render.frame={frame}")], ..LoadOptions::default() };
+    load(path, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// All control points of a scene, of each yarn, in the scene's own space.
+fn points(scene: &Scene) -> Vec<Vec<Point>> {
+    let place = |p: &glam::DVec3| (*p + scene.middle).to_array();
+    scene.fabrics.iter().flat_map(|f| &f.curves).map(|(curve, _)| curve.points.iter().map(place).collect()).collect()
+}
+
+/// The phase of the plies in the middle of each segment.
+fn phases(scene: &Scene) -> Vec<f32> {
+    let (world, _) = World::new(scene, 1).unwrap();
+    let of = |geometry: &CurveGeometry| {
+        let CurveGeometry::Yarns(yarns) = geometry else { panic!("yarns") };
+        (0..yarns.strands.segments().len() as u32).map(|i| yarns.strands.frame(i, 0.5).phase).collect::<Vec<_>>()
+    };
+    world.geometries().iter().flat_map(of).collect()
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    [0, 1, 2].map(|k| (a[k] - b[k]).powi(2)).iter().sum::<f64>().sqrt()
+}
+
+/// Frames as files: at rest, bent, and turned as a whole.
+fn three_frames(d: &Path) {
+    for (number, at) in [(1, &flat as &dyn Fn(f64, f64) -> Point), (2, &bent), (3, &turned)] {
+        write(d, &format!("g.{number:04}.obj"), mesh(at));
+    }
+}
+
+#[test]
+fn stitches_go_with_the_cloth_and_plies_keep_their_places() {
+    let folder = directory();
+    let d = folder.path();
+    three_frames(d);
+    let path = write(d, "s.toml", scene("path = \"g.####.obj\"", "vary = { tension = 0.04 }", STILL));
+    let [rest, bent_one, turned_one] = [1, 2, 3].map(|frame| at_frame(&path, frame));
+    let [a, b, c] = [&rest, &bent_one, &turned_one].map(points);
+    let count = |yarns: &[Vec<Point>]| yarns.iter().map(Vec::len).collect::<Vec<_>>();
+    assert!(count(&a) == count(&b) && count(&a) == count(&c));
+    assert!(a.iter().map(Vec::len).sum::<usize>() > 10_000);
+    // Cloth that is turned as a whole takes its yarns with it as they are.
+    let mut worst = [0.0_f64; 2];
+    for ((p, q), r) in a.iter().flatten().zip(b.iter().flatten()).zip(c.iter().flatten()) {
+        let [u, v, w] = *p;
+        let [x, y, z] = turned(u, v);
+        let (sin, cos) = 0.7_f64.sin_cos();
+        // The normal is turned about x only.
+        worst[0] = worst[0].max(distance(*r, [x, y - w * sin, z + w * cos]));
+        // Where it bends each point stays over its place of the panel: aside by no more than its height times the slope.
+        let [_, _, height] = bent(u, v);
+        worst[1] = worst[1].max(distance(*q, [u, v, height + w]));
+    }
+    assert!(worst[0] < 2e-3, "{worst:?}");
+    assert!(worst[1] < 0.9, "{worst:?}");
+    // Plies wind as at rest: by the same angle at each place of the yarn.
+    let [a, b, c] = [&rest, &bent_one, &turned_one].map(phases);
+    assert!(a.len() == b.len() && a.len() == c.len() && a.len() > 10_000);
+    let off = |x: &f32, y: &f32| ((x - y) / std::f32::consts::TAU).fract().abs();
+    let slid = |other: &[f32]| a.iter().zip(other).map(|(x, y)| off(x, y).min(1.0 - off(x, y))).fold(0.0, f32::max);
+    assert!(slid(&b) < 1e-3 && slid(&c) < 1e-3, "{} {}", slid(&b), slid(&c));
+}
+
+#[test]
+fn the_shutter_sees_the_cloth_on_its_way() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "g.0001.obj", mesh(&flat));
+    write(d, "g.0002.obj", mesh(&|u, v| [u, v, 12.0]));
+    let camera = format!("{STILL}\nshutter = [0, 0.5]");
+    let path = write(d, "s.toml", scene("path = \"g.####.obj\"", "", &camera));
+    let scene = at_frame(&path, 1);
+    let motion = &scene.fabrics[0].motion;
+    let lowest = |yarns: &[Vec<glam::DVec3>]| yarns.iter().flatten().map(|p| p.z).fold(f64::MAX, f64::min);
+    let open: Vec<Vec<glam::DVec3>> = scene.fabrics[0].curves.iter().map(|(c, _)| c.points.clone()).collect();
+    let last = motion.later.last().expect("it moves");
+    let risen = lowest(last) - lowest(&open);
+    assert!((risen - 6.0).abs() < 1e-3, "{risen}");
+    // What is around follows by the number of the frame as well.
+    let mut text = scene_with_body(&camera);
+    text = text.replace("BODY", "g.####.obj");
+    let path = write(d, "with.toml", text);
+    let highest = |frame| at_frame(&path, frame).objects[0].mesh.points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+    let body = [1, 2].map(|frame| highest(frame) + at_frame(&path, frame).middle.z);
+    assert!((body[1] - body[0] - 12.0).abs() < 1e-6, "{body:?}");
+}
+
+fn scene_with_body(camera: &str) -> String {
+    scene("path = \"g.####.obj\"", "", camera) + "[[mesh]]\npath = \"BODY\"\nunit = \"mm\"\n"
+}
+
+#[test]
+fn a_frame_of_another_mesh_is_named() {
+    let folder = directory();
+    let d = folder.path();
+    three_frames(d);
+    let shorter = mesh(&flat);
+    let shorter = shorter.trim_end().rsplit_once('\n').unwrap().0;
+    write(d, "g.0002.obj", shorter);
+    write(d, "s.toml", scene("path = \"g.####.obj\"", "", STILL));
+    let run = yarnray(d, &["render", "s.toml", "-q", "--frames", "2", "-o", "o.png"]);
+    assert_eq!(run.status, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains("g.0002.obj: 254 triangles, where the first frame has 256"), "{}", run.stderr);
+    assert!(!d.join("o.png").exists());
+    // A number that is not there.
+    let run = yarnray(d, &["render", "s.toml", "-q", "--frames", "9", "-o", "o.png"]);
+    assert!(run.status == Some(2) && run.stderr.contains("g.0009.obj"), "{}", run.stderr);
+}
+
+#[test]
+fn motifs_are_placed_by_lengths() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "g.obj", mesh(&flat));
+    // Two stitches of 4 x 3 mm, 40 mm from the left and 30 from below.
+    let motif = "motif = { rows = [\"##\"], yarns = { \"#\" = \"dark\" }, place = [40, 30], repeat = \"none\" }";
+    let own = format!("[[fabric.panel]]\ngroup = \"left\"\n{motif}");
+    let source = "path = \"g.obj\"";
+    let path = write(d, "s.toml", scene(source, "", STILL).replace("[[light]]", &format!("{own}\n[[light]]")));
+    let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let mut dark = Vec::new();
+    for fabric in &scene.fabrics {
+        let is_dark = |i: &u16| fabric.variants.get(usize::from(*i)).is_some_and(|y| y.name == "dark");
+        for ((curve, _), indices) in fabric.curves.iter().zip(&fabric.material_indices) {
+            let steps = indices.len() / curve.points.len().max(2) + 1;
+            let places = indices.iter().enumerate().filter(|(_, i)| is_dark(i));
+            dark.extend(
+                places.map(|(k, _)| curve.points[(k / steps.max(1)).min(curve.points.len() - 1)] + scene.middle),
+            );
+        }
+    }
+    assert!(!dark.is_empty());
+    let middle = dark.iter().sum::<glam::DVec3>() / dark.len() as f64;
+    // Within a stitch and what is left for the edge.
+    assert!((middle.x - 44.0).abs() < 5.0 && (middle.y - 31.5).abs() < 5.0, "{middle}");
+    // Not elsewhere, and not on the other panel.
+    assert!(dark.iter().all(|p| (p.x - 44.0).abs() < 10.0 && (p.y - 31.5).abs() < 8.0));
+}
+
+#[test]
+fn cloth_that_has_no_room_is_an_error() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "g.obj", mesh(&flat));
+    write(d, "s.toml", scene("path = \"g.obj\", scale = 0.02", "", STILL));
+    let run = yarnray(d, &["make", "garment", "s.toml", "-o", "y.txt"]);
+    assert_eq!(run.status, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains("no panel has room for a stitch of 4.000 x 3.000 mm"), "{}", run.stderr);
+    assert!(!d.join("y.txt").exists());
+}
