@@ -348,6 +348,9 @@ fn scene_report(scene: &Scene) -> (Value, String) {
             bytes_in_words(limit)
         );
     }
+    if !scene.garments.is_empty() && scene.fabrics.is_empty() {
+        text += "  of cloth on garments, which is not laid to tell this, nothing is said below\n";
+    }
     for used in [true, false] {
         text += if used { "  used\n" } else { "  left out\n" };
         for f in plan.features.iter().filter(|f| f.used == used) {
