@@ -62,30 +62,17 @@ pub(super) fn ways(edges: &[([u32; 2], u32, Option<u32>)]) -> Vec<Way> {
     out
 }
 
-/// A way in one frame, walked by its length.
+/// A way in one frame, walked by its length in the first: what runs along it stays where it is on the cloth.
 struct Rail<'a> {
     pose: &'a Pose,
     way: &'a Way,
-    lengths: Vec<f64>,
+    lengths: &'a [f64],
 }
 
-impl<'a> Rail<'a> {
-    fn new(pose: &'a Pose, way: &'a Way) -> Self {
-        let mut lengths = vec![0.0];
-        for pair in way.vertices.windows(2) {
-            let [a, b] = [pair[0], pair[1]].map(|v| pose.vertex(v).0);
-            lengths.push(lengths[lengths.len() - 1] + a.distance(b));
-        }
-        Self { pose, way, lengths }
-    }
-
-    fn length(&self) -> f64 {
-        self.lengths[self.lengths.len() - 1]
-    }
-
+impl Rail<'_> {
     /// Position at a share of the length, and unit vectors along, inwards (to the left) and out.
     fn at(&self, share: f64) -> [DVec3; 4] {
-        let total = self.length();
+        let total = self.lengths[self.lengths.len() - 1];
         let share = if self.way.closed { share.rem_euclid(1.0) } else { share };
         let s = share * total;
         let n = self.lengths.len();
@@ -139,32 +126,55 @@ const LINK: f64 = 3.2;
 /// A chain's middle is so far inside the edge, in diameters of its yarn.
 pub(super) const CHAIN_INSIDE: f64 = 1.1;
 
-/// The yarns along some ways in all frames: for each frame the same yarns.
-pub(super) fn finish(poses: &[Pose], ways: &[(Way, Finish)]) -> Vec<Vec<LaidYarn>> {
-    let counts: Vec<usize> = ways
-        .iter()
-        .map(|(way, finish)| {
-            // As many links in all frames as in the first.
-            let length = Rail::new(&poses[0], way).length();
-            let step = match finish {
-                Finish::Chain { link, .. } => *link,
-                Finish::Overcast { radius, .. } => 2.6 * radius,
-                Finish::Mattress { step, .. } => *step,
-                Finish::Overlock { radius, .. } => 6.0 * radius,
-            };
-            ((length / step).round() as usize).max(1)
-        })
-        .collect();
+/// What runs along an edge, and of which cloth it is.
+#[derive(Clone, Debug)]
+pub(super) struct Edging {
+    pub(super) way: Way,
+    pub(super) finish: Finish,
+    pub(super) cloth: usize,
+    /// Links, turns or stitches: as many in all frames as in the first.
+    count: usize,
+    /// Length from the way's start to each of its vertices in the first frame, mm.
+    lengths: Vec<f64>,
+}
+
+impl Edging {
+    /// Counts along the way as it is in the first frame.
+    pub(super) fn new(way: Way, finish: Finish, cloth: usize, first: &Pose) -> Self {
+        let step = match finish {
+            Finish::Chain { link, .. } => link,
+            Finish::Overcast { radius, .. } => 2.6 * radius,
+            Finish::Mattress { step, .. } => step,
+            Finish::Overlock { radius, .. } => 6.0 * radius,
+        };
+        let mut lengths = vec![0.0];
+        for pair in way.vertices.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|v| first.vertex(v).0);
+            lengths.push(lengths[lengths.len() - 1] + a.distance(b));
+        }
+        let count = ((lengths[lengths.len() - 1] / step).round() as usize).max(1);
+        Self { way, finish, cloth, count, lengths }
+    }
+}
+
+/// The yarns along some edges in all frames: for each frame the same yarns.
+pub(super) fn finish(poses: &[Pose], edgings: &[&Edging]) -> Vec<Vec<LaidYarn>> {
     let link = chain(LINK);
     poses
         .iter()
         .map(|pose| {
-            let one = |((way, finish), &count): (&(Way, Finish), &usize)| {
-                let rail = Rail::new(pose, way);
-                let (points, radius) = points(&rail, finish, count, &link);
-                LaidYarn { points, closed: way.closed, radius, kind: StrandKind::Course, coordinates: Vec::new() }
+            let one = |edging: &&Edging| {
+                let rail = Rail { pose, way: &edging.way, lengths: &edging.lengths };
+                let (points, radius) = points(&rail, &edging.finish, edging.count, &link);
+                LaidYarn {
+                    points,
+                    closed: edging.way.closed,
+                    radius,
+                    kind: StrandKind::Course,
+                    coordinates: Vec::new(),
+                }
             };
-            ways.par_iter().zip(&counts).map(one).collect()
+            edgings.par_iter().map(one).collect()
         })
         .collect()
 }

@@ -19,12 +19,12 @@ use rayon::prelude::*;
 
 use self::{
     body::Body,
-    edges::{Finish, Way, finish, ways},
+    edges::{Edging, Finish, finish, ways},
     lattice::{Division, Lattice},
     lay::{lay, turn},
     panels::Panels,
     strain::Shapes,
-    surface::{BorderEdge, Surface},
+    surface::{BorderEdge, Pose, Surface},
 };
 pub use self::{
     edges::SeamKind,
@@ -108,7 +108,7 @@ pub struct Garment {
     surface: Surface,
     lattices: Vec<Lattice>,
     shapes: Vec<Shapes>,
-    ways: Vec<(Way, Finish, usize)>,
+    edgings: Vec<Edging>,
     options: Options,
     report: Report,
 }
@@ -176,7 +176,7 @@ impl Garment {
                 return Err(GarmentError::at(panel.line, problem, "lay the panel out flat, without overlaps"));
             }
         }
-        let ways = edge_ways(&borders, &lattices, &cloth, &options, &shapes);
+        let edgings = edgings(&surface.pose(&points), &borders, &lattices, &cloth, &options, &shapes);
         let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let report = Report {
@@ -200,7 +200,7 @@ impl Garment {
             notes,
             bounds: (low, high),
         };
-        Ok(Self { panels, surface, lattices, shapes, ways, options, report })
+        Ok(Self { panels, surface, lattices, shapes, edgings, options, report })
     }
 
     /// What is known of it.
@@ -245,8 +245,7 @@ impl Garment {
             }
         }
         for cloth in 0..self.options.cloths.len() {
-            let own: Vec<(Way, Finish)> =
-                self.ways.iter().filter(|w| w.2 == cloth).map(|(way, finish, _)| (way.clone(), *finish)).collect();
+            let own: Vec<&Edging> = self.edgings.iter().filter(|e| e.cloth == cloth).collect();
             for (frame, mut yarns) in laid.iter_mut().zip(finish(&poses, &own)) {
                 if self.options.coordinates {
                     for yarn in &mut yarns {
@@ -328,14 +327,15 @@ fn division(cloth: &Cloth, shapes: &Shapes) -> Division {
     Division { stitch, repeat: cloth.tile.counts, free, sewn }
 }
 
-/// What runs along the edges of all panels.
-fn edge_ways(
+/// What runs along the edges of all panels, as they lie in the first frame.
+fn edgings(
+    first: &Pose,
     borders: &[Vec<BorderEdge>],
     lattices: &[Lattice],
     cloth: &[usize],
     options: &Options,
     shapes: &[Shapes],
-) -> Vec<(Way, Finish, usize)> {
+) -> Vec<Edging> {
     let mut free = Vec::new();
     let mut sewn = Vec::new();
     for (panel, border) in borders.iter().enumerate() {
@@ -362,7 +362,7 @@ fn edge_ways(
         } else {
             Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
         };
-        out.push((way, finish, own));
+        out.push(Edging::new(way, finish, own, first));
     }
     if options.seam != SeamKind::None {
         // Ways of a seam keep to one pair of panels.
@@ -378,7 +378,7 @@ fn edge_ways(
                     SeamKind::Overlock => Finish::Overlock { radius: 0.25 * d, reach: (1.6 * d).max(1.0) },
                     _ => Finish::Mattress { step: (2.0 * stitch.y).max(4.0 * d), radius: 0.4 * d },
                 };
-                out.push((way, finish, own));
+                out.push(Edging::new(way, finish, own, first));
             }
         }
     }
