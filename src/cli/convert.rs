@@ -4,7 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, files::Files, log, make::write_curves, positive};
+use super::{
+    Failure,
+    files::Files,
+    level::LevelArgs,
+    log,
+    make::{refuse_unknown, write_curves},
+    positive,
+};
 use crate::geometry::{
     curve::{Basis, CurveSet},
     curve_file::{self, ReadOptions},
@@ -13,9 +20,10 @@ use crate::geometry::{
 
 const EXAMPLES: &str = "Examples:
   yarnray convert glove.bcc glove.usdc --unit cm --radius 0.08     curves for Blender, Houdini and usdview
+  yarnray convert cloth.abc plies.usdc --unit mm --yarn wool --as plies
 
 --prim '/Garment/*' takes some prims of a stage, --frame 12 one frame of it, --tile 8,12 repeats a periodic pattern.
-Read: .bcc .hair .obj .pyp .txt .usd .usda .usdc .usdz .abc. Written: .bcc .hair .obj .txt .usda .usdc .usd.
+Read: .bcc .hair .obj .pyp .yarns .smobj .txt .usd .usda .usdc .usdz .abc. Written: .bcc .hair .obj .yarns .txt .usda .usdc.
 What a format cannot hold is said.";
 
 #[derive(Args, Debug)]
@@ -49,6 +57,8 @@ pub(super) struct ConvertArgs {
     /// Radius of curves that have none, in the input's unit.
     #[arg(long, value_name = "R", value_parser = positive)]
     radius: Option<f64>,
+    #[command(flatten)]
+    level: LevelArgs,
     /// Say nothing.
     #[arg(long, short)]
     quiet: bool,
@@ -115,12 +125,12 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
     if !can.ids && set.ids.iter().any(Option::is_some) {
         lost.push("ids are lost: curves are numbered as they come".to_owned());
     }
+    if !can.ids && set.plies.iter().any(Option::is_some) {
+        lost.push("numbers of plies are lost: the format has none".to_owned());
+    }
     if !can.unit && set.unit_mm.is_some_and(|unit| unit != 1.0) {
         let unit = set.unit_mm.unwrap_or(1.0);
         lost.push(format!("the unit is lost: lengths are of {unit} mm, which whoever reads them must know"));
-    }
-    if set.curves.iter().any(|c| c.flattening.is_some()) {
-        lost.push("flat sections are lost: yarns are round, as wide as they were".to_owned());
     }
     if set.curves.iter().any(|c| !can.bases.contains(&c.basis)) {
         lost.push("how points are meant is lost: give it as `basis` where the file is read".to_owned());
@@ -129,12 +139,46 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
 }
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
-    if !curve_file::can_write(&args.output) {
-        let known = ".bcc, .hair, .obj, .yarns, .txt, .usda or .usdc";
-        let problem = format!("error: {}: expected a name that ends in {known}", args.output.display());
-        return Err(Failure::Input(problem));
-    }
+    refuse_unknown(std::slice::from_ref(&args.output))?;
     Files::default().reads("input", [&args.input]).writes("output", [&args.output]).check(args.quiet)?;
+    let mut set = read(args)?;
+    if set.up_axis == Some(2) {
+        // Files of this program have y up: a quarter turn about x.
+        let points = set.curves.iter_mut().flat_map(|c| &mut c.points);
+        points.for_each(|p| *p = glam::DVec3::new(p.x, p.z, -p.y));
+        set.up_axis = Some(1);
+    }
+    let unit = set.unit_mm;
+    if let Some(yarn) = args.level.yarn()? {
+        let unit = unit.ok_or_else(|| {
+            let hint = "--unit cm; `yarnray info` of it proposes one";
+            Failure::Input(format!(
+                "error: {}: a yarn needs the unit of its curves\n  hint: {hint}",
+                args.input.display()
+            ))
+        })?;
+        scale(&mut set, unit);
+        set = args.level.apply(set, &yarn)?;
+        scale(&mut set, 1.0 / unit);
+    }
+    set.unit_mm = unit;
+    if let Some(to) = args.to_unit.as_deref().map(millimetres) {
+        scale(&mut set, unit.unwrap_or(1.0) / to);
+        set.unit_mm = Some(to);
+    }
+    write_curves(&args.output, &set)?;
+    if !args.quiet {
+        for line in set.notes.iter().cloned().chain(losses(&args.output, &set)) {
+            log::say(&format!("{}: {line}", args.output.display()));
+        }
+        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+        log::say(&format!("wrote {}: {} curves, {points} points", args.output.display(), set.curves.len()));
+    }
+    Ok(())
+}
+
+/// The curves of the input with the unit and the radius that the command line gives them.
+fn read(args: &ConvertArgs) -> Result<CurveSet, Failure> {
     let basis = args.basis.as_deref().map(|b| if b == "b-spline" { Basis::BSpline } else { Basis::CatmullRom });
     let options = ReadOptions {
         basis,
@@ -158,29 +202,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
             curve.radii = Some(vec![radius; curve.points.len()]);
         }
     }
-    if let Some(unit) = args.to_unit.as_deref().map(millimetres) {
-        let scale = set.unit_mm.unwrap_or(1.0) / unit;
-        for curve in &mut set.curves {
-            curve.points.iter_mut().for_each(|p| *p *= scale);
-            curve.radii.iter_mut().flatten().for_each(|r| *r *= scale);
-        }
-        set.unit_mm = Some(unit);
+    Ok(set)
+}
+
+fn scale(set: &mut CurveSet, by: f64) {
+    for curve in &mut set.curves {
+        curve.points.iter_mut().for_each(|p| *p *= by);
+        curve.radii.iter_mut().flatten().for_each(|r| *r *= by);
     }
-    if set.up_axis == Some(2) {
-        // Files of this program have y up: a quarter turn about x.
-        for curve in &mut set.curves {
-            let turned = curve.points.iter_mut().chain(curve.flattening.iter_mut().flatten());
-            turned.for_each(|p| *p = glam::DVec3::new(p.x, p.z, -p.y));
-        }
-        set.up_axis = Some(1);
-    }
-    write_curves(&args.output, &set)?;
-    if !args.quiet {
-        for line in set.notes.iter().cloned().chain(losses(&args.output, &set)) {
-            log::say(&format!("{}: {line}", args.output.display()));
-        }
-        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        log::say(&format!("wrote {}: {} curves, {points} points", args.output.display(), set.curves.len()));
-    }
-    Ok(())
 }

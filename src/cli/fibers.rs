@@ -6,31 +6,30 @@ use clap::Args;
 
 use super::{
     Failure, SceneArgs,
-    files::{Attempts, Files},
-    log,
-    make::write_curves,
+    files::Files,
+    level,
+    make::{refuse_unknown, write_all},
     terminal::print,
 };
 use crate::{
-    geometry::curve::CurveSet,
-    geometry::curve_file,
     scene::Mode,
     trace::{self, Estimate},
 };
 
 const EXAMPLES: &str = "Examples:
   yarnray make fibers scenes/woven_silk.toml -o silk.txt          every fibre, as x y z radius for Mitsuba's bsplinecurve
-  yarnray make fibers scenes/knit.toml --mode ply -o plies.hair   one curve for each ply
+  yarnray make fibers scenes/knit.toml --mode ply -o plies.usdc   one curve for each ply
   yarnray make fibers scenes/knit.toml --estimate                 how many there would be
 
-The extension names the format: .bcc (no radii), .hair, .txt (x y z radius). Positions are millimetres.";
+The extension names the format: .usda and .usdc (with colours and the numbers of yarns and plies), .bcc (no radii), .hair,
+.obj (lines, no radii), .yarns, .txt (x y z radius). Positions are millimetres.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct FibersArgs {
     /// The scene (.toml).
     scene: PathBuf,
-    /// Where to write; the extension names the format (.bcc, .hair, .txt). Repeatable.
+    /// Where to write; the extension names the format. Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required_unless_present = "estimate")]
     out: Vec<PathBuf>,
     /// Only tell how many curves' points there would be, and how much memory they take.
@@ -44,6 +43,7 @@ pub(super) struct FibersArgs {
 }
 
 pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
+    refuse_unknown(&args.out)?;
     let mut scene = args.options.load(&args.scene)?;
     // Yarns are what the scene's own curve files hold: this command is for what is in them.
     if scene.render.mode == Mode::Yarn {
@@ -59,13 +59,6 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
             super::bytes_in_words(total.bvh_bytes)
         ))?;
     }
-    for path in &args.out {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if !curve_file::can_write(path) || extension.as_deref() == Some("obj") {
-            let problem = format!("error: {}: expected a name that ends in .bcc, .hair or .txt", path.display());
-            return Err(Failure::Input(problem));
-        }
-    }
     if args.out.is_empty() {
         return Ok(());
     }
@@ -74,17 +67,5 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
         .reads("--curves", &args.options.curves)
         .writes("-o", &args.out)
         .check(args.quiet)?;
-    let curves = trace::curves(&scene)?;
-    let set = CurveSet { curves, unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
-    let mut attempts = Attempts::default();
-    for path in &args.out {
-        if attempts.note(write_curves(path, &set)) && !args.quiet {
-            log::say(&format!("wrote {}", path.display()));
-        }
-    }
-    if !args.quiet {
-        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        log::say(&format!("{} curves, {points} control points", set.curves.len()));
-    }
-    attempts.finish()
+    write_all(&args.out, &level::curves(&scene)?, args.quiet)
 }

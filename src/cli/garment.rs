@@ -4,19 +4,21 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, SceneArgs, log, make::write_curves};
-use crate::geometry::{
-    curve::{Curve, CurveSet},
-    curve_file,
+use super::{
+    Failure, SceneArgs,
+    level::{self, LEVELS},
+    log,
+    make::{refuse_unknown, write_all},
 };
 
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make garment scenes/pullover.toml --set render.frame=12 -o pullover.0012.usdc
+  yarnray make garment scenes/pullover.toml --as plies -o plies.usdc
   yarnray info scenes/pullover.toml                               how many stitches there would be
 
-The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius). Positions are
-millimetres, as the scene has them.";
+The extension names the format: .usda and .usdc (with colours and the numbers of yarns and plies), .bcc (no radii), .hair,
+.obj (lines, no radii), .yarns, .txt (x y z radius). Positions are millimetres, as the scene has them.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
@@ -26,46 +28,31 @@ pub(super) struct GarmentArgs {
     /// Where to write; the extension names the format. Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required = true)]
     out: Vec<PathBuf>,
+    /// Write yarns, a curve for each ply, or every fibre.
+    #[arg(long = "as", value_name = "LEVEL", default_value = "yarns", value_parser = LEVELS)]
+    level: String,
     /// Say nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
     #[command(flatten)]
     options: SceneArgs,
 }
 
 pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
-    for path in &args.out {
-        if !curve_file::can_write(path) {
-            let problem = format!("error: {}: expected a name that ends in .bcc, .hair, .obj or .txt", path.display());
-            return Err(Failure::Input(problem));
-        }
-    }
-    let scene = args.options.load(&args.scene)?;
+    refuse_unknown(&args.out)?;
+    let mut scene = args.options.load(&args.scene)?;
     if scene.garments.is_empty() {
         let hint = "source = { type = \"garment\", path = \"pullover.obj\", cloth = { type = \"knit\" } }";
         let problem = format!("error: {}: no fabric is laid on a garment\n  help: {hint}", args.scene.display());
         return Err(Failure::Input(problem));
     }
-    let facts = scene.garments.clone();
-    let middle = scene.middle;
-    let placed = |(mut curve, radii): (Curve, Vec<f64>)| {
-        curve.points.iter_mut().for_each(|p| *p += middle);
-        curve.radii = Some(radii);
-        curve
-    };
-    let curves = scene.fabrics.into_iter().flat_map(|f| f.curves).map(placed).collect();
-    let set = CurveSet { curves, unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
-    for path in &args.out {
-        write_curves(path, &set)?;
-    }
+    scene.render.mode = level::mode(&args.level);
+    let set = level::curves(&scene)?;
+    write_all(&args.out, &set, args.quiet)?;
     if !args.quiet {
-        for path in &args.out {
-            log::say(&format!("wrote {}", path.display()));
-        }
-        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        let stitches: u64 = facts.iter().map(|f| f.stitches).sum();
-        log::say(&format!("{stitches} stitches, {} yarns, {points} control points", set.curves.len()));
-        for note in facts.iter().flat_map(|f| &f.repairs) {
+        let stitches: u64 = scene.garments.iter().map(|f| f.stitches).sum();
+        log::say(&format!("{stitches} stitches"));
+        for note in scene.garments.iter().flat_map(|f| &f.repairs) {
             log::say(&format!("note: {note}"));
         }
     }

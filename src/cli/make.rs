@@ -10,11 +10,12 @@ use super::{
     fibers::{self, FibersArgs},
     files::{Attempts, Files},
     garment::{self, GarmentArgs},
+    level::LevelArgs,
     log, positive,
 };
 use crate::{
     geometry::{
-        curve::CurveSet,
+        curve::{Curve, CurveSet},
         curve_file,
         pattern::{
             MAX_POINTS, PatternStrand, StrandKind,
@@ -27,6 +28,7 @@ use crate::{
         },
     },
     image::output,
+    scene::Yarn,
 };
 
 const EXAMPLES: &str = "Examples:
@@ -34,10 +36,12 @@ const EXAMPLES: &str = "Examples:
   yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --rows 10 --form tube -o shaped.hair
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
+  yarnray make weave --yarn linen --as fibers -o linen.usdc
   yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
 The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it),
-.usda and .usdc (BasisCurves with widths, in millimetres). Lengths have no unit in the others; what reads them gives one.";
+.usda and .usdc (BasisCurves with widths, colours and the numbers of yarns and plies, in millimetres). Lengths have no unit
+in the others; what reads them gives one.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
@@ -64,9 +68,11 @@ struct Output {
     /// Where to write; the extension names the format (.bcc, .hair, .obj, .yarns, .txt, .usda, .usdc). Repeatable.
     #[arg(short, long = "out", value_name = "PATH", required = true)]
     out: Vec<PathBuf>,
-    /// Radius of the yarn; 0.5, or that of a WIF draft.
+    /// Radius of the yarn; that of --yarn, or of a WIF draft, or 0.5, if not given.
     #[arg(long, value_name = "R", value_parser = positive)]
     radius: Option<f64>,
+    #[command(flatten)]
+    level: LevelArgs,
     /// Say nothing.
     #[arg(long, short)]
     quiet: bool,
@@ -198,7 +204,8 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         let rows = chart.rows();
         (Some(chart), (!args.profile.is_empty()).then_some(rows))
     };
-    let radius = args.output.radius.unwrap_or(RADIUS);
+    let yarn = args.output.yarn()?;
+    let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
     let Some(chart) = chart else { return Err(Failure::Input("error: unknown pattern".to_owned())) };
     let profile: Vec<DVec2> = args.profile.iter().map(|p| DVec2::from(*p)).collect();
     if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
@@ -236,7 +243,7 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
     let made = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
     let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
-    write(made.strands, &args.output, [radius; 2])?;
+    write(made.strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;
     if !args.output.quiet {
         let [width, height] = made.gauge;
         let (across, up) = (f64::from(piece.stitches) * width, f64::from(piece.rows) * height);
@@ -261,9 +268,10 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
         rows => (Draft::matrix(rows).map_err(wrong)?, None),
     };
+    let yarn = args.output.yarn()?;
     let [warps, wefts] = file.as_ref().map_or([YARNS; 2], |f| f.count);
     let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
-    let radius = own(args.output.radius, 0).unwrap_or(RADIUS);
+    let radius = own(args.output.radius, 0).or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let piece = Weave {
         warps: Extent::Yarns(args.warps.unwrap_or(warps)),
@@ -285,7 +293,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         }),
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
         draft,
-        threads: file.map(|f| f.threads).unwrap_or_default(),
+        threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
     };
     let cloth = match piece.relax() {
         Ok(cloth) => cloth,
@@ -300,7 +308,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         }
         Err(Impossible::TooLarge) => return too_many("warps, wefts"),
     };
-    write(cloth.strands(), &args.output, [radius, piece.weft_radius])?;
+    let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
+    write(cloth.strands(), &args.output, [radius, piece.weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
         let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
@@ -324,46 +333,75 @@ fn wif_draft(path: &str) -> Result<WovenWif, Failure> {
     Ok(woven)
 }
 
+impl Output {
+    /// The yarn that cloth is of, if one is named; files are refused first that cannot be written.
+    fn yarn(&self) -> Result<Option<Yarn>, Failure> {
+        refuse_unknown(&self.out)?;
+        self.level.yarn()
+    }
+}
+
 /// Writes all files and says what they hold. Radii are those of other strands and of wefts.
-fn write(strands: Vec<PatternStrand>, output: &Output, [radius, weft_radius]: [f64; 2]) -> Result<(), Failure> {
-    let curves = strands
-        .into_iter()
-        .map(|strand| {
-            let radius = if strand.kind == StrandKind::Weft { weft_radius } else { radius };
-            let mut curve = strand.curve;
-            // Curve files know round yarns only: of equal area.
-            let own = curve.radii.take().zip(curve.flattening.take());
-            let round = |(wide, axes): (Vec<f64>, Vec<glam::DVec3>)| -> Vec<f64> {
-                wide.iter().zip(&axes).map(|(w, axis)| w * axis.length().sqrt()).collect()
-            };
-            curve.radii = Some(own.map_or_else(|| vec![radius; curve.points.len()], round));
-            curve
-        })
-        .collect();
-    let set = CurveSet { curves, up_axis: Some(1), ..CurveSet::default() };
-    for path in &output.out {
-        if !curve_file::can_write(path) {
-            let problem = format!(
-                "error: {}: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc",
-                path.display()
-            );
-            return Err(Failure::Input(problem));
-        }
+fn write(
+    strands: Vec<PatternStrand>,
+    output: &Output,
+    [radius, weft_radius]: [f64; 2],
+    yarn: Option<&Yarn>,
+    color: impl Fn(&PatternStrand) -> Option<[f32; 3]>,
+) -> Result<(), Failure> {
+    let mut set = CurveSet { up_axis: Some(1), ..CurveSet::default() };
+    for strand in strands {
+        let radius = if strand.kind == StrandKind::Weft { weft_radius } else { radius };
+        set.colors.push(color(&strand));
+        let mut curve = strand.curve;
+        curve.radii.get_or_insert_with(|| vec![radius; curve.points.len()]);
+        set.curves.push(curve);
     }
-    Files::default().writes("-o", &output.out).check(output.quiet)?;
-    let mut attempts = Attempts::default();
-    for path in &output.out {
-        if attempts.note(write_curves(path, &set)) && !output.quiet {
-            log::say(&format!("wrote {}", path.display()));
-        }
+    if set.colors.iter().all(Option::is_none) {
+        set.colors = Vec::new();
     }
-    if !output.quiet {
-        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+    let set = match yarn {
+        Some(yarn) => output.level.apply(set, yarn)?,
+        None => {
+            set.curves.iter_mut().for_each(Curve::make_round);
+            set
+        }
+    };
+    write_all(&output.out, &set, output.quiet)?;
+    if !output.quiet && set.plies.is_empty() {
         let lengths = overlap(set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?))));
-        log::say(&format!("{} yarns, {points} control points", set.curves.len()));
         if let Some(found) = lengths {
             log::say(&super::overlap_in_words(&found));
         }
+    }
+    Ok(())
+}
+
+/// Refuses names of files whose format is not written.
+pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
+    match paths.iter().find(|path| !curve_file::can_write(path)) {
+        None => Ok(()),
+        Some(path) => {
+            let known = ".bcc, .hair, .obj, .yarns, .txt, .usda or .usdc";
+            Err(Failure::Input(format!("error: {}: expected a name that ends in {known}", path.display())))
+        }
+    }
+}
+
+/// Writes curves to every file that can be written, and says what they hold.
+pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Result<(), Failure> {
+    Files::default().writes("-o", paths).check(quiet)?;
+    let mut attempts = Attempts::default();
+    for path in paths {
+        if attempts.note(write_curves(path, set)) && !quiet {
+            log::say(&format!("wrote {}", path.display()));
+        }
+    }
+    if !quiet {
+        set.notes.iter().for_each(|note| log::say(&format!("note: {note}")));
+        let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
+        let what = if set.plies.is_empty() { "yarns" } else { "curves" };
+        log::say(&format!("{} {what}, {points} control points", set.curves.len()));
     }
     attempts.finish()
 }

@@ -11,6 +11,7 @@ mod fibers;
 mod files;
 mod garment;
 mod info;
+mod level;
 mod log;
 mod make;
 mod manual;

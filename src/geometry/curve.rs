@@ -39,6 +39,25 @@ impl Curve {
         };
         closing + self.points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>()
     }
+
+    /// The radius of a curve that is equally thick everywhere, but for rounding.
+    pub fn even_radius(&self) -> Option<f64> {
+        let radii = self.radii.as_ref()?;
+        let first = *radii.first()?;
+        radii.iter().all(|r| equal_radii(*r, first)).then_some(first)
+    }
+
+    /// Gives sections that are pressed flat up for round ones of equal area, which is all that files can hold.
+    pub fn make_round(&mut self) {
+        if let (Some(radii), Some(axes)) = (&mut self.radii, self.flattening.take()) {
+            radii.iter_mut().zip(&axes).for_each(|(r, axis)| *r *= axis.length().sqrt());
+        }
+    }
+}
+
+/// Whether two radii differ by no more than single precision loses on the way.
+pub fn equal_radii(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }
 
 /// The curves of one file.
@@ -54,8 +73,10 @@ pub struct CurveSet {
     pub notes: Vec<String>,
     /// Colour of each curve, linear Rec.709, where the file has one; empty where no curve has.
     pub colors: Vec<Option<[f32; 3]>>,
-    /// The number that the file gives each curve; empty where it gives none.
+    /// The number of each curve's yarn, as the file gives it; empty where it gives none.
     pub ids: Vec<Option<i64>>,
+    /// Which ply of its yarn each curve is, or is a fibre of, from 0; empty where curves are yarns.
+    pub plies: Vec<Option<i64>>,
 }
 
 impl CurveSet {

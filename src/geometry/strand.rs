@@ -332,12 +332,18 @@ impl Strands {
         }
     }
 
-    /// The yarns as curves with radii, to be written to a file; closed ones are cut at their seam.
-    pub fn curves(&self) -> impl Iterator<Item = Curve> + '_ {
+    /// The yarns, each with its number, as curves with radii, to be written to a file; closed ones are cut at their seam, flat
+    /// ones are round and of equal area. Those without segments are left out.
+    pub fn curves(&self) -> impl Iterator<Item = (usize, Curve)> + '_ {
         (0..self.yarns()).filter(|&yarn| !self.segments_of(yarn).is_empty()).map(|yarn| {
             let segments = self.segments_of(yarn);
             let first = self.segments[segments.start as usize] as usize;
-            curve_of(self.basis, &self.points[first..first + segments.len() + 3])
+            let all = first..first + segments.len() + 3;
+            if self.flattening.is_empty() {
+                return (yarn, curve_of(self.basis, &self.points[all]));
+            }
+            let round = |i: usize| self.points[i] * Vec4::new(1.0, 1.0, 1.0, self.flattening[i].length().sqrt());
+            (yarn, curve_of(self.basis, &all.map(round).collect::<Vec<_>>()))
         })
     }
 

@@ -121,6 +121,11 @@ impl Tubes {
         self.first_segments.partition_point(|&first| first <= segment) - 1
     }
 
+    /// The segments of one tube.
+    pub fn segments_of(&self, tube: usize) -> std::ops::Range<usize> {
+        self.first_segments[tube] as usize..self.first_segments[tube + 1] as usize
+    }
+
     /// Bytes of points and segments.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points) + size_of_val(&*self.segments) + size_of_val(&*self.first_segments)) as u64

@@ -43,6 +43,16 @@ impl FiberMaterial {
         2.0 * front_share_of_wrapped_normal(self.beta_n) - 1.0
     }
 
+    /// The colour of thick cloth of such fibres under an even sky, for programs that show curves in one colour: what a
+    /// half-space of isotropic scatterers of their albedo reflects (van de Hulst, Multiple Light Scattering, 1980). Linear
+    /// Rec.709.
+    pub fn cloth_color(&self) -> [f64; 3] {
+        std::array::from_fn(|c| {
+            let s = (1.0 - (self.r[c] + self.tt[c] + self.d[c]).clamp(0.0, 1.0)).sqrt();
+            (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s)
+        })
+    }
+
     /// The largest r + tt + d of the three channels.
     pub fn largest_albedo(&self) -> f64 {
         (0..3).map(|c| self.r[c] + self.tt[c] + self.d[c]).fold(0.0, f64::max)

@@ -7,6 +7,7 @@
 mod build;
 mod filter;
 mod mesh;
+mod outgoing;
 
 use std::{
     borrow::Cow,
@@ -19,7 +20,7 @@ use glam::{Vec3A, Vec4};
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
     geometry::{
-        curve::{Basis, Curve},
+        curve::Basis,
         ray::Ray,
         section::{Crossings, Section},
         strand::{Strands, TightBend},
@@ -40,6 +41,7 @@ use build::{Given, Preparation};
 use filter::{Counting, GapFilter, ShadowFilter};
 pub use mesh::SurfacePlace;
 use mesh::TriangleMesh;
+pub use outgoing::{curves, yarns};
 
 /// Curves of one kind of yarn with all that its rays need.
 #[derive(Debug)]
@@ -384,25 +386,6 @@ fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
 /// What the curves of each fabric will take, without making them.
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
     Preparation::new(scene, borrowed(scene)).estimates().collect()
-}
-
-/// The curves that a scene's cloth is in its mode, as Embree would get them: millimetres, where the scene's file has them.
-///
-/// # Errors
-/// If they would take more memory than the scene may.
-pub fn curves(scene: &Scene) -> Result<Vec<Curve>, BuildError> {
-    let geometries = Preparation::checked(scene, borrowed(scene), scene.render.max_memory, 0)?.geometries();
-    let mut curves: Vec<Curve> = geometries
-        .iter()
-        .flat_map(|geometry| match geometry {
-            CurveGeometry::Yarns(yarns) => yarns.strands.curves().collect::<Vec<_>>(),
-            CurveGeometry::Fibers(fibers) => fibers.tubes.curves().collect(),
-        })
-        .collect();
-    for point in curves.iter_mut().flat_map(|c| &mut c.points) {
-        *point += scene.middle;
-    }
-    Ok(curves)
 }
 
 /// A yarn with one of the models.

@@ -4,7 +4,7 @@ use std::{io, path::Path};
 
 use super::{CurveFileError, FileLocation, PrimPattern, ReadOptions, Stage, counted};
 use crate::geometry::{
-    curve::{Basis, Curve, CurveSet},
+    curve::{Basis, CurveSet, equal_radii},
     stage::{self, Contents, CurvesOut, Interpolated, StageError},
 };
 
@@ -61,42 +61,104 @@ pub(super) fn can_write(path: &Path) -> bool {
     matches!(extension.as_deref(), Some("usd" | "usda" | "usdc"))
 }
 
-/// One prim for each basis and kind of ends, with the number of each yarn.
-pub(super) fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
-    let color = |i: usize| set.colors.get(i).copied().flatten();
-    let kind = |i: usize, c: &Curve| (c.basis, c.closed, c.radii.is_some(), color(i).is_some());
-    let all_have_ids = !set.ids.is_empty() && set.ids.iter().all(Option::is_some);
-    let mut groups: Vec<CurvesOut<'_>> = Vec::new();
-    let mut kinds = Vec::new();
-    for (i, curve) in set.curves.iter().enumerate() {
-        let own = kinds.iter().position(|k| *k == kind(i, curve)).unwrap_or_else(|| {
-            kinds.push(kind(i, curve));
-            let basis = match curve.basis {
-                Basis::CatmullRom => "catmull_rom",
-                Basis::BSpline => "b_spline",
-                Basis::Linear => "linear",
-            };
-            let ends = if curve.closed { "closed" } else { "open" };
-            let name =
-                if kinds.len() == 1 { "yarns".to_owned() } else { format!("yarns_{basis}_{ends}_{}", kinds.len()) };
-            groups.push(CurvesOut { name, curves: Vec::new(), radius: SOME_RADIUS, primvars: Vec::new() });
-            kinds.len() - 1
-        });
-        groups[own].curves.push(curve);
-        // The file's own numbers, where it has some for all.
-        let id = if all_have_ids { set.ids[i].unwrap_or(0) } else { i as i64 };
-        let id = i32::try_from(id).unwrap_or(i as i32);
-        let primvars = &mut groups[own].primvars;
-        match primvars.first_mut() {
-            Some((_, Interpolated::Id(ids))) => ids.push(id),
-            _ => primvars.push(("yarnId".into(), Interpolated::Id(vec![id]))),
+/// The most prims for curves that are of one width each.
+const MOST_WIDTHS: usize = 8;
+
+/// What all curves of a prim have in common.
+#[derive(Clone, Copy, PartialEq)]
+struct Kind {
+    basis: Basis,
+    closed: bool,
+    radii: Radii,
+    colored: bool,
+    in_plies: bool,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Radii {
+    None,
+    /// The same everywhere on all curves of the prim: the first is this one's.
+    Even(f64),
+    Varying,
+}
+
+impl Kind {
+    fn of(set: &CurveSet, i: usize, widths: &mut Vec<f64>) -> Self {
+        let curve = &set.curves[i];
+        let radii = match (&curve.radii, curve.even_radius()) {
+            (None, _) => Radii::None,
+            (_, None) => Radii::Varying,
+            (_, Some(radius)) => match widths.iter().find(|w| equal_radii(**w, radius)) {
+                Some(known) => Radii::Even(*known),
+                None if widths.len() < MOST_WIDTHS => {
+                    widths.push(radius);
+                    Radii::Even(radius)
+                }
+                None => Radii::Varying,
+            },
+        };
+        Self {
+            basis: curve.basis,
+            closed: curve.closed,
+            radii,
+            colored: label(&set.colors, i).is_some(),
+            in_plies: label(&set.plies, i).is_some(),
         }
-        if let Some(color) = color(i) {
-            match primvars.get_mut(1) {
-                Some((_, Interpolated::Color(colors))) => colors.push(color),
-                _ => primvars.push(("displayColor".into(), Interpolated::Color(vec![color]))),
+    }
+
+    /// The name of the `number`th prim, which is the first of several or the only one.
+    fn name(&self, number: usize) -> String {
+        let what = if self.in_plies { "curves" } else { "yarns" };
+        if number == 1 {
+            return what.to_owned();
+        }
+        let basis = match self.basis {
+            Basis::CatmullRom => "catmull_rom",
+            Basis::BSpline => "b_spline",
+            Basis::Linear => "linear",
+        };
+        let ends = if self.closed { "closed" } else { "open" };
+        format!("{what}_{basis}_{ends}_{number}")
+    }
+}
+
+fn label<T: Copy>(list: &[Option<T>], i: usize) -> Option<T> {
+    list.get(i).copied().flatten()
+}
+
+/// One prim for each basis, kind of ends and width, with the number of each yarn. Curves of one width have a prim of their
+/// own, as constant widths are what every program reads alike.
+pub(super) fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
+    // The file's own numbers, where it has some for all.
+    let all_have_ids = !set.ids.is_empty() && set.ids.iter().all(Option::is_some);
+    let number = |n: i64, otherwise: usize| i32::try_from(n).unwrap_or(otherwise as i32);
+    let (mut kinds, mut widths) = (Vec::new(), Vec::new());
+    let mut members: Vec<Vec<usize>> = Vec::new();
+    for i in 0..set.curves.len() {
+        let kind = Kind::of(set, i, &mut widths);
+        match kinds.iter().position(|k| *k == kind) {
+            Some(own) => members[own].push(i),
+            None => {
+                kinds.push(kind);
+                members.push(vec![i]);
             }
         }
     }
+    let group = |(number_of_prim, (kind, members)): (usize, (&Kind, &Vec<usize>))| {
+        let all = || members.iter().copied();
+        let yarn = |i: usize| number(if all_have_ids { set.ids[i].unwrap_or(0) } else { i as i64 }, i);
+        let mut primvars = vec![("yarnId".to_owned(), Interpolated::Id(all().map(yarn).collect()))];
+        if kind.in_plies {
+            let plies = all().filter_map(|i| label(&set.plies, i)).map(|ply| number(ply, 0)).collect();
+            primvars.push(("plyId".to_owned(), Interpolated::Id(plies)));
+        }
+        if kind.colored {
+            let colors = all().filter_map(|i| label(&set.colors, i)).collect();
+            primvars.push(("displayColor".to_owned(), Interpolated::Color(colors)));
+        }
+        let curves = all().map(|i| &set.curves[i]).collect();
+        CurvesOut { name: kind.name(number_of_prim + 1), curves, radius: SOME_RADIUS, primvars }
+    };
+    let groups: Vec<CurvesOut<'_>> = kinds.iter().zip(&members).enumerate().map(group).collect();
     stage::write(path, set.unit_mm.unwrap_or(1.0), &groups, out)
 }

@@ -33,6 +33,11 @@ pub(super) enum Wrap {
     Pinned,
 }
 
+/// Names of numbers of curves; the first that an object has counts. Other programs have their own.
+pub(super) const ID_NAMES: [&str; 3] = ["yarnId", "id", "curveId"];
+/// The name of the number of a curve's ply.
+pub(super) const PLY_NAMES: [&str; 1] = ["plyId"];
+
 /// What all curves of a batch share.
 struct Kind {
     basis: StageBasis,
@@ -52,8 +57,10 @@ pub(super) struct Batch {
     pub(super) widths: Option<(Vec<f64>, Spread)>,
     /// Colours, linear Rec.709.
     pub(super) colors: Option<(Vec<DVec3>, Spread)>,
-    /// Numbers of the curves.
+    /// Numbers of the curves' yarns.
     pub(super) ids: Option<(Vec<i64>, Spread)>,
+    /// Numbers of their plies.
+    pub(super) plies: Option<(Vec<i64>, Spread)>,
 }
 
 /// How values are spread over an object.
@@ -125,10 +132,16 @@ impl Batch {
         let color = |v: DVec3| {
             Some(v.max(DVec3::ZERO).to_array().map(|c| c as f32)).filter(|c| c.iter().all(|c| c.is_finite()))
         };
-        let colors = per_curve(self.colors, &counts, mean).map_err(|p| p.of("displayColor"))?;
+        let labels = Labels { kind: &kind, counts: &counts };
+        let colors = labels.of("colours", self.colors, mean, &mut set.notes);
         set.add_labels(before, colors.map(|all| all.into_iter().map(color).collect()), |set| &mut set.colors);
-        let ids = per_curve(self.ids, &counts, |v| v[0]).map_err(|p| p.of("ids"))?;
-        set.add_labels(before, ids.map(|all| all.into_iter().map(Some).collect()), |set| &mut set.ids);
+        for (name, given, list) in [
+            ("ids", self.ids, (|set| &mut set.ids) as fn(&mut CurveSet) -> &mut Vec<Option<i64>>),
+            ("numbers of plies", self.plies, |set| &mut set.plies),
+        ] {
+            let own = labels.of(name, given, |v| v[0], &mut set.notes);
+            set.add_labels(before, own.map(|all| all.into_iter().map(Some).collect()), list);
+        }
         let stretch = [to_stage.x_axis, to_stage.y_axis, to_stage.z_axis].map(|axis| axis.truncate().length());
         let (least, most) =
             (stretch.iter().copied().fold(f64::INFINITY, f64::min), stretch.iter().copied().fold(0.0, f64::max));
@@ -257,36 +270,52 @@ impl Kind {
     }
 }
 
-/// One value for each curve; of values along curves what `one` makes of them.
-fn per_curve<T: Copy>(
-    given: Option<(Vec<T>, Spread)>,
-    counts: &[i64],
-    one: impl Fn(&[T]) -> T,
-) -> Result<Option<Vec<T>>, Problem> {
-    let Some((values, spread)) = given.filter(|(v, _)| !v.is_empty()) else { return Ok(None) };
-    // One value is that of all, whatever it is called.
-    if values.len() == 1 {
-        return Ok(Some(vec![values[0]; counts.len()]));
-    }
-    if values.len() == counts.len() && matches!(spread, Spread::Constant | Spread::Uniform) {
-        return Ok(Some(values));
-    }
-    let points: i64 = counts.iter().sum();
-    if spread != Spread::Vertex || values.len() as i64 != points {
-        // Along segments their numbers depend on basis and ends: all are one.
-        if matches!(spread, Spread::Varying | Spread::FaceVarying) {
-            return Ok(Some(vec![one(&values); counts.len()]));
+/// What curves are labelled with, by the numbers of their points.
+struct Labels<'a> {
+    kind: &'a Kind,
+    counts: &'a [i64],
+}
+
+impl Labels<'_> {
+    /// One value for each curve; of values along a curve what `one` makes of them. What does not fit is left out with a note:
+    /// curves are as good without.
+    fn of<T: Copy>(
+        &self,
+        name: &str,
+        given: Option<(Vec<T>, Spread)>,
+        one: impl Fn(&[T]) -> T,
+        notes: &mut Vec<String>,
+    ) -> Option<Vec<T>> {
+        let (values, spread) = given.filter(|(v, _)| !v.is_empty())?;
+        let curves = self.counts.len();
+        // One value is that of all, whatever it is called.
+        if values.len() == 1 {
+            return Some(vec![values[0]; curves]);
         }
-        let expected = if spread == Spread::Vertex { points } else { counts.len() as i64 };
-        return Err(Problem::new(format!("{} values are {expected} here, found {}", spread.name(), values.len())));
+        let sizes: Vec<usize> = match spread {
+            Spread::Constant | Spread::Uniform => vec![1; curves],
+            Spread::Vertex => self.counts.iter().map(|&c| c as usize).collect(),
+            Spread::Varying | Spread::FaceVarying => {
+                let ends: Vec<usize> = self.counts.iter().map(|&c| self.kind.varying_values(c as usize)).collect();
+                // Many programs take the word for values of points.
+                let of_points = values.len() as i64 == self.counts.iter().sum::<i64>();
+                if of_points { self.counts.iter().map(|&c| c as usize).collect() } else { ends }
+            }
+        };
+        let expected: usize = sizes.iter().sum();
+        if values.len() != expected {
+            let (spread, found) = (spread.name(), values.len());
+            notes.push(format!("{name} are left out: {spread} values are {expected} here, found {found}"));
+            return None;
+        }
+        let mut rest = values.as_slice();
+        let of_curve = |&size: &usize| {
+            let (own, others) = rest.split_at(size);
+            rest = others;
+            one(own)
+        };
+        Some(sizes.iter().map(of_curve).collect())
     }
-    let mut rest = values.as_slice();
-    let of_curve = |&count: &i64| {
-        let (own, others) = rest.split_at(count as usize);
-        rest = others;
-        one(own)
-    };
-    Ok(Some(counts.iter().map(of_curve).collect()))
 }
 
 /// The widths of a batch, as they are spread.

@@ -61,11 +61,6 @@ impl Problem {
         Self { object: None, text: text.into() }
     }
 
-    /// Of this property.
-    fn of(self, property: &str) -> Self {
-        Self { text: format!("`{property}`: {}", self.text), ..self }
-    }
-
     fn at(mut self, object: &str) -> Self {
         self.object.get_or_insert_with(|| object.to_owned());
         self

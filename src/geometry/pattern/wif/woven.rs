@@ -1,9 +1,13 @@
 //! What a WIF file says of cloth, as the loom of [`super::super::weave`] takes it.
 
 use super::{
-    super::draft::{Draft, DraftError, Threads},
+    super::{
+        PatternStrand, StrandKind,
+        draft::{Draft, DraftError, Threads},
+    },
     Wif,
 };
+use crate::math::srgb::srgb_to_linear;
 
 /// Threads of this thickness over their spacing are drawn so, not woven: programs write one value in both places.
 const DRAWN: f64 = 0.9;
@@ -42,6 +46,21 @@ pub struct WovenWif {
     pub count: [u32; 2],
     /// What was taken for granted.
     pub notes: Vec<String>,
+}
+
+impl WovenWif {
+    /// The colour of a strand of this cloth, linear Rec.709: the mean where it is several threads in one.
+    pub fn color_of(&self, strand: &PatternStrand) -> Option<[f32; 3]> {
+        let side = usize::from(strand.kind == StrandKind::Weft);
+        let colors = &self.colors[side];
+        let thread = |at: &[f32; 2]| colors.get((at[side].floor() as i64).rem_euclid(colors.len() as i64) as usize);
+        if colors.is_empty() || strand.coordinates.is_empty() {
+            return None;
+        }
+        let all: Vec<[f64; 3]> = strand.coordinates.iter().filter_map(thread).copied().collect();
+        let mean = |c: usize| all.iter().map(|v| srgb_to_linear(v[c] as f32)).sum::<f32>() / all.len() as f32;
+        Some([mean(0), mean(1), mean(2)])
+    }
 }
 
 impl Wif {

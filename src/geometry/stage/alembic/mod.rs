@@ -3,6 +3,7 @@
 //! The layout was taken from the sources of Alembic 1.8 (lib/Alembic/AbcCoreOgawa and lib/Alembic/Ogawa). Archives have
 //! neither unit nor up axis; times are seconds, which count [`FRAMES_PER_SECOND`] frames here.
 
+mod curves;
 mod ogawa;
 mod property;
 #[cfg(test)]
@@ -13,8 +14,7 @@ use std::fmt;
 use glam::{DMat4, DVec2, DVec3};
 
 use super::{
-    Contents, Format, MAX_DEPTH, PolygonMesh, PrimPattern, Problem, StageCamera, Take,
-    curves::{Batch, Spread, StageBasis, Wrap},
+    Contents, Format, MAX_DEPTH, PolygonMesh, PrimPattern, Problem, StageCamera, Take, curves::Spread,
     polygons::AtCorners,
 };
 use ogawa::{Bytes, Cursor, Group};
@@ -195,36 +195,6 @@ impl Archive {
         let top = Bytes(&self.bytes).root()?.group(2)?;
         let mut walk = Walk { archive: self, pattern, time, left: MAX_OBJECTS };
         walk.children(top, "", DMat4::IDENTITY, [false, true], 0, visit)
-    }
-
-    fn batch(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<Batch>, Problem> {
-        let Some(geometry) = self.geometry(object)? else { return Ok(None) };
-        let numbers = |name: &str| self.numbers(&geometry, name, time);
-        let points = numbers("P")?.unwrap_or_default();
-        let counts = geometry.at("nVertices", time, &self.samplings)?;
-        let counts = counts.map_or(Ok(Vec::new()), |around| around.before.integers("nVertices"))?;
-        let kind = numbers("curveBasisAndType")?.unwrap_or_default();
-        let code = |i: usize| kind.get(i).map_or(0, |&x| x as i64);
-        let basis = match (code(0), code(2)) {
-            (1, _) => StageBasis::Linear,
-            (0, 1) => StageBasis::Bezier,
-            (0, 2) => StageBasis::BSpline,
-            (0, 3) => StageBasis::CatmullRom,
-            (0, other) => return Err(Problem::new(format!("cubic curves of basis {other} are not read"))),
-            (other, _) => {
-                return Err(Problem::new(format!("curves of type {other} are not read; linear and cubic are")));
-            }
-        };
-        let wrap = if code(1) == 1 { Wrap::Periodic } else { Wrap::NonPeriodic };
-        let widths = self.indexed(&geometry, "width", time)?.map(|widths| {
-            let spread = spread_of(geometry.metadata("width"), Spread::Constant);
-            let values = match widths.indices {
-                Some(indices) => indices.iter().map(|&i| widths.values[i as usize]).collect(),
-                None => widths.values,
-            };
-            (values, spread)
-        });
-        Ok(Some(Batch { basis, wrap, counts, points: vectors(&points, "P")?, widths, colors: None, ids: None }))
     }
 
     fn mesh(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<PolygonMesh>, Problem> {

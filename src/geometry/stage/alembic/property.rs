@@ -24,6 +24,8 @@ struct Header {
     metadata: String,
     kind: Kind,
     pod: usize,
+    /// Numbers of one value: 3 of a vector.
+    extent: usize,
     /// Samples as seen from outside, and the first and last that differ from their neighbours.
     samples: u32,
     first_changed: u32,
@@ -76,6 +78,11 @@ impl<'a> Compound<'a> {
     /// What a property says of itself, such as how its values are spread.
     pub(super) fn metadata(&self, name: &str) -> &str {
         self.find(name).map_or("", |(_, header)| &header.metadata)
+    }
+
+    /// How many numbers one value of a property has.
+    pub(super) fn extent(&self, name: &str) -> Option<usize> {
+        self.find(name).filter(|(_, h)| h.kind != Kind::Compound).map(|(_, header)| header.extent)
     }
 
     /// The times of a property's samples.
@@ -137,6 +144,7 @@ fn headers(data: &[u8], indexed: &[String]) -> Result<Vec<Header>, Problem> {
             _ => Kind::Array,
         };
         let pod = ((info >> 4) & 0xf) as usize;
+        let extent = ((info >> 12) & 0xff) as usize;
         let (mut samples, mut first_changed, mut last_changed, mut time_sampling) = (0, 0, 0, 0);
         if kind != Kind::Compound {
             samples = cursor.sized(hint)?;
@@ -161,7 +169,7 @@ fn headers(data: &[u8], indexed: &[String]) -> Result<Vec<Header>, Problem> {
             }
             i => indexed.get(i as usize).cloned().unwrap_or_default(),
         };
-        out.push(Header { name, metadata, kind, pod, samples, first_changed, last_changed, time_sampling });
+        out.push(Header { name, metadata, kind, pod, extent, samples, first_changed, last_changed, time_sampling });
     }
     Ok(out)
 }

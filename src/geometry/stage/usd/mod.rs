@@ -27,7 +27,7 @@ use openusd::{
 
 use super::{
     Contents, Format, MAX_DEPTH, PrimPattern, Problem, StageCamera, Take,
-    curves::{Batch, Spread, StageBasis, Wrap},
+    curves::{Batch, ID_NAMES, PLY_NAMES, Spread, StageBasis, Wrap},
 };
 use resolver::LookingResolver;
 use value::{Values, token};
@@ -316,7 +316,8 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
     };
     Ok(Batch {
         colors: colors(values)?,
-        ids: ids(values)?,
+        ids: ids(values, &ID_NAMES)?,
+        plies: ids(values, &PLY_NAMES)?,
         basis,
         wrap,
         counts: values.integers("curveVertexCounts")?.unwrap_or_default(),
@@ -324,9 +325,6 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
         widths,
     })
 }
-
-/// Primvars that number curves; the first that a prim has counts.
-const ID_NAMES: [&str; 3] = ["primvars:yarnId", "primvars:id", "primvars:curveId"];
 
 /// `displayColor`, linear as USD has it.
 fn colors(values: &Values<'_>) -> Result<Option<(Vec<DVec3>, Spread)>, Problem> {
@@ -340,11 +338,12 @@ fn colors(values: &Values<'_>) -> Result<Option<(Vec<DVec3>, Spread)>, Problem> 
     Ok(Some((given, spread)))
 }
 
-fn ids(values: &Values<'_>) -> Result<Option<(Vec<i64>, Spread)>, Problem> {
-    for name in ID_NAMES {
+fn ids(values: &Values<'_>, names: &[&str]) -> Result<Option<(Vec<i64>, Spread)>, Problem> {
+    for name in names {
+        let name = format!("primvars:{name}");
         // Other programs keep other things under such names.
-        if let Ok(Some(ids)) = values.integers(name) {
-            return Ok(Some((ids, values.spread(name, Spread::Constant)?)));
+        if let Ok(Some(ids)) = values.integers(&name) {
+            return Ok(Some((ids, values.spread(&name, Spread::Constant)?)));
         }
     }
     Ok(None)

@@ -13,7 +13,7 @@ use openusd::{
 };
 
 use super::children;
-use crate::geometry::curve::{Basis, Curve};
+use crate::geometry::curve::{Basis, Curve, equal_radii};
 
 /// Values of a primvar beside curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,7 +142,7 @@ fn add_curves(data: &mut sdf::Data, path: &sdf::Path, group: &CurvesOut<'_>) -> 
     let narrow = |p: DVec3| Vec3f { x: p.x as f32, y: p.y as f32, z: p.z as f32 };
     let points: Vec<Vec3f> = group.curves.iter().flat_map(|c| c.points.iter().map(|p| narrow(*p))).collect();
     let ends: Vec<f64> = group.curves.iter().flat_map(|c| at_ends(c, group.radius)).collect();
-    let constant = ends.windows(2).all(|w| w[0] == w[1]);
+    let constant = ends.iter().all(|r| equal_radii(*r, ends[0]));
     let widths: Vec<f32> = ends.iter().take(if constant { 1 } else { ends.len() }).map(|r| 2.0 * *r as f32).collect();
     let widest = ends.iter().fold(0.0, |a: f64, &b| a.max(b));
 
