@@ -1,5 +1,7 @@
 //! `make` and what `info` says of what it made.
 
+use yarnray::geometry::curve_file::{self, ReadOptions};
+
 use crate::support::{directory, listing, project, write, yarnray};
 
 #[test]
@@ -110,4 +112,79 @@ fn a_wif_draft_gives_threads_colours_and_measures() {
     let run = yarnray(d, &["info", "t.txt", "--json"]);
     let info: serde_json::Value = serde_json::from_str(&run.good().stdout).unwrap();
     assert_eq!(info["curves"].as_u64(), Some(48));
+}
+
+/// One straight yarn of the library: its plies and fibres are where the yarn's description says.
+#[test]
+fn plies_and_fibres_are_written_with_their_yarn_and_colour() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "line.txt", "-6 0 0\n-3 0 0\n0 0 0\n3 0 0\n6 0 0\n\n-6 9 0\n-3 9 0\n0 9 0\n3 9 0\n6 9 0\n");
+    write(
+        d,
+        "own.toml",
+        "[fiber.red]\ntt = [0.5, 0.1, 0.1]\nd = [0.3, 0.1, 0.1]\n[fiber.white]\ntt = [0.5, 0.5, 0.5]\nd = [0.4, 0.4, 0.4]\n\
+         [yarn.marl]\nradius = 0.5\nply_twist = 20\nply_distance = 0.25\n[[yarn.marl.ply]]\nfiber = \"red\"\nfibers = 7\ndensity = 0.3\nply_radius = 0.2\n\
+         [[yarn.marl.ply]]\nfiber = \"white\"\nfibers = 5\ndensity = 0.3\nply_radius = 0.2\n",
+    );
+    let args = ["convert", "line.txt", "out.usda", "--unit", "cm", "--yarn", "marl", "--library", "own.toml", "--as"];
+    let read = |level: &str, file: &str| {
+        let args = [&args[..2], &[file], &args[3..], &[level]].concat();
+        yarnray(d, &args).good();
+        curve_file::read(&d.join(file), &ReadOptions::default()).unwrap()
+    };
+    let yarns = read("yarns", "y.usda");
+    assert_eq!((yarns.curves.len(), yarns.plies.len(), yarns.unit_mm), (2, 0, Some(10.0)));
+    assert!((yarns.curves[0].radii.as_ref().unwrap()[0] - 0.05).abs() < 1e-7, "0.5 mm in centimetres");
+    let plies = read("plies", "p.usdc");
+    assert_eq!(plies.ids, [0, 1, 0, 1].map(Some));
+    assert_eq!(plies.plies, [0, 0, 1, 1].map(Some));
+    for (i, curve) in plies.curves.iter().enumerate() {
+        let [r, g, b] = plies.colors[i].unwrap();
+        assert!(if i < 2 { r > 2.0 * g && g == b } else { r == g && g == b }, "{i}: {r} {g} {b}");
+        let axis = 9.0 * plies.ids[i].unwrap() as f64;
+        // Inner control points of a helix's spline lie a little outside of it.
+        for p in &curve.points[3..curve.points.len() - 3] {
+            let distance = (p.y - axis).hypot(p.z);
+            assert!((0.0249..0.0262).contains(&distance), "0.25 mm from the axis: {distance}");
+        }
+        assert!(curve.radii.as_ref().unwrap().iter().all(|r| (0.0185..=0.0201).contains(r)), "{:?}", curve.radii);
+    }
+    let fibers = read("fibers", "f.usdc");
+    assert_eq!(fibers.curves.len(), 2 * (7 + 5));
+    let of =
+        |yarn: i64, ply: i64| (0..24).filter(|&i| fibers.ids[i] == Some(yarn) && fibers.plies[i] == Some(ply)).count();
+    assert_eq!([of(0, 0), of(1, 0), of(0, 1), of(1, 1)], [7, 7, 5, 5]);
+    // Each is within its ply, and as wide as its share of the ply's section says.
+    let radius = 0.02 * (0.3f64 / 7.0).sqrt();
+    let own = fibers.curves[0].radii.as_ref().unwrap();
+    assert!(own.iter().all(|r| (r - radius).abs() < 1e-6 * radius.max(1.0)), "{radius}: {own:?}");
+    // Without a yarn nobody knows what plies there are; without a unit nobody knows how thick they are.
+    let refused = yarnray(d, &["convert", "line.txt", "n.usda", "--as", "plies"]);
+    assert!(refused.stderr.contains("--as plies needs to know") && !d.join("n.usda").exists(), "{}", refused.stderr);
+    let refused = yarnray(d, &["convert", "line.txt", "n.usda", "--as", "plies", "--yarn", "wool"]);
+    assert!(refused.stderr.contains("a yarn needs the unit of its curves"), "{}", refused.stderr);
+    let refused = yarnray(d, &["make", "knit", "--yarn", "wol", "-o", "n.usda"]);
+    assert!(refused.stderr.contains("did you mean \"wool\"?"), "{}", refused.stderr);
+    let lost = yarnray(d, &["convert", "p.usdc", "p.hair"]).good().stderr;
+    assert!(lost.contains("numbers of plies are lost") && lost.contains("colours are lost"), "{lost}");
+}
+
+/// What a scene's cloth is of, made in the scene's mode: the same curves under every command.
+#[test]
+fn commands_agree_on_what_a_yarn_is_made_of() {
+    let folder = directory();
+    let d = folder.path();
+    let library = project("scenes/yarns.toml");
+    let scene = format!(
+        "library = [{library:?}]\n[camera]\ntype = \"frame\"\n[[fabric]]\nyarn = \"cotton\"\nphase = 0\n\
+         source = {{ type = \"straight\", count = 2, length = 4 }}\n"
+    );
+    write(d, "s.toml", scene);
+    yarnray(d, &["make", "fibers", "s.toml", "--mode", "ply", "-o", "p.usda", "-o", "p.txt"]).good();
+    let plies = curve_file::read(&d.join("p.usda"), &ReadOptions::default()).unwrap();
+    assert_eq!(plies.ids.iter().flatten().max(), Some(&1));
+    assert!(plies.colors.iter().all(Option::is_some) && plies.plies.iter().all(Option::is_some));
+    let text = curve_file::read(&d.join("p.txt"), &ReadOptions::default()).unwrap();
+    assert_eq!(text.curves.len(), plies.curves.len());
 }

@@ -143,6 +143,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     let distinct: std::collections::BTreeSet<[u32; 3]> =
         set.colors.iter().flatten().map(|c| c.map(f32::to_bits)).collect();
     let numbered: std::collections::BTreeSet<i64> = set.ids.iter().flatten().copied().collect();
+    let of_plies: std::collections::BTreeSet<i64> = set.plies.iter().flatten().copied().collect();
     let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
     // What the file does not say, and nobody has.
     let proposal = if radii || radius.is_some() { None } else { Proposal::new(set) };
@@ -159,6 +160,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found),
         "bounds": [list(low), list(high)], "notes": set.notes,
         "colored": colored, "colors": distinct.len(), "ids": numbered.len(),
+        "plies": of_plies.len(),
     });
     let mut text = format!(
         "{}\n  curves    {} ({closed} closed, {open} open), {basis}\n  points    {points}\n  length    {length:.6}\n  bounds    {low:.4} to {high:.4}\n  radii     {}\n  unit      {}\n",
@@ -173,6 +175,9 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     }
     if let (Some(first), Some(last)) = (numbered.first(), numbered.last()) {
         text += &format!("  ids       {} from {first} to {last}\n", numbered.len());
+    }
+    if !of_plies.is_empty() {
+        text += &format!("  plies     {}: curves are plies or fibres of yarns\n", of_plies.len());
     }
     text += &overlap_line(found);
     if let Some(p) = proposal {

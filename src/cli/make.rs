@@ -262,8 +262,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
     let (draft, file) = match args.draft.as_slice() {
         [path] if path.to_lowercase().ends_with(".wif") => {
-            let file = wif_draft(path)?;
-            (file.draft.clone(), Some(file))
+            wif_draft(path).map(|file| (file.draft.clone(), Some(file)))?
         }
         [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
         rows => (Draft::matrix(rows).map_err(wrong)?, None),
@@ -271,7 +270,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let yarn = args.output.yarn()?;
     let [warps, wefts] = file.as_ref().map_or([YARNS; 2], |f| f.count);
     let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
-    let radius = own(args.output.radius, 0).or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
+    let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
+    let radius = own(args.output.radius, 0).unwrap_or(otherwise);
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let piece = Weave {
         warps: Extent::Yarns(args.warps.unwrap_or(warps)),

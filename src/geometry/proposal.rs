@@ -12,6 +12,9 @@ use super::{
 const OVERLAP: f64 = 0.02;
 /// Points that are looked at, those around the middle of the file: enough to know the rest.
 const LOOKED_AT: usize = 60_000;
+/// Tenths by which the radius grows at most, and at a time to begin with.
+const MOST_STEPS: u32 = 60;
+const STRIDE: u32 = 4;
 /// Radius of a common yarn, millimetres: worsted knitting yarn has about 1, fine weaving yarn 0.2.
 const COMMON_RADIUS: f64 = 0.5;
 /// Units of length and their millimetres.
@@ -38,25 +41,30 @@ impl Proposal {
         let mut steps: Vec<f64> =
             curves.iter().flat_map(|c| c.points.windows(2)).map(|p| p[0].distance(p[1])).filter(|d| *d > 0.0).collect();
         steps.sort_unstable_by(f64::total_cmp);
-        let mut radius = 0.1 * steps.get(steps.len() / 2)?;
-        let at = |radius: f64| {
-            let radii: Vec<Vec<f64>> = curves.iter().map(|c| vec![radius; c.points.len()]).collect();
+        let least = 0.1 * steps.get(steps.len() / 2)?;
+        let radius = |step: u32| least * 1.1f64.powi(step as i32);
+        let at = |step: u32| {
+            let radii: Vec<Vec<f64>> = curves.iter().map(|c| vec![radius(step); c.points.len()]).collect();
             overlap(curves.iter().zip(&radii).map(|(c, r)| (c, r.as_slice())))
         };
-        let mut last = None;
-        // Up from there in steps of a tenth, as far as 30 points apart, until yarns run into each other.
-        for _ in 0..60 {
-            let found = at(radius)?;
-            if found.share > OVERLAP {
-                let (radius, overlap): (f64, Overlap) = last?;
-                let log = |millimetres: f64| (radius * millimetres / COMMON_RADIUS).ln().abs();
-                let unit = UNITS.into_iter().min_by(|a, b| log(a.1).total_cmp(&log(b.1)))?;
-                return Some(Self { radius, overlap, bends: bends(&curves), unit });
+        // Up from there in steps of a tenth, as far as 30 points apart, until yarns run into each other: first in strides,
+        // as they do so more and more.
+        let (mut step, mut found) = (0, at(0).filter(|o| o.share <= OVERLAP)?);
+        for stride in [STRIDE, 2, 1] {
+            while step + stride <= MOST_STEPS {
+                match at(step + stride)? {
+                    next if next.share > OVERLAP => break,
+                    next => (step, found) = (step + stride, next),
+                }
             }
-            last = Some((radius, found));
-            radius *= 1.1;
         }
-        None
+        if step == MOST_STEPS {
+            return None;
+        }
+        let radius = radius(step);
+        let log = |millimetres: f64| (radius * millimetres / COMMON_RADIUS).ln().abs();
+        let unit = UNITS.into_iter().min_by(|a, b| log(a.1).total_cmp(&log(b.1)))?;
+        Some(Self { radius, overlap: found, bends: bends(&curves), unit })
     }
 }
 

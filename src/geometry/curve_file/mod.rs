@@ -9,6 +9,8 @@
 mod bcc;
 mod faces;
 mod hair;
+#[cfg(feature = "usd")]
+mod layer;
 mod obj_lines;
 mod pyp;
 mod repair;
@@ -283,7 +285,11 @@ fn written_as(path: &Path) -> Option<Format> {
 
 /// Whether [`write()`] knows a format by this name.
 pub fn can_write(path: &Path) -> bool {
-    written_as(path).is_some() || staged::can_write(path)
+    #[cfg(feature = "usd")]
+    if layer::can_write(path) {
+        return true;
+    }
+    written_as(path).is_some()
 }
 
 /// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.yarns`, `.txt`,
@@ -292,8 +298,9 @@ pub fn can_write(path: &Path) -> bool {
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] if there is no such format or the curves do not fit it; whatever `out` reports.
 pub fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Result<()> {
-    if staged::can_write(path) {
-        return staged::write(path, set, out);
+    #[cfg(feature = "usd")]
+    if layer::can_write(path) {
+        return layer::write(path, set, out);
     }
     match written_as(path) {
         Some(Format::Bcc) => write_bcc(set, out),

@@ -30,6 +30,7 @@ pub(super) enum StageBasis {
 pub(super) enum Wrap {
     NonPeriodic,
     Periodic,
+    #[cfg_attr(not(feature = "usd"), allow(dead_code, reason = "Alembic has no pinned curves"))]
     Pinned,
 }
 
@@ -128,20 +129,8 @@ impl Batch {
             first += count;
             first_varying += kind.varying_values(count);
         }
-        let mean = |v: &[DVec3]| v.iter().sum::<DVec3>() / v.len().max(1) as f64;
-        let color = |v: DVec3| {
-            Some(v.max(DVec3::ZERO).to_array().map(|c| c as f32)).filter(|c| c.iter().all(|c| c.is_finite()))
-        };
         let labels = Labels { kind: &kind, counts: &counts };
-        let colors = labels.of("colours", self.colors, mean, &mut set.notes);
-        set.add_labels(before, colors.map(|all| all.into_iter().map(color).collect()), |set| &mut set.colors);
-        for (name, given, list) in [
-            ("ids", self.ids, (|set| &mut set.ids) as fn(&mut CurveSet) -> &mut Vec<Option<i64>>),
-            ("numbers of plies", self.plies, |set| &mut set.plies),
-        ] {
-            let own = labels.of(name, given, |v| v[0], &mut set.notes);
-            set.add_labels(before, own.map(|all| all.into_iter().map(Some).collect()), list);
-        }
+        labels.add_to(set, before, self.colors, [self.ids, self.plies]);
         let stretch = [to_stage.x_axis, to_stage.y_axis, to_stage.z_axis].map(|axis| axis.truncate().length());
         let (least, most) =
             (stretch.iter().copied().fold(f64::INFINITY, f64::min), stretch.iter().copied().fold(0.0, f64::max));
@@ -277,6 +266,27 @@ struct Labels<'a> {
 }
 
 impl Labels<'_> {
+    /// Gives the curves from `before` on their colours and the numbers of their yarns and plies.
+    fn add_to(
+        &self,
+        set: &mut CurveSet,
+        before: usize,
+        colors: Option<(Vec<DVec3>, Spread)>,
+        numbers: [Option<(Vec<i64>, Spread)>; 2],
+    ) {
+        let mean = |v: &[DVec3]| v.iter().sum::<DVec3>() / v.len().max(1) as f64;
+        let color = |v: DVec3| {
+            Some(v.max(DVec3::ZERO).to_array().map(|c| c as f32)).filter(|c| c.iter().all(|c| c.is_finite()))
+        };
+        let colors = self.of("colours", colors, mean, &mut set.notes);
+        set.add_labels(before, colors.map(|all| all.into_iter().map(color).collect()), |set| &mut set.colors);
+        let [ids, plies] = numbers;
+        let ids = self.of("ids", ids, |v| v[0], &mut set.notes);
+        set.add_labels(before, ids.map(|all| all.into_iter().map(Some).collect()), |set| &mut set.ids);
+        let plies = self.of("numbers of plies", plies, |v| v[0], &mut set.notes);
+        set.add_labels(before, plies.map(|all| all.into_iter().map(Some).collect()), |set| &mut set.plies);
+    }
+
     /// One value for each curve; of values along a curve what `one` makes of them. What does not fit is left out with a note:
     /// curves are as good without.
     fn of<T: Copy>(

@@ -9,6 +9,7 @@ mod alembic;
 mod curves;
 mod polygons;
 mod select;
+#[cfg(feature = "usd")]
 mod usd;
 
 use std::{
@@ -22,6 +23,7 @@ use glam::DMat4;
 
 pub use polygons::{FaceGroup, PolygonMesh};
 pub use select::PrimPattern;
+#[cfg(feature = "usd")]
 pub use usd::write::{CurvesOut, Interpolated, write};
 
 use super::{curve::CurveSet, unreadable::hindrance};
@@ -155,9 +157,7 @@ impl Stage {
             if bytes.starts_with(alembic::MAGIC) || bytes.starts_with(alembic::HDF5_MAGIC) {
                 Ok(Box::new(alembic::Archive::new(bytes)?) as Box<dyn Format>)
             } else {
-                usd::check::look_over(&bytes)?;
-                drop(bytes);
-                Ok(Box::new(usd::UsdStage::open(path)?) as Box<dyn Format>)
+                open_usd(path, bytes)
             }
         };
         let format = open().map_err(|p: Problem| p.in_file(path))?;
@@ -244,6 +244,16 @@ impl Stage {
     pub fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, StageError> {
         self.format.camera(path, frame).map_err(|p| p.in_file(&self.path))
     }
+}
+
+#[cfg(feature = "usd")]
+fn open_usd(path: &Path, bytes: Vec<u8>) -> Result<Box<dyn Format>, Problem> {
+    Ok(Box::new(usd::UsdStage::open(path, bytes)?))
+}
+
+#[cfg(not(feature = "usd"))]
+fn open_usd(_: &Path, _: Vec<u8>) -> Result<Box<dyn Format>, Problem> {
+    Err(Problem::new("is no Alembic archive, and this program was built without USD (the feature `usd`)"))
 }
 
 type AddCurves<'a> = dyn FnMut(&str, curves::Batch, &DMat4) -> Result<(), Problem> + 'a;

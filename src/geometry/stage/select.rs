@@ -44,10 +44,12 @@ impl PrimPattern {
         self.all || self.paths.iter().any(|pattern| path_matches(pattern, path))
     }
 
+    #[cfg_attr(not(feature = "usd"), allow(dead_code, reason = "Alembic has no materials"))]
     pub(super) fn names_materials(&self) -> bool {
         !self.materials.is_empty()
     }
 
+    #[cfg_attr(not(feature = "usd"), allow(dead_code, reason = "Alembic has no materials"))]
     pub(super) fn matches_material(&self, path: &str) -> bool {
         self.materials.iter().any(|pattern| path_matches(pattern, path))
     }

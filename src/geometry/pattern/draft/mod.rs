@@ -71,6 +71,11 @@ impl Draft {
         Self { warps, over: over.collect(), layers: 1, crossing: false, pile: None }
     }
 
+    /// Some warps and wefts of a cloth of one layer, from `first` on, as a repeat of their own.
+    pub(super) fn part(&self, first: [usize; 2], count: [usize; 2]) -> Self {
+        Self::from_fn(count[0], count[1], |weft, warp| self.warp_over(first[1] + weft, first[0] + warp))
+    }
+
     /// What a loom weaves: the shaft of each warp from the left, the shafts that each treadle raises, and the treadle of
     /// each weft from the bottom; shafts and treadles are counted from 1.
     ///

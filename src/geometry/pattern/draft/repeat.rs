@@ -2,8 +2,8 @@
 
 use super::{Draft, DraftError};
 
-/// The most crossings of a repeat that can be relaxed in reasonable time: minutes.
-pub const MOST_CROSSINGS: usize = 64 * 64;
+/// The most crossings of a repeat: relaxing it takes some milliseconds and 12 kB for each.
+pub const MOST_CROSSINGS: usize = 512 * 512;
 
 /// How the threads of one system differ: one value for each of the repeat, relative to their mean; empty where all are
 /// alike.
@@ -36,7 +36,7 @@ impl Draft {
         let wefts = period(picks, |i, j| alike(1, i, j) && over[i] == over[j]);
         if warps * wefts > MOST_CROSSINGS {
             let problem = format!("the smallest repeat of the draft is {warps} ends x {wefts} picks");
-            let hint = format!("at most {MOST_CROSSINGS} crossings are woven, as of 64 x 64");
+            let hint = format!("at most {MOST_CROSSINGS} crossings are woven, as of 512 x 512");
             return Err(DraftError { problem, hint });
         }
         for (threads, count) in threads.iter_mut().zip([warps, wefts]) {
@@ -91,9 +91,9 @@ mod tests {
         let mut threads = [Threads::default(), Threads::default()];
         assert_eq!(Draft::repeat_of(&over(6), &mut threads).unwrap().warps(), 6);
         let scrambled: Vec<Vec<bool>> =
-            (0..300u32).map(|i| (0..300u32).map(|j| crate::math::sampler::hash2(i, j) & 1 == 1).collect()).collect();
+            (0..600u32).map(|i| (0..600u32).map(|j| crate::math::sampler::hash2(i, j) & 1 == 1).collect()).collect();
         let error = Draft::repeat_of(&scrambled, &mut threads).unwrap_err();
-        assert!(error.problem.contains("300 ends x 300 picks"), "{error}");
+        assert!(error.problem.contains("600 ends x 600 picks"), "{error}");
         assert!(Draft::repeat_of(&[], &mut threads).is_err());
     }
 }

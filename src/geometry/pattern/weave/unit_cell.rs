@@ -23,6 +23,11 @@ use super::{
 /// Distance of yarns, in half their width, at which the reed is full and they lie side by side: what presses harder makes
 /// them climb over each other.
 const FULL: f64 = 2.04;
+/// Crossings from which on a part of a repeat is relaxed first. A large one comes to its spacings too slowly: it begins with
+/// those of the part.
+const LARGE: usize = 1024;
+/// Most ends and picks of that part.
+const PART: usize = 24;
 /// Force on each yarn that packs the cloth, unless spacings are given.
 pub(super) const BEAT: f64 = 1.0;
 
@@ -81,7 +86,8 @@ impl UnitCell {
     pub(super) fn relax(draft: &Draft, options: &CellOptions) -> Self {
         let unit = 0.5 * (options.radius[0] + options.radius[1]);
         let mut energy = Energy::new(draft, options, unit);
-        let mut x = energy.start();
+        let begin = Self::first_spacing(draft, options).map(|s| s.map(|s| s / unit));
+        let mut x = energy.start(begin);
         let alike = energy.alike();
         let mut free = vec![0.0; alike.iter().max().map_or(0, |m| m + 1)];
         // Alike by what starts alike.
@@ -110,6 +116,23 @@ impl UnitCell {
         let (deepest, share) = intrusion(&cell.sections(), 0.1 * unit);
         cell.overlap = [deepest / (2.0 * unit), share];
         cell
+    }
+
+    /// The spacings of the middle of a large repeat by itself, in the unit of the radii.
+    fn first_spacing(draft: &Draft, options: &CellOptions) -> Option<[f64; 2]> {
+        let whole = [draft.warps(), draft.wefts()];
+        let simple = draft.layers() == 1 && !draft.twines();
+        if whole[0] * whole[1] <= LARGE || !simple || options.spacing.iter().all(Option::is_some) {
+            return None;
+        }
+        let count = whole.map(|n| n.min(PART));
+        let first = [0, 1].map(|side| (whole[side] - count[side]) / 2);
+        let part = draft.part(first, count);
+        let thickness = [0, 1].map(|side| match options.thickness[side].as_slice() {
+            [] => Vec::new(),
+            given => given[first[side]..first[side] + count[side]].to_vec(),
+        });
+        Some(Self::relax(&part, &CellOptions { thickness, ..options.clone() }).spacing)
     }
 
     /// The cross-sections of all yarns, with a crossing or more of the next repeats.

@@ -4,11 +4,15 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::super::{PrimPattern, Stage};
+use super::super::{Contents, PrimPattern, Stage, StageError};
 use crate::geometry::curve::Basis;
 
 fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/stages/scene.abc")
+    stages("scene.abc")
+}
+
+fn stages(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/stages").join(name)
 }
 
 fn point(i: usize) -> DVec3 {
@@ -57,6 +61,32 @@ fn points_move_and_hidden_ones_are_not_there() {
     assert!(stage.contents().unwrap().curves.contains(&"/hidden".to_owned()));
 }
 
+/// `tests/data/stages/make_abc_labels.py`: two curves of three points and of two, labelled in every way.
+#[test]
+fn curves_have_colours_and_numbers() {
+    const RED: [f32; 3] = [0.8, 0.05, 0.05];
+    const GREEN: [f32; 3] = [0.1, 0.6, 0.1];
+    const BLUE: [f32; 3] = [0.05, 0.1, 0.8];
+    let stage = Stage::open(&stages("labels.abc")).unwrap();
+    let read = |prim: &str| stage.curves(&PrimPattern::parse(prim).unwrap(), None).unwrap().0;
+    let between: [f32; 3] = std::array::from_fn(|c| 0.5 * (GREEN[c] + BLUE[c]));
+    for (prim, want) in
+        [("/constant", [RED, RED]), ("/uniform", [RED, BLUE]), ("/vertex", [RED, between]), ("/indexed", [BLUE, GREEN])]
+    {
+        for (found, want) in read(prim).colors.iter().zip(want) {
+            assert!(found.unwrap().iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-6), "{prim}: {found:?} {want:?}");
+        }
+        assert_eq!(read(prim).colors.len(), 2, "{prim}");
+    }
+    let numbered = read("/uniform");
+    assert_eq!((numbered.ids, numbered.plies), (vec![Some(7), Some(9)], vec![Some(0), Some(1)]));
+    // Three colours of two curves are left out, and said; text under the name of a colour is something else.
+    let wrong = read("/wrong");
+    assert!(wrong.colors.is_empty() && wrong.curves.len() == 2);
+    assert_eq!(wrong.notes, ["colours are left out: uniform values are 2 here, found 3"]);
+    assert!(read("/text").colors.is_empty());
+}
+
 #[test]
 fn meshes_have_sides_groups_and_coordinates() {
     let stage = Stage::open(&data()).unwrap();
@@ -71,16 +101,30 @@ fn meshes_have_sides_groups_and_coordinates() {
 
 #[test]
 fn damaged_files_are_errors() {
-    let whole = std::fs::read(data()).unwrap();
+    damage(&stages("labels.abc"));
+    let whole = damage(&data());
+    let read = |bytes: &[u8]| read(&tempfile::tempdir().unwrap().path().join("x.abc"), bytes);
+    let old = [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 64]].concat();
+    assert!(read(&old).unwrap_err().to_string().contains("HDF5"));
+    let mut open = whole;
+    open[5] = 0;
+    assert!(read(&open).unwrap_err().to_string().contains("not closed"));
+}
+
+fn read(path: &Path, bytes: &[u8]) -> Result<Contents, StageError> {
+    std::fs::write(path, bytes).unwrap();
+    let stage = Stage::open(path)?;
+    stage.curves(&PrimPattern::all(), Some(1.0))?;
+    stage.mesh(&PrimPattern::all(), Some(1.0))?;
+    stage.contents()
+}
+
+/// Reads a file cut off and changed in many ways; what cannot be read is an error. Gives its bytes.
+fn damage(file: &Path) -> Vec<u8> {
+    let whole = std::fs::read(file).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.abc");
-    let read = |bytes: &[u8]| {
-        std::fs::write(&path, bytes).unwrap();
-        let stage = Stage::open(&path)?;
-        stage.curves(&PrimPattern::all(), Some(1.0))?;
-        stage.mesh(&PrimPattern::all(), Some(1.0))?;
-        stage.contents()
-    };
+    let read = |bytes: &[u8]| read(&path, bytes);
     assert!(read(&whole).is_ok());
     let mut random = crate::math::sampler::Stream::new(3);
     for round in 0..400 {
@@ -96,9 +140,5 @@ fn damaged_files_are_errors() {
         }
         let _ = read(&bytes);
     }
-    let old = [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 64]].concat();
-    assert!(read(&old).unwrap_err().to_string().contains("HDF5"));
-    let mut open = whole.clone();
-    open[5] = 0;
-    assert!(read(&open).unwrap_err().to_string().contains("not closed"));
+    whole
 }

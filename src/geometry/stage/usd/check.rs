@@ -13,7 +13,7 @@ const SECTION_ENTRY: usize = 32;
 
 /// Looks a file over. The text reader makes room as it reads: of text only the depth counts. Layers inside of archives
 /// are looked over one by one.
-pub(in crate::geometry::stage) fn look_over(bytes: &[u8]) -> Result<(), Problem> {
+pub(super) fn look_over(bytes: &[u8]) -> Result<(), Problem> {
     if bytes.starts_with(MAGIC) {
         return binary(bytes);
     }

@@ -3,7 +3,7 @@
 //!
 //! A file, and each that it refers to, is looked over first ([`check`]), and a panic inside of the crate is an error like any other.
 
-pub(super) mod check;
+mod check;
 mod children;
 mod mesh;
 mod resolver;
@@ -51,10 +51,12 @@ impl fmt::Debug for UsdStage {
 }
 
 impl UsdStage {
-    pub(super) fn open(path: &Path) -> Result<Self, Problem> {
+    /// Opens the layer of these bytes at a path, and all that it refers to.
+    pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<Self, Problem> {
+        check::look_over(&bytes)?;
         guarded(|| {
             let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
-            Ok(Self { stage: usd::Stage::builder().resolver(LookingResolver::default()).open(name)? })
+            Ok(Self { stage: usd::Stage::builder().resolver(LookingResolver::new(path, bytes)).open(name)? })
         })
     }
 

@@ -8,6 +8,7 @@ use super::*;
 use crate::geometry::{
     chain::Chain,
     curve::{Basis, Curve, CurveSet},
+    curve_file::{self, ReadOptions},
     stage::Stage,
 };
 
@@ -350,4 +351,41 @@ fn damaged_files_are_errors() {
     let huge = "#usda 1.0\ndef BasisCurves \"a\" {\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2147483647]\n\
                 point3f[] points = [(0,0,0)]\n}\n";
     assert!(refused("huge.usda", huge.as_bytes()).unwrap_err().contains("/a: "));
+}
+
+/// Curves of one width have a prim of their own; rounding makes no width of its own.
+#[test]
+fn widths_that_are_one_are_constant() {
+    let curve = |radius: &dyn Fn(usize) -> f64| Curve {
+        basis: Basis::BSpline,
+        closed: false,
+        points: (0..6).map(|i| DVec3::new(i as f64, 0.0, 0.0)).collect(),
+        radii: Some((0..6).map(radius).collect()),
+        flattening: None,
+    };
+    let single = |r: f64| f64::from(r as f32);
+    let set = CurveSet {
+        curves: vec![
+            curve(&|_| 0.2),
+            curve(&|_| 0.5),
+            curve(&|i| single(0.2) * (1.0 + 1e-7 * i as f64)),
+            curve(&|i| 0.1 + 0.1 * i as f64),
+        ],
+        ids: vec![Some(3), Some(3), Some(4), Some(5)],
+        plies: vec![Some(0), Some(1), Some(0), Some(0)],
+        unit_mm: Some(10.0),
+        ..CurveSet::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plies.usda");
+    curve_file::write(&path, &set, &mut std::fs::File::create(&path).unwrap()).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(text.matches("def BasisCurves").count(), 3, "{text}");
+    assert_eq!((text.matches("\"constant\"").count(), text.matches("\"varying\"").count()), (2, 1), "{text}");
+    let again = curve_file::read(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(again.ids, [Some(3), Some(4), Some(3), Some(5)]);
+    assert_eq!(again.plies, [Some(0), Some(0), Some(1), Some(0)]);
+    assert_eq!(again.unit_mm, Some(10.0));
+    let radii = |i: usize| again.curves[i].radii.as_ref().unwrap();
+    assert!((radii(1)[5] - 0.2).abs() < 1e-6 && (radii(2)[0] - 0.5).abs() < 1e-6 && (radii(3)[5] - 0.6).abs() < 1e-6);
 }

@@ -92,8 +92,9 @@ impl<'a> Energy<'a> {
         energy
     }
 
-    /// Variables to start from: every yarn in its dent, above and below the others as the draft says, in an open cloth.
-    pub(super) fn start(&self) -> Vec<f64> {
+    /// Variables to start from: every yarn in its dent, above and below the others as the draft says, in an open cloth
+    /// or in one of these spacings.
+    pub(super) fn start(&self, spacing: Option<[f64; 2]>) -> Vec<f64> {
         let mut x = vec![0.0; self.variables()];
         let half = 0.5 * (self.radius[0] + self.radius[1]);
         for side in 0..2 {
@@ -110,7 +111,9 @@ impl<'a> Energy<'a> {
             }
         }
         let n = x.len();
-        x[n - 2..].fill(4.4 * half / self.gear);
+        for (x, spacing) in x[n - 2..].iter_mut().zip(spacing.unwrap_or([4.4 * half; 2])) {
+            *x = spacing / self.gear;
+        }
         if self.draft.twines() {
             self.twine(&mut x);
         }
