@@ -2,7 +2,8 @@
 //!
 //! All sums are exact ([`crate::math::exact`]): films of different samples of a picture, from threads, resumed runs or
 //! other machines, add up to the film of all of them, to the bit. A pixel takes 84 bytes (count, colour, squares,
-//! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from.
+//! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from. Position takes 24, motion
+//! and texture coordinates 16 each.
 
 mod matte;
 mod parts;
@@ -84,13 +85,16 @@ struct Sums {
     depth: Vec<Sum>,
     normal: Vec<[NarrowSum; 3]>,
     albedo: Vec<[NarrowSum; 3]>,
+    position: Vec<[NarrowSum; 3]>,
+    motion: Vec<[NarrowSum; 2]>,
+    uv: Vec<[NarrowSum; 2]>,
     parts: Vec<[[NarrowSum; 3]; LightParts::COUNT]>,
 }
 
 /// Does the same with every vector of sums.
 macro_rules! for_all_sums {
     ($sums:expr, $do:ident $(, $more:expr)*) => {{
-        let Sums { count, color, square, alpha, depth, normal, albedo, parts } = $sums;
+        let Sums { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts } = $sums;
         $do(count $(, $more)*);
         $do(color $(, $more)*);
         $do(square $(, $more)*);
@@ -98,6 +102,9 @@ macro_rules! for_all_sums {
         $do(depth $(, $more)*);
         $do(normal $(, $more)*);
         $do(albedo $(, $more)*);
+        $do(position $(, $more)*);
+        $do(motion $(, $more)*);
+        $do(uv $(, $more)*);
         $do(parts $(, $more)*);
     }};
 }
@@ -113,6 +120,9 @@ impl Sums {
             depth: zeros(sized(layers.depth))?,
             normal: zeros(sized(layers.normal))?,
             albedo: zeros(sized(layers.albedo))?,
+            position: zeros(sized(layers.position))?,
+            motion: zeros(sized(layers.motion))?,
+            uv: zeros(sized(layers.uv))?,
             parts: zeros(sized(layers.lobes))?,
         })
     }
@@ -124,7 +134,7 @@ impl Sums {
                 sum.merge(more);
             }
         }
-        let Self { count, color, square, alpha, depth, normal, albedo, parts } = other;
+        let Self { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts } = other;
         one(&mut self.count, i, count, j);
         one(&mut self.color, i, color, j);
         one(&mut self.square, i, square, j);
@@ -132,6 +142,9 @@ impl Sums {
         one(&mut self.depth, i, depth, j);
         one(&mut self.normal, i, normal, j);
         one(&mut self.albedo, i, albedo, j);
+        one(&mut self.position, i, position, j);
+        one(&mut self.motion, i, motion, j);
+        one(&mut self.uv, i, uv, j);
         one(&mut self.parts, i, parts, j);
     }
 }
@@ -181,6 +194,15 @@ impl Tile {
         }
         if let Some(albedo) = sums.albedo.get_mut(i) {
             add_color(albedo, sample.albedo.to_array());
+        }
+        if let Some(position) = sums.position.get_mut(i) {
+            add_color(position, sample.position.to_array());
+        }
+        if let Some(motion) = sums.motion.get_mut(i) {
+            add_color(motion, sample.motion.to_array());
+        }
+        if let Some(uv) = sums.uv.get_mut(i) {
+            add_color(uv, sample.uv.to_array());
         }
         if let Some(cloth) = sample.cloth {
             self.matte.add(i, cloth, 1);
@@ -280,6 +302,9 @@ impl Tile {
             + sized(layers.depth, Sum::BYTES)
             + sized(layers.normal, narrow)
             + sized(layers.albedo, narrow)
+            + sized(layers.position, narrow)
+            + sized(layers.motion, <[NarrowSum; 2]>::BYTES)
+            + sized(layers.uv, <[NarrowSum; 2]>::BYTES)
             + sized(layers.lobes, LightParts::COUNT * narrow)
             + sized(layers.cryptomatte, size_of::<u32>())
     }
@@ -303,7 +328,7 @@ impl Tile {
 }
 
 #[inline]
-fn add_color(sum: &mut [NarrowSum; 3], value: [f32; 3]) {
+fn add_color<const N: usize>(sum: &mut [NarrowSum; N], value: [f32; N]) {
     sum.iter_mut().zip(value).for_each(|(sum, v)| sum.add(v));
 }
 
@@ -362,6 +387,12 @@ pub struct Pixel {
     pub normal: [f32; 3],
     /// Mean albedo of what is seen first, black where nothing is.
     pub albedo: [f32; 3],
+    /// Mean place of what covers the pixel, millimetres about the scene's middle; 0 where nothing does.
+    pub position: [f32; 3],
+    /// Mean of the pixels by which it moves until the next frame, to the right and up.
+    pub motion: [f32; 2],
+    /// Mean of its texture coordinates.
+    pub uv: [f32; 2],
     /// Mean radiance of each of [`LightParts::to_array`].
     pub parts: [[f32; 3]; LightParts::COUNT],
     /// Number of samples.
@@ -476,6 +507,7 @@ impl Film {
         let n = f64::from(samples);
         let color = |sum: &[NarrowSum; 3]| sum.map(|v| (v.value() / n) as f32);
         let alpha = sums.alpha[i].value();
+        let of_cover = |sum: NarrowSum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let depth = |sum: &Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
         Pixel {
@@ -485,6 +517,9 @@ impl Film {
             depth: sums.depth.get(i).map_or(0.0, depth),
             normal: sums.normal.get(i).map_or([0.0; 3], normal),
             albedo: sums.albedo.get(i).map_or([0.0; 3], color),
+            position: sums.position.get(i).map_or([0.0; 3], |p| p.map(of_cover)),
+            motion: sums.motion.get(i).map_or([0.0; 2], |m| m.map(of_cover)),
+            uv: sums.uv.get(i).map_or([0.0; 2], |uv| uv.map(of_cover)),
             parts: sums
                 .parts
                 .get(i)
@@ -618,7 +653,7 @@ mod tests {
         }
         let mut bytes = Vec::new();
         tile.save(&mut bytes);
-        assert_eq!(bytes.len(), 6 * 460 + 3 * 16);
+        assert_eq!(bytes.len(), 6 * 516 + 3 * 16);
         let mut again = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
         assert_eq!(again.load(&bytes), Some(()));
         assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));

@@ -11,10 +11,11 @@ pub mod table3;
 
 use std::time::Duration;
 
+use glam::DMat4;
 use serde_json::{Value, json};
 
 use crate::{
-    image::Attribute,
+    image::{Attribute, exr},
     plan::Plan,
     render::{Job, Rendered},
     scene::Scene,
@@ -164,7 +165,39 @@ pub fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
         ("embree", world.embree_version()),
     ]
     .map(|(name, value)| (format!("yarnray.{name}"), Attribute::Text(value)))
-    .into()
+    .into_iter()
+    .chain(of_camera(scene))
+    .collect()
+}
+
+/// What OpenEXR has names for: colours, time, and the camera in the middle of the shutter's time. Lengths are
+/// millimetres.
+fn of_camera(scene: &Scene) -> Vec<(String, Attribute)> {
+    let rows = |m: DMat4| Attribute::Matrix(m.transpose().as_mat4().to_cols_array_2d());
+    let aspect = f64::from(scene.render.width) / f64::from(scene.render.height);
+    let mut out = vec![
+        ("chromaticities".to_owned(), exr::REC_709),
+        ("worldToCamera".to_owned(), rows(scene.camera.world_to_camera(scene.middle))),
+        ("worldToNDC".to_owned(), rows(scene.camera.world_to_ndc(scene.middle, aspect))),
+    ];
+    if let Some(rate) = scene.frames_per_second {
+        let [frames, seconds] = as_ratio(rate);
+        out.push(("framesPerSecond".to_owned(), Attribute::Ratio(frames as i32, seconds)));
+    }
+    out
+}
+
+/// A rate of frames as a ratio: 23.976 and 23.98 are 24000/1001, as film and video have it.
+fn as_ratio(rate: f64) -> [u32; 2] {
+    let whole = rate.round();
+    let slowed = rate.ceil() * 1000.0;
+    if (rate - whole).abs() < 1e-6 {
+        [whole as u32, 1]
+    } else if (rate - slowed / 1001.0).abs() < 0.005 {
+        [slowed as u32, 1001]
+    } else {
+        [(rate * 1000.0).round() as u32, 1000]
+    }
 }
 
 /// The metadata of a picture that was merged from so many parts.

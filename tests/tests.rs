@@ -55,6 +55,8 @@ mod meshes;
 mod make;
 // Every scene of the project, and real curve files.
 mod scenes;
+// What an EXR says of the camera, and the layers of position, motion and texture coordinates.
+mod seen;
 // Stiff and extreme cases, as the program reports them.
 mod stress;
 // Outputs that fail, clash or have nowhere to go.

@@ -1,6 +1,6 @@
 //! What a film takes: one sample of a pixel.
 
-use glam::Vec3A;
+use glam::{Vec2, Vec3A};
 
 use super::LightParts;
 use crate::math::Rgb;
@@ -16,6 +16,12 @@ pub struct Sample {
     pub depth: f32,
     /// Unit normal where it first scattered; zero without.
     pub normal: Vec3A,
+    /// Where it first scattered, millimetres about the scene's middle; zero without.
+    pub position: Vec3A,
+    /// By how many pixels that moves until the next frame, to the right and up, if a layer holds it.
+    pub motion: Vec2,
+    /// Texture coordinates where it first scattered, if a layer holds them.
+    pub uv: Vec2,
     /// Albedo of what it first scattered at, 0 to 1.
     pub albedo: Rgb,
     /// The radiance by where it came from.

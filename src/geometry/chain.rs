@@ -2,7 +2,7 @@
 
 use std::ops::{Mul, Sub};
 
-use glam::{DVec3, DVec4};
+use glam::{DVec3, DVec4, Vec2};
 use rayon::prelude::*;
 
 use super::{
@@ -250,6 +250,31 @@ pub(super) fn nearest_indices(
             let index = ((place + shift) * steps).round() as usize;
             material_indices
                 [if curve.closed { index % material_indices.len() } else { index.min(material_indices.len() - 1) }]
+        })
+        .collect()
+}
+
+/// Texture coordinates where each segment of a resampled curve starts and ends, from those of the given points. Where they
+/// jump from one point to the next, as at the seam of a tube, a segment keeps what it starts with.
+pub(super) fn uvs_of_segments(
+    curve: &Curve,
+    uvs: &[Vec2],
+    chain: &Chain,
+    knots: Option<&[(usize, f64)]>,
+) -> Vec<[Vec2; 2]> {
+    // The place among the given points where a segment of the chain starts: see `nearest_indices`.
+    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
+    let place = |knot: usize| shift + knots.map_or(knot as f64, |knots| knots[knot].0 as f64 + knots[knot].1);
+    let point = |i: usize| uvs[if curve.closed { i % uvs.len() } else { i.min(uvs.len() - 1) }];
+    let jumps = |a: Vec2, b: Vec2| (b - a).abs().max_element() > 0.5;
+    let at = |place: f64| {
+        let (a, b) = (point(place as usize), point(place as usize + 1));
+        if jumps(a, b) { a } else { a.lerp(b, place.fract() as f32) }
+    };
+    (0..knots.map_or(chain.segments(), |knots| knots.len() - 1))
+        .map(|segment| {
+            let (start, end) = (at(place(segment)), at(place(segment + 1)));
+            [start, if jumps(start, end) { start } else { end }]
         })
         .collect()
 }

@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    chain::{Chain, Fit, GAUSS, nearest_indices, resample},
+    chain::{Chain, Fit, GAUSS, nearest_indices, resample, uvs_of_segments},
     curve::{Basis, Curve},
     spline::{SplinePoint, Weights, evaluate_f32},
     tube::curve_of,
@@ -122,6 +122,10 @@ pub struct Strands {
     frames: Vec<PointFrame>,
     /// The same points and frames at later times; empty where yarns stand still.
     later: Vec<Pose>,
+    /// The same at the frame's own time and one frame later; empty where yarns stand still or nobody asks.
+    flow: Vec<Pose>,
+    /// Texture coordinates where each segment starts and ends; empty if nobody asks.
+    uvs: Vec<[Vec2; 2]>,
     /// As [`YarnFrame::flattening`], for each point; empty where all yarns are round.
     flattening: Vec<Vec2>,
     /// What was nearest for each segment: see [`Self::material_index`].
@@ -146,6 +150,18 @@ pub struct StrandMotion<'a> {
     pub later: &'a [Vec<Vec<DVec3>>],
     /// At rest: by lengths along these, plies wind about the yarn, so that stretching carries them along.
     pub rest: Option<&'a [Vec<DVec3>]>,
+    /// At the frame's own time and one frame later; or nothing.
+    pub flow: &'a [Vec<Vec<DVec3>>],
+}
+
+/// What lies along curves beside their points: for each curve; empty where there is nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Along<'a> {
+    /// Material indices, so many evenly from each given point to the next (a closed curve goes on to its first point, an
+    /// open one ends with its last), of which each segment gets that nearest to its middle.
+    pub material_indices: &'a [Vec<u16>],
+    /// Texture coordinates of each given point.
+    pub uvs: &'a [Vec<Vec2>],
 }
 
 /// One yarn before it joins the others.
@@ -155,6 +171,8 @@ struct Strand {
     /// For each point, or empty.
     flattening: Vec<Vec2>,
     material_indices: Vec<u16>,
+    /// For each segment, or empty.
+    uvs: Vec<[Vec2; 2]>,
     tight: Option<(usize, f64)>,
     length: f64,
 }
@@ -174,24 +192,22 @@ impl Strands {
         motion: StrandMotion<'_>,
         options: &StrandOptions,
     ) -> Self {
-        Self::with_material_indices(curves, &[], motion, options)
+        Self::with(curves, Along::default(), motion, options)
     }
 
-    /// Prepares curves that move and that are of several materials. Each curve has material indices, so many evenly from
-    /// each given point to the next (a closed curve goes on to its first point, an open one ends with its last), of which
-    /// each segment gets that nearest to its middle; or none at all. Curves that are handed over are freed as yarns are
-    /// made of them.
+    /// Prepares curves that move, with what lies along them. Curves that are handed over are freed as yarns are made of
+    /// them.
     ///
     /// # Panics
     /// If curves or their points have other numbers at other times.
-    pub fn with_material_indices<'a>(
+    pub fn with<'a>(
         curves: impl Into<Cow<'a, [(Curve, Vec<f64>)]>>,
-        material_indices: &[Vec<u16>],
+        along: Along<'_>,
         motion: StrandMotion<'_>,
         options: &StrandOptions,
     ) -> Self {
         let mut curves = curves.into();
-        let mut joined = Joined::new(curves.len(), motion.later.len());
+        let mut joined = Joined::new(curves.len(), motion.later.len() + motion.flow.len());
         let mut first = 0;
         while first < curves.len() {
             // A few at a time, so that what is not joined yet stays small.
@@ -208,10 +224,10 @@ impl Strands {
                     let (curve, radii) = &curves[yarn];
                     let phase =
                         if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] };
-                    let later: Vec<&[DVec3]> = motion.later.iter().map(|curves| curves[yarn].as_slice()).collect();
+                    let later = motion.later.iter().chain(motion.flow);
+                    let later: Vec<&[DVec3]> = later.map(|curves| curves[yarn].as_slice()).collect();
                     let rest = motion.rest.map(|curves| curves[yarn].as_slice());
-                    let material_indices = material_indices.get(yarn).map_or(&[][..], Vec::as_slice);
-                    Strand::new(curve, radii, material_indices, &later, rest, options, phase)
+                    Strand::new(curve, radii, along.of(yarn), &later, rest, options, phase)
                 })
                 .collect();
             if let Cow::Owned(curves) = &mut curves {
@@ -222,7 +238,7 @@ impl Strands {
             made.into_iter().for_each(|strand| joined.push(strand));
             first = end;
         }
-        joined.finish(options.basis)
+        joined.finish(options.basis, motion.flow.len())
     }
 
     /// The basis of the control points.
@@ -277,7 +293,13 @@ impl Strands {
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
             + size_of_val(&*self.flattening)
-            + self.later.iter().map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames)).sum::<usize>()
+            + size_of_val(&*self.uvs)
+            + self
+                .later
+                .iter()
+                .chain(&self.flow)
+                .map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames))
+                .sum::<usize>()
             + size_of_val(&*self.material_indices)
             + size_of_val(&*self.first_segments)) as u64
     }
@@ -286,6 +308,34 @@ impl Strands {
     #[inline]
     pub fn material_index(&self, segment: u32) -> Option<u16> {
         self.material_indices.get(segment as usize).copied()
+    }
+
+    /// Texture coordinates at `u` (0 to 1) of a segment; zero if nobody asked for them.
+    #[inline]
+    pub fn uv(&self, segment: u32, u: f32) -> Vec2 {
+        self.uvs.get(segment as usize).map_or(Vec2::ZERO, |[start, end]| start.lerp(*end, u))
+    }
+
+    /// Whether texture coordinates were asked for.
+    pub fn has_uvs(&self) -> bool {
+        !self.uvs.is_empty()
+    }
+
+    /// Takes texture coordinates from elsewhere; nothing, or a pair for each segment.
+    pub fn set_uvs(&mut self, uvs: Vec<[Vec2; 2]>) {
+        assert!(uvs.is_empty() || uvs.len() == self.segments.len(), "texture coordinates for each segment");
+        self.uvs = uvs;
+    }
+
+    /// Frames at `u` (0 to 1) of a segment at the frame's own time and one frame later, if it moves.
+    #[inline]
+    pub fn flow(&self, segment: u32, u: f32) -> Option<[YarnFrame; 2]> {
+        let [now, next] = self.flow.as_slice() else { return None };
+        let first = self.segments[segment as usize] as usize;
+        Some([now, next].map(|Pose { points, frames }| {
+            let p: &[Vec4; 4] = points[first..first + 4].try_into().expect("a segment has four points");
+            self.frame_of(first, p, &SegmentFrame::new(frames, first), u)
+        }))
     }
 
     /// Takes what was nearest_indices for every segment from elsewhere; nothing, or one for each.
@@ -447,9 +497,18 @@ struct Joined {
     flattening: Vec<Vec2>,
     segments: Vec<u32>,
     material_indices: Vec<u16>,
+    uvs: Vec<[Vec2; 2]>,
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
     length: f64,
+}
+
+impl<'a> Along<'a> {
+    /// What lies along one curve.
+    fn of(&self, curve: usize) -> (&'a [u16], &'a [Vec2]) {
+        let of_curve = self.material_indices.get(curve).map_or(&[][..], Vec::as_slice);
+        (of_curve, self.uvs.get(curve).map_or(&[], Vec::as_slice))
+    }
 }
 
 impl Joined {
@@ -459,6 +518,7 @@ impl Joined {
             flattening: Vec::new(),
             segments: Vec::new(),
             material_indices: Vec::new(),
+            uvs: Vec::new(),
             first_segments: Vec::with_capacity(yarns + 1),
             tight_bends: Vec::new(),
             length: 0.0,
@@ -479,11 +539,12 @@ impl Joined {
             all.1.extend(frames);
         }
         self.material_indices.extend(strand.material_indices);
+        self.uvs.extend(strand.uvs);
         self.length += strand.length;
         self.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
     }
 
-    fn finish(mut self, basis: Basis) -> Strands {
+    fn finish(mut self, basis: Basis, flow: usize) -> Strands {
         self.first_segments.push(self.segments.len() as u32);
         if self.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
             self.flattening = Vec::new();
@@ -496,12 +557,16 @@ impl Joined {
         };
         let mut poses = self.poses.into_iter().map(pose);
         let first = poses.next().expect("yarns are somewhere when the shutter opens");
+        let mut later: Vec<Pose> = poses.collect();
+        let flow = later.split_off(later.len() - flow);
         Strands {
             basis,
             points: first.points,
             segments: self.segments.into(),
             frames: first.frames,
-            later: poses.collect(),
+            later,
+            flow,
+            uvs: self.uvs,
             flattening: self.flattening,
             material_indices: self.material_indices,
             first_segments: self.first_segments,
@@ -515,7 +580,7 @@ impl Strand {
     fn new(
         curve: &Curve,
         radii: &[f64],
-        material_indices: &[u16],
+        (material_indices, uvs): (&[u16], &[Vec2]),
         later: &[&[DVec3]],
         rest: Option<&[DVec3]>,
         options: &StrandOptions,
@@ -542,6 +607,7 @@ impl Strand {
         } else {
             nearest_indices(curve, material_indices, &chain, knots.as_deref())
         };
+        let uvs = if uvs.is_empty() { Vec::new() } else { uvs_of_segments(curve, uvs, &chain, knots.as_deref()) };
         // The same places of the yarn at all times: points move with it.
         let resampled = |chain: Chain| match &knots {
             Some(knots) => chain.through(knots, closed, options.basis),
@@ -571,7 +637,7 @@ impl Strand {
         };
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
         let poses = poses.iter().zip(&wound).map(|(chain, winding)| (points(chain), frames(winding))).collect();
-        Self { poses, flattening, material_indices, tight, length: total }
+        Self { poses, flattening, material_indices, uvs, tight, length: total }
     }
 }
 
@@ -777,9 +843,9 @@ mod tests {
                 let count = if closed { 1200 } else { 1198 };
                 let material_indices: Vec<u16> = (0..count).map(|i| u16::from((300..750).contains(&i))).collect();
                 let of = StrandOptions { tolerance, ..options(basis) };
-                let s = Strands::with_material_indices(
+                let s = Strands::with(
                     &[(curve.clone(), vec![0.5; 400])],
-                    &[material_indices],
+                    Along { material_indices: &[material_indices], ..Along::default() },
                     StrandMotion::default(),
                     &of,
                 );
@@ -862,7 +928,7 @@ mod tests {
             let round = strands(curve.clone(), 0.5, &options(basis));
             let pose = vec![curve.points.iter().map(|p| *p + DVec3::X).collect()];
             let radii = vec![0.5; curve.points.len()];
-            let movement = StrandMotion { later: &[pose], rest: None };
+            let movement = StrandMotion { later: &[pose], ..StrandMotion::default() };
             let s = Strands::moving(&[(Curve { flattening, ..curve }, radii)], movement, &options(basis));
             assert!(s.flattened() && !round.flattened() && round.mean_flattening() == 1.0);
             assert_eq!(s.segments().len(), round.segments().len());
@@ -895,7 +961,7 @@ mod tests {
             let pose = |s: f64| -> Vec<Vec<DVec3>> { vec![curve.points.iter().map(|p| move_by(s, p)).collect()] };
             let later = [pose(0.5), pose(1.0)];
             let rest = [curve.points.clone()];
-            let motion = StrandMotion { later: &later, rest: Some(&rest) };
+            let motion = StrandMotion { later: &later, rest: Some(&rest), ..StrandMotion::default() };
             let o = options(basis);
             let moving = Strands::moving(&[(curve.clone(), radii.clone())], motion, &o);
             let still = strands(curve.clone(), 0.5, &o);

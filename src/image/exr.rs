@@ -16,7 +16,8 @@ use exr::{
     meta::{
         BlockDescription,
         attribute::{
-            AttributeValue, ChannelDescription, Compression as Method, IntegerBounds, LineOrder, SampleType, Text,
+            AttributeValue, ChannelDescription, Chromaticities, Compression as Method, IntegerBounds, LineOrder,
+            SampleType, Text,
         },
         header::Header,
     },
@@ -108,7 +109,16 @@ pub enum Attribute {
     Double(f64),
     /// A whole number.
     Whole(i32),
+    /// A ratio of whole numbers.
+    Ratio(i32, u32),
+    /// A matrix that is multiplied by a column, row by row. (In the file it stands for rows that are multiplied by it.)
+    Matrix([[f32; 4]; 4]),
+    /// x and y of red, green, blue and white by the CIE.
+    Chromaticities([[f32; 2]; 4]),
 }
+
+/// Those of linear Rec. 709, which all colours here are.
+pub const REC_709: Attribute = Attribute::Chromaticities([[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]]);
 
 /// What an EXR file contains besides its samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -299,10 +309,28 @@ fn header(layout: &ExrLayout) -> Result<Header, String> {
             Attribute::Float(value) => AttributeValue::F32(*value),
             Attribute::Double(value) => AttributeValue::F64(*value),
             Attribute::Whole(value) => AttributeValue::I32(*value),
+            Attribute::Ratio(value, of) => AttributeValue::Rational((*value, *of)),
+            Attribute::Matrix(rows) => AttributeValue::Matrix4x4(std::array::from_fn(|i| rows[i % 4][i / 4])),
+            Attribute::Chromaticities(values) => {
+                let [red, green, blue, white] = values.map(|[x, y]| Vec2(x, y));
+                AttributeValue::Chromaticities(Chromaticities { red, green, blue, white })
+            }
         };
-        header.own_attributes.other.insert(text(name), value);
+        set(&mut header, name, value);
     }
     Ok(header)
+}
+
+/// Puts an attribute where the crate keeps it: it has fields for what OpenEXR has names for.
+fn set(header: &mut Header, name: &str, value: AttributeValue) {
+    let (shared, own) = (&mut header.shared_attributes, &mut header.own_attributes);
+    match (name, value) {
+        ("chromaticities", AttributeValue::Chromaticities(value)) => shared.chromaticities = Some(value),
+        ("framesPerSecond", AttributeValue::Rational(value)) => own.frames_per_second = Some(value),
+        ("worldToCamera", AttributeValue::Matrix4x4(value)) => own.world_to_camera = Some(value),
+        ("worldToNDC", AttributeValue::Matrix4x4(value)) => own.world_to_normalized_device = Some(value),
+        (name, value) => _ = own.other.insert(text(name), value),
+    }
 }
 
 /// Attributes that the format itself needs, or that are written anyway.
@@ -394,7 +422,12 @@ fn sort_attributes(file: &mut File) -> io::Result<()> {
     file.write_all(&bytes)
 }
 
-/// The metadata of an EXR file whose value is text or a number, sorted by name; of the first part if there are many.
+/// Little-endian numbers, one behind the other.
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect()
+}
+
+/// The metadata of an EXR file whose value is text, a number, a matrix or chromaticities, sorted by name; of the first part if there are many.
 ///
 /// # Errors
 /// [`ImageError::Read`].
@@ -416,6 +449,17 @@ pub fn read_attributes(path: &Path) -> Result<Vec<(String, Attribute)>, ImageErr
             (b"float", &[a, b, c, d]) => Attribute::Float(f32::from_le_bytes([a, b, c, d])),
             (b"int", &[a, b, c, d]) => Attribute::Whole(i32::from_le_bytes([a, b, c, d])),
             (b"double", &[a, b, c, d, e, f, g, h]) => Attribute::Double(f64::from_le_bytes([a, b, c, d, e, f, g, h])),
+            (b"rational", &[a, b, c, d, e, f, g, h]) => {
+                Attribute::Ratio(i32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
+            }
+            (b"m44f", bytes) if bytes.len() == 64 => {
+                let all = floats(bytes);
+                Attribute::Matrix(std::array::from_fn(|row| std::array::from_fn(|column| all[4 * column + row])))
+            }
+            (b"chromaticities", bytes) if bytes.len() == 32 => {
+                let all = floats(bytes);
+                Attribute::Chromaticities(std::array::from_fn(|i| [all[2 * i], all[2 * i + 1]]))
+            }
             _ => continue,
         };
         attributes.push((String::from_utf8_lossy(&attribute.name).into_owned(), value));

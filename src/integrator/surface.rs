@@ -40,6 +40,8 @@ impl Integrator<'_> {
         if path.bounces == 0 {
             sample.alpha = 1.0;
             sample.depth = (path.from - place.point).dot(self.back);
+            self.sees(sample, place.point);
+            sample.uv = place.uv;
             sample.normal = place.shading;
             sample.albedo = albedo;
         }

@@ -139,6 +139,9 @@ impl Plan {
         add("normal_layer", scene.layers.normal, "asked for", "no output holds it");
         add("variance_layer", scene.layers.variance, "asked for", "no output holds it");
         add("sample_layer", scene.layers.samples, "asked for", "no output holds it");
+        add("position_layer", scene.layers.position, "asked for", "no output holds it");
+        add("motion_layer", scene.layers.motion, "asked for", "no output holds it: the next frame is not read");
+        add("uv_layer", scene.layers.uv, "asked for", "no output holds it");
         add("denoiser", scene.denoise, "asked for", "nobody asks for a denoised picture: not loaded");
         add(
             "camera_motion",
@@ -186,6 +189,9 @@ impl Plan {
             ("cryptomatte", Layers { cryptomatte: true, ..Layers::NONE }),
             ("variance_layer", Layers { variance: true, ..Layers::NONE }),
             ("sample_layer", Layers { samples: true, ..Layers::NONE }),
+            ("position_layer", Layers { position: true, ..Layers::NONE }),
+            ("motion_layer", Layers { motion: true, ..Layers::NONE }),
+            ("uv_layer", Layers { uv: true, ..Layers::NONE }),
         ] {
             let bytes = Tile::bytes_per_pixel(layer) - Tile::bytes_per_pixel(Layers::NONE);
             if let Some(feature) = features.iter_mut().find(|f| f.name == name) {

@@ -79,9 +79,18 @@ fn forced_is_the_same(text: &str, name: &str, to_the_bit: bool) {
 
 #[test]
 fn layers_do_not_change_the_picture() {
-    for name in
-        ["lobe_layers", "depth_layer", "normal_layer", "albedo_layer", "cryptomatte", "variance_layer", "sample_layer"]
-    {
+    for name in [
+        "lobe_layers",
+        "depth_layer",
+        "normal_layer",
+        "albedo_layer",
+        "cryptomatte",
+        "variance_layer",
+        "sample_layer",
+        "position_layer",
+        "motion_layer",
+        "uv_layer",
+    ] {
         forced_is_the_same(MINIMAL, name, true);
     }
 }

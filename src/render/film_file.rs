@@ -34,7 +34,7 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"YARNFILM";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Longest header that is read: identities hold a few lines for each light, yarn and fabric.
 const HEADER_LIMIT: u32 = 64 << 20;
 /// Bytes of a tile besides its sums and its length: next samples, shares, rays, checksum.
@@ -287,7 +287,7 @@ fn in_words(error: &io::Error) -> String {
 }
 
 fn header_json(about: &About, job: &Job) -> Value {
-    let Frame { width, height, layers, storage, display, fabrics } = about.frame.clone();
+    let Frame { width, height, layers, storage, display, fabrics, middle } = about.frame.clone();
     let metadata: Vec<Value> = about
         .metadata
         .iter()
@@ -296,6 +296,9 @@ fn header_json(about: &About, job: &Job) -> Value {
             Attribute::Float(v) => json!([name, "float", v.to_bits()]),
             Attribute::Double(v) => json!([name, "double", v.to_bits()]),
             Attribute::Whole(v) => json!([name, "whole", v]),
+            Attribute::Ratio(v, of) => json!([name, "ratio", [v, of]]),
+            Attribute::Matrix(v) => json!([name, "matrix", bits(v.as_flattened())]),
+            Attribute::Chromaticities(v) => json!([name, "chromaticities", bits(v.as_flattened())]),
         })
         .collect();
     let c = &job.counters;
@@ -312,6 +315,7 @@ fn header_json(about: &About, job: &Job) -> Value {
             "exposure_bits": display.exposure.to_bits(),
             "alpha": display.alpha,
             "fabrics": fabrics,
+            "middle_bits": middle.map(f64::to_bits),
         },
         "collected": layer_names(about.collected),
         "story": metadata,
@@ -332,6 +336,17 @@ fn name_of<T: PartialEq>(value: T, names: &[(&'static str, T)]) -> &'static str 
     names.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
 }
 
+/// Numbers to the last bit.
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+/// What [`bits`] wrote.
+fn floats<const N: usize>(v: &Value) -> Option<[f32; N]> {
+    let bit = |v: &Value| Some(f32::from_bits(u32::try_from(v.as_u64()?).ok()?));
+    v.as_array()?.iter().map(bit).collect::<Option<Vec<f32>>>()?.try_into().ok()
+}
+
 fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let word = |v: &Value| u32::try_from(v.as_u64()?).ok();
     let words = |v: &Value| -> Option<Vec<u32>> { v.as_array()?.iter().map(word).collect() };
@@ -344,6 +359,15 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
             "float" => Attribute::Float(f32::from_bits(word(&item[2])?)),
             "double" => Attribute::Double(f64::from_bits(item[2].as_u64()?)),
             "whole" => Attribute::Whole(i32::try_from(item[2].as_i64()?).ok()?),
+            "ratio" => Attribute::Ratio(i32::try_from(item[2][0].as_i64()?).ok()?, word(&item[2][1])?),
+            "matrix" => {
+                let all = floats::<16>(&item[2])?;
+                Attribute::Matrix(std::array::from_fn(|i| std::array::from_fn(|k| all[4 * i + k])))
+            }
+            "chromaticities" => {
+                let all = floats::<8>(&item[2])?;
+                Attribute::Chromaticities(std::array::from_fn(|i| [all[2 * i], all[2 * i + 1]]))
+            }
             _ => return None,
         };
         Some((text(&item[0])?, value))
@@ -371,6 +395,10 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
             alpha: f["alpha"].as_bool()?,
         },
         fabrics: f["fabrics"].as_array()?.iter().map(text).collect::<Option<_>>()?,
+        middle: {
+            let bits = f["middle_bits"].as_array()?.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?;
+            <[u64; 3]>::try_from(bits).ok()?.map(f64::from_bits)
+        },
     };
     let shard = match words(&v["shard"]).as_deref() {
         None if v["shard"].is_null() => None,

@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    film::{ClothId, Film, LightParts},
+    film::{ClothId, Film, LightParts, Pixel},
     image::{
         ImageError, cryptomatte,
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
@@ -51,6 +51,8 @@ pub struct Frame {
     pub display: Display,
     /// Names of the fabrics, for Cryptomatte.
     pub fabrics: Vec<String>,
+    /// Where the film's origin lies in the world, millimetres.
+    pub middle: [f64; 3],
 }
 
 impl Frame {
@@ -63,6 +65,7 @@ impl Frame {
             storage: scene.storage,
             display: scene.display,
             fabrics: scene.fabrics.iter().map(|f| f.name.clone()).collect(),
+            middle: scene.middle.to_array(),
         }
     }
 }
@@ -133,6 +136,10 @@ fn write_exr(
     layer(layers.albedo, "albedo", &["R", "G", "B"], Sample::F32);
     layer(layers.variance, "variance", &["R", "G", "B"], Sample::F32);
     layer(layers.samples, "samples", &["count"], Sample::U32);
+    layer(layers.position, "P", &["X", "Y", "Z"], Sample::F32);
+    // As Nuke calls them.
+    layer(layers.motion, "forward", &["u", "v"], Sample::F32);
+    layer(layers.uv, "uv", &["U", "V"], Sample::F32);
     let precision = if frame.storage.half_lobes { Sample::F16 } else { Sample::F32 };
     for name in PART_NAMES {
         layer(layers.lobes, name, &["R", "G", "B"], precision);
@@ -171,6 +178,15 @@ fn write_exr(
             if layers.samples {
                 values.push(0.0);
             }
+            if layers.position {
+                values.extend(in_world(&p, frame.middle));
+            }
+            if layers.motion {
+                values.extend(p.motion);
+            }
+            if layers.uv {
+                values.extend(p.uv);
+            }
             if layers.lobes {
                 values.extend(p.parts.as_flattened());
             }
@@ -186,6 +202,15 @@ fn write_exr(
             }
         }
     })
+}
+
+/// The place of a pixel in the world; the origin where nothing is.
+fn in_world(pixel: &Pixel, middle: [f64; 3]) -> [f32; 3] {
+    if pixel.alpha > 0.0 {
+        std::array::from_fn(|k| (f64::from(pixel.position[k]) + middle[k]) as f32)
+    } else {
+        [0.0; 3]
+    }
 }
 
 /// What a matte tells apart.

@@ -6,7 +6,8 @@ use glam::{DAffine3, DVec3};
 
 use super::{
     CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Mode, Object, RenderSettings, Scene,
-    Storage, Yarn, bounds, defaults, force, identity, view::CameraSetup,
+    Storage, Yarn, bounds, defaults, force, identity,
+    view::{CameraSetup, Views},
 };
 use crate::{
     geometry::{
@@ -65,6 +66,8 @@ pub struct OutputSettings {
     pub storage: Storage,
     /// Whether a denoised picture is made as well.
     pub denoise: bool,
+    /// Frames in a second of the sequence, if that is known: written to an EXR.
+    pub frames_per_second: Option<f64>,
 }
 
 /// A floor before it is known where the cloth lies.
@@ -138,14 +141,14 @@ impl SceneBuilder {
         }
         let aspect = f64::from(render.width) / f64::from(render.height);
         let frame = f64::from(render.frame.unwrap_or(defaults::FRAME));
-        let (camera, camera_path) = camera.place(&fabrics, &objects, middle, aspect, frame);
+        let Views { camera, path, flow } = camera.place(&fabrics, &objects, middle, aspect, frame);
         let ground = ground.map(|ground| {
             let lowest = [bounds(&fabrics), bounds_of_objects(&objects)].into_iter().flatten().map(|(low, _)| low.y);
             let lowest = lowest.reduce(f64::min).unwrap_or(0.0);
             let height = ground.height.map_or(lowest, |h| h - middle.y);
             Ground { height: height as f32, material: ground.material }
         });
-        let OutputSettings { display, layers, storage, denoise } = output;
+        let OutputSettings { display, layers, storage, denoise, frames_per_second } = output;
         let mut scene = Scene {
             path: name,
             render,
@@ -154,7 +157,9 @@ impl SceneBuilder {
             storage,
             denoise,
             camera,
-            camera_path,
+            camera_path: path,
+            camera_flow: layers.motion.then_some(flow),
+            frames_per_second,
             yarns,
             fibers,
             fabrics,
@@ -247,6 +252,7 @@ impl Fabric {
             motion: FabricMotion::default(),
             variants: Vec::new(),
             material_indices: Vec::new(),
+            uvs: Vec::new(),
             phases: curves.iter().map(|_| TAU * f64::from(stream.next())).collect(),
             seed,
             basis: match curves.first().map(|curve| curve.basis) {

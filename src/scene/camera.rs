@@ -1,6 +1,6 @@
 //! From a pixel to a ray.
 
-use glam::{DQuat, DVec3, Vec2, Vec3, Vec3A};
+use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use crate::{geometry::ray::Ray, math::warp};
@@ -193,6 +193,52 @@ impl Camera {
         Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()))
     }
 
+    /// Where a point of the world is seen, in pixels from the upper left corner of a picture; `None` if it is not in front.
+    #[inline]
+    pub fn project(&self, point: DVec3, width: u32, height: u32) -> Option<DVec2> {
+        let q = point - self.position;
+        let depth = -q.dot(self.back);
+        let half = match self.projection {
+            Projection::Perspective(_) if depth <= 0.0 => return None,
+            Projection::Perspective(angle) => depth * (0.5 * angle).tan(),
+            Projection::Orthographic(size) => 0.5 * size,
+        };
+        let (w, h) = (f64::from(width), f64::from(height));
+        let pixel = 0.5 * h / half;
+        Some(DVec2::new(0.5 * w + pixel * q.dot(self.right), 0.5 * h - pixel * q.dot(self.up)))
+    }
+
+    /// From the world, whose origin is at `-middle` of this camera's, to the camera: x to the right, y up, -z ahead.
+    pub fn world_to_camera(&self, middle: DVec3) -> DMat4 {
+        let to_world = DMat3::from_cols(self.right, self.up, self.back);
+        let turn = to_world.transpose();
+        DMat4::from_mat3_translation(turn, -(turn * (self.position + middle)))
+    }
+
+    /// From the same world to a picture of the given aspect (width over height), whose upper left corner is (0, 0) and
+    /// lower right (1, 1), after a division by w; z grows with depth.
+    pub fn world_to_ndc(&self, middle: DVec3, aspect: f64) -> DMat4 {
+        let to_picture = match self.projection {
+            Projection::Perspective(angle) => {
+                let scale = 0.5 / (0.5 * angle).tan();
+                DMat4::from_cols(
+                    DVec4::new(scale / aspect, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, -scale, 0.0, 0.0),
+                    // w is the depth, -z; z / w is 0 a millimetre ahead and 1 far away.
+                    DVec4::new(-0.5, -0.5, -1.0, -1.0),
+                    DVec4::new(0.0, 0.0, -1.0, 0.0),
+                )
+            }
+            Projection::Orthographic(size) => DMat4::from_cols(
+                DVec4::new(1.0 / (size * aspect), 0.0, 0.0, 0.0),
+                DVec4::new(0.0, -1.0 / size, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, -1.0, 0.0),
+                DVec4::new(0.5, 0.5, 0.0, 1.0),
+            ),
+        };
+        to_picture * self.world_to_camera(middle)
+    }
+
     /// How wide a pixel of a picture of so many rows is at the camera, and by how much wider for each length of
     /// distance.
     pub fn pixel_width(&self, height: u32) -> (f32, f32) {
@@ -287,6 +333,30 @@ mod tests {
         assert!((corner.y / -corner.z - 0.5f32.tan()).abs() < 1e-5);
         assert!(Camera::looking_at(DVec3::ZERO, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
         assert!(Camera::looking_at(DVec3::Y, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
+    }
+
+    #[test]
+    fn what_a_ray_sees_is_projected_to_where_the_ray_began() {
+        for projection in [Projection::Perspective(0.7), Projection::Orthographic(25.0)] {
+            let camera = Camera::looking_at(DVec3::new(7.0, -4.0, 30.0), DVec3::ONE, DVec3::Y, projection).unwrap();
+            let middle = DVec3::new(100.0, 20.0, -5.0);
+            let (to_camera, to_ndc) = (camera.world_to_camera(middle), camera.world_to_ndc(middle, 64.0 / 48.0));
+            for (pixel, distance) in [(Vec2::new(3.25, 40.5), 20.0), (Vec2::new(60.0, 5.0), 47.0)] {
+                let ray = camera.ray(pixel, Vec2::ZERO, 64, 48);
+                let point = ray.origin.as_dvec3() + distance * ray.direction.as_dvec3();
+                let seen = camera.project(point, 64, 48).unwrap();
+                // An orthographic ray is tilted by a millionth.
+                assert!((seen - pixel.as_dvec2()).length() < 1e-3, "{projection:?}: {seen}");
+                let ndc = to_ndc * (point + middle).extend(1.0);
+                let ndc = ndc.truncate() / ndc.w;
+                assert!((ndc.truncate() * DVec2::new(64.0, 48.0) - seen).length() < 1e-9, "{projection:?}: {ndc}");
+                let local = to_camera.transform_point3(point + middle);
+                let depth = (camera.position - point).dot(camera.back);
+                assert!((-local.z - depth).abs() < 1e-9 && ndc.z > 0.0, "{projection:?}: {local}, {depth}");
+            }
+            let behind = camera.position + camera.back;
+            assert_eq!(camera.project(behind, 64, 48).is_none(), matches!(projection, Projection::Perspective(_)));
+        }
     }
 
     #[test]

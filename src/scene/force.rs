@@ -17,7 +17,7 @@ use crate::{
 const FAINT: f32 = 1e-30;
 
 /// Names of features that can be forced, as the plan of a render has them.
-pub const FORCEABLE: [&str; 18] = [
+pub const FORCEABLE: [&str; 21] = [
     "ply_filter",
     "elliptical_plies",
     "ply_twist",
@@ -36,6 +36,9 @@ pub const FORCEABLE: [&str; 18] = [
     "cryptomatte",
     "variance_layer",
     "sample_layer",
+    "position_layer",
+    "motion_layer",
+    "uv_layer",
 ];
 
 /// Makes the scene need a feature. Does nothing where it needs it already.
@@ -131,6 +134,13 @@ pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
         "cryptomatte" => layers.cryptomatte = true,
         "variance_layer" => layers.variance = true,
         "sample_layer" => layers.samples = true,
+        "position_layer" => layers.position = true,
+        "uv_layer" => layers.uv = true,
+        // Cloth whose next frame was not read stands still.
+        "motion_layer" => {
+            layers.motion = true;
+            scene.camera_flow.get_or_insert([scene.camera; 2]);
+        }
         _ => return Err(format!("`{name}` cannot be forced; these can: {}", FORCEABLE.join(", "))),
     }
     Ok(())

@@ -5,7 +5,7 @@
 
 use std::fmt::{Debug, Write as _};
 
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
@@ -33,6 +33,8 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         denoise: _,
         camera,
         camera_path,
+        camera_flow,
+        frames_per_second: _,
         yarns,
         fibers,
         fabrics,
@@ -51,6 +53,9 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
     of_settings(render, &mut keys);
     let Camera { position, right, up, back, projection, lens } = camera;
     keys.add("camera.shutter", camera_path);
+    if let Some(flow) = camera_flow {
+        keys.add("camera.flow", flow);
+    }
     keys.add("camera.position", position);
     keys.add("camera.direction", &[right, up, back]);
     keys.add("camera.projection", projection);
@@ -220,6 +225,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         motion,
         variants,
         material_indices,
+        uvs,
         phases,
         seed,
         basis,
@@ -251,14 +257,26 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         hash
     };
     key("curves", &in_order(curves.par_iter().map(of_curve)));
-    let FabricMotion { later, rest } = motion;
-    if !later.is_empty() || rest.is_some() {
-        let of_points = |points: &Vec<DVec3>| {
+    if !uvs.is_empty() {
+        let of_curve = |uvs: &Vec<Vec2>| {
             let mut hash = Hash::default();
-            hash.bytes(&points.len().to_le_bytes());
-            points.iter().for_each(|p| hash.numbers(&p.to_array()));
+            uvs.iter().for_each(|uv| hash.numbers(&uv.as_dvec2().to_array()));
             hash
         };
+        key("uv", &in_order(uvs.par_iter().map(of_curve)));
+    }
+    let FabricMotion { later, rest, flow } = motion;
+    let of_points = |points: &Vec<DVec3>| {
+        let mut hash = Hash::default();
+        hash.bytes(&points.len().to_le_bytes());
+        points.iter().for_each(|p| hash.numbers(&p.to_array()));
+        hash
+    };
+    if !flow.is_empty() {
+        let poses: Vec<&Vec<DVec3>> = flow.iter().flatten().collect();
+        key("flow", &in_order(poses.into_par_iter().map(of_points)));
+    }
+    if !later.is_empty() || rest.is_some() {
         let poses: Vec<&Vec<DVec3>> = later.iter().flatten().chain(rest.iter().flatten()).collect();
         key("shutter", &(later.len(), rest.is_some(), in_order(poses.into_par_iter().map(of_points))));
     }

@@ -11,6 +11,7 @@ pub mod camera;
 pub mod defaults;
 pub mod force;
 pub mod identity;
+mod layers;
 pub mod load;
 pub mod motion;
 pub mod view;
@@ -22,6 +23,7 @@ use rayon::prelude::*;
 
 pub use builder::{SceneBuilder, SceneError};
 pub use camera::Camera;
+pub use layers::{LayerName, Layers};
 
 use crate::{
     geometry::{
@@ -169,71 +171,6 @@ pub struct RenderSettings {
     pub force: Vec<String>,
 }
 
-/// Layers of an EXR beside the picture and its alpha.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layers {
-    /// The light by where it came from: R, TT, D, F and B of its first scattering at cloth, direct and indirect; lights;
-    /// other surfaces.
-    pub lobes: bool,
-    /// Distance to the first yarn or ground along the view.
-    pub depth: bool,
-    /// Normal of the first ply.
-    pub normal: bool,
-    /// Albedo of what is seen first.
-    pub albedo: bool,
-    /// Variance of each pixel's mean.
-    pub variance: bool,
-    /// Number of samples.
-    pub samples: bool,
-    /// Which fabric, yarn and ply cover each pixel, as Cryptomatte.
-    pub cryptomatte: bool,
-}
-
-impl Default for Layers {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
-/// A layer's name, and where it is switched.
-pub type LayerName = (&'static str, fn(&mut Layers) -> &mut bool);
-
-impl Layers {
-    /// Every layer with its name in scene files.
-    pub const NAMES: [LayerName; 7] = [
-        ("lobes", |l| &mut l.lobes),
-        ("depth", |l| &mut l.depth),
-        ("normal", |l| &mut l.normal),
-        ("albedo", |l| &mut l.albedo),
-        ("variance", |l| &mut l.variance),
-        ("samples", |l| &mut l.samples),
-        ("cryptomatte", |l| &mut l.cryptomatte),
-    ];
-    /// All of them.
-    pub const ALL: Self = Self { lobes: true, cryptomatte: true, ..Self::DEFAULT };
-    /// Those of a scene that names none: all but the light by where it came from, whose sums would take two thirds of
-    /// the film, and Cryptomatte, whose channels are many.
-    pub const DEFAULT: Self = Self {
-        lobes: false,
-        depth: true,
-        normal: true,
-        albedo: true,
-        variance: true,
-        samples: true,
-        cryptomatte: false,
-    };
-    /// None of them.
-    pub const NONE: Self = Self {
-        lobes: false,
-        depth: false,
-        normal: false,
-        albedo: false,
-        variance: false,
-        samples: false,
-        cryptomatte: false,
-    };
-}
-
 /// How EXR files are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Storage {
@@ -335,6 +272,8 @@ pub struct Fabric {
     pub variants: Vec<Yarn>,
     /// Indices into `variants` along each curve, as many from each control point to the next; empty without variants.
     pub material_indices: Vec<Vec<u16>>,
+    /// Texture coordinates of each control point of each curve, 0 to 1 over the fabric; empty if no layer holds them.
+    pub uvs: Vec<Vec<Vec2>>,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
     /// Start of what is random in it: where explicit fibres lie.
@@ -354,13 +293,16 @@ pub struct FabricMotion {
     pub later: Vec<Vec<Vec<DVec3>>>,
     /// At rest: plies wind by lengths along these. `None` if the curves are at rest.
     pub rest: Option<Vec<Vec<DVec3>>>,
+    /// At the frame's own time and one frame later, for the layer of motion. Empty if nothing moves or no layer holds it.
+    pub flow: Vec<Vec<Vec<DVec3>>>,
 }
 
 impl Fabric {
     /// Moves curves, at all times, by a transform whose scale is the same along all axes; radii grow with it.
     pub fn transform(&mut self, by: &DAffine3) {
         transform_curves(&mut self.curves, by);
-        for curve in self.motion.later.iter_mut().flatten().chain(self.motion.rest.iter_mut().flatten()) {
+        let FabricMotion { later, rest, flow } = &mut self.motion;
+        for curve in later.iter_mut().chain(flow).flatten().chain(rest.iter_mut().flatten()) {
             for p in curve {
                 *p = by.transform_point3(*p);
             }
@@ -462,6 +404,10 @@ pub struct Scene {
     pub camera: Camera,
     /// The view from when the shutter opens to when it closes, evenly spaced in time; empty if it stands still.
     pub camera_path: Vec<Camera>,
+    /// The view at the frame's own time and one frame later, if the layer of motion holds how it moves.
+    pub camera_flow: Option<[Camera; 2]>,
+    /// Frames in a second of the sequence, as its user told.
+    pub frames_per_second: Option<f64>,
     /// Kinds of yarn that fabrics use.
     pub yarns: Vec<Yarn>,
     /// Fibres that fabrics use by themselves: name and material.

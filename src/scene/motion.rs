@@ -71,6 +71,11 @@ impl CameraMotion {
         camera
     }
 
+    /// The camera at a time in frames: `still` where it does not move.
+    pub(super) fn at(&self, still: &Camera, aim: Option<&Aim>, middle: DVec3, up: DVec3, time: f64) -> Camera {
+        if self.moves() { self.pose(still, aim, middle, up, time) } else { *still }
+    }
+
     /// The camera in the middle of the shutter's time, and where it is from opening to closing if it moves meanwhile.
     pub(super) fn poses(
         &self,

@@ -74,8 +74,7 @@ impl CameraSetup {
         Some(Self { camera, margin: None, lens: None, aim: Some(aim), up: aim.up, motion, faces_cloth: false })
     }
 
-    /// The camera at a frame for cloth that lies about `middle`, and its path while the shutter is open, if it moves.
-    /// Without any cloth it frames `objects`.
+    /// The camera at a frame for cloth that lies about `middle`. Without any cloth it frames `objects`.
     pub(super) fn place(
         &self,
         fabrics: &[Fabric],
@@ -83,7 +82,7 @@ impl CameraSetup {
         middle: DVec3,
         aspect: f64,
         frame: f64,
-    ) -> (Camera, Vec<Camera>) {
+    ) -> Views {
         let frame_all = |margin, clouds: &[Cloud<'_>]| -> Camera {
             let camera = match self.faces_cloth {
                 true => self.camera.facing(clouds.iter().flat_map(Cloud::points).map(|(p, _)| p)),
@@ -109,13 +108,24 @@ impl CameraSetup {
             }
         };
         let (mut camera, mut path) = self.motion.poses(&still, self.aim.as_ref(), middle, self.up, frame);
+        let flow = [frame, frame + 1.0].map(|time| self.motion.at(&still, self.aim.as_ref(), middle, self.up, time));
         if let Some(lens) = &self.lens {
             for camera in std::iter::once(&mut camera).chain(&mut path) {
                 camera.lens = Some(lens.of(camera, middle));
             }
         }
-        (camera, path)
+        Views { camera, path, flow }
     }
+}
+
+/// A camera as a scene has it.
+pub(super) struct Views {
+    /// In the middle of the shutter's time.
+    pub(super) camera: Camera,
+    /// While the shutter is open; empty if it stands still.
+    pub(super) path: Vec<Camera>,
+    /// At the frame's own time and one frame later.
+    pub(super) flow: [Camera; 2],
 }
 
 /// Points that a camera shall frame, and their radii unless they have none.

@@ -8,7 +8,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         fiber::Plies,
-        strand::{StrandMotion, StrandOptions, Strands},
+        strand::{Along, StrandMotion, StrandOptions, Strands},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
     },
@@ -246,11 +246,12 @@ impl<'a> Preparation<'a> {
                     fiber: material,
                     variants: Vec::new(),
                     material_indices: Vec::new(),
+                    uvs: Vec::new(),
                 })),
                 Of::Yarns { yarn, shape, strands } => {
                     let kinds = &prepared.fabric.variants;
                     let plies = Plies::new(&strands, &yarn.plies, &shape, prepared.fabric.seed);
-                    let fibers = |ply: usize, tubes, first_tubes, material_indices| {
+                    let fibers = |ply: usize, tubes, first_tubes, material_indices, uvs| {
                         let fiber = |of: &Yarn| FiberBcsdf::new(&of.fibers[ply].1);
                         let (fiber, variants) = (fiber(yarn), kinds.iter().map(fiber).collect());
                         CurveGeometry::Fibers(FiberGeometry {
@@ -261,6 +262,7 @@ impl<'a> Preparation<'a> {
                             fiber,
                             variants,
                             material_indices,
+                            uvs,
                         })
                     };
                     let slots = 0..yarn.plies.len();
@@ -273,6 +275,7 @@ impl<'a> Preparation<'a> {
                                 _ => alone,
                             };
                             strands.set_material_indices(plies.material_indices_along(1));
+                            strands.set_uvs(plies.uvs_along(1));
                             let scatterer = |of: &Yarn| yarn_scatterer(shape.clone(), &[&of.fibers[ply].1], model);
                             let (yarn, variants) = (scatterer(yarn), kinds.iter().map(scatterer).collect());
                             CurveGeometry::Yarns(YarnGeometry {
@@ -285,7 +288,8 @@ impl<'a> Preparation<'a> {
                         })),
                         Mode::Fiber => all.extend(slots.clone().map(|ply| {
                             let (tubes, first) = plies.fibers(ply, yarn.placement);
-                            fibers(ply, tubes, first, plies.material_indices_along(yarn.plies[ply].fibers as usize))
+                            let count = yarn.plies[ply].fibers as usize;
+                            fibers(ply, tubes, first, plies.material_indices_along(count), plies.uvs_along(count))
                         })),
                     }
                     if let Some(flyaways) = &yarn.flyaways {
@@ -293,7 +297,11 @@ impl<'a> Preparation<'a> {
                             let (tubes, first, from) = plies.flyaways(ply, flyaways);
                             let index = |segment| strands.material_index(from[tubes.tube_of(segment)]);
                             let material_indices = (0..tubes.segments().len() as u32).filter_map(index).collect();
-                            fibers(ply, tubes, first, material_indices)
+                            // A hair has the coordinates of the place where it leaves the yarn.
+                            let uv = |segment| [strands.uv(from[tubes.tube_of(segment)], 0.0); 2];
+                            let segments = if strands.has_uvs() { tubes.segments().len() as u32 } else { 0 };
+                            let uvs = (0..segments).map(uv).collect();
+                            fibers(ply, tubes, first, material_indices, uvs)
                         }));
                     }
                     if mode == Mode::Yarn {
@@ -323,10 +331,10 @@ impl<'a> Preparation<'a> {
 }
 
 fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
-    Strands::with_material_indices(
+    Strands::with(
         curves,
-        &fabric.material_indices,
-        StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref() },
+        Along { material_indices: &fabric.material_indices, uvs: &fabric.uvs },
+        StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref(), flow: &fabric.motion.flow },
         &StrandOptions {
             basis: fabric.basis,
             tolerance: fabric.tolerance,

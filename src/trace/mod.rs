@@ -15,7 +15,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use glam::{Vec3A, Vec4};
+use glam::{Vec2, Vec3A, Vec4};
 
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
@@ -75,6 +75,8 @@ pub struct FiberGeometry {
     pub variants: Vec<FiberBcsdf>,
     /// Material indices: which of `variants` each segment is made of; empty without variants.
     pub material_indices: Vec<u16>,
+    /// Texture coordinates where each segment starts and ends; empty if nobody asks.
+    pub uvs: Vec<[Vec2; 2]>,
 }
 
 /// What one geometry of Embree stands for.
@@ -115,6 +117,8 @@ pub struct Hit<'a> {
     pub geometry: usize,
     /// Segment or triangle within it.
     pub segment: u32,
+    /// How far along that segment, 0 to 1.
+    pub u: f32,
     /// Outward unit normal of the yarn, fibre or triangle.
     pub normal: Vec3A,
     /// What was met.
@@ -250,7 +254,7 @@ impl World {
             None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, raw)),
         };
         let normal = raw.normal.normalize_or(-ray.direction);
-        Hit { t: raw.t, geometry, segment: raw.segment, normal, place }
+        Hit { t: raw.t, geometry, segment: raw.segment, u: raw.u, normal, place }
     }
 
     /// The nearest hit and the transmittance of a ray, and how many hits Embree offered to the filter of each: what a ray
@@ -320,6 +324,12 @@ impl FiberGeometry {
         }
     }
 
+    /// Texture coordinates at `u` (0 to 1) of a segment; zero if nobody asked for them.
+    #[inline]
+    pub fn uv(&self, segment: u32, u: f32) -> Vec2 {
+        self.uvs.get(segment as usize).map_or(Vec2::ZERO, |[start, end]| start.lerp(*end, u))
+    }
+
     /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
     pub fn yarn_of(&self, segment: u32) -> usize {
         let tube = self.tubes.tube_of(segment);
@@ -363,7 +373,7 @@ impl CurveGeometry {
     fn bytes(&self) -> u64 {
         match self {
             Self::Yarns(w) => w.strands.bytes(),
-            Self::Fibers(f) => f.tubes.bytes() + size_of_val(&*f.material_indices) as u64,
+            Self::Fibers(f) => f.tubes.bytes() + (size_of_val(&*f.material_indices) + size_of_val(&*f.uvs)) as u64,
         }
     }
 }

@@ -89,6 +89,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
                     fiber: FiberBcsdf::new(&yarn.fibers[ply].1),
                     variants: Vec::new(),
                     material_indices: Vec::new(),
+                    uvs: Vec::new(),
                 })
             })
             .collect();

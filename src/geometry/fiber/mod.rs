@@ -260,6 +260,27 @@ impl<'a> Plies<'a> {
         material_indices
     }
 
+    /// For each segment of so many curves along each yarn, the texture coordinates of the yarn where it starts and ends;
+    /// nothing if nobody asked for them.
+    pub fn uvs_along(&self, curves: usize) -> Vec<[Vec2; 2]> {
+        let mut uvs = Vec::new();
+        for yarn in (0..self.strands.yarns()).filter(|_| self.strands.has_uvs()) {
+            let (guide, steps) = (Guide::new(self.strands, yarn), self.steps()[yarn]);
+            let at = |along: f64| {
+                let (segment, u) = guide.find(along);
+                self.strands.uv(segment, u)
+            };
+            let places: Vec<Vec2> = guide.steps(steps).map(at).collect();
+            let whole = |pair: &[Vec2]| {
+                let jumps = (pair[1] - pair[0]).abs().max_element() > 0.5;
+                [pair[0], pair[usize::from(!jumps)]]
+            };
+            let along: Vec<[Vec2; 2]> = places.windows(2).map(whole).collect();
+            uvs.extend(std::iter::repeat_n(along, curves).flatten());
+        }
+        uvs
+    }
+
     /// Mean radius of strands made along plies, in radii of the yarns that these belong to.
     pub fn mean_width(&self, plies: &Strands) -> f64 {
         let all = |of: &Strands| (0..of.yarns()).map(|yarn| of.mean_radius_of(yarn)).sum::<f64>();

@@ -34,6 +34,9 @@ use crate::{
 /// Columns that a yarn counts where nothing is known of its cloth.
 const COLUMNS: f32 = 256.0;
 
+/// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
+const SHOWN_CELLS: [u32; 2] = [6, 6];
+
 /// How finely curves are resampled, for all fabrics.
 pub(super) struct Detail {
     /// `None` for that of each file: exact, where points are kept.
@@ -46,6 +49,9 @@ pub(super) struct Detail {
     pub(super) can_move: bool,
     /// When it opens and closes, in frames from the frame's own time.
     pub(super) shutter: Option<[f64; 2]>,
+    /// Whether a layer holds how yarns move until the next frame, and whether one holds their texture coordinates.
+    pub(super) flow: bool,
+    pub(super) uv: bool,
     /// Whether garments are only measured, not laid.
     pub(super) survey: bool,
 }
@@ -62,7 +68,17 @@ impl Detail {
         });
         let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(defaults::FRAME, |f| f as u32);
         let can_move = table.is_none_or(|t| t.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name());
-        Self { basis, tolerance, longest_segment, frame, can_move, shutter: None, survey: false }
+        Self {
+            basis,
+            tolerance,
+            longest_segment,
+            frame,
+            can_move,
+            shutter: None,
+            flow: false,
+            uv: false,
+            survey: false,
+        }
     }
 }
 
@@ -160,7 +176,7 @@ pub(super) fn plan(
             source(source_table, &table, context, &known, curves)
         }
         None if curves.is_some() => {
-            curves.map(|path| file_source(path.to_owned(), table.header(), None, None, context))
+            curves.map(|path| file_source(path.to_owned(), table.header(), None, None, true, context))
         }
         None => {
             table.error(
@@ -183,9 +199,13 @@ fn file_source(
     span: Span,
     unit: Option<f64>,
     table: Option<&Reader<'_>>,
+    by_option: bool,
     context: &Context<'_>,
 ) -> Source {
     let mut options = ReadOptions::default();
+    if by_option && path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pyp")) {
+        options.tile = SHOWN_CELLS;
+    }
     let mut up = Up::Auto;
     let mut colors = false;
     if let Some(table) = table {
@@ -265,7 +285,8 @@ fn source(
             };
             let span = if curves.is_some() { table.header() } else { table.span("path").unwrap_or(table.header()) };
             // Read all keys in any case, so that each is known.
-            let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table), context);
+            let by_option = curves.is_some();
+            let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table), by_option, context);
             path.map(|_| source)
         }
         Some(1) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
@@ -282,7 +303,7 @@ fn source(
     };
     if let (Some(path), Some(1..)) = (curves, kind) {
         table.finish();
-        return Some(file_source(path.to_owned(), header, None, None, context));
+        return Some(file_source(path.to_owned(), header, None, None, true, context));
     }
     table.finish();
     made
@@ -352,7 +373,7 @@ impl FabricPlan {
         };
         let made = match self.source {
             Source::Garment(plan) => {
-                let (tension, places) = (self.color.tension(), self.color.needs_places());
+                let (tension, places) = (self.color.tension(), self.color.needs_places() || detail.uv);
                 let (panels, facts) = {
                     let name = match &self.kind {
                         KindName::Yarn(name) | KindName::Fiber(name) => name.as_str(),
@@ -451,6 +472,7 @@ impl FabricPlan {
                 motion,
                 variants: Vec::new(),
                 material_indices: Vec::new(),
+                uvs: Vec::new(),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
@@ -458,6 +480,14 @@ impl FabricPlan {
                 longest_segment: detail.longest_segment,
             };
             fabric.transform(&self.transform);
+            let coordinates = match detail.uv {
+                false => coordinates,
+                true => {
+                    let places = coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, &fabric));
+                    fabric.uvs = places.uvs(&fabric);
+                    Some(places)
+                }
+            };
             color.as_ref().unwrap_or(&self.color).apply(
                 &mut fabric,
                 dyes.as_ref(),

@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{
     super::{CurveKind, Fabric, Yarn},
@@ -100,6 +100,15 @@ impl FabricCoordinates {
             Some(at) => *at,
             None => [point as f32 / (count.max(2) - 1) as f32 * self.extent[0] * 0.999_99, curve as f32 + 0.5],
         }
+    }
+
+    /// Texture coordinates of each control point: columns and rows as shares of the fabric's, as a tint sees them.
+    pub(super) fn uvs(&self, fabric: &Fabric) -> Vec<Vec<Vec2>> {
+        let of_curve = |(i, (curve, _)): (usize, &(Curve, Vec<f64>))| {
+            let count = curve.points.len();
+            (0..count).map(|point| Vec2::from(self.at(i, point, count)) / Vec2::from(self.extent)).collect()
+        };
+        fabric.curves.iter().enumerate().map(of_curve).collect()
     }
 
     /// At the place `place` of `steps` from each control point to the next.

@@ -12,6 +12,7 @@ use super::{
     mesh::prim_pattern,
     pattern,
     poses::{Frames, Moment, Pose, between},
+    sequence::check_moves,
     weave,
     yarns::Library,
 };
@@ -419,22 +420,17 @@ impl GarmentPlan {
             }
             meshes.push(between(a, b, pose.share));
         }
-        let still = meshes.iter().all(|m| m.points == meshes[0].points);
-        if still {
-            meshes.truncate(1);
-        }
-        if meshes.len() > 1 && !detail.can_move {
-            let message = "yarns that move while the shutter is open need mode = \"yarn\"";
-            context.error(self.span, message, Some("shutter = [0, 0] shows them at the frame's own time".to_owned()));
-            return None;
-        }
+        let kept = kept(&meshes, frames.shown);
+        let shown = kept.iter().filter(|i| **i < frames.shown).count();
+        check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
+        let mut meshes: Vec<GarmentMesh> = kept.iter().map(|&i| meshes[i].clone()).collect();
         // Plies wind by lengths in the first frame, so that they keep their places from frame to frame.
         let with_rest = frames.animated && (meshes.len() > 1 || meshes[0].points != rest.points);
         let times = meshes.len();
         if with_rest {
             meshes.push(rest.clone());
         }
-        let bodies = self.bodies(&frames, unit, meshes.len(), with_rest, detail, context)?;
+        let bodies = self.bodies(&kept, unit, with_rest, detail, context)?;
         let all: Vec<&GarmentMesh> = meshes.iter().collect();
         let body: Vec<&Mesh> = bodies.iter().collect();
         let mut laid = match garment.lay(rest, &all, &body, &mut notes) {
@@ -447,21 +443,27 @@ impl GarmentPlan {
         drop(garment);
         let at_rest = if with_rest { laid.pop() } else { None };
         debug_assert_eq!(laid.len(), times);
-        let later = laid.split_off(1);
+        let mut later = laid.split_off(1);
+        let flow = later.split_off(shown - 1);
         let first = laid.pop()?;
         let lengths: Vec<f64> = first.iter().map(|yarns| length(yarns)).collect();
         facts.yarn_length = lengths.iter().sum();
         facts.weight = weight(&lengths);
         facts.repairs = notes;
-        Some((self.made(first, later, at_rest, &sizes), facts))
+        Some((self.made(first, [later, flow], at_rest, &sizes), facts))
     }
 
     /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm.
-    fn made(self, first: Laid, later: Vec<Laid>, rest: Option<Laid>, sizes: &[DVec2]) -> Vec<MadePanels> {
+    fn made(
+        self,
+        first: Laid,
+        [mut later, mut flow]: [Vec<Laid>; 2],
+        mut rest: Option<Laid>,
+        sizes: &[DVec2],
+    ) -> Vec<MadePanels> {
         let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
             std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
         };
-        let (mut later, mut rest) = (later, rest);
         let mut out = Vec::new();
         for (i, (yarns, rule)) in first.into_iter().zip(self.rules).enumerate() {
             if yarns.is_empty() {
@@ -470,6 +472,7 @@ impl GarmentPlan {
             let motion = FabricMotion {
                 later: later.iter_mut().map(|laid| points(laid, i)).collect(),
                 rest: rest.as_mut().map(|laid| points(laid, i)),
+                flow: flow.iter_mut().map(|laid| points(laid, i)).collect(),
             };
             let mut kinds = Vec::with_capacity(yarns.len());
             let mut places = Vec::with_capacity(yarns.len());
@@ -495,12 +498,11 @@ impl GarmentPlan {
         out
     }
 
-    /// The body in every pose.
+    /// The body in each pose that is kept.
     fn bodies(
         &self,
-        frames: &Frames,
+        kept: &[usize],
         unit: f64,
-        count: usize,
         with_rest: bool,
         detail: &Detail,
         context: &Context<'_>,
@@ -531,14 +533,23 @@ impl GarmentPlan {
             mesh
         };
         let last = own.poses.len() - 1;
-        let still = count - usize::from(with_rest);
-        let mut out: Vec<Mesh> = (0..still).map(|i| posed(&own.poses[i.min(last)])).collect();
+        let mut out: Vec<Mesh> = kept.iter().map(|&i| posed(&own.poses[i.min(last)])).collect();
         if with_rest {
             out.push(read[&own.rest].clone());
         }
-        debug_assert!(frames.poses.len() >= still);
         Some(out)
     }
+}
+
+/// Which poses are laid: one where nothing moves while the shutter is open, and those behind `shown` if anything moves
+/// from one of them to the next.
+fn kept(meshes: &[GarmentMesh], shown: usize) -> Vec<usize> {
+    let moves = |poses: &[GarmentMesh]| poses.windows(2).any(|pair| pair[0].points != pair[1].points);
+    let mut kept: Vec<usize> = if moves(&meshes[..shown]) { (0..shown).collect() } else { vec![0] };
+    if moves(&meshes[shown..]) {
+        kept.extend(shown..meshes.len());
+    }
+    kept
 }
 
 /// Length of yarns, mm: between the places where segments of their B-splines join.

@@ -325,6 +325,7 @@ impl Plans {
         let meshes = mesh::meshes(root, context, &materials, detail.frame);
         let camera = view::camera(root, context, options.frame, detail.frame);
         detail.survey = options.survey;
+        (detail.flow, detail.uv) = (output.layers.motion, output.layers.uv);
         detail.shutter = camera.as_ref().and_then(|camera| camera.motion.shutter);
         let lights = view::lights(root, context);
         let ground = view::ground(root, context, &materials);

@@ -103,26 +103,38 @@ pub(super) struct Pose {
     pub(super) share: f64,
 }
 
+/// Times at which to know the meshes, in frames: those of the shutter, then those of the layer of motion.
+fn times(detail: &Detail) -> Vec<f64> {
+    let mut times = super::sequence::times(detail.frame, detail.shutter);
+    if detail.flow {
+        times.extend(super::sequence::flow_times(detail.frame));
+    }
+    times
+}
+
 /// The moments of a frame, and the first of all.
 pub(super) struct Frames {
     pub(super) rest: Moment,
     pub(super) poses: Vec<Pose>,
+    /// How many of the poses are those of the shutter; the others are for the layer of motion.
+    pub(super) shown: usize,
     pub(super) animated: bool,
 }
 
 impl Frames {
     pub(super) fn find(path: &Path, detail: &Detail) -> Self {
+        let shown = super::sequence::times(detail.frame, detail.shutter).len();
         if stage::is_stage(path) && path.exists() {
             let at = |time: f64| Moment { frame: Some(time.to_bits()), ..Moment::of_file(path) };
             let pose = |time: f64| Pose { before: at(time), after: at(time), share: 0.0 };
-            let times = super::sequence::times(detail.frame, detail.shutter);
-            return Self { rest: Moment::of_file(path), poses: times.into_iter().map(pose).collect(), animated: true };
+            let poses = times(detail).into_iter().map(pose).collect();
+            return Self { rest: Moment::of_file(path), poses, shown, animated: true };
         }
         let own = numbered(path, detail.frame).filter(|_| !path.exists());
         let Some(own) = own else {
             let own = Moment::of_file(path);
             let pose = Pose { before: own.clone(), after: own.clone(), share: 0.0 };
-            return Self { rest: own, poses: vec![pose], animated: false };
+            return Self { rest: own, poses: vec![pose], shown: 1, animated: false };
         };
         // Before the first file and after the last all stand still.
         let there = |number: f64| {
@@ -130,12 +142,12 @@ impl Frames {
             path.exists().then_some(path)
         };
         let needed = |number: f64| Moment::of_file(&there(number).unwrap_or_else(|| own.clone()));
-        let poses = super::sequence::times(detail.frame, detail.shutter)
+        let poses = times(detail)
             .into_iter()
             .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
             .collect();
         let rest = first_number(path).and_then(|n| numbered(path, n)).unwrap_or_else(|| own.clone());
-        Self { rest: Moment::of_file(&rest), poses, animated: true }
+        Self { rest: Moment::of_file(&rest), poses, shown, animated: true }
     }
 
     /// All moments, each once.

@@ -16,7 +16,10 @@ use super::{
     Context,
     cloth::{CurveFile, Detail},
 };
-use crate::geometry::{curve::Curve, stage};
+use crate::{
+    geometry::{curve::Curve, stage},
+    input::diagnostic::Span,
+};
 
 /// Curves with their radii, millimetres.
 type Curves = Vec<(Curve, Vec<f64>)>;
@@ -50,7 +53,11 @@ pub(super) fn read(
     };
 
     // Between two files yarns move evenly from one to the other.
-    let times = times(detail.frame, detail.shutter);
+    let mut times = times(detail.frame, detail.shutter);
+    let shown = times.len();
+    if detail.flow {
+        times.extend(flow_times(detail.frame));
+    }
     let mut files: BTreeMap<i64, Curves> = BTreeMap::new();
     // Before the first file and after the last they stand still.
     let there = |number: i64| -> Option<(i64, PathBuf)> {
@@ -79,13 +86,11 @@ pub(super) fn read(
     let mut curves = files[&around[0].0].clone();
     let first = pose(&around[0]);
     let mut later: Vec<_> = around[1..].iter().map(pose).collect();
+    let flow = moving_on(later.split_off(shown - 1));
     if later.iter().all(|points| *points == first) {
         later.clear();
     }
-    if !later.is_empty() && !detail.can_move {
-        context.error(file.span, CANNOT_MOVE, Some(CANNOT_MOVE_HINT.to_owned()));
-        return None;
-    }
+    check_moves(&later, &flow, file.span, detail, context)?;
     for ((curve, _), points) in curves.iter_mut().zip(first) {
         curve.points = points;
     }
@@ -102,7 +107,7 @@ pub(super) fn read(
             Some(rest_of(&curves, rest).map_err(|problem| tell(problem, &path)).ok()?)
         }
     };
-    Some((own, curves, FabricMotion { later, rest }))
+    Some((own, curves, FabricMotion { later, rest, flow }))
 }
 
 /// The curves of a stage while the shutter is open; plies wind as in its first frame, or in the file `rest`.
@@ -116,7 +121,11 @@ fn of_stage(
         let message = format!("{}: {problem}", file.path.display());
         context.error(file.span, message, Some("yarns keep their points from frame to frame".to_owned()));
     };
-    let times = times(detail.frame, detail.shutter);
+    let mut times = times(detail.frame, detail.shutter);
+    let shown = times.len();
+    if detail.flow {
+        times.extend(flow_times(detail.frame));
+    }
     let curves = read(&file.path, Some(times[0]))?;
     let mut later = Vec::with_capacity(times.len() - 1);
     for &time in &times[1..] {
@@ -125,24 +134,52 @@ fn of_stage(
         later.push(points_of(pose));
     }
     let first = points_of(curves.clone());
+    let flow = moving_on(later.split_off(shown - 1));
     if later.iter().all(|points| *points == first) {
         later.clear();
     }
-    if !later.is_empty() && !detail.can_move {
-        context.error(file.span, CANNOT_MOVE, Some(CANNOT_MOVE_HINT.to_owned()));
-        return None;
-    }
+    check_moves(&later, &flow, file.span, detail, context)?;
     let rest = match &file.rest {
         Some(path) => read(path, None)?,
         None => read(&file.path, None)?,
     };
     same_shape(&curves, &rest).map_err(tell).ok()?;
     let rest = Some(points_of(rest)).filter(|rest| *rest != first || !later.is_empty());
-    Some((file.path.clone(), curves, FabricMotion { later, rest }))
+    Some((file.path.clone(), curves, FabricMotion { later, rest, flow }))
 }
 
-const CANNOT_MOVE: &str = "yarns that move while the shutter is open need mode = \"yarn\"";
-const CANNOT_MOVE_HINT: &str = "shutter = [0, 0] shows them at the frame's own time";
+/// When to know curves for the layer of motion, in frames.
+pub(super) fn flow_times(frame: u32) -> [f64; 2] {
+    [f64::from(frame), f64::from(frame) + 1.0]
+}
+
+/// Two poses, if anything moves from one to the other.
+fn moving_on(poses: Vec<Vec<Vec<DVec3>>>) -> Vec<Vec<Vec<DVec3>>> {
+    if poses.windows(2).all(|pair| pair[0] == pair[1]) { Vec::new() } else { poses }
+}
+
+/// Tells where yarns move in a mode in which they cannot.
+pub(super) fn check_moves<T>(
+    later: &[T],
+    flow: &[T],
+    span: Span,
+    detail: &Detail,
+    context: &Context<'_>,
+) -> Option<()> {
+    let (message, hint) = match (later, flow) {
+        _ if detail.can_move => return Some(()),
+        ([], []) => return Some(()),
+        ([], _) => {
+            ("the layer of motion needs mode = \"yarn\" for yarns that move", "leave `motion` out of output.layers")
+        }
+        _ => (
+            "yarns that move while the shutter is open need mode = \"yarn\"",
+            "shutter = [0, 0] shows them at the frame's own time",
+        ),
+    };
+    context.error(span, message, Some(hint.to_owned()));
+    None
+}
 
 /// Times at which to know the curves, evenly spaced from the opening of the shutter to its closing, in frames.
 pub(super) fn times(frame: u32, shutter: Option<[f64; 2]>) -> Vec<f64> {

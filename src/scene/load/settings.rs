@@ -125,6 +125,7 @@ pub(super) fn output(table: Option<Reader<'_>>) -> OutputSettings {
         }
     }
     let denoise = table.bool_or("denoise", otherwise.denoise);
+    let frames_per_second = table.f64("frames_per_second", Range::between(0.01, 10_000.0));
     table.finish();
-    OutputSettings { display, layers, storage, denoise }
+    OutputSettings { display, layers, storage, denoise, frames_per_second }
 }

@@ -1,0 +1,73 @@
+//! What layers hold of the place that a camera path meets first.
+
+use glam::{Vec2, Vec3A};
+
+use super::Integrator;
+use crate::{
+    film::Sample,
+    scene::{Camera, Scene},
+    trace::{Hit, YarnGeometry},
+};
+
+/// The most pixels by which anything is said to move: what passes close by the camera moves without end.
+const MOST_PIXELS: f64 = 65_536.0;
+
+/// The view at the frame's own time and one frame later.
+#[derive(Debug)]
+pub(super) struct Flow {
+    cameras: [Camera; 2],
+    size: [u32; 2],
+}
+
+impl Flow {
+    pub(super) fn of(scene: &Scene) -> Option<Self> {
+        let size = [scene.render.width, scene.render.height];
+        scene.camera_flow.filter(|_| scene.layers.motion).map(|cameras| Self { cameras, size })
+    }
+
+    /// By how many pixels, to the right and up, something moves from one place to another while the camera moves, too;
+    /// nothing where it is not in front of it.
+    fn pixels(&self, from: Vec3A, to: Vec3A) -> Vec2 {
+        let [width, height] = self.size;
+        let seen = |camera: &Camera, at: Vec3A| camera.project(at.as_dvec3(), width, height);
+        match (seen(&self.cameras[0], from), seen(&self.cameras[1], to)) {
+            (Some(a), Some(b)) => {
+                let moved = (b - a).clamp(glam::DVec2::splat(-MOST_PIXELS), glam::DVec2::splat(MOST_PIXELS));
+                Vec2::new(moved.x as f32, -moved.y as f32)
+            }
+            _ => Vec2::ZERO,
+        }
+    }
+}
+
+impl Integrator<'_> {
+    /// Notes a place that stands still in the world.
+    #[inline]
+    pub(super) fn sees(&self, sample: &mut Sample, point: Vec3A) {
+        sample.position = point;
+        if let Some(flow) = &self.flow {
+            sample.motion = flow.pixels(point, point);
+        }
+    }
+
+    /// Notes a place on a yarn, which may move: it keeps its place in the yarn's frame.
+    #[inline]
+    pub(super) fn sees_yarn(&self, sample: &mut Sample, hit: &Hit<'_>, yarns: &YarnGeometry, point: Vec3A, time: f32) {
+        sample.position = point;
+        if self.layers.uv {
+            sample.uv = yarns.strands.uv(hit.segment, hit.u);
+        }
+        let Some(flow) = &self.flow else { return };
+        let [from, to] = match yarns.strands.flow(hit.segment, hit.u) {
+            None => [point; 2],
+            Some(frames) => {
+                let seen = yarns.strands.frame_at(hit.segment, hit.u, time);
+                let off = point - seen.centre;
+                let across = seen.tangent.cross(seen.normal);
+                let [t, n, b] = [seen.tangent, seen.normal, across].map(|axis| off.dot(axis));
+                frames.map(|f| f.centre + t * f.tangent + n * f.normal + b * f.tangent.cross(f.normal))
+            }
+        };
+        sample.motion = flow.pixels(from, to);
+    }
+}

@@ -1,0 +1,198 @@
+//! What an EXR says of the camera, and of where what is seen lies, moves and belongs.
+
+use std::path::Path;
+
+use yarnray::image::{self, Attribute, Image};
+
+use crate::support::{SWATCH, directory, render, write, yarnray};
+
+/// A yarn along x under an even sky, seen by a camera that the test gives.
+fn scene(camera: &str, layers: &str, source: &str) -> String {
+    format!(
+        r#"
+[render]
+width = 60
+height = 40
+spp = 4
+filter = "box"
+filter_width = 0.5
+frame = 1
+
+[output]
+layers = {layers}
+frames_per_second = 23.976
+
+[camera]
+{camera}
+
+[fiber.wool]
+r = 0.1
+tt = 0.3
+d = 0.3
+beta_r = 10
+beta_tt = 10
+beta_n = 25
+
+[yarn.one]
+radius = 2
+plies = 1
+fiber = "wool"
+fibers = 50
+density = 0.5
+
+[[fabric]]
+yarn = "one"
+source = {{ {source} }}
+
+[[light]]
+type = "environment"
+"#
+    )
+}
+
+const VIEWS: [&str; 2] = [
+    "type = \"perspective\"\nposition = [30, 25, 60]\ntarget = [4, 1, 2]\nfov = 25",
+    "type = \"orthographic\"\nposition = [-20, 40, 50]\ntarget = [3, 0, 1]\nsize = 30",
+];
+
+#[track_caller]
+fn matrix(image: &Image, name: &str) -> [[f32; 4]; 4] {
+    match image.attribute(name) {
+        Some(Attribute::Matrix(rows)) => *rows,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+fn apply(rows: &[[f32; 4]; 4], point: [f32; 3]) -> [f64; 4] {
+    let p = [point[0], point[1], point[2], 1.0].map(f64::from);
+    rows.map(|row| row.into_iter().zip(p).map(|(a, b)| f64::from(a) * b).sum())
+}
+
+fn read(directory: &Path, args: &[&str]) -> Image {
+    yarnray(directory, &[&["render", "s.toml", "-q", "-o", "out.exr"], args].concat()).good();
+    image::read(&directory.join("out.exr")).expect("a picture")
+}
+
+fn triple(image: &Image, names: [&str; 3], i: usize) -> [f32; 3] {
+    names.map(|name| image.channel(name).expect("the channel")[i])
+}
+
+#[test]
+fn positions_fall_on_their_pixels_by_the_matrices_of_the_file() {
+    for camera in VIEWS {
+        // Two yarns, far from the origin: their middle is not the world's.
+        let source = "type = \"straight\", count = 3, length = 40, spacing = 7";
+        let text = scene(camera, "[\"position\", \"depth\"]", source);
+        let picture = render(&text, &[]).image;
+        let (to_camera, to_ndc) = (matrix(&picture, "worldToCamera"), matrix(&picture, "worldToNDC"));
+        let mut seen = 0;
+        for i in 0..60 * 40 {
+            let alpha = picture.channel("A").unwrap()[i];
+            if alpha < 1.0 {
+                continue;
+            }
+            seen += 1;
+            let p = triple(&picture, ["P.X", "P.Y", "P.Z"], i);
+            let [x, y, _, w] = apply(&to_ndc, p);
+            let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+            // The mean of samples all over the pixel is somewhere in it.
+            assert!(off.iter().all(|o| o.abs() < 0.5), "{camera}, pixel {i}: {off:?} pixels off");
+            let [_, _, z, _] = apply(&to_camera, p);
+            let depth = f64::from(picture.channel("depth.Z").unwrap()[i]);
+            assert!((-z - depth).abs() < 1e-3 * depth, "{camera}, pixel {i}: {z}, depth {depth}");
+        }
+        assert!(seen > 200, "{camera}: {seen} pixels are covered");
+    }
+}
+
+#[test]
+fn an_exr_names_its_colours_and_its_rate() {
+    let picture = render(&scene(VIEWS[0], "[]", "type = \"straight\", count = 1, length = 40"), &[]).image;
+    assert_eq!(picture.attribute("framesPerSecond"), Some(&Attribute::Ratio(24_000, 1001)));
+    let Some(Attribute::Chromaticities([red, .., white])) = picture.attribute("chromaticities") else {
+        panic!("no chromaticities")
+    };
+    assert_eq!((*red, *white), ([0.64, 0.33], [0.3127, 0.329]));
+    for layer in ["P.X", "forward.u", "uv.U"] {
+        assert!(picture.channel(layer).is_none(), "{layer} was not asked for");
+    }
+    let plain = render(SWATCH, &["--spp", "1"]).image;
+    assert_eq!(plain.attribute("framesPerSecond"), None);
+}
+
+/// A straight yarn along x at a place.
+fn straight(x: f64, y: f64, z: f64) -> String {
+    (0..=10).map(|i| format!("{} {} {z}\n", 40.0 * (f64::from(i) / 10.0 - 0.5) + x, y)).collect()
+}
+
+#[test]
+fn motion_is_that_of_yarns_and_camera_until_the_next_frame() {
+    // Straight from the front, a pixel is a millimetre: 40 rows of an orthographic view 40 high.
+    let view = "type = \"orthographic\"\nposition = [0, 0, 90]\ntarget = [0, 0, 0]\nsize = 40\n";
+    let source = "type = \"file\", path = \"y.####.txt\", unit = \"mm\"";
+    let d = directory();
+    write(d.path(), "y.0001.txt", straight(0.0, 0.0, 0.0));
+    write(d.path(), "y.0002.txt", straight(0.0, 3.0, 0.0));
+    write(d.path(), "y.0003.txt", straight(2.0, 3.0, 0.0));
+    let keys = "[[camera.key]]\nframe = 1\nposition = [0, 0, 90]\ntarget = [0, 0, 0]\n\
+                [[camera.key]]\nframe = 2\nposition = [5, 0, 90]\ntarget = [5, 0, 0]\n";
+    let moves = |camera: &str, args: &[&str]| {
+        write(d.path(), "s.toml", scene(camera, "[\"motion\"]", source));
+        let image = read(d.path(), args);
+        let (u, v, alpha) = (image.channel("forward.u"), image.channel("forward.v"), image.channel("A"));
+        let (u, v, alpha) = (u.expect("u"), v.expect("v"), alpha.expect("alpha"));
+        let covered: Vec<[f32; 2]> = (0..alpha.len()).filter(|i| alpha[*i] > 0.0).map(|i| [u[i], v[i]]).collect();
+        assert!((0..alpha.len()).all(|i| alpha[i] > 0.0 || (u[i], v[i]) == (0.0, 0.0)), "nothing does not move");
+        assert!(covered.len() > 60, "{} pixels", covered.len());
+        let first = covered[0];
+        for [u, v] in covered {
+            assert!((u - first[0]).abs() < 2e-3 && (v - first[1]).abs() < 2e-3, "{u} {v}, elsewhere {first:?}");
+        }
+        first
+    };
+    let near = |[u, v]: [f32; 2], want: [f32; 2]| {
+        assert!((u - want[0]).abs() < 2e-3 && (v - want[1]).abs() < 2e-3, "{u} {v}, not {want:?}");
+    };
+    // Up in the picture is positive, as in Nuke.
+    near(moves(view, &["--frames", "1"]), [0.0, 3.0]);
+    near(moves(view, &["--frames", "2"]), [2.0, 0.0]);
+    // After the last file all stand still.
+    near(moves(view, &["--frames", "3"]), [0.0, 0.0]);
+    near(moves(&format!("{view}{keys}"), &["--frames", "1"]), [-5.0, 3.0]);
+    // A shutter changes what is blurred, not how far things move until the next frame.
+    let blurred = format!("{view}shutter = [0, 0.5]\n");
+    near(moves(&blurred, &["--frames", "1"]), [0.0, 3.0]);
+    // In a mode in which yarns do not move there is a clear word.
+    write(d.path(), "s.toml", scene(view, "[\"motion\"]", source));
+    let run = yarnray(d.path(), &["render", "s.toml", "-q", "--mode", "fiber", "-o", "out.exr"]);
+    assert_eq!(run.status, Some(2));
+    assert!(run.stderr.contains("the layer of motion needs mode = \"yarn\""), "{}", run.stderr);
+}
+
+#[test]
+fn texture_coordinates_run_over_the_cloth_as_a_tint_does() {
+    for mode in ["yarn", "ply", "fiber"] {
+        let view = "type = \"frame\"\ndirection = [0, 0, 1]\nprojection = \"orthographic\"";
+        let source = "type = \"weave\", draft = \"plain\", warps = 12, wefts = 10, edges = \"live\"";
+        let picture = render(&scene(view, "[\"uv\", \"position\"]", source), &["--mode", mode]).image;
+        let channel = |name: &str| picture.channel(name).expect("the channel");
+        let (alpha, u, v) = (channel("A"), channel("uv.U"), channel("uv.V"));
+        let mut sums = [[0.0_f64; 5]; 2];
+        for i in (0..alpha.len()).filter(|&i| alpha[i] == 1.0) {
+            for (sums, (uv, axis)) in sums.iter_mut().zip([(u[i], "P.X"), (v[i], "P.Y")]) {
+                let (uv, at) = (f64::from(uv), f64::from(channel(axis)[i]));
+                assert!((-0.05..1.05).contains(&uv), "{mode}: {uv}");
+                let more = [1.0, uv, at, uv * at, at * at];
+                sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+            }
+        }
+        for [n, uv, at, both, square] in sums {
+            // The slope of coordinates over places: one over the cloth's size.
+            let slope = (both - uv * at / n) / (square - at * at / n);
+            let size = 1.0 / slope;
+            assert!(n > 500.0 && size > 30.0 && size < 90.0, "{mode}: {n} pixels, as if {size} mm wide");
+            // Evenly over it: the mean is near the middle.
+            assert!((uv / n - 0.5).abs() < 0.03, "{mode}: mean {}", uv / n);
+        }
+    }
+}
