@@ -644,7 +644,7 @@ mod tests {
         let layers = Layers::ALL;
         assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 84);
         assert_eq!(Tile::bytes_per_pixel(Layers::DEFAULT), 144);
-        assert_eq!(Tile::bytes_per_pixel(layers), 460);
+        assert_eq!(Tile::bytes_per_pixel(layers), 516);
         let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
         let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
         for x in 0..3 {

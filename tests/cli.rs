@@ -136,6 +136,27 @@ fn statistics_have_every_key_of_the_interface() {
 }
 
 #[test]
+fn statistics_say_what_info_says() {
+    // A render takes the curves out of its scene: what it says of them afterwards must be what was there.
+    let scene =
+        SWATCH.replace("type = \"stockinette\", stitches = 4, rows = 6", "type = \"weave\", warps = 4, wefts = 4");
+    let directory = directory();
+    write(directory.path(), "s.toml", scene);
+    let args = ["render", "s.toml", "-q", "--spp", "1", "-o", "s.exr", "--stats", "s.json"];
+    yarnray(directory.path(), &args).good();
+    let stats = read_json(&directory.path().join("s.json"));
+    let info = yarnray(directory.path(), &["info", "s.toml", "--json"]).good().stdout;
+    let info: Value = serde_json::from_str(&info).unwrap();
+    for key in ["used", "left_out"] {
+        let named: Vec<&Value> = info[key].as_array().unwrap().iter().map(|f| &f["name"]).collect();
+        assert_eq!(stats[key].as_array().unwrap().iter().collect::<Vec<_>>(), named, "{key}");
+    }
+    assert!(stats["used"].as_array().unwrap().iter().any(|n| n == "flattening"));
+    assert!(stats["curves"]["given_points"].as_u64() > Some(0));
+    assert_eq!(stats["curves"]["given_points"], info["fabrics"][0]["given_points"]);
+}
+
+#[test]
 fn what_is_not_asked_for_is_left_out() {
     let directory = directory();
     let scene = SWATCH.replace("plies = 3", "plies = 1").replace("ply_twist = 18", "");

@@ -1,9 +1,14 @@
 //! Every command that the program or its documents print, run in a cheap form: few samples, small pictures.
 //!
-//! Commands are collected by themselves: the examples of each `--help`, and whatever begins with `yarnray` in code of the
-//! README and of docs. Files that a command reads and nobody has written before it are made up.
+//! Commands are collected by themselves: the examples of each `--help`, whatever begins with `yarnray` in code of the
+//! README and of docs, and in comments of scenes. Files that a command reads and nobody has written before it are made up.
 
-use std::{collections::BTreeSet, path::Path, process::Command, sync::LazyLock};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::LazyLock,
+};
 
 use crate::support::{SWATCH, directory, program, project, write, yarnray};
 
@@ -71,6 +76,23 @@ fn examples_of_document(text: &str) -> Vec<String> {
     let whole = |c: &String| c.split_whitespace().skip(2).any(|w| w.starts_with('-') || w.contains('.'));
     out.retain(|c| !capitals(c) && !c.contains("...") && whole(c));
     out
+}
+
+/// The commands that the comments of a scene name, each on a line of its own.
+fn examples_of_scene(text: &str) -> Vec<String> {
+    let comments = text.lines().filter_map(|l| l.strip_prefix('#')).map(str::trim);
+    comments.filter(|c| c.starts_with("yarnray ")).map(alone).collect()
+}
+
+/// All scene files below a folder, in order.
+fn scenes(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    let mut entries: Vec<PathBuf> = entries.collect();
+    entries.sort();
+    let below = |path: PathBuf| if path.is_dir() { scenes(&path) } else { vec![path] };
+    let mut all: Vec<PathBuf> = entries.into_iter().flat_map(below).collect();
+    all.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    all
 }
 
 /// The words of a command as a shell makes them.
@@ -227,6 +249,10 @@ fn every_printed_command_runs() {
     for path in &documents {
         let text = std::fs::read_to_string(path).expect("a document");
         all.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), examples_of_document(&text)));
+    }
+    for path in scenes(&project("scenes")) {
+        let text = std::fs::read_to_string(&path).expect("a scene");
+        all.push((path.display().to_string(), examples_of_scene(&text)));
     }
     let mut seen = BTreeSet::new();
     let problems: Vec<String> = all.iter().flat_map(|(title, commands)| run_all(title, commands, &mut seen)).collect();

@@ -77,8 +77,9 @@ fn cloth_under_a_ball_of_light_is_as_under_a_disc_of_the_sky() {
     let args = ["--spp", "128"];
     let (ball, disc) = (render(&ball, &args), render(&disc, &args));
     let (a, b) = (ball.mean(), disc.mean());
+    // Both share the random numbers of their paths: 0.06 % apart with these samples, 0.03 % with 4096.
     for k in 0..3 {
-        assert!((a[k] / b[k] - 1.0).abs() < 0.01, "{a:?} {b:?}");
+        assert!((a[k] / b[k] - 1.0).abs() < 0.0015, "{a:?} {b:?}");
     }
 }
 

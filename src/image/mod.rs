@@ -14,6 +14,7 @@ pub mod exr;
 pub mod metric;
 mod oiio;
 pub mod output;
+mod palette;
 pub mod png;
 pub mod texture;
 

@@ -8,7 +8,7 @@ use std::{
 
 pub use crate::math::srgb::{linear_to_srgb, srgb_to_linear};
 
-use super::{Channel, Image, ImageError, check_size, error::plain, output};
+use super::{Channel, Image, ImageError, check_size, error::plain, output, palette::Indexed};
 
 /// The curve from linear light to the light that a screen shows, before the sRGB encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -111,15 +111,33 @@ pub fn write(
     })
 }
 
-/// The bytes of a PNG file of `width` x `height` pixels, three bytes each, the top row first.
+/// The bytes of a PNG file of at most 256 colours, `width` in a row, the top row first: exact where the picture has no more,
+/// else of the colours that come close, in a byte a pixel.
 ///
 /// # Panics
-/// If the bytes are not that many, or the size is zero or beyond 32 bits.
-pub fn encode(width: usize, height: usize, bytes: &[u8]) -> Vec<u8> {
+/// If the size is zero or beyond 32 bits.
+pub fn encode_few(width: usize, colors: &[[u8; 3]]) -> Vec<u8> {
+    let Indexed { palette, pixels } = Indexed::new(colors);
+    encode(width, &pixels, |encoder| {
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette.into_flattened());
+    })
+}
+
+/// The bytes of a PNG file of grey values, `width` in a row, the top row first.
+///
+/// # Panics
+/// If the size is zero or beyond 32 bits.
+pub fn encode_gray(width: usize, bytes: &[u8]) -> Vec<u8> {
+    encode(width, bytes, |encoder| encoder.set_color(png::ColorType::Grayscale))
+}
+
+/// A PNG file of a byte a pixel.
+fn encode(width: usize, bytes: &[u8], kind: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>)) -> Vec<u8> {
     let number = |value| u32::try_from(value).expect("a size of 32 bits");
     let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, number(width), number(height));
-    encoder.set_color(png::ColorType::Rgb);
+    let mut encoder = png::Encoder::new(&mut out, number(width), number(bytes.len() / width));
+    kind(&mut encoder);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
     let written = encoder.write_header().and_then(|mut writer| {

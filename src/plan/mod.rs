@@ -9,7 +9,7 @@ pub use memory::{Memory, TooLarge};
 use crate::{
     film::Tile,
     light::Light,
-    scene::{CurveKind, Layers, Mode, Scene},
+    scene::{CurveKind, Fabric, Layers, Mode, Scene},
 };
 
 /// One feature of the renderer.
@@ -84,7 +84,7 @@ impl Plan {
         add("ply_filter", shapes.iter().any(|s| !s.filled), "plies leave gaps", "plies fill the yarn");
         add(
             "flattening",
-            scene.fabrics.iter().flat_map(|f| &f.curves).any(|(curve, _)| curve.flattening.is_some()),
+            scene.fabrics.iter().any(Fabric::is_pressed),
             "a yarn is pressed flat",
             "all yarns are round",
         );

@@ -7,19 +7,24 @@ for (const slider of document.querySelectorAll(".slider")) {
   const light = {};
   let split = 0.5;
 
-  // Mantissas stand on the left, the shared exponent on the right.
+  // The logarithm of the light, the share of red in it, and that of blue, side by side.
   const decode = (image) => {
-    const copy = document.createElement("canvas");
-    copy.width = 2 * width;
+    const copy = document.createElement("canvas"), end = Number(image.dataset.end), levels = 255 / Number(image.dataset.range);
+    const shares = Number(image.dataset.shares);
+    copy.width = 3 * width;
     copy.height = height;
     const pen = copy.getContext("2d", { willReadFrequently: true });
     pen.drawImage(image, 0, 0);
-    const bytes = pen.getImageData(0, 0, 2 * width, height).data;
+    const bytes = pen.getImageData(0, 0, 3 * width, height).data;
     const out = new Float32Array(3 * width * height);
     for (let y = 0; y < height; y++) {
       for (let x = 0; x < width; x++) {
-        const from = 4 * (2 * y * width + x), scale = 2 ** (bytes[from + 4 * width] - 128) / 256;
-        for (let k = 0; k < 3; k++) out[3 * (y * width + x) + k] = (bytes[from + k] + 0.5) * scale;
+        const from = 4 * (3 * y * width + x), to = 3 * (y * width + x), level = bytes[from];
+        const light = level > 0 ? 2 ** (end + (level - 255) / levels) : 0;
+        const red = bytes[from + 4 * width] / shares, blue = bytes[from + 8 * width] / shares;
+        out[to] = light * red;
+        out[to + 1] = light * Math.max(0, 1 - red - blue);
+        out[to + 2] = light * blue;
       }
     }
     return out;

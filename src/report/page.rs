@@ -41,37 +41,50 @@ impl Picture {
         Self { width, colors }
     }
 
-    /// A PNG for a screen, as the address of an image.
+    /// A PNG for a screen, of at most 256 colours, as the address of an image.
     fn address(&self, display: &Display) -> String {
-        let bytes: Vec<u8> = self
-            .colors
-            .iter()
-            .flat_map(|[r, g, b]| {
-                let [r, g, b, _] = display.encode([*r, *g, *b, 1.0]);
-                [r, g, b]
-            })
-            .collect();
-        address(&png::encode(self.width, self.height(), &bytes))
+        let seen = |&[r, g, b]: &[f32; 3]| {
+            let [r, g, b, _] = display.encode([r, g, b, 1.0]);
+            [r, g, b]
+        };
+        let colors: Vec<[u8; 3]> = self.colors.iter().map(seen).collect();
+        address(&png::encode_few(self.width, &colors))
     }
 
-    /// A PNG that keeps the range: three mantissas for each pixel on the left, the exponent they share on the right.
-    /// The script makes linear light of it, (m + 0.5) / 256 x 2^(e - 128), within 0.4 % of the brightest channel.
-    fn wide_range_address(&self) -> String {
-        let mut bytes = vec![0_u8; self.colors.len() * 6];
+    /// A PNG that keeps the range, and the stops above 1 at which it ends. Three pictures of grey stand side by side: the
+    /// logarithm of the light, and the shares of red and of blue in it. The script makes linear light of them, within 2 %
+    /// and 0.8 % of it; what is [`RANGE`] stops below the end is black. Cloth is of nearly one hue, so that this takes half
+    /// of what colours take.
+    fn wide_range_address(&self) -> (String, f32) {
+        let light = |c: &[f32; 3]| c.iter().map(|v| v.max(0.0)).sum::<f32>();
+        let mut all: Vec<f32> = self.colors.iter().map(light).filter(|v| v.is_finite() && *v > 0.0).collect();
+        all.sort_by(f32::total_cmp);
+        // A few fireflies or lamps leave the range to the rest, and are cut.
+        let bright = all.get(all.len() * 199 / 200).copied().unwrap_or(1.0);
+        let end = (bright.log2() + HEADROOM).ceil();
+        let mut bytes = vec![0_u8; self.colors.len() * 3];
         for (i, color) in self.colors.iter().enumerate() {
             let (x, y) = (i % self.width, i / self.width);
-            let most = color.iter().copied().fold(0.0, f32::max);
-            let exponent = if most.is_finite() && most > 1e-30 { most.log2().floor() as i32 + 1 } else { -127 };
-            let place = (y * 2 * self.width + x) * 3;
-            for (k, value) in color.iter().enumerate() {
-                // A cast takes what is not a number or negative to 0, and what is too large to 255.
-                bytes[place + k] = (value * 256.0 * (-exponent as f32).exp2()) as u8;
-                bytes[place + 3 * self.width + k] = (exponent + 128).clamp(0, 255) as u8;
+            let place = 3 * y * self.width + x;
+            let light = light(color);
+            // A cast takes what is not a number to 0, and what is too large to 255.
+            bytes[place] = (255.5 + LEVELS * (light.log2() - end)).max(0.0) as u8;
+            for (k, channel) in [0, 2].into_iter().enumerate() {
+                bytes[place + (k + 1) * self.width] = (SHARES * color[channel].max(0.0) / light + 0.5) as u8;
             }
         }
-        address(&png::encode(2 * self.width, self.height(), &bytes))
+        (address(&png::encode_gray(3 * self.width, &bytes)), end)
     }
 }
+
+/// Stops from the brightest to the darkest light of a picture that keeps its range.
+const RANGE: f32 = 14.0;
+/// Levels of a stop.
+const LEVELS: f32 = 255.0 / RANGE;
+/// Levels of a share of red or blue: more would keep noise that is not seen.
+const SHARES: f32 = 63.0;
+/// Stops by which the range ends above all but the brightest half per cent of pixels.
+const HEADROOM: f32 = 2.0;
 
 fn address(bytes: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(bytes))
@@ -122,7 +135,8 @@ pub fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2], stops: f32) -
         figure.slider id=(id) data-width=(width) data-height=(height) {
             canvas width=(width) height=(height) style=(format!("width:{}px", shown_width(pictures[0]))) {}
             @for (side, picture) in ["a", "b"].into_iter().zip(pictures) {
-                img.source data-side=(side) src=(picture.wide_range_address()) alt="";
+                @let (address, end) = picture.wide_range_address();
+                img.source data-side=(side) data-end=(end) data-range=(RANGE) data-shares=(SHARES) src=(address) alt="";
             }
             figcaption { span { "◀ " (names[0]) } span { (names[1]) " ▶" } }
             label { "exposure " input type="range" min="-10" max="10" step="0.25" value=(stops); output { (stops) } " stops" }
@@ -136,26 +150,30 @@ mod tests {
 
     #[test]
     fn wide_range_pictures_keep_their_light() {
-        let colors =
-            vec![[0.0, 0.0, 0.0], [1.0, 0.5, 0.25], [1e-4, 3e-5, 0.0], [1234.5, 1.0, 1000.0], [0.3; 3], [7.0; 3]];
-        let picture = Picture { width: 3, colors: colors.clone() };
-        let text = picture.wide_range_address();
+        let mut colors = vec![[0.3; 3], [1.0, 0.5, 0.25], [0.01, 0.003, 0.0], [0.0; 3], [3.0, 0.1, 2.0], [f32::NAN; 3]];
+        colors.extend(vec![[0.2, 0.3, 0.1]; 594]);
+        // One firefly in 600 pixels: cut, and nothing else.
+        colors[599] = [1e6; 3];
+        let picture = Picture { width: 6, colors: colors.clone() };
+        let (text, end) = picture.wide_range_address();
         let bytes = STANDARD.decode(text.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("x.png");
         std::fs::write(&path, bytes).unwrap();
         let image = crate::image::read(&path).unwrap();
-        assert_eq!((image.width, image.height), (6, 2));
-        for (i, color) in colors.iter().enumerate() {
-            let at = |x: usize, k: usize| {
-                let byte = png::linear_to_srgb(image.rgb().unwrap()[k][i / 3 * 6 + x]) * 255.0;
-                f64::from(byte.round())
+        assert_eq!((image.width, image.height), (18, 100));
+        for (i, color) in colors[..599].iter().enumerate().filter(|(i, _)| *i != 5) {
+            let at = |plane: usize| {
+                let value = image.channels[0].samples[i / 6 * 18 + plane * 6 + i % 6];
+                (png::linear_to_srgb(value) * 255.0).round()
             };
-            let scale = 2f64.powf(at(i % 3 + 3, 0) - 128.0) / 256.0;
-            let most = f64::from(color.iter().copied().fold(0.0, f32::max));
-            for (k, value) in color.iter().enumerate() {
-                let found = (at(i % 3, k) + 0.5) * scale;
-                assert!((found - f64::from(*value)).abs() <= 0.004 * most + 1e-30, "{color:?}: {found}");
+            // As the script does.
+            let light = if at(0) > 0.0 { (end + (at(0) - 255.0) / LEVELS).exp2() } else { 0.0 };
+            let (r, b) = (at(1) / SHARES, at(2) / SHARES);
+            let found = [light * r, light * (1.0 - r - b), light * b];
+            let all: f32 = color.iter().sum();
+            for (found, value) in found.into_iter().zip(color) {
+                assert!((found - value).abs() <= 0.021 * value + 0.017 * all, "{color:?}: {found}");
             }
         }
     }

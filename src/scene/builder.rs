@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::{
     CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Mode, Object, RenderSettings, Scene,
-    Storage, Yarn, bounds, defaults, force, identity,
+    Storage, Taken, Yarn, bounds, defaults, force, identity,
     view::{CameraSetup, Views},
 };
 use crate::{
@@ -253,6 +253,7 @@ impl Fabric {
             variants: Vec::new(),
             material_indices: Vec::new(),
             uvs: Vec::new(),
+            taken: Taken::default(),
             phases: curves.iter().map(|_| TAU * f64::from(stream.next())).collect(),
             seed,
             basis: match curves.first().map(|curve| curve.basis) {

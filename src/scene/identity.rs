@@ -226,6 +226,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         variants,
         material_indices,
         uvs,
+        taken: _,
         phases,
         seed,
         basis,

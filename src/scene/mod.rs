@@ -274,6 +274,8 @@ pub struct Fabric {
     pub material_indices: Vec<Vec<u16>>,
     /// Texture coordinates of each control point of each curve, 0 to 1 over the fabric; empty if no layer holds them.
     pub uvs: Vec<Vec<Vec2>>,
+    /// What they were, where a render has taken them.
+    pub taken: Taken,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
     /// Start of what is random in it: where explicit fibres lie.
@@ -284,6 +286,13 @@ pub struct Fabric {
     pub tolerance: f64,
     /// The longest segment, in yarn radii.
     pub longest_segment: f64,
+}
+
+/// What is known of curves that a render has taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    points: usize,
+    pressed: bool,
 }
 
 /// The points of a fabric's curves at other times: for each time, for each curve, millimetres.
@@ -311,7 +320,18 @@ impl Fabric {
 
     /// Number of control points, as given.
     pub fn control_points(&self) -> usize {
-        self.curves.iter().map(|(c, _)| c.points.len()).sum()
+        self.taken.points + self.curves.iter().map(|(c, _)| c.points.len()).sum::<usize>()
+    }
+
+    /// Whether any of its yarns is pressed flat.
+    pub fn is_pressed(&self) -> bool {
+        self.taken.pressed || self.curves.iter().any(|(curve, _)| curve.flattening.is_some())
+    }
+
+    /// Takes the curves out of it, and leaves what statistics tell of them.
+    pub fn take_curves(&mut self) -> Vec<(Curve, Vec<f64>)> {
+        self.taken = Taken { points: self.control_points(), pressed: self.is_pressed() };
+        std::mem::take(&mut self.curves)
     }
 }
 

@@ -156,7 +156,7 @@ impl World {
         limit: Option<u64>,
         beside: u64,
     ) -> Result<(Self, BuildTimes), BuildError> {
-        let curves = scene.fabrics.iter_mut().map(|fabric| Cow::Owned(std::mem::take(&mut fabric.curves))).collect();
+        let curves = scene.fabrics.iter_mut().map(|fabric| Cow::Owned(fabric.take_curves())).collect();
         Self::with_curves(scene, curves, threads, limit, beside)
     }
 

@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Mode, Yarn, defaults, transform_curves},
+    super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Mode, Taken, Yarn, defaults, transform_curves},
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan, FabricCoordinates},
     dyes::Dyes,
@@ -473,6 +473,7 @@ impl FabricPlan {
                 variants: Vec::new(),
                 material_indices: Vec::new(),
                 uvs: Vec::new(),
+                taken: Taken::default(),
                 phases,
                 seed: self.seed,
                 basis: detail.basis.unwrap_or(of_file),
