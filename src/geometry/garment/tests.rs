@@ -96,7 +96,7 @@ fn overlapping(yarns: &[LaidYarn]) -> f64 {
 
 #[test]
 fn a_flat_square_holds_its_stitches_within_its_border() {
-    for (tile, most) in [(knitted(), 0.15), (woven(), 0.35)] {
+    for tile in [knitted(), woven()] {
         let stitch = tile.stitch();
         let (report, yarns) = laid(&square(), options(tile));
         let wanted = 100.0 * 100.0 / stitch.element_product();
@@ -112,7 +112,8 @@ fn a_flat_square_holds_its_stitches_within_its_border() {
                 assert!(p.z.abs() < 6.0, "{p}");
             }
         }
-        assert!(overlapping(&yarns) < most);
+        // At finished edges, where chains and hems go through the cloth: 10 to 11.3 % measured.
+        assert!(overlapping(&yarns) < 0.12);
         assert!((report.uv_mm - 1.0).abs() < 1e-9 && (report.ratio.p50 - 1.0).abs() < 1e-6);
     }
 }

@@ -499,8 +499,8 @@ mod tests {
         for (x, y) in [(1.15, 1.0), (1.0, 1.12), (0.9, 1.05)] {
             let pulled = tile.pulled(tile.period * DVec2::new(x, y), 150);
             let grown = pulled.length() / tile.length();
-            eprintln!("GROWN {x} {y} {grown}");
-            assert!((grown - 1.0).abs() < 0.045, "{x} {y}: {grown}");
+            // Measured: 1.4, 1.6 and 0.3 % longer.
+            assert!((grown - 1.0).abs() < 0.018, "{x} {y}: {grown}");
             assert_eq!(pulled.diameter(), tile.diameter());
         }
     }
