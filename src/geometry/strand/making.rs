@@ -1,0 +1,273 @@
+//! Strands from curves: each yarn resampled and wound by itself, then all joined one behind the other.
+
+use std::borrow::Cow;
+
+use glam::{DVec2, DVec3, Vec2, Vec4};
+use rayon::prelude::*;
+
+use super::{
+    Along, FLATTEST, Pose, StrandMotion, StrandOptions, Strands, TightBend, frames::PointFrame, winding::Winding,
+};
+use crate::geometry::{
+    chain::{Chain, Fit, nearest_indices, resample, uvs_of_segments},
+    curve::{Basis, Curve},
+    yarn_frame::{Pressed, ROUND},
+};
+
+/// Points of curves that are made into yarns at a time, so that what is not joined yet stays small.
+const BATCH: usize = 1 << 20;
+
+/// What [`Strands::with`] promises. Curves that are handed over are freed as yarns are made of them.
+pub(super) fn strands(
+    mut curves: Cow<'_, [(Curve, Vec<f64>)]>,
+    along: Along<'_>,
+    motion: StrandMotion<'_>,
+    options: &StrandOptions,
+) -> Strands {
+    let mut joined = Joined::new(curves.len(), motion.later.len() + motion.flow.len());
+    let mut first = 0;
+    while first < curves.len() {
+        let end = first + batch(&curves[first..]);
+        let made: Vec<Strand> = (first..end)
+            .into_par_iter()
+            .map(|yarn| {
+                let (curve, radii) = &curves[yarn];
+                let given = Given {
+                    curve,
+                    radii,
+                    along: along.of(yarn),
+                    later: motion.later.iter().chain(motion.flow).map(|curves| curves[yarn].as_slice()).collect(),
+                    rest: motion.rest.map(|curves| curves[yarn].as_slice()),
+                    phase: if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] },
+                };
+                Strand::new(&given, options)
+            })
+            .collect();
+        if let Cow::Owned(curves) = &mut curves {
+            for (curve, radii) in &mut curves[first..end] {
+                (curve.points, *radii) = (Vec::new(), Vec::new());
+            }
+        }
+        made.into_iter().for_each(|strand| joined.push(strand));
+        first = end;
+    }
+    joined.finish(options.basis, motion.flow.len())
+}
+
+/// How many of the next curves are made at once: at least one.
+fn batch(curves: &[(Curve, Vec<f64>)]) -> usize {
+    let mut points = 0;
+    let fits = |(curve, _): &&(Curve, Vec<f64>)| {
+        let before = points;
+        points += curve.points.len();
+        before < BATCH
+    };
+    curves.iter().take_while(fits).count()
+}
+
+/// What a yarn is made from.
+struct Given<'a> {
+    curve: &'a Curve,
+    radii: &'a [f64],
+    /// Its material indices and texture coordinates; empty where there are none.
+    along: (&'a [u16], &'a [Vec2]),
+    /// Its points at later times, then those that its flow goes by.
+    later: Vec<&'a [DVec3]>,
+    /// Its points at rest, if other than the first.
+    rest: Option<&'a [DVec3]>,
+    /// Phase of the plies at its start, radians.
+    phase: f64,
+}
+
+/// One yarn before it joins the others.
+struct Strand {
+    /// Points and frames at each time.
+    poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
+    /// For each point, or empty.
+    flattening: Vec<Vec2>,
+    material_indices: Vec<u16>,
+    /// For each segment, or empty.
+    uvs: Vec<[Vec2; 2]>,
+    tight: Option<(usize, f64)>,
+    length: f64,
+}
+
+impl Strand {
+    fn new(given: &Given<'_>, options: &StrandOptions) -> Self {
+        let &Given { curve, radii, along: (material_indices, uvs), .. } = given;
+        let chain = Chain::new(curve, radii);
+        let lengths = chain.lengths();
+        let total = lengths[lengths.len() - 1];
+        let closed = curve.closed && curve.points.len() >= 3;
+        let knots = knots(&chain, &lengths, closed, radii, options);
+        let material_indices = if material_indices.is_empty() {
+            Vec::new()
+        } else {
+            nearest_indices(curve, material_indices, &chain, knots.as_deref())
+        };
+        let uvs = if uvs.is_empty() { Vec::new() } else { uvs_of_segments(curve, uvs, &chain, knots.as_deref()) };
+        // The same places of the yarn at all times: points move with it.
+        let resampled = |chain: Chain| match &knots {
+            Some(knots) => chain.through(knots, closed, options.basis),
+            None => chain,
+        };
+        let rest = given.rest.map(|points| resampled(Chain::at_time(curve, radii, points)));
+        let poses: Vec<Chain> = std::iter::once(chain)
+            .chain(given.later.iter().map(|points| Chain::at_time(curve, radii, points)))
+            .map(resampled)
+            .collect();
+        let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, options)).collect();
+        let rest = rest.map(|rest| Winding::new(&rest, options));
+        let frames = frames(&wound, rest.as_ref().unwrap_or(&wound[0]), curve.closed, given.phase, options.symmetry);
+        let flattening = match &curve.flattening {
+            Some(vectors) => flattening_along(curve, vectors, knots.as_deref(), &wound[0]),
+            None => Vec::new(),
+        };
+        let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
+        let poses = poses.iter().map(points).zip(frames).collect();
+        Self { poses, flattening, material_indices, uvs, tight: wound[0].tight, length: total }
+    }
+}
+
+/// Where a chain is resampled; nothing where its own points are kept.
+fn knots(
+    chain: &Chain,
+    lengths: &[f64],
+    closed: bool,
+    radii: &[f64],
+    options: &StrandOptions,
+) -> Option<Vec<(usize, f64)>> {
+    let total = lengths[lengths.len() - 1];
+    let kept = options.tolerance <= 0.0 && chain.basis == options.basis;
+    if kept || total <= 0.0 || total.is_nan() {
+        return None;
+    }
+    let mean_radius = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
+    let fit = Fit {
+        basis: options.basis,
+        tolerance: options.tolerance * mean_radius,
+        longest: options.longest_segment * mean_radius,
+    };
+    resample(chain, lengths, closed, &fit)
+}
+
+/// Frames of the control points at each time. The frame of a closed yarn comes back turned by some angle; what is missing
+/// to a full `symmetry` is spread over the yarn, always the same one.
+fn frames(wound: &[Winding], at_rest: &Winding, closed: bool, phase: f64, symmetry: f64) -> Vec<Vec<PointFrame>> {
+    let missing = |residual: f64, from: f64| residual - symmetry * ((residual - from) / symmetry).round();
+    let missing_at_rest = missing(at_rest.residual(at_rest), 0.0);
+    let of = |winding: &Winding| {
+        let missing = if closed { missing(winding.residual(at_rest), missing_at_rest) } else { 0.0 };
+        winding.frames(at_rest, missing, phase)
+    };
+    wound.iter().map(of).collect()
+}
+
+/// What presses a curve flat, in the frame of each point of the chain made from it: it moves with that frame.
+fn flattening_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]>, wound: &Winding) -> Vec<Vec2> {
+    assert_eq!(vectors.len(), curve.points.len(), "a curve is pressed flat at each of its points or at none");
+    // An axis has no sign: each points to the side of the one before. Its direction and its ratio make a chain of their
+    // own, which has its knots where the curve has them.
+    let mut axis = DVec3::ZERO;
+    let axes: Vec<DVec3> = vectors
+        .iter()
+        .map(|v| {
+            let v = v.try_normalize().unwrap_or(axis);
+            axis = if v.dot(axis) < 0.0 { -v } else { v };
+            axis
+        })
+        .collect();
+    let ratios: Vec<f64> = vectors.iter().map(|v| v.length()).collect();
+    let chain = Chain::at_time(curve, &ratios, &axes);
+    let ends = || (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]);
+    let at: Vec<(usize, f64)> = knots.map_or_else(|| ends().collect(), <[_]>::to_vec);
+    let mut before = DVec2::ZERO;
+    let made = at.iter().zip(&wound.knots).map(|(&(segment, u), knot)| {
+        let place = chain.at(segment, u);
+        let axis = place.at.truncate();
+        let across = DVec2::new(axis.dot(knot.normal), axis.dot(knot.tangent.cross(knot.normal)));
+        let across = across.try_normalize().unwrap_or(DVec2::X) * place.at.w.clamp(FLATTEST, 1.0);
+        before = if across.dot(before) < 0.0 { -across } else { across };
+        before.as_vec2()
+    });
+    let made: Vec<Vec2> = made.collect();
+    std::iter::once(made[0]).chain(made.iter().copied()).chain([made[made.len() - 1]]).collect()
+}
+
+/// Yarns one behind the other.
+struct Joined {
+    poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
+    /// Of the points of all yarns up to the last that is pressed flat.
+    flattening: Vec<Vec2>,
+    segments: Vec<u32>,
+    material_indices: Vec<u16>,
+    uvs: Vec<[Vec2; 2]>,
+    first_segments: Vec<u32>,
+    tight_bends: Vec<TightBend>,
+    length: f64,
+}
+
+impl Joined {
+    fn new(yarns: usize, later: usize) -> Self {
+        Self {
+            poses: vec![(Vec::new(), Vec::new()); 1 + later],
+            flattening: Vec::new(),
+            segments: Vec::new(),
+            material_indices: Vec::new(),
+            uvs: Vec::new(),
+            first_segments: Vec::with_capacity(yarns + 1),
+            tight_bends: Vec::new(),
+            length: 0.0,
+        }
+    }
+
+    fn push(&mut self, strand: Strand) {
+        let yarn = self.first_segments.len();
+        self.first_segments.push(self.segments.len() as u32);
+        let first = self.poses[0].0.len() as u32;
+        self.segments.extend(first..first + strand.poses[0].0.len().saturating_sub(3) as u32);
+        if !strand.flattening.is_empty() {
+            self.flattening.resize(first as usize, ROUND);
+            self.flattening.extend(strand.flattening);
+        }
+        for (all, (points, frames)) in self.poses.iter_mut().zip(strand.poses) {
+            all.0.extend(points);
+            all.1.extend(frames);
+        }
+        self.material_indices.extend(strand.material_indices);
+        self.uvs.extend(strand.uvs);
+        self.length += strand.length;
+        self.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
+    }
+
+    fn finish(mut self, basis: Basis, flow: usize) -> Strands {
+        self.first_segments.push(self.segments.len() as u32);
+        if self.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
+            self.flattening = Vec::new();
+        } else {
+            self.flattening.resize(self.poses[0].0.len(), ROUND);
+        }
+        let pose = |(points, mut frames): (Vec<Vec4>, Vec<PointFrame>)| {
+            frames.shrink_to_fit();
+            Pose { points: points.into(), frames }
+        };
+        let mut poses = self.poses.into_iter().map(pose);
+        let first = poses.next().expect("yarns are somewhere when the shutter opens");
+        let mut later: Vec<Pose> = poses.collect();
+        let flow = later.split_off(later.len() - flow);
+        Strands {
+            basis,
+            points: first.points,
+            segments: self.segments.into(),
+            frames: first.frames,
+            later,
+            flow,
+            uvs: self.uvs,
+            flattening: self.flattening,
+            material_indices: self.material_indices,
+            first_segments: self.first_segments,
+            tight_bends: self.tight_bends,
+            length: self.length,
+        }
+    }
+}

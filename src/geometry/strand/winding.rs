@@ -1,0 +1,156 @@
+//! The normal that does not turn about the yarn, and how far plies have turned about it, carried along a chain.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{StrandOptions, frames::PointFrame};
+use crate::geometry::{
+    chain::{Chain, GAUSS},
+    spline::{SplinePoint, Weights},
+};
+
+/// How far the inner side of a bend may run backwards, in yarn radii, before plies are seen to break: about the radius of one
+/// ply of three.
+const SEEN_FOLD: f64 = 0.5;
+
+/// A normal carried along a chain, and how far plies have turned about it.
+pub(super) struct Winding {
+    pub(super) knots: Vec<Knot>,
+    /// By how much a closed chain turns the normal against itself.
+    angle: f64,
+    /// The tightest place: its segment and its fold, in yarn radii, where plies are seen to break.
+    pub(super) tight: Option<(usize, f64)>,
+}
+
+/// A knot of a chain.
+#[derive(Clone, Copy)]
+pub(super) struct Knot {
+    pub(super) tangent: DVec3,
+    pub(super) normal: DVec3,
+    /// The angle of the plies' turns up to here.
+    turned: f64,
+}
+
+/// Segments along which a normal is carried in one go; longer chains are cut, whatever the number of threads.
+const STRETCH: usize = 16_384;
+
+impl Winding {
+    /// Carries the normal along the chain and integrates the phase of the plies.
+    pub(super) fn new(chain: &Chain, options: &StrandOptions) -> Self {
+        let segments = chain.segments();
+        let starts: Vec<usize> = (0..segments.max(1)).step_by(STRETCH).collect();
+        let stretches: Vec<_> = starts
+            .into_par_iter()
+            .map(|start| carry(chain, start, (start + STRETCH).min(segments), options.ply_rate))
+            .collect();
+        // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
+        let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
+        let mut tight: Option<(usize, f64)> = None;
+        for (mut stretch, its_tight) in stretches {
+            if let Some(end) = knots.pop() {
+                let first = stretch[0];
+                let (sin, cos) = (end.normal.dot(first.tangent.cross(first.normal)), end.normal.dot(first.normal));
+                let size = sin.hypot(cos);
+                let (sin, cos) = if size > 0.0 { (sin / size, cos / size) } else { (0.0, 1.0) };
+                for knot in &mut stretch {
+                    knot.normal = cos * knot.normal + sin * knot.tangent.cross(knot.normal);
+                    knot.turned += end.turned;
+                }
+            }
+            knots.append(&mut stretch);
+            if let Some((_, fold)) = its_tight
+                && tight.is_none_or(|(_, worst)| fold > worst)
+            {
+                tight = its_tight;
+            }
+        }
+        let (start, end) = (knots[0].normal, knots[knots.len() - 1]);
+        let angle = end.tangent.dot(start.cross(end.normal)).atan2(start.dot(end.normal));
+        Self { knots, angle, tight }
+    }
+
+    /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
+    pub(super) fn residual(&self, at_rest: &Self) -> f64 {
+        self.angle + at_rest.knots[at_rest.knots.len() - 1].turned
+    }
+
+    /// What is known at each control point.
+    pub(super) fn frames(&self, at_rest: &Self, missing: f64, phase: f64) -> Vec<PointFrame> {
+        let segments = self.knots.len() - 1;
+        let turned = |i: usize| at_rest.knots[i].turned - missing * i as f64 / segments as f64;
+        // Knot i is where segment i starts: the second of its four points.
+        let frame = |i: usize| {
+            let angle = |i: usize| phase + turned(i.min(segments));
+            let within = |angle: f64| angle - TAU * (angle / TAU).round();
+            let growth = angle(i + 1) - angle(i);
+            let normal = self.knots[i.min(segments)].normal;
+            PointFrame::new(normal, within(angle(i)), growth, within(angle(i + 1)))
+        };
+        let mut frames = Vec::with_capacity(segments + 3);
+        frames.push(frame(0));
+        frames.extend((0..=segments).map(frame));
+        frames.push(frame(segments));
+        frames
+    }
+}
+
+/// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
+/// knots from there to there, and the tightest bend.
+fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, Option<(usize, f64)>) {
+    let [a, b, c, d] = GAUSS;
+    let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (Weights::new(chain.basis, u), weight));
+    let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
+    // Where the segment before ends: straight segments do not go on as they began.
+    let mut here = if start == 0 { chain.at(0, 0.0) } else { chain.at(start - 1, 1.0) };
+    let mut tangent = tangent_of(&here, DVec3::X);
+    // Any rule will do for where the turning starts; this one is easy to reproduce: +z, laid across the yarn.
+    let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
+    let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
+    let mut turned = 0.0;
+    let (mut fold, mut tight): (f64, Option<(usize, f64)>) = (0.0, None);
+    let mut knots = Vec::with_capacity(end - start + 1);
+    knots.push(Knot { tangent, normal, turned });
+    for segment in start..end {
+        let points = chain.points_of(segment);
+        for (weights, weight) in &nodes {
+            let next = weights.evaluate(points);
+            let velocity = next.d1.truncate();
+            let speed = velocity.length();
+            let next_tangent = velocity.try_normalize().unwrap_or(tangent);
+            normal = double_reflection(here.at.truncate(), tangent, next.at.truncate(), next_tangent, normal);
+            turned += weight * ply_rate * speed / next.at.w.max(1e-300);
+            // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
+            // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
+            let distance = next.at.truncate().distance(here.at.truncate());
+            let forward = distance / (0.5 * (here.at.w + next.at.w)).max(1e-300);
+            // An angle is at most pi / 2 times its chord.
+            if fold > 0.0 || FRAC_PI_2 * tangent.distance(next_tangent) > forward {
+                fold = (fold + tangent.angle_between(next_tangent) - forward).max(0.0);
+                if fold > SEEN_FOLD && tight.is_none_or(|(_, worst)| fold > worst) {
+                    tight = Some((segment, fold));
+                }
+            }
+            (here, tangent) = (next, next_tangent);
+        }
+        // Rounding must not accumulate over thousands of segments.
+        normal = (normal - normal.dot(tangent) * tangent).try_normalize().unwrap_or(normal);
+        knots.push(Knot { tangent, normal, turned });
+    }
+    (knots, tight)
+}
+
+/// Carries `normal` from one point of a curve to the next without turning it about the tangent.
+fn double_reflection(from: DVec3, tangent: DVec3, to: DVec3, next_tangent: DVec3, normal: DVec3) -> DVec3 {
+    let reflect = |v: DVec3, plane: DVec3, square: f64| v - 2.0 / square * plane.dot(v) * plane;
+    let step = to - from;
+    let c1 = step.length_squared();
+    if c1 == 0.0 {
+        return normal;
+    }
+    let (n, t) = (reflect(normal, step, c1), reflect(tangent, step, c1));
+    let turn = next_tangent - t;
+    let c2 = turn.length_squared();
+    if c2 > 1e-300 { reflect(n, turn, c2) } else { n }
+}
