@@ -1,10 +1,17 @@
-//! Damaged scene files. Case i is made from i alone, so that a failure can be run again.
+//! Damaged files: scenes, curves, drafts, instructions; stages are damaged beside their readers. Case i is made from i alone, so that a failure can be run again.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use yarnray::scene::load::{LoadOptions, load};
+use yarnray::{
+    geometry::{
+        curve::CurveSet,
+        curve_file::{self, Format, ReadOptions},
+        pattern::{chart::Chart, knitspeak, straight, wif},
+    },
+    scene::load::{LoadOptions, load},
+};
 
-use crate::support::{SWATCH, directory, weave_text, write};
+use crate::support::{SWATCH, directory, project, weave_text, write};
 
 /// A small generator of random numbers: splitmix64.
 struct Random(u64);
@@ -140,4 +147,81 @@ fn damaged_scenes_never_panic() {
     }
     eprintln!("{loaded} of {cases} damaged scenes were still loaded");
     assert!(loaded > 0, "damage must leave some scenes whole, or nothing behind the parser is reached");
+}
+
+/// A few bytes cut off, changed, put in or said twice.
+fn battered(whole: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = whole.to_vec();
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len().max(1));
+        match random.below(6) {
+            0 => bytes.truncate(at),
+            1 => bytes.insert(at.min(bytes.len()), b"-9e[]{}=.#\n*"[random.below(12)]),
+            2 => {
+                let piece =
+                    bytes[at.min(bytes.len())..].iter().copied().take(1 + random.below(40)).collect::<Vec<u8>>();
+                bytes.splice(at.min(bytes.len())..at.min(bytes.len()), piece);
+            }
+            _ if at < bytes.len() => bytes[at] = random.below(256) as u8,
+            _ => {}
+        }
+    }
+    bytes
+}
+
+/// Reads damaged files with `read`, which gives the words of its error; some are still sound, some are not.
+fn batter(name: &str, whole: &[u8], cases: u64, read: impl Fn(&[u8]) -> Result<(), String>) {
+    assert_eq!(read(whole), Ok(()), "{name}");
+    let (mut good, mut bad) = (0, 0);
+    for case in 0..cases {
+        let bytes = battered(whole, &mut Random(case));
+        match catch_unwind(AssertUnwindSafe(|| read(&bytes))) {
+            Ok(Ok(())) => good += 1,
+            Ok(Err(message)) => {
+                assert!(!message.is_empty() && message.len() < 1000, "{name} {case}: {message}");
+                bad += 1;
+            }
+            Err(_) => panic!("{name}, case {case} panicked:\n{}", String::from_utf8_lossy(&bytes)),
+        }
+    }
+    assert!(good > 0 && bad > 0, "{name}: {good} are read, {bad} are not");
+}
+
+#[test]
+fn damaged_curves_drafts_and_instructions_never_panic() {
+    let folder = directory();
+    let at = folder.path();
+    let mut set = CurveSet { curves: straight(3, 4.0, 0.6), ..CurveSet::default() };
+    for curve in &mut set.curves {
+        curve.radii = Some(vec![0.2; curve.points.len()]);
+    }
+    let small = ReadOptions { max_points: 100_000, ..ReadOptions::default() };
+    let formats = [("a.bcc", Format::Bcc), ("a.hair", Format::Hair), ("a.obj", Format::Obj), ("a.txt", Format::Text)];
+    for (name, format) in formats.into_iter().chain([("a.yarns", Format::Yarns)]) {
+        let mut bytes = Vec::new();
+        curve_file::write(at.join(name).as_path(), &set, &mut bytes).unwrap();
+        let read = |bytes: &[u8]| curve_file::parse(bytes, format, &small).map(|_| ()).map_err(|e| e.to_string());
+        batter(name, &bytes, 3000, read);
+    }
+    let mesh = "L k -l1 +y1 +l1 -y1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4\nT 1\nf 4 3 5 6\nT 1\ne 1/3 2/-1\n";
+    let faces = "face k\nedge (-1,-1) -l1\nedge (1,-1) +y1\nedge (1,1) +l1\nedge (-1,1) -y1\nyarn [3:0.5,0] (-0.5,0,0.1) [2:0.7,0]\n\
+                 yarn [2:0.3,0] (0.5,0,0.1) [1:0.5,0]\nyarn [0:0.3,0] (0,0.6,-0.1) [0:0.7,0]\n";
+    let stitch_mesh = |mesh: &[u8], faces: &[u8]| {
+        write(at, "a.smobj", mesh);
+        write(at, "a.sf", faces);
+        curve_file::read(&at.join("a.smobj"), &small).map(|_| ()).map_err(|e| e.to_string())
+    };
+    batter("a.smobj", mesh.as_bytes(), 1000, |bytes| stitch_mesh(bytes, faces.as_bytes()));
+    batter("a.sf", faces.as_bytes(), 1000, |bytes| stitch_mesh(mesh.as_bytes(), bytes));
+    let tartan = std::fs::read(project("tests/data/drafts/tartan.wif")).unwrap();
+    batter("tartan.wif", &tartan, 2000, |bytes| {
+        let file = wif::parse(bytes).map_err(|e| e.to_string())?;
+        file.woven(wif::WifUse::default()).map(|_| ()).map_err(|e| e.to_string())
+    });
+    let rows = "Row 1 (RS): k2, *p2, k2; rep from * to end.\nRow 2: p2, *k2, p2; rep from * to end.\n";
+    batter("instructions", rows.as_bytes(), 3000, |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        let rows = knitspeak::chart_rows(&text, 10).map_err(|e| e.to_string())?;
+        Chart::parse(&rows).map(|_| ()).map_err(|e| e.to_string())
+    });
 }

@@ -6,7 +6,7 @@ use yarnray::geometry::curve_file::{Format, ReadOptions, parse};
 
 fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else { return };
-    let formats = [Format::Bcc, Format::Hair, Format::Obj, Format::Pyp, Format::Text];
+    let formats = [Format::Bcc, Format::Hair, Format::Obj, Format::Pyp, Format::Text, Format::Yarns];
     let options = ReadOptions { max_points: 1 << 16, ..ReadOptions::default() };
     let _ = parse(bytes, formats[usize::from(*choice) % formats.len()], &options);
 });

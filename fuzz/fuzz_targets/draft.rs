@@ -2,7 +2,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use yarnray::geometry::pattern::wif::{WifUse, parse};
 
 fuzz_target!(|data: &[u8]| {
-    let _ = yarnray::geometry::pattern::wif::parse(data);
+    if let Ok(file) = parse(data) {
+        let _ = file.woven(WifUse::default());
+    }
 });

@@ -168,6 +168,8 @@ const RADIUS: f64 = 0.5;
 const YARNS: u32 = 20;
 /// Length of a fringe, in radii of the warp.
 const FRINGE: f64 = 24.0;
+/// Crossings of a repeat from which on a weave takes more than some seconds.
+const LONG_REPEAT: usize = 1024;
 
 fn share(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
@@ -189,10 +191,6 @@ pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
         What::Garment(args) => garment::run(args),
         What::Fibers(args) => fibers::run(args),
     }
-}
-
-fn too_many<T>(what: &str) -> Result<T, Failure> {
-    Err(Failure::Input(format!("error: more than 2^27 control points; fewer {what} or points")))
 }
 
 fn knit(args: &KnitArgs) -> Result<(), Failure> {
@@ -238,7 +236,8 @@ fn knit(args: &KnitArgs) -> Result<(), Failure> {
         colors: None,
     };
     if piece.control_points() > MAX_POINTS {
-        return too_many("stitches, rows");
+        let problem = "error: more than 2^27 control points; fewer stitches, rows or points";
+        return Err(Failure::Input(problem.to_owned()));
     }
     let made = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
     let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
@@ -295,19 +294,12 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         draft,
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
     };
-    let cloth = match piece.relax() {
-        Ok(cloth) => cloth,
-        Err(Impossible::TooTight { warp, least }) => {
-            let option = if warp { "--warp-spacing" } else { "--weft-spacing" };
-            let problem = format!("error: {option} leaves the yarns no room to pass; at least {least:.4} here");
-            return Err(Failure::Input(problem));
-        }
-        Err(Impossible::TooMuchCover { most }) => {
-            let problem = format!("error: these yarns cover at most {most:.3} of the plane in this weave");
-            return Err(Failure::Input(problem));
-        }
-        Err(Impossible::TooLarge) => return too_many("warps, wefts"),
-    };
+    let repeat = [piece.draft.warps(), piece.draft.wefts()];
+    if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
+        log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
+    }
+    let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
+    let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     write(cloth.strands(), &args.output, [radius, piece.weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
@@ -321,6 +313,27 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         ));
     }
     Ok(())
+}
+
+/// Why a weave cannot be; a spacing is the command line's or the file's.
+fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
+    Failure::Input(match *why {
+        Impossible::TooTight { warp, least } => {
+            let name = if warp { "warp" } else { "weft" };
+            if given[usize::from(!warp)] {
+                format!("error: --{name}-spacing leaves the yarns no room to pass; at least {least:.4} here")
+            } else {
+                format!(
+                    "error: the {name} spacing of the draft leaves the yarns no room to pass; at least {least:.4} here\n  \
+                     hint: thinner yarns (--radius), or a spacing of your own (--{name}-spacing)"
+                )
+            }
+        }
+        Impossible::TooMuchCover { most } => {
+            format!("error: these yarns cover at most {most:.3} of the plane in this weave")
+        }
+        Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),
+    })
 }
 
 /// A draft of a weaving program; what it leaves open is said.

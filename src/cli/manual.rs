@@ -21,7 +21,7 @@ pub(super) struct CompletionsArgs {
 }
 
 const MAN: &str = "Examples:
-  yarnray man man1      for ~/.local/share/man/man1; then: man yarnray, man yarnray-render";
+  yarnray man man1      for ~/.local/share/man/man1; then: man yarnray, man yarnray-render, man yarnray-make-knit";
 
 #[derive(Args, Debug)]
 #[command(after_help = MAN)]
@@ -36,12 +36,11 @@ pub(super) fn completions(args: &CompletionsArgs, mut command: Command) -> Resul
     print(&String::from_utf8_lossy(&text))
 }
 
-/// One page for the program and one for each command.
+/// One page for the program and one for each command, those of `make` among them.
 pub(super) fn man(args: &ManArgs, mut command: Command) -> Result<(), Failure> {
     command.build();
-    let mut pages = vec![("yarnray".to_owned(), command.clone())];
-    let own = command.get_subcommands().filter(|c| c.get_name() != "help");
-    pages.extend(own.map(|c| (format!("yarnray-{}", c.get_name()), c.clone())));
+    let mut pages = Vec::new();
+    add_pages("yarnray".to_owned(), command, &mut pages);
     for (name, page) in pages {
         let path = args.folder.join(format!("{name}.1"));
         output::check_target(&path)?;
@@ -53,4 +52,12 @@ pub(super) fn man(args: &ManArgs, mut command: Command) -> Result<(), Failure> {
         log::say(&format!("wrote {}", path.display()));
     }
     Ok(())
+}
+
+fn add_pages(name: String, command: Command, pages: &mut Vec<(String, Command)>) {
+    let own: Vec<Command> = command.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
+    pages.push((name.clone(), command));
+    for below in own {
+        add_pages(format!("{name}-{}", below.get_name()), below, pages);
+    }
 }

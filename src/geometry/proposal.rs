@@ -11,7 +11,7 @@ use super::{
 /// without any overlap.
 const OVERLAP: f64 = 0.02;
 /// Points that are looked at, those around the middle of the file: enough to know the rest.
-const LOOKED_AT: usize = 60_000;
+const LOOKED_AT: usize = 20_000;
 /// Tenths by which the radius grows at most, and at a time to begin with.
 const MOST_STEPS: u32 = 60;
 const STRIDE: u32 = 4;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{CurveFileError, FileLocation, PrimPattern, ReadOptions, Stage, counted};
+use super::{CurveFileError, FileLocation, PrimPattern, ReadOptions, Stage};
 use crate::geometry::{
     curve::CurveSet,
     stage::{Contents, StageError},
@@ -33,7 +33,8 @@ pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet
             }
             ([], n) => {
                 let hint = "a mesh goes into [[mesh]], or under yarns: source = { type = \"garment\" }";
-                (format!("there are no curves in it, but {}", counted(n as u64, "mesh")), hint.to_owned())
+                let meshes = if n == 1 { "a mesh".to_owned() } else { format!("{n} meshes") };
+                (format!("there are no curves in it, but {meshes}"), hint.to_owned())
             }
             (paths, _) => {
                 let shown: Vec<&str> = paths.iter().take(8).map(String::as_str).collect();
@@ -46,6 +47,9 @@ pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet
     let points: u64 = set.curves.iter().map(|c| c.points.len() as u64).sum();
     if points > options.max_points {
         return Err(CurveFileError::too_many_points(FileLocation::File, points, options));
+    }
+    if let (None, Some([first, last])) = (options.frame, stage.frames().filter(|[first, last]| first < last)) {
+        set.notes.push(format!("frames {first} to {last} are in it: the curves are those of the earliest"));
     }
     if options.basis.is_some() {
         set.notes.push("the basis asked for was ignored: stages know their own".into());
