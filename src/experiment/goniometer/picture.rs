@@ -34,7 +34,7 @@ pub fn write_map(path: &Path, title: &str, all: &[(&str, &Measurement)]) -> Resu
     plot.text(side, 8, &format!("{title}; white is {} per steradian", short(largest)));
     for (i, (name, m)) in all.iter().enumerate() {
         let left = side + i * step;
-        plot.text(left, top - 14, name);
+        plot.centred(left + map_width / 2, top - 14, name);
         for (y, x) in (0..map_height).flat_map(|y| (0..map_width).map(move |x| (y, x))) {
             let [r, g, b] = m.distribution.value(ROWS - 1 - y / CELL, x / CELL).map(|v| (v / largest) as f32);
             plot.set(left + x, top + y, [r, g, b]);
@@ -51,7 +51,7 @@ pub fn write_map(path: &Path, title: &str, all: &[(&str, &Measurement)]) -> Resu
             let label = theta.to_string();
             plot.text(left - 8 - Pixels::GLYPH * label.len(), y - 3, &label);
         }
-        plot.text(left - side + 2, top - 14, "theta");
+        plot.text(left - side + 2, top - 14, "latitude theta, degrees");
     }
     plot.write(path)
 }
