@@ -20,7 +20,7 @@ use crate::geometry::{
 
 const EXAMPLES: &str = "Examples:
   yarnray convert glove.bcc glove.usdc --unit cm --radius 0.08     curves for Blender, Houdini and usdview
-  yarnray convert cloth.abc plies.usdc --unit mm --yarn wool --as plies
+  yarnray convert glove.bcc plies.usdc --unit cm --yarn wool --as plies
 
 --prim '/Garment/*' takes some prims of a stage, --frame 12 one frame of it, --tile 8,12 repeats a periodic pattern.
 Read: .bcc .hair .obj .pyp .yarns .smobj .txt .usd .usda .usdc .usdz .abc. Written: .bcc .hair .obj .yarns .txt .usda .usdc.

@@ -14,7 +14,6 @@ use super::{
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make garment scenes/pullover.toml --set render.frame=12 -o pullover.0012.usdc
-  yarnray make garment scenes/pullover.toml --as plies -o plies.usdc
   yarnray info scenes/pullover.toml                               how many stitches there would be
 
 The extension names the format: .usda and .usdc (with colours and the numbers of yarns and plies), .bcc (no radii), .hair,

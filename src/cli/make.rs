@@ -36,7 +36,7 @@ const EXAMPLES: &str = "Examples:
   yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --rows 10 --form tube -o shaped.hair
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
-  yarnray make weave --yarn linen --as fibers -o linen.usdc
+  yarnray make weave --yarn linen --as plies -o linen.usdc
   yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
 The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it),
