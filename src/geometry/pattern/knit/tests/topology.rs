@@ -158,6 +158,7 @@ fn stitches_and_decreases() {
         (&["k3", "k2tog yo k"], 3),
         (&["k3", "yo ssk k"], 3),
         (&["k4", "yo p2tog k2"], 4),
+        (&["p3", "yo ssp p"], 3),
         (&["k4", "k yo k3tog yo"], 4),
         (&["k4", "k yo sssk yo"], 4),
         (&["k4", "k yo cdd yo"], 4),
