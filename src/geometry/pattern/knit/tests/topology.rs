@@ -221,3 +221,22 @@ fn strands_of_a_cable_that_pass_in_front_are_in_front() {
         assert!(front > back + 1.0, "{rows:?}: {front} {back}");
     }
 }
+
+#[test]
+fn yarns_do_not_pass_each_other_in_pieces() {
+    let tube = Knit { form: Form::Tube, ..knit("stockinette", 24, 6) };
+    // Cables in a piece that has no repeat.
+    let chart = Chart::parse(&["k", "p k4 p k4", "p c4f p c4b", "p k4 p k4", "p k4 k2tog k3", "k", "k"]).unwrap();
+    let shaped = Knit { chart, rows: 7, ..knit("stockinette", 10, 1) };
+    for (name, piece) in [
+        ("flat", knit("stockinette", 8, 6)),
+        ("cable", knit("cable", 8, 6)),
+        ("tube", tube),
+        ("hat", hat(24)),
+        ("shaped", shaped),
+        ("floats", in_colors(&TWO_COLORS, Form::Flat)),
+        ("floats in a tube", in_colors(&TWO_COLORS, Form::Tube)),
+    ] {
+        assert_eq!(passed(|| drop(piece.strands(1.0).unwrap())), 0, "{name}");
+    }
+}
