@@ -10,7 +10,7 @@ fn bits(picture: &Picture) -> Vec<(String, Vec<u32>)> {
 fn any_number_of_threads_and_every_run_make_the_same_picture() {
     let args = |threads| ["--set", "output.layers=all", "--threads", threads];
     let one = bits(&render(SWATCH, &args("1")));
-    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 3 + 1 + 13 * 3 + 3 * 12, "all layers");
+    assert_eq!(one.len(), 4 + 1 + 3 + 3 + 3 + 1 + 3 + 2 + 2 + 13 * 3 + 3 * 12, "all layers");
     for threads in ["1", "2", "3"] {
         assert!(one == bits(&render(SWATCH, &args(threads))), "{threads} threads");
     }

@@ -219,7 +219,9 @@ fn collect(folder: &Path, below: &str, out: &mut Vec<Source>) {
         let file = path.file_name().unwrap().to_string_lossy().into_owned();
         let name = format!("{below}{file}");
         if path.is_dir() {
-            collect(&path, &format!("{name}/"), out);
+            if file != "tests" {
+                collect(&path, &format!("{name}/"), out);
+            }
         } else if file.ends_with(".rs") && file != "tests.rs" && name != "testing.rs" {
             let text = std::fs::read_to_string(&path).unwrap();
             out.push(Source { name, tokens: without_tests(tokens(&text)) });
