@@ -9,7 +9,7 @@ use super::{
 const OVER: f64 = 0.8;
 const TUCKED: f64 = 0.75;
 pub(super) const LIFTED: f64 = 0.6;
-const CAST_ON: f64 = 0.9;
+const CAST_ON: f64 = 0.82;
 
 /// The loop of each stitch, before there are any.
 const NONE: u32 = u32::MAX;
