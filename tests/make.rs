@@ -47,6 +47,27 @@ fn the_same_knit_is_the_same_file_and_keeps_its_yarns_apart() {
     assert!(info["overlap"]["share"].as_f64().unwrap() <= 0.042, "{}", info["overlap"]);
 }
 
+/// Sizes count stitches, rows and yarns, or say how large they are.
+#[test]
+fn sizes_are_kept_to_the_nearest_stitch_and_yarn() {
+    let folder = directory();
+    let d = folder.path();
+    let made = |args: &[&str]| yarnray(d, &[&["make"], args, &["-o", "a.bcc"]].concat()).good().stderr;
+    // 17.6 stitches and 20.4 rows, in repeats of two stitches.
+    let said = made(&["knit", "--pattern", "seed", "--gauge", "22,34", "--width", "80", "--height", "60"]);
+    assert!(said.contains("4.5455 from stitch to stitch, 2.9412 from row to row\n"), "{said}");
+    assert!(said.contains("18 x 20, 81.818 wide, 58.824 high; "), "{said}");
+    // A size and a count give the stitch.
+    let tube = ["knit", "--form", "tube", "--stitches", "24", "--circumference", "96", "--rows", "8", "--height", "24"];
+    let said = made(&tube);
+    assert!(said.contains("24 x 8, 96.000 around, 24.000 high; "), "{said}");
+    // A tile is of whole repeats.
+    let said = made(&["knit", "--pattern", "moss", "--tile", "--gauge", "22,34", "--width", "60", "--height", "39"]);
+    assert!(said.contains("period 63.636364 across, 35.294118 up; "), "{said}");
+    let said = made(&["weave", "--width", "24", "--wefts", "6", "--warp-spacing", "2.5"]);
+    assert!(said.contains("16 yarns, ") && said.contains("25.000 wide, "), "{said}");
+}
+
 #[test]
 fn what_cannot_be_made_is_refused() {
     let folder = directory();
@@ -64,6 +85,43 @@ fn what_cannot_be_made_is_refused() {
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
         (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
+        (
+            &["knit", "--gauge", "40,60", "-o", "a.bcc"],
+            "error: a gauge of 40.0 x 60.0 in 10 cm is too dense for yarn 1.000 mm thick: a stitch of 2.500 x 1.667 mm takes \
+             9.8 diameters of yarn\n  hint: at most ",
+        ),
+        (
+            &["knit", "--form", "tube", "--stitches", "100", "--circumference", "100", "-o", "a.bcc"],
+            "error: 100 stitches on a circumference of 100.0 mm are 1.00 yarn diameters wide\n  hint: about 33 stitches fit",
+        ),
+        (
+            &["knit", "--form", "tube", "--width", "100", "-o", "a.bcc"],
+            "error: a tube has no width\n  hint: --circumference is the way round it\n",
+        ),
+        (
+            &["knit", "--circumference", "100", "-o", "a.bcc"],
+            "error: a flat piece has no circumference\n  hint: --width, or a tube by --form\n",
+        ),
+        (
+            &["knit", "--gauge", "22,30", "--stitches", "20", "--width", "100", "-o", "a.bcc"],
+            "error: --width, --stitches and --gauge are given\n  hint: two of them give the third\n",
+        ),
+        (
+            &["knit", "--gauge", "22,30", "--row-height", "3", "-o", "a.bcc"],
+            "error: --row-height and --gauge are given\n",
+        ),
+        (
+            &["knit", "--profile", "90,0", "--profile", "60,80", "--height", "50", "-o", "a.bcc"],
+            "error: the profile says how large the piece is, not --height\n",
+        ),
+        (
+            &["knit", "--gauge", "22,0", "-o", "a.bcc"],
+            "error: invalid value '22,0' for '--gauge <WALES,COURSES>': expected stitches and rows from 0.001",
+        ),
+        (
+            &["weave", "--width", "10", "--warps", "9", "-o", "a.bcc"],
+            "error: the argument '--width <L>' cannot be used with '--warps <N>'",
+        ),
     ] {
         let run = yarnray(d, &[&["make"], args].concat());
         assert!(run.stderr.starts_with(message), "{args:?}: {}", run.stderr);

@@ -1,10 +1,12 @@
 //! `yarnray make`: curve files of cloth that the program makes.
 
+mod knit;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use glam::DVec2;
 
+use self::knit::KnitArgs;
 use super::{
     Failure,
     fibers::{self, FibersArgs},
@@ -18,10 +20,8 @@ use crate::{
         curve::{Curve, CurveSet},
         curve_file,
         pattern::{
-            MAX_POINTS, PatternStrand, StrandKind,
-            chart::{Chart, PATTERNS},
+            PatternStrand, StrandKind,
             draft::{Draft, DraftError},
-            knit::{self, Edges, Form, Knit},
             overlap::overlap,
             weave::{self, Extent, Impossible, Measures, Weave},
             wif::{self, WifUse, WovenWif},
@@ -34,8 +34,10 @@ use crate::{
 const EXAMPLES: &str = "Examples:
   yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.hair
   yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --rows 10 --form tube -o shaped.hair
+  yarnray make knit --pattern seed --gauge 22,34 --width 80 --height 60 -o seed.hair
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
+  yarnray make weave --draft 'satin 5' --width 30 --height 20 --radius 0.2 -o satin.txt
   yarnray make weave --yarn linen --as plies -o linen.usdc
   yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
@@ -53,9 +55,9 @@ pub(super) struct MakeArgs {
 #[derive(Subcommand, Debug)]
 enum What {
     /// Knitted cloth from a named pattern or a chart.
-    Knit(KnitArgs),
+    Knit(Box<KnitArgs>),
     /// Woven cloth from a draft.
-    Weave(WeaveArgs),
+    Weave(Box<WeaveArgs>),
     /// The yarns of a scene's cloth, such as those laid on a garment.
     Garment(Box<GarmentArgs>),
     /// The explicit fibres or plies of a scene's cloth.
@@ -80,49 +82,6 @@ struct Output {
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
-struct KnitArgs {
-    #[command(flatten)]
-    output: Output,
-    /// A pattern with a name.
-    #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
-    pattern: Option<String>,
-    /// A row of a chart, from the cast-on edge, as in 'k2 p2' or '12: k' (repeatable).
-    #[arg(long, value_name = "ROW")]
-    chart: Vec<String>,
-    /// Stitches cast on.
-    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    stitches: u32,
-    /// Rows; those of the chart if it is shaped over a profile, else 20.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    rows: Option<u32>,
-    /// Flat, or round about the y axis.
-    #[arg(long, default_value = "flat", value_parser = ["flat", "tube"])]
-    form: String,
-    /// A point of the profile to knit round over, from the cast-on edge: radius and height (repeatable).
-    #[arg(long, value_name = "R,Y", value_parser = pair)]
-    profile: Vec<[f64; 2]>,
-    /// Width of a stitch in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
-    stitch_width: Option<f64>,
-    /// Distance between rows in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
-    row_height: Option<f64>,
-    /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2, if not given.
-    #[arg(long, value_name = "D", value_parser = positive)]
-    yarn_per_stitch: Option<f64>,
-    /// Cast on and bound off, or with open loops.
-    #[arg(long, default_value = "finished", value_parser = ["finished", "live"])]
-    edges: String,
-    /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
-    #[arg(long, conflicts_with_all = ["edges", "form", "profile"])]
-    tile: bool,
-    /// Control points of a stitch.
-    #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
-    points: u32,
-}
-
-#[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
 struct WeaveArgs {
     #[command(flatten)]
     output: Output,
@@ -131,11 +90,17 @@ struct WeaveArgs {
     #[arg(long, default_value = "plain", value_name = "DRAFT")]
     draft: Vec<String>,
     /// Number of warps; 20, or those of the file.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, conflicts_with = "width", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     warps: Option<u32>,
     /// Number of wefts; 20, or those of the file.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, conflicts_with = "height", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     wefts: Option<u32>,
+    /// How wide the cloth is, in place of a number of warps: as many as fill it best.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    width: Option<f64>,
+    /// How high the cloth is, in place of a number of wefts.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    height: Option<f64>,
     /// Radius of the weft yarn, if not that of the warp.
     #[arg(long, value_name = "R", value_parser = positive)]
     weft_radius: Option<f64>,
@@ -175,86 +140,13 @@ fn share(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
-fn pair(text: &str) -> Result<[f64; 2], String> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
-    numbers
-        .and_then(|n| <[f64; 2]>::try_from(n).ok())
-        .filter(|[radius, _]| *radius >= 0.0)
-        .ok_or_else(|| "expected a radius of at least 0 and a height, as in 90,20".to_owned())
-}
-
 pub(super) fn run(args: &MakeArgs) -> Result<(), Failure> {
     match &args.what {
-        What::Knit(args) => knit(args),
+        What::Knit(args) => knit::run(args),
         What::Weave(args) => weave(args),
         What::Garment(args) => garment::run(args),
         What::Fibers(args) => fibers::run(args),
     }
-}
-
-fn knit(args: &KnitArgs) -> Result<(), Failure> {
-    let wrong = |error: &dyn std::fmt::Display| Failure::Input(format!("error: {error}"));
-    let (chart, own_rows) = if args.chart.is_empty() {
-        (Chart::named(args.pattern.as_deref().unwrap_or("stockinette")), None)
-    } else {
-        let chart = Chart::parse(&args.chart).map_err(|e| wrong(&e))?;
-        let rows = chart.rows();
-        (Some(chart), (!args.profile.is_empty()).then_some(rows))
-    };
-    let yarn = args.output.yarn()?;
-    let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
-    let Some(chart) = chart else { return Err(Failure::Input("error: unknown pattern".to_owned())) };
-    let profile: Vec<DVec2> = args.profile.iter().map(|p| DVec2::from(*p)).collect();
-    if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
-        return Err(Failure::Input(
-            "error: a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80".into(),
-        ));
-    }
-    let form = match (profile.is_empty(), args.form.as_str()) {
-        (false, _) => Form::Revolution(profile),
-        (true, "tube") => Form::Tube,
-        _ => Form::Flat,
-    };
-    if form != Form::Flat && args.stitches < 3 {
-        return Err(Failure::Input("error: knitting in the round takes at least 3 stitches".to_owned()));
-    }
-    let piece = Knit {
-        chart,
-        stitches: args.stitches,
-        rows: args.rows.or(own_rows).unwrap_or(20),
-        form,
-        stitch_width: args.stitch_width,
-        row_height: args.row_height,
-        edges: match args.edges.as_str() {
-            _ if args.tile => Edges::Tile,
-            "live" => Edges::Live,
-            _ => Edges::Finished,
-        },
-        yarn_per_stitch: args.yarn_per_stitch,
-        points: args.points,
-        colors: None,
-    };
-    if piece.control_points() > MAX_POINTS {
-        let problem = "error: more than 2^27 control points; fewer stitches, rows or points";
-        return Err(Failure::Input(problem.to_owned()));
-    }
-    let made = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
-    let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
-    // Flat cloth lies in the plane z = 0, as the files of others do.
-    write(made.strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;
-    if !args.output.quiet {
-        let [width, height] = made.gauge;
-        let (across, up) = (f64::from(piece.stitches) * width, f64::from(piece.rows) * height);
-        log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));
-        log::say(&match piece.form {
-            Form::Flat if args.tile => format!("period {across:.6} across, {up:.6} up; {length:.1} of yarn"),
-            Form::Flat => format!("{across:.3} wide, {up:.3} high; {length:.1} of yarn"),
-            Form::Tube => format!("{across:.3} around, {up:.3} high; {length:.1} of yarn"),
-            Form::Revolution(_) => format!("{length:.1} of yarn"),
-        });
-    }
-    Ok(())
 }
 
 fn weave(args: &WeaveArgs) -> Result<(), Failure> {
@@ -273,8 +165,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let radius = own(args.output.radius, 0).unwrap_or(otherwise);
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let piece = Weave {
-        warps: Extent::Yarns(args.warps.unwrap_or(warps)),
-        wefts: Extent::Yarns(args.wefts.unwrap_or(wefts)),
+        warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
+        wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
         warp_radius: radius,
         weft_radius: own(args.weft_radius, 1).unwrap_or(radius),
         warp_spacing: args.warp_spacing.or_else(|| spaced(0)),

@@ -2,7 +2,8 @@
 //!
 //! A chart becomes loops, each with what it is drawn through (`loops`); these become curves that cross on the right side of
 //! each other (`shape`); the curves are relaxed as elastic rods, cloth that repeats as one cell with periodic borders that
-//! finds its own gauge (`cell`); and a piece is put together, with one yarn from row to row and finished edges (`piece`).
+//! finds its own gauge (`cell`); and a piece is put together, with one yarn from row to row and finished edges (`piece`), as
+//! large as is asked for (`size`).
 //! Inside this folder the unit is the yarn's diameter.
 
 mod cell;
@@ -10,18 +11,22 @@ mod colors;
 mod loops;
 mod piece;
 mod shape;
+mod size;
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-pub use self::colors::{Colors, Work};
 use self::{
     cell::Cell,
     colors::Way,
     loops::{Border, Loops},
     piece::{Laying, Surface, Thread, settle},
+};
+pub use self::{
+    colors::{Colors, Work},
+    size::{Misfit, Sizes},
 };
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,

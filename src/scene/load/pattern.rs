@@ -6,7 +6,7 @@ use super::{
     Context, Range, Reader, chart_picture,
     cloth::Yarns,
     color::{FabricCoordinates, StitchColors},
-    knit_size::Sizes,
+    knit_size::GivenSizes,
 };
 use crate::{
     geometry::{
@@ -39,7 +39,7 @@ pub(super) struct KnitPlan {
     lines: Vec<Span>,
     header: Span,
     work: ColorWork,
-    sizes: Sizes,
+    sizes: GivenSizes,
 }
 
 /// How the stitches of a knit get their colours.
@@ -268,7 +268,7 @@ pub(super) fn knit(
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
     let rows = if lines_are_all(&form, &lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
-    let sizes = Sizes::read(table, Some(fabric), context, &form);
+    let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     counted(table, chart, form, &name, rows, lines, sizes)
 }
 
@@ -280,7 +280,7 @@ fn lines_are_all(form: &Option<Form>, lines: &[Span]) -> bool {
 /// `type = "stockinette"`: a flat knit of that pattern.
 pub(super) fn stockinette(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>) -> Option<KnitPlan> {
     let form = Some(Form::Flat);
-    let sizes = Sizes::read(table, Some(fabric), context, &form);
+    let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     counted(table, Chart::named("stockinette"), form, "stockinette", 20, Vec::new(), sizes)
 }
 
@@ -291,7 +291,7 @@ fn counted(
     name: &str,
     rows: u32,
     lines: Vec<Span>,
-    sizes: Sizes,
+    sizes: GivenSizes,
 ) -> Option<KnitPlan> {
     let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;

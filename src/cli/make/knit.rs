@@ -1,0 +1,193 @@
+//! `yarnray make knit`
+
+use clap::Args;
+use glam::DVec2;
+
+use super::{EXAMPLES, Output, RADIUS, write};
+use crate::{
+    cli::{Failure, log, positive},
+    geometry::pattern::{
+        MAX_POINTS,
+        chart::{Chart, PATTERNS},
+        knit::{self, Edges, Form, Knit, Knitted, Misfit, Sizes},
+    },
+};
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct KnitArgs {
+    #[command(flatten)]
+    output: Output,
+    /// A pattern with a name.
+    #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
+    pattern: Option<String>,
+    /// A row of a chart, from the cast-on edge, as in 'k2 p2' or '12: k' (repeatable).
+    #[arg(long, value_name = "ROW")]
+    chart: Vec<String>,
+    /// Stitches cast on; 20, or as many as the width takes.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    stitches: Option<u32>,
+    /// Rows; 20, or as many as the height takes, or those of a chart that is shaped over a profile.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    rows: Option<u32>,
+    #[command(flatten)]
+    size: SizeArgs,
+    /// Flat, or round about the y axis.
+    #[arg(long, default_value = "flat", value_parser = ["flat", "tube"])]
+    form: String,
+    /// A point of the profile to knit round over, from the cast-on edge: radius and height (repeatable).
+    #[arg(long, value_name = "R,Y", value_parser = profile_point)]
+    profile: Vec<[f64; 2]>,
+    /// Width of a stitch in yarn diameters.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    stitch_width: Option<f64>,
+    /// Distance between rows in yarn diameters.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    row_height: Option<f64>,
+    /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2, if not given.
+    #[arg(long, value_name = "D", value_parser = positive)]
+    yarn_per_stitch: Option<f64>,
+    /// Cast on and bound off, or with open loops.
+    #[arg(long, default_value = "finished", value_parser = ["finished", "live"])]
+    edges: String,
+    /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
+    #[arg(long, conflicts_with_all = ["edges", "form", "profile"])]
+    tile: bool,
+    /// Control points of a stitch.
+    #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
+    points: u32,
+}
+
+/// How large it is to be; lengths count as millimetres.
+#[derive(Args, Debug)]
+struct SizeArgs {
+    /// Stitches and rows in 100 units of length: in 10 cm, if those are millimetres.
+    #[arg(long, value_name = "WALES,COURSES", value_parser = gauge)]
+    gauge: Option<[f64; 2]>,
+    /// Width of a flat piece: counts its stitches, or with --stitches says how wide they are.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    width: Option<f64>,
+    /// Height of the piece: counts its rows, or with --rows says how high they are.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    height: Option<f64>,
+    /// Way round a tube, as the width of a flat piece.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    circumference: Option<f64>,
+}
+
+/// Stitches, and rows, unless given.
+const COUNT: u32 = 20;
+
+fn two(text: &str) -> Option<[f64; 2]> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    numbers?.try_into().ok()
+}
+
+fn profile_point(text: &str) -> Result<[f64; 2], String> {
+    let problem = "expected a radius of at least 0 and a height, as in 90,20";
+    two(text).filter(|[radius, _]| *radius >= 0.0).ok_or_else(|| problem.to_owned())
+}
+
+fn gauge(text: &str) -> Result<[f64; 2], String> {
+    let problem = "expected stitches and rows from 0.001 to 1000000, as in 22,30";
+    two(text).filter(|n| n.iter().all(|v| (1e-3..=1e6).contains(v))).ok_or_else(|| problem.to_owned())
+}
+
+fn wrong(error: &dyn std::fmt::Display) -> Failure {
+    Failure::Input(format!("error: {error}"))
+}
+
+impl KnitArgs {
+    /// What is to be knitted, of yarn of a radius.
+    fn piece(&self, radius: f64) -> Result<Knit, Failure> {
+        let chart = if self.chart.is_empty() {
+            Chart::named(self.pattern.as_deref().unwrap_or("stockinette")).ok_or_else(|| wrong(&"unknown pattern"))?
+        } else {
+            Chart::parse(&self.chart).map_err(|e| wrong(&e))?
+        };
+        let form = self.form(radius)?;
+        // Shaped pieces are knitted once, from the first row of the chart to the last.
+        let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
+        let rows = if all { chart.rows() } else { COUNT };
+        let piece = Knit {
+            chart,
+            stitches: self.stitches.unwrap_or(COUNT),
+            rows: self.rows.unwrap_or(rows),
+            form,
+            stitch_width: self.stitch_width,
+            row_height: self.row_height,
+            edges: match self.edges.as_str() {
+                _ if self.tile => Edges::Tile,
+                "live" => Edges::Live,
+                _ => Edges::Finished,
+            },
+            yarn_per_stitch: self.yarn_per_stitch,
+            points: self.points,
+            colors: None,
+        };
+        let piece = self.sized(&piece, 2.0 * radius)?;
+        if piece.form != Form::Flat && piece.stitches < 3 {
+            return Err(wrong(&"knitting in the round takes at least 3 stitches"));
+        }
+        if piece.control_points() > MAX_POINTS {
+            return Err(wrong(&"more than 2^27 control points; fewer stitches, rows or points"));
+        }
+        Ok(piece)
+    }
+
+    fn form(&self, radius: f64) -> Result<Form, Failure> {
+        let profile: Vec<DVec2> = self.profile.iter().map(|p| DVec2::from(*p)).collect();
+        if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
+            let problem = "a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80";
+            return Err(wrong(&problem));
+        }
+        Ok(match (profile.is_empty(), self.form.as_str()) {
+            (false, _) => Form::Revolution(profile),
+            (true, "tube") => Form::Tube,
+            _ => Form::Flat,
+        })
+    }
+
+    /// The piece in the size that is asked for.
+    fn sized(&self, piece: &Knit, diameter: f64) -> Result<Knit, Failure> {
+        let SizeArgs { gauge, width, height, circumference } = self.size;
+        let sizes = Sizes {
+            stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
+            width,
+            circumference,
+            height,
+            counted: [self.stitches, self.rows].map(|count| count.is_some()),
+        };
+        let told = |Misfit { problem, hint, .. }| Failure::Input(format!("error: {problem}\n  hint: {hint}"));
+        let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
+        let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
+        if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {
+            return Err(told(clash));
+        }
+        sizes.apply(piece, diameter).map_err(told)
+    }
+}
+
+pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
+    let yarn = args.output.yarn()?;
+    let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
+    let piece = args.piece(radius)?;
+    let Knitted { strands, gauge, .. } = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
+    let length: f64 = strands.iter().map(|s| s.curve.polygon_length()).sum();
+    // Flat cloth lies in the plane z = 0, as the files of others do.
+    write(strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;
+    if !args.output.quiet {
+        let Knit { stitches, rows, form, .. } = &piece;
+        let [width, height] = gauge;
+        let (across, up) = (f64::from(*stitches) * width, f64::from(*rows) * height);
+        log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));
+        log::say(&match form {
+            Form::Flat if args.tile => format!("period {across:.6} across, {up:.6} up; {length:.1} of yarn"),
+            Form::Flat => format!("{stitches} x {rows}, {across:.3} wide, {up:.3} high; {length:.1} of yarn"),
+            Form::Tube => format!("{stitches} x {rows}, {across:.3} around, {up:.3} high; {length:.1} of yarn"),
+            Form::Revolution(_) => format!("{length:.1} of yarn"),
+        });
+    }
+    Ok(())
+}
