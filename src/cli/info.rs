@@ -322,7 +322,10 @@ fn scene_report(scene: &Scene) -> (Value, String) {
         let what = match f.kind {
             CurveKind::Yarn(yarn) => {
                 let yarn = &scene.yarns[yarn];
-                format!("yarns of `{}` ({} plies of {} fibres)", yarn.name, yarn.plies.len(), yarn.plies[0].fibers)
+                match yarn.plies.len() {
+                    1 => format!("yarns of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
+                    plies => format!("yarns of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
+                }
             }
             CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
         };

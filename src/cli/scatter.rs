@@ -81,7 +81,7 @@ pub(super) struct ScatterArgs {
     /// Measure over a range of a parameter: `theta`, `offset`, `phase`, a key of the yarn or its fibre, or a dotted path.
     #[arg(long, value_name = "KEY=A..B:N")]
     sweep: Option<String>,
-    /// Override any key of the file by its dotted path (repeatable).
+    /// Override a key of the yarn or its fibre, or any key by its dotted path (repeatable).
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Start of all random numbers.
@@ -162,11 +162,13 @@ impl ScatterArgs {
     }
 
     fn load(&self, extra: Option<(String, Setting, String)>) -> Result<Definitions, Failure> {
-        let options = LoadOptions {
-            assignments: self.set.clone(),
-            settings: extra.into_iter().collect(),
-            ..LoadOptions::default()
-        };
+        let assignments = self.set.iter().map(|assignment| match assignment.split_once('=') {
+            Some((key, value)) => Ok(format!("{}={value}", self.path_of(key.trim())?)),
+            // That this is no assignment is told where it is read.
+            None => Ok(assignment.clone()),
+        });
+        let assignments = assignments.collect::<Result<_, Failure>>()?;
+        let options = LoadOptions { assignments, settings: extra.into_iter().collect(), ..LoadOptions::default() };
         Ok(load_definitions(self.file().as_deref(), &options)?)
     }
 
@@ -224,7 +226,7 @@ impl ScatterArgs {
         if let Some(fiber) = &self.fiber {
             return Ok(format!("fiber.{fiber}.{key}"));
         }
-        let definitions = self.load(None)?;
+        let definitions = load_definitions(self.file().as_deref(), &LoadOptions::default())?;
         let yarn = self.yarn(&definitions)?;
         Ok(if of_fiber { format!("fiber.{}.{key}", yarn.fibers[0].0) } else { format!("yarn.{}.{key}", yarn.name) })
     }

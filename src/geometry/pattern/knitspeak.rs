@@ -406,25 +406,29 @@ impl Parser<'_> {
             return error(self.line, format!("repeats lie more than {MOST_NESTED} deep"), KNOWN);
         }
         let mut out = Sequence::default();
-        let mut star = None;
+        let (mut star, mut closed) = (None, false);
         loop {
             self.separators();
             match self.peek(0) {
                 None | Some("]" | ")") => break,
                 Some("*") => {
                     self.at += 1;
-                    star = Some(out.0.len());
+                    // "*k1, p1* repeat to end": the second star ends what the first one begins.
+                    closed = star.is_some() && matches!(self.peek(0), Some("rep" | "repeat"));
+                    if !closed {
+                        star = Some(out.0.len());
+                    }
                 }
                 Some("rep" | "repeat") => {
                     self.at += 1;
                     let Some(start) = star.take() else {
                         return error(self.line, "a repeat without a * where it begins", KNOWN);
                     };
-                    if !self.take(&["from", "*"]) {
+                    if !self.take(&["from", "*"]) && !closed {
                         return error(self.line, "expected \"rep from *\"", KNOWN);
                     }
                     let body = Sequence(out.0.split_off(start));
-                    self.take(&["across"]);
+                    let _ = self.take(&["across"]) || self.take(&["around"]);
                     let again = match self.until()? {
                         Some(last) => Item::Repeat(body, last),
                         // Once as written, and so many times more.
@@ -459,7 +463,7 @@ impl Parser<'_> {
 
     /// "to end", "to last 3 sts": how many stitches are left then.
     fn until(&mut self) -> Result<Option<u32>> {
-        if self.take(&["across"]) || self.take(&["all", "sts"]) {
+        if self.take(&["across"]) || self.take(&["around"]) || self.take(&["all", "sts"]) {
             return Ok(Some(0));
         }
         if !matches!(self.peek(0), Some("to" | "until")) {
@@ -519,6 +523,20 @@ impl Parser<'_> {
             steps.name.push_str("tbl");
         }
         if steps.name == "sl" {
+            // "sl 1, k2tog, psso" is one decrease.
+            let counted = self.take(&["1"]);
+            for (passed, name) in [("k1", "skp"), ("k2tog", "sk2p")] {
+                if self.take(&[",", passed, ",", "psso"]) || self.take(&[passed, "psso"]) {
+                    return Ok(Item::Steps(step(name).expect("a stitch that is known")));
+                }
+            }
+            if !counted
+                && let Some(count) =
+                    self.peek(0).and_then(|n| n.parse().ok()).filter(|n| (1..=MOST_STITCHES).contains(n))
+            {
+                self.at += 1;
+                steps.count = count;
+            }
             let _ = self.take(&["st"]) || self.take(&["sts"]) || self.take(&["purlwise"]) || self.take(&["pwise"]);
             if self.take(&["wyif"]) {
                 steps.name = "slwyif".into();
@@ -623,6 +641,10 @@ mod tests {
     #[test]
     fn rounds_are_all_on_the_right_side() {
         assert_eq!(rows("Rnd 1: *k1, p1; rep from * to end\nRnd 2: knit", 4), ["p k p k", "k4"]);
+        assert_eq!(rows("Rnd 1: *k1, p1; repeat from * around.", 4), ["p k p k"]);
+        assert_eq!(rows("Row 1: *k1, p1* repeat to end", 4), ["p k p k"]);
+        let decreases = "Row 1: sl 1, k2tog, psso, sl 1, k1, psso, k to end\nRow 2: purl\nRow 3: sl 2, k to end";
+        assert_eq!(rows(decreases, 7), ["k2 ssk sssk", "k4", "k2 sl sl"]);
     }
 
     #[test]

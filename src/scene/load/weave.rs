@@ -78,8 +78,12 @@ impl WeavePlan {
                         hint,
                     );
                 } else {
+                    let count = if warp { "ends_per_cm" } else { "picks_per_cm" };
+                    let most = 10.0 / (least * context.unit);
                     wrong(
-                        format!("`{key}` leaves the yarns no room to pass: at least {least:.4} here"),
+                        format!(
+                            "`{key}` (or `{count}`) leaves the yarns no room to pass: at least {least:.4} (at most {most:.1}) here"
+                        ),
                         "thinner yarns, another `crimp`, or no spacing at all for the tightest",
                     );
                 }

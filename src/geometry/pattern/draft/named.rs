@@ -41,6 +41,8 @@ impl<'a> Words<'a> {
         let mut words = Self { name: String::new(), groups: Vec::new(), left: false, step: None, text };
         let mut parts = text.split_whitespace();
         while let Some(part) = parts.next() {
+            let part = part.to_lowercase();
+            let part = part.as_str();
             let number = |n: &str| n.parse().ok().filter(|n| (1..=LARGEST).contains(n));
             match part {
                 "left" => words.left = true,
