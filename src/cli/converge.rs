@@ -26,7 +26,8 @@ const EXAMPLES: &str = "Examples:
 
 Writes converge.csv, converge.json and converge.svg. Every method is rendered with several seeds; each time the samples have doubled, the
 relMSE (square error / (square of the truth + 0.01)) is taken against the method's own converged picture (noise) and against that of the
-reference (noise and model error), both of independent seeds and without their own noise. Converged pictures are kept in out/cache.";
+reference (noise and model error), both of independent seeds and without their own noise. Converged pictures are kept in the folder
+`cache` beside the output.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]

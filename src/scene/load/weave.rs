@@ -6,7 +6,7 @@ use crate::{
         curve::Curve,
         pattern::{
             PatternStrand, StrandKind,
-            draft::{Draft, DraftError},
+            draft::{Draft, DraftError, Threads},
             weave::{self, Edges, Extent, Impossible, Measures, Weave},
             wif::{self, WifUse, WovenWif},
         },
@@ -150,10 +150,10 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let crimp = table.f64("crimp", Range::UNIT);
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
-    let edges = edges(table, context, own);
     let pile = table.f64("pile_height", Range::POSITIVE).map(|h| h * context.unit);
     let Drafted { draft, wif } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
+    let edges = edges(table, context, own, &threads);
     let default_pile = weave::pile_height(&draft, own);
     let weave = Weave {
         draft,
@@ -186,13 +186,22 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     })
 }
 
+/// Thickness of a thread over the mean from which on cloth is not hemmed unless asked: three layers of it do not lie flat.
+const UNEQUAL: f64 = 1.5;
+
 /// How the cloth ends.
-fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64) -> Edges {
+fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, threads: &[Threads; 2]) -> Edges {
     let fringe = table.f64("fringe", Range::POSITIVE).map(|l| l * context.unit);
     let fringed = Edges::Fringe(fringe.unwrap_or(FRINGE * radius));
     let names =
         [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
-    let edges = table.one_of_or("edges", if fringe.is_some() { fringed } else { Edges::Finished }, &names);
+    let unequal = threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL);
+    let default = match fringe {
+        Some(_) => fringed,
+        None if unequal => Edges::Selvedge,
+        None => Edges::Finished,
+    };
+    let edges = table.one_of_or("edges", default, &names);
     if fringe.is_some() && edges != fringed {
         table.error_at("fringe", "only `edges = \"fringe\"` has a fringe", None);
     }
