@@ -190,26 +190,26 @@ impl Tile {
             depth.add(sample.depth);
         }
         if let Some(normal) = sums.normal.get_mut(i) {
-            add_color(normal, sample.normal.to_array());
+            add_each(normal, sample.normal.to_array());
         }
         if let Some(albedo) = sums.albedo.get_mut(i) {
-            add_color(albedo, sample.albedo.to_array());
+            add_each(albedo, sample.albedo.to_array());
         }
         if let Some(position) = sums.position.get_mut(i) {
-            add_color(position, sample.position.to_array());
+            add_each(position, sample.position.to_array());
         }
         if let Some(motion) = sums.motion.get_mut(i) {
-            add_color(motion, sample.motion.to_array());
+            add_each(motion, sample.motion.to_array());
         }
         if let Some(uv) = sums.uv.get_mut(i) {
-            add_color(uv, sample.uv.to_array());
+            add_each(uv, sample.uv.to_array());
         }
         if let Some(cloth) = sample.cloth {
             self.matte.add(i, cloth, 1);
         }
         if let Some(parts) = sums.parts.get_mut(i) {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
-                add_color(sum, (value * down).to_array());
+                add_each(sum, (value * down).to_array());
             }
         }
         true
@@ -328,7 +328,7 @@ impl Tile {
 }
 
 #[inline]
-fn add_color<const N: usize>(sum: &mut [NarrowSum; N], value: [f32; N]) {
+fn add_each<const N: usize>(sum: &mut [NarrowSum; N], value: [f32; N]) {
     sum.iter_mut().zip(value).for_each(|(sum, v)| sum.add(v));
 }
 

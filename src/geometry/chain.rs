@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     curve::{Basis, Curve},
+    segment_uvs::{self, SegmentUvs},
     spline::{SplinePoint, Weights, evaluate},
 };
 
@@ -231,52 +232,44 @@ pub(super) fn nearest_indices(
     chain: &Chain,
     knots: Option<&[(usize, f64)]>,
 ) -> Vec<u16> {
-    let count = knots.map_or(chain.segments(), |knots| knots.len() - 1);
-    // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
-    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
+    let starts = starts_among_points(curve, chain, knots);
     let points = curve.points.len();
     let steps =
         if curve.closed { material_indices.len() / points } else { (material_indices.len() - 1) / (points - 1).max(1) }
             as f64;
-    (0..count)
-        .map(|segment| {
-            let place = match knots {
-                None => segment as f64 + 0.5,
-                Some(knots) => {
-                    let at = |knot: usize| knots[knot].0 as f64 + knots[knot].1;
-                    0.5 * (at(segment) + at(segment + 1))
-                }
-            };
-            let index = ((place + shift) * steps).round() as usize;
+    starts
+        .windows(2)
+        .map(|ends| {
+            let index = (0.5 * (ends[0] + ends[1]) * steps).round() as usize;
             material_indices
                 [if curve.closed { index % material_indices.len() } else { index.min(material_indices.len() - 1) }]
         })
         .collect()
 }
 
-/// Texture coordinates where each segment of a resampled curve starts and ends, from those of the given points. Where they
-/// jump from one point to the next, as at the seam of a tube, a segment keeps what it starts with.
+/// The places among a curve's points, from 0, at which each segment of `chain`, or of one made through places of it,
+/// starts, and where the last one ends.
+fn starts_among_points(curve: &Curve, chain: &Chain, knots: Option<&[(usize, f64)]>) -> Vec<f64> {
+    // Segment i starts at given point i, and between points i and i + 2 of an open B-spline.
+    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
+    match knots {
+        None => (0..=chain.segments()).map(|i| i as f64 + shift).collect(),
+        Some(knots) => knots.iter().map(|&(segment, u)| segment as f64 + u + shift).collect(),
+    }
+}
+
+/// Texture coordinates where each segment of a resampled curve starts and ends, from those of the given points.
 pub(super) fn uvs_of_segments(
     curve: &Curve,
     uvs: &[Vec2],
     chain: &Chain,
     knots: Option<&[(usize, f64)]>,
-) -> Vec<[Vec2; 2]> {
-    // The place among the given points where a segment of the chain starts: see `nearest_indices`.
-    let shift = if chain.basis == Basis::BSpline && !curve.closed { 1.0 } else { 0.0 };
-    let place = |knot: usize| shift + knots.map_or(knot as f64, |knots| knots[knot].0 as f64 + knots[knot].1);
+) -> SegmentUvs {
     let point = |i: usize| uvs[if curve.closed { i % uvs.len() } else { i.min(uvs.len() - 1) }];
-    let jumps = |a: Vec2, b: Vec2| (b - a).abs().max_element() > 0.5;
-    let at = |place: f64| {
-        let (a, b) = (point(place as usize), point(place as usize + 1));
-        if jumps(a, b) { a } else { a.lerp(b, place.fract() as f32) }
-    };
-    (0..knots.map_or(chain.segments(), |knots| knots.len() - 1))
-        .map(|segment| {
-            let (start, end) = (at(place(segment)), at(place(segment + 1)));
-            [start, if jumps(start, end) { start } else { end }]
-        })
-        .collect()
+    let at =
+        |place: &f64| segment_uvs::mixed([point(*place as usize), point(*place as usize + 1)], place.fract() as f32);
+    let places: Vec<Vec2> = starts_among_points(curve, chain, knots).iter().map(at).collect();
+    SegmentUvs::between(&places)
 }
 
 /// After so many knots a B-spline has forgotten another: (2 - sqrt 3)^28 is 1e-16.

@@ -12,6 +12,7 @@ pub mod pattern;
 pub mod proposal;
 pub mod ray;
 pub mod section;
+pub mod segment_uvs;
 mod spline;
 pub mod stage;
 pub mod strand;

@@ -15,6 +15,7 @@ use glam::{DVec3, Vec2, Vec3A, Vec4};
 use self::frames::{PointFrame, SegmentFrame};
 use super::{
     curve::{Basis, Curve},
+    segment_uvs::SegmentUvs,
     spline::evaluate_f32,
     tube::curve_of,
     yarn_frame::{ROUND, YarnFrame},
@@ -60,8 +61,7 @@ pub struct Strands {
     later: Vec<Pose>,
     /// The same at the frame's own time and one frame later; empty where yarns stand still or nobody asks.
     flow: Vec<Pose>,
-    /// Texture coordinates where each segment starts and ends; empty if nobody asks.
-    uvs: Vec<[Vec2; 2]>,
+    uvs: SegmentUvs,
     /// Short axis of the section at each point, see [`YarnFrame::flattening`]; empty where all yarns are round.
     flattening: Vec<Vec2>,
     /// One for each segment, or empty: see [`Self::material_index`].
@@ -192,7 +192,7 @@ impl Strands {
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
             + size_of_val(&*self.flattening)
-            + size_of_val(&*self.uvs)
+            + self.uvs.bytes()
             + self
                 .later
                 .iter()
@@ -209,19 +209,16 @@ impl Strands {
         self.material_indices.get(segment as usize).copied()
     }
 
-    /// Texture coordinates at `u` (0 to 1) of a segment; zero if nobody asked for them.
-    #[inline]
-    pub fn uv(&self, segment: u32, u: f32) -> Vec2 {
-        self.uvs.get(segment as usize).map_or(Vec2::ZERO, |[start, end]| start.lerp(*end, u))
+    /// Texture coordinates along all segments.
+    pub fn uvs(&self) -> &SegmentUvs {
+        &self.uvs
     }
 
-    /// Whether texture coordinates were asked for.
-    pub fn has_uvs(&self) -> bool {
-        !self.uvs.is_empty()
-    }
-
-    /// Takes texture coordinates from elsewhere; nothing, or a pair for each segment.
-    pub fn set_uvs(&mut self, uvs: Vec<[Vec2; 2]>) {
+    /// Takes texture coordinates from elsewhere: none, or those of each segment.
+    ///
+    /// # Panics
+    /// If their number is another.
+    pub fn set_uvs(&mut self, uvs: SegmentUvs) {
         assert!(uvs.is_empty() || uvs.len() == self.segments.len(), "texture coordinates for each segment");
         self.uvs = uvs;
     }

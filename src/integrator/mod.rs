@@ -213,7 +213,7 @@ impl<'a> Integrator<'a> {
                                 if let (true, CurveGeometry::Fibers(fibers)) =
                                     (self.layers.uv, &self.world.geometries()[hit.geometry])
                                 {
-                                    sample.uv = fibers.uv(hit.segment, hit.u);
+                                    sample.uv = fibers.uvs.at(hit.segment, hit.u);
                                 }
                             }
                         }

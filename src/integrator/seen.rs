@@ -55,7 +55,7 @@ impl Integrator<'_> {
     pub(super) fn sees_yarn(&self, sample: &mut Sample, hit: &Hit<'_>, yarns: &YarnGeometry, point: Vec3A, time: f32) {
         sample.position = point;
         if self.layers.uv {
-            sample.uv = yarns.strands.uv(hit.segment, hit.u);
+            sample.uv = yarns.strands.uvs().at(hit.segment, hit.u);
         }
         let Some(flow) = &self.flow else { return };
         let [from, to] = match yarns.strands.flow(hit.segment, hit.u) {

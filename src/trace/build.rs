@@ -8,6 +8,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         fiber::Plies,
+        segment_uvs::SegmentUvs,
         strand::{Along, StrandMotion, StrandOptions, Strands},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
@@ -246,7 +247,7 @@ impl<'a> Preparation<'a> {
                     fiber: material,
                     variants: Vec::new(),
                     material_indices: Vec::new(),
-                    uvs: Vec::new(),
+                    uvs: SegmentUvs::default(),
                 })),
                 Of::Yarns { yarn, shape, strands } => {
                     let kinds = &prepared.fabric.variants;
@@ -298,9 +299,10 @@ impl<'a> Preparation<'a> {
                             let index = |segment| strands.material_index(from[tubes.tube_of(segment)]);
                             let material_indices = (0..tubes.segments().len() as u32).filter_map(index).collect();
                             // A hair has the coordinates of the place where it leaves the yarn.
-                            let uv = |segment| [strands.uv(from[tubes.tube_of(segment)], 0.0); 2];
-                            let segments = if strands.has_uvs() { tubes.segments().len() as u32 } else { 0 };
-                            let uvs = (0..segments).map(uv).collect();
+                            let own = strands.uvs();
+                            let segments = if own.is_empty() { 0 } else { tubes.segments().len() as u32 };
+                            let uv = |segment| own.at(from[tubes.tube_of(segment)], 0.0);
+                            let uvs = SegmentUvs::constant((0..segments).map(uv));
                             fibers(ply, tubes, first, material_indices, uvs)
                         }));
                     }

@@ -15,7 +15,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use glam::{Vec2, Vec3A, Vec4};
+use glam::{Vec3A, Vec4};
 
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
@@ -23,6 +23,7 @@ use crate::{
         curve::Basis,
         ray::Ray,
         section::{Crossings, Section},
+        segment_uvs::SegmentUvs,
         strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
         walk::Walker,
@@ -75,8 +76,8 @@ pub struct FiberGeometry {
     pub variants: Vec<FiberBcsdf>,
     /// Material indices: which of `variants` each segment is made of; empty without variants.
     pub material_indices: Vec<u16>,
-    /// Texture coordinates where each segment starts and ends; empty if nobody asks.
-    pub uvs: Vec<[Vec2; 2]>,
+    /// Texture coordinates along all segments.
+    pub uvs: SegmentUvs,
 }
 
 /// What one geometry of Embree stands for.
@@ -324,12 +325,6 @@ impl FiberGeometry {
         }
     }
 
-    /// Texture coordinates at `u` (0 to 1) of a segment; zero if nobody asked for them.
-    #[inline]
-    pub fn uv(&self, segment: u32, u: f32) -> Vec2 {
-        self.uvs.get(segment as usize).map_or(Vec2::ZERO, |[start, end]| start.lerp(*end, u))
-    }
-
     /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
     pub fn yarn_of(&self, segment: u32) -> usize {
         let tube = self.tubes.tube_of(segment);
@@ -373,7 +368,7 @@ impl CurveGeometry {
     fn bytes(&self) -> u64 {
         match self {
             Self::Yarns(w) => w.strands.bytes(),
-            Self::Fibers(f) => f.tubes.bytes() + (size_of_val(&*f.material_indices) + size_of_val(&*f.uvs)) as u64,
+            Self::Fibers(f) => f.tubes.bytes() + (size_of_val(&*f.material_indices) + f.uvs.bytes()) as u64,
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         fiber::Plies,
+        segment_uvs::SegmentUvs,
         strand::{StrandOptions, Strands},
     },
     math::{
@@ -89,7 +90,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
                     fiber: FiberBcsdf::new(&yarn.fibers[ply].1),
                     variants: Vec::new(),
                     material_indices: Vec::new(),
-                    uvs: Vec::new(),
+                    uvs: SegmentUvs::default(),
                 })
             })
             .collect();

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use super::{
     curve::{Basis, Curve},
     density::PlyPacking,
+    segment_uvs::SegmentUvs,
     strand::Strands,
     tube::{Tubes, spline_through},
     yarn::{PlyParameters, PlyShape, YarnShape},
@@ -262,21 +263,17 @@ impl<'a> Plies<'a> {
 
     /// For each segment of so many curves along each yarn, the texture coordinates of the yarn where it starts and ends;
     /// nothing if nobody asked for them.
-    pub fn uvs_along(&self, curves: usize) -> Vec<[Vec2; 2]> {
-        let mut uvs = Vec::new();
-        for yarn in (0..self.strands.yarns()).filter(|_| self.strands.has_uvs()) {
+    pub fn uvs_along(&self, curves: usize) -> SegmentUvs {
+        let own = self.strands.uvs();
+        let mut uvs = SegmentUvs::default();
+        for yarn in (0..self.strands.yarns()).filter(|_| !own.is_empty()) {
             let (guide, steps) = (Guide::new(self.strands, yarn), self.steps()[yarn]);
             let at = |along: f64| {
                 let (segment, u) = guide.find(along);
-                self.strands.uv(segment, u)
+                own.at(segment, u)
             };
-            let places: Vec<Vec2> = guide.steps(steps).map(at).collect();
-            let whole = |pair: &[Vec2]| {
-                let jumps = (pair[1] - pair[0]).abs().max_element() > 0.5;
-                [pair[0], pair[usize::from(!jumps)]]
-            };
-            let along: Vec<[Vec2; 2]> = places.windows(2).map(whole).collect();
-            uvs.extend(std::iter::repeat_n(along, curves).flatten());
+            let along = SegmentUvs::between(&guide.steps(steps).map(at).collect::<Vec<_>>());
+            (0..curves).for_each(|_| uvs.append(&along));
         }
         uvs
     }

@@ -11,6 +11,7 @@ use super::{
 use crate::geometry::{
     chain::{Chain, Fit, nearest_indices, resample, uvs_of_segments},
     curve::{Basis, Curve},
+    segment_uvs::SegmentUvs,
     yarn_frame::{Pressed, ROUND},
 };
 
@@ -86,8 +87,7 @@ struct Strand {
     /// For each point, or empty.
     flattening: Vec<Vec2>,
     material_indices: Vec<u16>,
-    /// For each segment, or empty.
-    uvs: Vec<[Vec2; 2]>,
+    uvs: SegmentUvs,
     tight: Option<(usize, f64)>,
     length: f64,
 }
@@ -105,7 +105,8 @@ impl Strand {
         } else {
             nearest_indices(curve, material_indices, &chain, knots.as_deref())
         };
-        let uvs = if uvs.is_empty() { Vec::new() } else { uvs_of_segments(curve, uvs, &chain, knots.as_deref()) };
+        let uvs =
+            if uvs.is_empty() { SegmentUvs::default() } else { uvs_of_segments(curve, uvs, &chain, knots.as_deref()) };
         // The same places of the yarn at all times: points move with it.
         let resampled = |chain: Chain| match &knots {
             Some(knots) => chain.through(knots, closed, options.basis),
@@ -201,7 +202,7 @@ struct Joined {
     flattening: Vec<Vec2>,
     segments: Vec<u32>,
     material_indices: Vec<u16>,
-    uvs: Vec<[Vec2; 2]>,
+    uvs: SegmentUvs,
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
     length: f64,
@@ -214,7 +215,7 @@ impl Joined {
             flattening: Vec::new(),
             segments: Vec::new(),
             material_indices: Vec::new(),
-            uvs: Vec::new(),
+            uvs: SegmentUvs::default(),
             first_segments: Vec::with_capacity(yarns + 1),
             tight_bends: Vec::new(),
             length: 0.0,
@@ -235,7 +236,7 @@ impl Joined {
             all.1.extend(frames);
         }
         self.material_indices.extend(strand.material_indices);
-        self.uvs.extend(strand.uvs);
+        self.uvs.append(&strand.uvs);
         self.length += strand.length;
         self.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
     }
