@@ -423,7 +423,8 @@ impl GarmentPlan {
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
         check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
-        let mut meshes: Vec<GarmentMesh> = kept.iter().map(|&i| meshes[i].clone()).collect();
+        let mut meshes: Vec<GarmentMesh> =
+            meshes.into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, mesh)| mesh).collect();
         // Plies wind by lengths in the first frame, so that they keep their places from frame to frame.
         let with_rest = frames.animated && (meshes.len() > 1 || meshes[0].points != rest.points);
         let times = meshes.len();

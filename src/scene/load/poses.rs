@@ -7,6 +7,7 @@ use super::{
     Context,
     cloth::Detail,
     mesh::polygons,
+    sequence::Times,
 };
 use crate::geometry::{
     garment::{GarmentError, GarmentMesh},
@@ -103,15 +104,6 @@ pub(super) struct Pose {
     pub(super) share: f64,
 }
 
-/// Times at which to know the meshes, in frames: those of the shutter, then those of the layer of motion.
-fn times(detail: &Detail) -> Vec<f64> {
-    let mut times = super::sequence::times(detail.frame, detail.shutter);
-    if detail.flow {
-        times.extend(super::sequence::flow_times(detail.frame));
-    }
-    times
-}
-
 /// The moments of a frame, and the first of all.
 pub(super) struct Frames {
     pub(super) rest: Moment,
@@ -123,11 +115,11 @@ pub(super) struct Frames {
 
 impl Frames {
     pub(super) fn find(path: &Path, detail: &Detail) -> Self {
-        let shown = super::sequence::times(detail.frame, detail.shutter).len();
+        let Times { all: times, shown } = Times::of(detail);
         if stage::is_stage(path) && path.exists() {
             let at = |time: f64| Moment { frame: Some(time.to_bits()), ..Moment::of_file(path) };
             let pose = |time: f64| Pose { before: at(time), after: at(time), share: 0.0 };
-            let poses = times(detail).into_iter().map(pose).collect();
+            let poses = times.into_iter().map(pose).collect();
             return Self { rest: Moment::of_file(path), poses, shown, animated: true };
         }
         let own = numbered(path, detail.frame).filter(|_| !path.exists());
@@ -142,7 +134,7 @@ impl Frames {
             path.exists().then_some(path)
         };
         let needed = |number: f64| Moment::of_file(&there(number).unwrap_or_else(|| own.clone()));
-        let poses = times(detail)
+        let poses = times
             .into_iter()
             .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
             .collect();

@@ -53,11 +53,7 @@ pub(super) fn read(
     };
 
     // Between two files yarns move evenly from one to the other.
-    let mut times = times(detail.frame, detail.shutter);
-    let shown = times.len();
-    if detail.flow {
-        times.extend(flow_times(detail.frame));
-    }
+    let Times { all: times, shown } = Times::of(detail);
     let mut files: BTreeMap<i64, Curves> = BTreeMap::new();
     // Before the first file and after the last they stand still.
     let there = |number: i64| -> Option<(i64, PathBuf)> {
@@ -121,11 +117,7 @@ fn of_stage(
         let message = format!("{}: {problem}", file.path.display());
         context.error(file.span, message, Some("yarns keep their points from frame to frame".to_owned()));
     };
-    let mut times = times(detail.frame, detail.shutter);
-    let shown = times.len();
-    if detail.flow {
-        times.extend(flow_times(detail.frame));
-    }
+    let Times { all: times, shown } = Times::of(detail);
     let curves = read(&file.path, Some(times[0]))?;
     let mut later = Vec::with_capacity(times.len() - 1);
     for &time in &times[1..] {
@@ -148,9 +140,23 @@ fn of_stage(
     Some((file.path.clone(), curves, FabricMotion { later, rest, flow }))
 }
 
-/// When to know curves for the layer of motion, in frames.
-pub(super) fn flow_times(frame: u32) -> [f64; 2] {
-    [f64::from(frame), f64::from(frame) + 1.0]
+/// When to know what moves, in frames.
+pub(super) struct Times {
+    /// While the shutter is open; then, for the layer of motion, the frame's own time and one frame later.
+    pub(super) all: Vec<f64>,
+    /// How many of them are those of the shutter.
+    pub(super) shown: usize,
+}
+
+impl Times {
+    pub(super) fn of(detail: &Detail) -> Self {
+        let mut all = times(detail.frame, detail.shutter);
+        let shown = all.len();
+        if detail.flow {
+            all.extend([f64::from(detail.frame), f64::from(detail.frame) + 1.0]);
+        }
+        Self { all, shown }
+    }
 }
 
 /// Two poses, if anything moves from one to the other.
