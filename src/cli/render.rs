@@ -438,7 +438,7 @@ fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usize]) {
             worst.yarn,
             worst.segment,
             worst.fold,
-            match (2 * bends().count() > yarns[i] && yarns[i] > 1, args.log.verbose > 0) {
+            match (fabric.from_file && 2 * bends().count() > yarns[i], args.log.verbose > 0) {
                 (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
                 (false, false) => " (-v shows all)",
                 (false, true) => "",

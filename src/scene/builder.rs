@@ -248,6 +248,7 @@ impl Fabric {
         Self {
             name: name.into(),
             origin: "a program".to_owned(),
+            from_file: false,
             kind,
             motion: FabricMotion::default(),
             variants: Vec::new(),

@@ -262,6 +262,8 @@ pub struct Fabric {
     pub name: String,
     /// Where the curves came from, for messages.
     pub origin: String,
+    /// Whether a file gave the curves: its unit or radius may have been meant otherwise.
+    pub from_file: bool,
     /// What they are.
     pub kind: CurveKind,
     /// Curves and their radii, millimetres, about the scene's middle. None are left in a render: its yarns are made of them.

@@ -312,6 +312,7 @@ fn source(
 /// Curves of one kind of yarn, before they are moved to their place.
 struct Made {
     origin: String,
+    from_file: bool,
     kind: CurveKind,
     curves: Vec<(Curve, Vec<f64>)>,
     /// Where their points are in the cloth, if that is known.
@@ -334,6 +335,7 @@ impl Made {
     ) -> Self {
         Self {
             origin,
+            from_file: false,
             kind,
             curves,
             coordinates,
@@ -452,12 +454,12 @@ impl FabricPlan {
                     warnings.push(format!("{}: `colors` is asked for, but no curve has one", path.display()));
                 }
                 let made = Made::new(path.display().to_string(), kind, curves, None);
-                vec![Made { motion, dyes: dyes.flatten(), ..made }]
+                vec![Made { from_file: true, motion, dyes: dyes.flatten(), ..made }]
             }
         };
         let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
         let name = self.name.unwrap_or_else(|| self.kind.into_name());
-        let fabric = |Made { origin, kind, curves, coordinates, color, dyes, motion, exact }: Made| {
+        let fabric = |Made { origin, from_file, kind, curves, coordinates, color, dyes, motion, exact }: Made| {
             let phases =
                 self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
             let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -467,6 +469,7 @@ impl FabricPlan {
             let mut fabric = Fabric {
                 name: name.clone(),
                 origin,
+                from_file,
                 kind,
                 curves,
                 motion,
