@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{
     Failure, SceneArgs,
+    files::Files,
     level::{self, LEVELS},
     log,
     make::{refuse_unknown, write_all},
@@ -39,6 +40,11 @@ pub(super) struct GarmentArgs {
 
 pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
     refuse_unknown(&args.out)?;
+    Files::default()
+        .reads("scene", [&args.scene])
+        .reads("--curves", &args.options.curves)
+        .writes("-o", &args.out)
+        .check(args.quiet)?;
     let mut scene = args.options.load(&args.scene)?;
     if scene.garments.is_empty() {
         let hint = "source = { type = \"garment\", path = \"pullover.obj\", cloth = { type = \"knit\" } }";

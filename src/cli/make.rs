@@ -129,10 +129,6 @@ struct WeaveArgs {
 
 /// Radius of the yarn unless given.
 const RADIUS: f64 = 0.5;
-/// Yarns of each side unless given.
-const YARNS: u32 = 20;
-/// Length of a fringe, in radii of the warp.
-const FRINGE: f64 = 24.0;
 /// Crossings of a repeat from which on a weave takes more than some seconds.
 const LONG_REPEAT: usize = 1024;
 
@@ -158,8 +154,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
         rows => (Draft::matrix(rows).map_err(wrong)?, None),
     };
-    let yarn = args.output.yarn()?;
-    let [warps, wefts] = file.as_ref().map_or([YARNS; 2], |f| f.count);
+    let yarn = args.output.checked()?;
+    let [warps, wefts] = file.as_ref().map_or([weave::YARNS; 2], |f| f.count);
     let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
     let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
     let radius = own(args.output.radius, 0).unwrap_or(otherwise);
@@ -179,7 +175,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
             "finished" => weave::Edges::Finished,
             "selvedge" => weave::Edges::Selvedge,
-            "fringe" => weave::Edges::Fringe(FRINGE * radius),
+            "fringe" => weave::Edges::Fringe(weave::FRINGE * radius),
             _ => weave::Edges::Live,
         }),
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
@@ -239,9 +235,10 @@ fn wif_draft(path: &str) -> Result<WovenWif, Failure> {
 }
 
 impl Output {
-    /// The yarn that cloth is of, if one is named; files are refused first that cannot be written.
-    fn yarn(&self) -> Result<Option<Yarn>, Failure> {
+    /// The yarn that cloth is of, if one is named; files that cannot be written are refused first, before any work.
+    fn checked(&self) -> Result<Option<Yarn>, Failure> {
         refuse_unknown(&self.out)?;
+        Files::default().writes("-o", &self.out).check(self.quiet)?;
         self.level.yarn()
     }
 }
@@ -295,7 +292,6 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
 
 /// Writes curves to every file that can be written, and says what they hold.
 pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Result<(), Failure> {
-    Files::default().writes("-o", paths).check(quiet)?;
     let mut attempts = Attempts::default();
     for path in paths {
         if attempts.note(write_curves(path, set)) && !quiet {

@@ -161,14 +161,19 @@ impl ScatterArgs {
         if given.is_empty() { vec![Model::Aggregated] } else { given }
     }
 
-    fn load(&self, extra: Option<(String, Setting, String)>) -> Result<Definitions, Failure> {
-        let assignments = self.set.iter().map(|assignment| match assignment.split_once('=') {
+    /// What `--set` says, by dotted paths.
+    fn assignments(&self) -> Result<Vec<String>, Failure> {
+        let spelled = |assignment: &String| match assignment.split_once('=') {
             Some((key, value)) => Ok(format!("{}={value}", self.path_of(key.trim())?)),
             // That this is no assignment is told where it is read.
             None => Ok(assignment.clone()),
-        });
-        let assignments = assignments.collect::<Result<_, Failure>>()?;
-        let options = LoadOptions { assignments, settings: extra.into_iter().collect(), ..LoadOptions::default() };
+        };
+        self.set.iter().map(spelled).collect()
+    }
+
+    fn load(&self, set: &[String], extra: Option<(String, Setting, String)>) -> Result<Definitions, Failure> {
+        let settings = extra.into_iter().collect();
+        let options = LoadOptions { assignments: set.to_vec(), settings, ..LoadOptions::default() };
         Ok(load_definitions(self.file().as_deref(), &options)?)
     }
 
@@ -197,8 +202,8 @@ impl ScatterArgs {
         Ok(view)
     }
 
-    /// The job for one value of the sweep.
-    fn swept(&self, sweep: &Sweep, at: f64) -> Result<Job, Failure> {
+    /// The job for one value of the sweep, with these assignments.
+    fn swept(&self, sweep: &Sweep, at: f64, set: &[String]) -> Result<Job, Failure> {
         let mut view = self.view()?;
         match sweep.key.as_str() {
             "theta" => view.theta = at.to_radians(),
@@ -210,11 +215,11 @@ impl ScatterArgs {
                 let value = if whole { Setting::Integer(at.round() as i64) } else { Setting::Float(at) };
                 let shown = if whole { at.round() } else { at };
                 let label = format!("--sweep {}={shown}", sweep.key);
-                return Ok(Job { definitions: self.load(Some((path, value, label)))?, view });
+                return Ok(Job { definitions: self.load(set, Some((path, value, label)))?, view });
             }
         }
         check(&view)?;
-        Ok(Job { definitions: self.load(None)?, view })
+        Ok(Job { definitions: self.load(set, None)?, view })
     }
 
     /// The dotted path that a short key stands for: of the yarn, or of the fibre it is made of.
@@ -226,7 +231,7 @@ impl ScatterArgs {
         if let Some(fiber) = &self.fiber {
             return Ok(format!("fiber.{fiber}.{key}"));
         }
-        let definitions = load_definitions(self.file().as_deref(), &LoadOptions::default())?;
+        let definitions = self.load(&[], None)?;
         let yarn = self.yarn(&definitions)?;
         Ok(if of_fiber { format!("fiber.{}.{key}", yarn.fibers[0].0) } else { format!("yarn.{}.{key}", yarn.name) })
     }
@@ -307,7 +312,7 @@ fn pretty(value: &Value) -> String {
 }
 
 fn run_one(args: &ScatterArgs) -> Result<(), Failure> {
-    let job = Job { definitions: args.load(None)?, view: args.view()? };
+    let job = Job { definitions: args.load(&args.assignments()?, None)?, view: args.view()? };
     let found = args.measure(&job)?;
     let mut report = report_json(args, &job, &found);
     let shown: Vec<(&str, &Measurement)> = found.all.iter().map(|(n, m)| (n.as_str(), m)).collect();
@@ -429,7 +434,8 @@ fn run_sweep(args: &ScatterArgs, sweep: &Sweep) -> Result<(), Failure> {
     let mut names: Vec<String> = Vec::new();
     let mut title = String::new();
     // Everything is read before anything is measured.
-    let jobs = sweep.values.iter().map(|&at| args.swept(sweep, at)).collect::<Result<Vec<_>, _>>()?;
+    let set = args.assignments()?;
+    let jobs = sweep.values.iter().map(|&at| args.swept(sweep, at, &set)).collect::<Result<Vec<_>, _>>()?;
     for (job, &at) in jobs.iter().zip(&sweep.values) {
         let found = args.measure(job)?;
         names = found.all.iter().map(|(n, _)| n.clone()).collect();

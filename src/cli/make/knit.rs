@@ -170,7 +170,7 @@ impl KnitArgs {
 }
 
 pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
-    let yarn = args.output.yarn()?;
+    let yarn = args.output.checked()?;
     let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
     let piece = args.piece(radius)?;
     let Knitted { strands, gauge, .. } = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;

@@ -18,12 +18,6 @@ use crate::{
     },
 };
 
-/// Yarns of each side unless given.
-const YARNS: u32 = 20;
-
-/// Length of a fringe unless given, in radii of the warp.
-const FRINGE: f64 = 24.0;
-
 /// A weave that is checked.
 pub(super) struct WeavePlan {
     weave: Weave,
@@ -144,7 +138,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     if cover.is_some() && warp_spacing.is_some() && weft_spacing.is_some() {
         table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
     }
-    let count = wif.map_or([YARNS; 2], |w| w.count);
+    let count = wif.map_or([weave::YARNS; 2], |w| w.count);
     let warps = extent(table, context, "warps", "width", count[0]);
     let wefts = extent(table, context, "wefts", "height", count[1]);
     let crimp = table.f64("crimp", Range::UNIT);
@@ -192,7 +186,7 @@ const UNEQUAL: f64 = 1.5;
 /// How the cloth ends.
 fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, threads: &[Threads; 2]) -> Edges {
     let fringe = table.f64("fringe", Range::POSITIVE).map(|l| l * context.unit);
-    let fringed = Edges::Fringe(fringe.unwrap_or(FRINGE * radius));
+    let fringed = Edges::Fringe(fringe.unwrap_or(weave::FRINGE * radius));
     let names =
         [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
     let unequal = threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL);

@@ -104,6 +104,10 @@ pub struct Measures {
 
 /// Control points between crossings unless asked otherwise.
 pub const POINTS: u32 = 8;
+/// Yarns of each side unless asked otherwise.
+pub const YARNS: u32 = 20;
+/// Length of a fringe unless asked otherwise, in radii of the warp.
+pub const FRINGE: f64 = 24.0;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
 pub const FLATTEN: f64 = 1.5;
 /// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut; loops, which
@@ -143,8 +147,8 @@ impl Weave {
     /// A weave of one yarn as it comes by itself, cut all around: 20 by 20 yarns.
     pub fn of(draft: Draft, radius: f64) -> Self {
         Self {
-            warps: Extent::Yarns(20),
-            wefts: Extent::Yarns(20),
+            warps: Extent::Yarns(YARNS),
+            wefts: Extent::Yarns(YARNS),
             warp_radius: radius,
             weft_radius: radius,
             warp_spacing: None,
