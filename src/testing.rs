@@ -1,6 +1,29 @@
-//! Helpers of the tests: data of the project, and data that lies beside it and is not part of it.
+//! Helpers of the tests: cloth, data of the project, and data that lies beside it and is not part of it.
 
 use std::{io::Write as _, path::PathBuf};
+
+use crate::geometry::pattern::{
+    chart::Chart,
+    knit::{Edges, Form, Knit},
+    tile::Tile,
+};
+
+/// Stockinette of stitches of 4 x 3 mm.
+pub(crate) fn stockinette() -> Tile {
+    let knit = Knit {
+        chart: Chart::named("stockinette").unwrap(),
+        stitches: 1,
+        rows: 1,
+        form: Form::Flat,
+        stitch_width: Some(4.0 / 1.2),
+        row_height: Some(3.0 / 1.2),
+        yarn_per_stitch: Some(13.9),
+        edges: Edges::Live,
+        points: 24,
+        colors: None,
+    };
+    Tile::of_knit(&knit, 1.2).unwrap()
+}
 
 /// The text of a file of `tests/data`.
 pub(crate) fn data(name: &str) -> String {

@@ -85,7 +85,7 @@ impl Shapes {
             .map(|&strain| (strain != UNSTRAINED.map(f64::from)).then(|| strained(tile, strain)))
             .collect();
         // Tiles come from other relaxations, each with a rest of its own: what strain does is the difference from this one's.
-        let settled = strained(tile, UNSTRAINED.map(f64::from));
+        let settled = pulled.iter().any(Option::is_some).then(|| strained(tile, UNSTRAINED.map(f64::from)));
         let counts = tile.counts.map(|n| n as usize);
         let strands: Vec<Shape> = tile
             .strands
@@ -100,7 +100,8 @@ impl Shapes {
                     let to = |p: glam::DVec3| Vec3::new((p.x / stitch.x) as f32, (p.y / stitch.y) as f32, p.z as f32);
                     t.strands[i].spline(&places, t.period).into_iter().map(to).collect()
                 };
-                let (as_cut, settled) = (control_of(tile), control_of(&settled));
+                let as_cut = control_of(tile);
+                let settled = settled.as_ref().map(control_of).unwrap_or_default();
                 let moved = |t: &Tile| {
                     let control = control_of(t).into_iter().zip(&settled).zip(&as_cut);
                     control.map(|((p, rest), as_cut)| *as_cut + (p - *rest)).collect::<Vec<_>>()
@@ -194,31 +195,13 @@ fn between(nodes: &[f32], value: f32) -> (usize, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{
-        curve::{Basis, Curve},
-        pattern::{
-            chart::Chart,
-            knit::{Edges, Form, Knit},
-            overlap::{Overlap, overlap},
+    use crate::{
+        geometry::{
+            curve::{Basis, Curve},
+            pattern::overlap::{Overlap, overlap},
         },
+        testing::stockinette,
     };
-
-    /// Stockinette of 4 x 3 mm.
-    fn stockinette() -> Tile {
-        let knit = Knit {
-            chart: Chart::named("stockinette").unwrap(),
-            stitches: 1,
-            rows: 1,
-            form: Form::Flat,
-            stitch_width: Some(4.0 / 1.2),
-            row_height: Some(3.0 / 1.2),
-            yarn_per_stitch: Some(13.9),
-            edges: Edges::Live,
-            points: 24,
-            colors: None,
-        };
-        Tile::of_knit(&knit, 1.2).unwrap()
-    }
 
     /// Three repeats each way, as they are laid on cloth that is strained so.
     fn laid(tile: &Tile, shapes: &Shapes, strain: Strain) -> Overlap {

@@ -1,34 +1,14 @@
 use std::fmt::Write;
 
 use super::*;
-use crate::geometry::{
-    curve::{Basis, Curve},
-    pattern::{
-        chart::Chart,
-        draft::Draft,
-        knit::{Edges, Form, Knit},
-        overlap::overlap,
-        weave::Weave,
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        pattern::{draft::Draft, overlap::overlap, weave::Weave},
+        spline::evaluate,
     },
-    spline::evaluate,
+    testing::stockinette,
 };
-
-/// A stockinette of 4 x 3 mm stitches.
-fn knitted() -> Tile {
-    let knit = Knit {
-        chart: Chart::named("stockinette").unwrap(),
-        stitches: 1,
-        rows: 1,
-        form: Form::Flat,
-        stitch_width: Some(4.0 / 1.2),
-        row_height: Some(3.0 / 1.2),
-        yarn_per_stitch: Some(13.9),
-        edges: Edges::Live,
-        points: 24,
-        colors: None,
-    };
-    Tile::of_knit(&knit, 1.2).unwrap()
-}
 
 fn woven() -> Tile {
     let spacing = Some(2.5);
@@ -96,7 +76,7 @@ fn overlapping(yarns: &[LaidYarn]) -> f64 {
 
 #[test]
 fn a_flat_square_holds_its_stitches_within_its_border() {
-    for tile in [knitted(), woven()] {
+    for tile in [stockinette(), woven()] {
         let stitch = tile.stitch();
         let (report, yarns) = laid(&square(), options(tile));
         let wanted = 100.0 * 100.0 / stitch.element_product();
@@ -120,7 +100,7 @@ fn a_flat_square_holds_its_stitches_within_its_border() {
 
 #[test]
 fn rows_are_few_yarns_and_long() {
-    let (report, yarns) = laid(&square(), options(knitted()));
+    let (report, yarns) = laid(&square(), options(stockinette()));
     // One yarn to and fro, and the chain around.
     assert!(yarns.len() <= 3, "{}", yarns.len());
     let longest = yarns.iter().map(|y| y.points.len()).max().unwrap();
@@ -137,7 +117,7 @@ fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
     };
     sheet(&mut text, "tube", 24, 6, 10.0, 0.0, &at);
     let mesh = GarmentMesh::parse(&text).unwrap();
-    let (report, yarns) = laid(&mesh, options(knitted()));
+    let (report, yarns) = laid(&mesh, options(stockinette()));
     let rounds: Vec<&LaidYarn> = yarns.iter().filter(|y| y.closed).collect();
     assert!(rounds.len() > 15, "{} of {}", rounds.len(), yarns.len());
     assert_eq!(report.all_stitches() % 60, 0, "{}", report.all_stitches());
@@ -187,7 +167,7 @@ fn distances_at_seam(tile: &Tile, axis: usize) -> Vec<f64> {
 
 #[test]
 fn panels_meet_at_seams_within_a_yarn() {
-    for (tile, axis) in [(knitted(), 0), (knitted(), 1), (woven(), 0), (woven(), 1)] {
+    for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0), (woven(), 1)] {
         let distances = distances_at_seam(&tile, axis);
         // They touch: without a gap, and not far into each other.
         assert!(distances.iter().all(|d| (0.8..1.2).contains(d)), "{axis}: {distances:.2?}");
@@ -201,7 +181,7 @@ fn frames_keep_their_yarns_and_errors_name_what_differs() {
     for p in &mut moved.points {
         *p = DVec3::new(p.x, p.y, p.z + 0.002 * p.x * p.x);
     }
-    let garment = Garment::new(&still, options(knitted())).unwrap();
+    let garment = Garment::new(&still, options(stockinette())).unwrap();
     let frames = garment.lay(&still, &[&still, &moved], &[], &mut Vec::new()).unwrap();
     for (a, b) in frames[0].iter().flatten().zip(frames[1].iter().flatten()) {
         assert_eq!((a.points.len(), a.closed), (b.points.len(), b.closed));
@@ -222,7 +202,7 @@ fn yarns_are_the_same_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let tension = Some(Tension { seed: 7, spread: 0.05 });
-            laid(&square(), Options { tension, ..options(knitted()) }).1
+            laid(&square(), Options { tension, ..options(stockinette()) }).1
         })
     };
     let (one, three) = (lay(1), lay(3));
@@ -242,7 +222,7 @@ fn a_body_keeps_yarns_out() {
     };
     sheet(&mut text, "cap", 12, 12, 5.0, 0.0, &at);
     let mesh = GarmentMesh::parse(&text).unwrap();
-    let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(knitted()) }).unwrap();
+    let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(stockinette()) }).unwrap();
     let mut notes = Vec::new();
     let yarns = garment.lay(&mesh, &[&mesh], &[&body], &mut notes).unwrap();
     assert!(notes.iter().any(|n| n.contains("out of the body")), "{notes:?}");
@@ -267,16 +247,16 @@ fn patterns_choose_names() {
         assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
     }
     let cloths = vec![
-        options(knitted()).cloths.remove(0),
-        Cloth { group: Some("nobody".into()), ..options(knitted()).cloths.remove(0) },
+        options(stockinette()).cloths.remove(0),
+        Cloth { group: Some("nobody".into()), ..options(stockinette()).cloths.remove(0) },
     ];
-    let error = Garment::new(&square(), Options { cloths, ..options(knitted()) }).err().unwrap();
+    let error = Garment::new(&square(), Options { cloths, ..options(stockinette()) }).err().unwrap();
     assert!(error.problem.contains("nobody") && error.hint.contains("square"), "{error:?}");
 }
 
 #[test]
 fn what_cannot_be_laid_is_said() {
-    let fine = options(knitted().scaled(1e-3));
+    let fine = options(stockinette().scaled(1e-3));
     let error = Garment::new(&square(), fine).err().unwrap();
     assert!(error.problem.contains("stitches of"), "{error:?}");
     let mut text = String::new();
@@ -306,7 +286,7 @@ fn what_cannot_be_laid_is_said() {
         writeln!(wound, "f {a}/{a} {1}/{1} {2}/{2} {0}/{0}", a + 2, a + 1, a + 3).unwrap();
     }
     let mesh = GarmentMesh::parse(&wound).unwrap();
-    let error = Garment::new(&mesh, options(knitted())).err().unwrap();
+    let error = Garment::new(&mesh, options(stockinette())).err().unwrap();
     assert!(error.problem.contains("`spiral` overlaps itself") && error.line > 0, "{error:?}");
-    assert!(Garment::new(&GarmentMesh::parse(&text).unwrap(), options(knitted())).is_ok());
+    assert!(Garment::new(&GarmentMesh::parse(&text).unwrap(), options(stockinette())).is_ok());
 }

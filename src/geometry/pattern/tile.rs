@@ -196,8 +196,9 @@ impl Tile {
         self.strained(period, 0.0, rounds)
     }
 
-    /// As [`Self::pulled`], and sheared: the tile above begins `shear` times its height further along x. The yarns are given
-    /// as they lie where the tile is drawn back upright, so that it repeats along x and y as any other does.
+    /// The same cloth pulled to another period and sheared: the tile above begins `shear` times its height further along x.
+    /// The yarns are given as they lie where the tile is drawn back upright, so that it repeats along x and y as any other
+    /// does.
     pub fn strained(&self, period: DVec2, shear: f64, rounds: usize) -> Self {
         let stretch = period / self.period;
         let mut out = self.clone();
