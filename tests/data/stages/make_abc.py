@@ -1,30 +1,10 @@
 """Makes scene.abc beside it with alembic3d 1.8.12.1 (`pip install alembic3d==1.8.12.1`): `python make_abc.py`."""
 
 import imath
+from abc_arrays import floats, indices, integers, pairs, points
 from alembic3d.Abc import *  # noqa: F403
 from alembic3d.AbcCoreAbstract import TimeSampling
 from alembic3d.AbcGeom import *  # noqa: F403
-
-
-def points(values):
-    array = imath.V3fArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = imath.V3f(*value)
-    return array
-
-
-def integers(values):
-    array = imath.IntArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = value
-    return array
-
-
-def floats(values):
-    array = imath.FloatArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = value
-    return array
 
 
 def point(i):
@@ -74,13 +54,8 @@ hidden.getSchema().set(OCurvesSchemaSample(
 CreateVisibilityProperty(hidden, 0).setValue(0)
 
 mesh = OPolyMesh(top, "panels")
-uvs = imath.V2fArray(4)
-for i, uv in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
-    uvs[i] = imath.V2f(*uv)
-indices = imath.UnsignedIntArray(7)
-for i, index in enumerate([0, 1, 2, 3, 1, 0, 2]):
-    indices[i] = index
-uv = OV2fGeomParamSample(uvs, indices, GeometryScope.kFacevaryingScope)
+uv = OV2fGeomParamSample(
+    pairs([(0, 0), (1, 0), (1, 1), (0, 1)]), indices([0, 1, 2, 3, 1, 0, 2]), GeometryScope.kFacevaryingScope)
 mesh.getSchema().set(OPolyMeshSchemaSample(
     points([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0, 0)]),
     integers([0, 1, 2, 3, 1, 4, 2]), integers([4, 3]), uv))

@@ -3,40 +3,11 @@
 Curves with colours and numbers under the names that programs give them, of every scope, plain and by indices.
 """
 
-import imath
+from abc_arrays import colors, indices, integers, points
 from alembic3d.Abc import *  # noqa: F403
 from alembic3d.AbcGeom import *  # noqa: F403
 
 RED, GREEN, BLUE = (0.8, 0.05, 0.05), (0.1, 0.6, 0.1), (0.05, 0.1, 0.8)
-
-
-def points(values):
-    array = imath.V3fArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = imath.V3f(*value)
-    return array
-
-
-def integers(values):
-    array = imath.IntArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = value
-    return array
-
-
-def colors(values):
-    array = imath.C3fArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = imath.Color3f(*value)
-    return array
-
-
-def indices(values):
-    array = imath.UnsignedIntArray(len(values))
-    for i, value in enumerate(values):
-        array[i] = value
-    return array
-
 
 archive = OArchive("labels.abc")
 top = archive.getTop()

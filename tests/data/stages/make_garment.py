@@ -5,7 +5,7 @@ usd-core 26.11 and alembic3d 1.8.12.1 (`pip install usd-core==26.11 alembic3d==1
 
 from math import cos, pi, sin
 
-import imath
+import abc_arrays as arrays
 from alembic3d.Abc import OArchive
 from alembic3d.AbcGeom import (GeometryScope, OFaceSetSchemaSample, OPolyMesh, OPolyMeshSchemaSample,
                              OV2fGeomParamSample)
@@ -75,19 +75,6 @@ def usd():
 def abc():
     points, counts, corners, st, hem = tube(False)
 
-    def integers(values):
-        out = imath.IntArray(len(values))
-        for i, value in enumerate(values):
-            out[i] = value
-        return out
-
-    places = imath.V3fArray(len(points))
-    for i, p in enumerate(points):
-        places[i] = imath.V3f(*p)
-    uvs, indices = imath.V2fArray(len(st)), imath.UnsignedIntArray(len(st))
-    for i, uv in enumerate(st):
-        uvs[i] = imath.V2f(*uv)
-        indices[i] = i
     archive = OArchive("garment.abc")
     mesh = OPolyMesh(archive.getTop(), "tube")
     # Alembic winds faces clockwise.
@@ -98,10 +85,10 @@ def abc():
             at += count
         return out
 
-    for i, uv in enumerate(turned(st)):
-        uvs[i] = imath.V2f(*uv)
-    uv = OV2fGeomParamSample(uvs, indices, GeometryScope.kFacevaryingScope)
-    mesh.getSchema().set(OPolyMeshSchemaSample(places, integers(turned(corners)), integers(counts), uv))
+    uv = OV2fGeomParamSample(
+        arrays.pairs(turned(st)), arrays.indices(range(len(st))), GeometryScope.kFacevaryingScope)
+    integers = arrays.integers
+    mesh.getSchema().set(OPolyMeshSchemaSample(arrays.points(points), integers(turned(corners)), integers(counts), uv))
     mesh.getSchema().createFaceSet("hem")
     faces = mesh.getSchema().getFaceSet("hem").getSchema()
     sample = OFaceSetSchemaSample(integers(hem))
