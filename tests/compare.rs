@@ -105,6 +105,17 @@ fn what_cannot_be_compared_is_refused() {
 }
 
 #[test]
+fn a_picture_for_a_screen_beside_one_of_radiance_is_told() {
+    let directory = directory();
+    let d = directory.path();
+    write(d, "s.toml", SWATCH);
+    yarnray(d, &["render", "s.toml", "-q", "--spp", "1", "-o", "a.exr", "-o", "a.png"]).good();
+    let told = yarnray(d, &["compare", "a.png", "a.exr"]).good().stderr;
+    assert!(told.contains("note: a.png holds colours for a screen") && told.contains("a.exr radiance"), "{told}");
+    assert_eq!(yarnray(d, &["compare", "a.exr", "a.exr"]).good().stderr, "");
+}
+
+#[test]
 fn renders_of_two_seeds_differ_by_noise_only() {
     let directory = directory();
     let d = directory.path();

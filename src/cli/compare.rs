@@ -7,6 +7,7 @@ use clap::Args;
 use super::{
     Failure,
     files::{Attempts, Files},
+    log,
     terminal::print,
     write_text,
 };
@@ -106,6 +107,12 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         ))
     })?;
     let names = names.each_ref().map(String::as_str);
+    if let Some((shown, linear)) = of_different_kinds([&args.test, &args.reference]) {
+        log::say(&format!(
+            "note: {shown} holds colours for a screen with the exposure and tone curve that it was written with, \
+             {linear} radiance: compare pictures of one kind"
+        ));
+    }
     let mut attempts = Attempts::default();
     for path in &args.out {
         if has_extension(path, "png") {
@@ -134,6 +141,19 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         })
         .collect();
     if worse.is_empty() { Ok(()) } else { Err(Failure::Check(worse.join("\n"))) }
+}
+
+/// The picture for a screen and the one of radiance, where the two are not of one kind.
+fn of_different_kinds(paths: [&PathBuf; 2]) -> Option<(String, String)> {
+    let is = |path: &Path, kinds: &[&str]| kinds.iter().any(|kind| has_extension(path, kind));
+    let shown = paths.map(|path| is(path, &["png", "jpg", "jpeg", "bmp", "tga"]));
+    let linear = paths.map(|path| is(path, &["exr", "hdr", "pfm"]));
+    let (a, b) = match (shown, linear) {
+        ([true, _], [_, true]) => (0, 1),
+        ([_, true], [true, _]) => (1, 0),
+        _ => return None,
+    };
+    Some((paths[a].display().to_string(), paths[b].display().to_string()))
 }
 
 fn has_extension(path: &Path, extension: &str) -> bool {

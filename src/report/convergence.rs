@@ -88,6 +88,20 @@ impl Curve {
     }
 }
 
+/// What keeps a curve from its target: where its last wave stood.
+fn not_reached(curve: &Curve) -> String {
+    curve.points.last().map_or_else(
+        || "not reached: there are no points".to_owned(),
+        |p| {
+            let error = p.error.unwrap_or(p.noise).mean;
+            format!(
+                "not reached: {error:.2e} at {} spp, of which {:.2e} are noise; the rest stays",
+                p.spp, p.noise.mean
+            )
+        },
+    )
+}
+
 fn reached_json(reached: Reached) -> Value {
     match reached {
         Reached::At(t) => json!({"seconds": t, "extrapolated": false}),
@@ -203,7 +217,11 @@ impl Convergence {
                 c.method, self.target
             );
             if self.reference.is_some() {
-                let _ = write!(out, ", with model error {}", reached_text(c.time_of_error(self.target)));
+                let with_model = match c.time_of_error(self.target) {
+                    Reached::Unknown => not_reached(c),
+                    reached => reached_text(reached),
+                };
+                let _ = write!(out, ", with model error {with_model}");
             }
             out.push('\n');
         }
