@@ -200,6 +200,8 @@ const MOST_ROWS: usize = 20_000;
 const MOST_STEPS: usize = 20_000;
 /// Most stitches in a cable.
 const WIDEST_CABLE: u8 = 24;
+/// How far from what is asked a number of stitches is looked for that a chart fits.
+const LARGEST_STEP_ASIDE: usize = 200;
 const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
                      sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, with spaces between them";
 
@@ -211,6 +213,15 @@ impl Chart {
     }
 
     /// Reads the rows of a chart, from the bottom upwards.
+    ///
+    /// ```
+    /// use yarnray::geometry::pattern::chart::Chart;
+    ///
+    /// let lace = Chart::parse(&["k6", "k2tog yo k2 yo ssk"]).unwrap();
+    /// // Twelve stitches, and every row keeps them: two decreases, two yarn-overs.
+    /// let rows = lace.work(12, 4, 1000).unwrap();
+    /// assert!(rows.iter().all(|row| row.len() == 12));
+    /// ```
     ///
     /// # Errors
     /// A step that is none, or too many of them.
@@ -285,6 +296,23 @@ impl Chart {
         rows.find(|(_, takes, found)| takes > found).map(|(r, takes, _)| (r, takes))
     }
 
+    /// The next numbers of stitches to cast on, fewer and more, that `rows` rows fit; empty if none is near.
+    fn counts_that_fit(&self, cast_on: u32, rows: u32) -> String {
+        let fits = |&count: &u32| {
+            let row = |found: Option<u32>, row: &Row| {
+                let (found, (takes, makes)) = (found?, row.takes_and_makes());
+                match found.checked_rem(takes)? {
+                    0 => (found / takes).checked_mul(makes),
+                    _ => row.is_plain().then_some(found),
+                }
+            };
+            self.rows.iter().cycle().take(rows as usize).fold(Some(count), row).is_some()
+        };
+        let fewer = (1..cast_on).rev().take(LARGEST_STEP_ASIDE).find(fits);
+        let more = (cast_on + 1..).take(LARGEST_STEP_ASIDE).find(fits);
+        [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
+    }
+
     /// Knits `rows` rows onto `cast_on` stitches.
     ///
     /// # Errors
@@ -299,6 +327,8 @@ impl Chart {
             if takes == 0 || (cut && !row.is_plain()) {
                 let problem = format!("row {} repeats over {takes} stitches, but finds {found}", r + 1);
                 let hint = "the number of stitches must be a multiple of what a row with shaping or cables takes";
+                let counts = self.counts_that_fit(cast_on, rows);
+                let hint = if counts.is_empty() { hint.to_owned() } else { format!("{hint}: cast on {counts}") };
                 return Err(ChartError::new(Some(row.line), problem, hint));
             }
             let made = if cut { u64::from(found) } else { u64::from(found / takes) * u64::from(makes) };
@@ -513,6 +543,10 @@ mod tests {
         assert_eq!(worked(&["k2 p2"], 7, 1)[0].iter().filter(|s| s.purl).count(), 3);
         let error = Chart::parse(&["k", "k3 k2tog"]).unwrap().work(9, 2, 1000).unwrap_err();
         assert_eq!((error.line, error.problem.as_str()), (Some(1), "row 2 repeats over 5 stitches, but finds 9"));
+        assert!(error.hint.ends_with("takes: cast on 5 or 10"), "{}", error.hint);
+        // Four stitches of each five of the second row, by sevens in the third.
+        let error = Chart::parse(&["k", "k3 k2tog", "k5 k2tog"]).unwrap().work(10, 3, 1000).unwrap_err();
+        assert!(error.hint.ends_with("takes: cast on 35"), "{}", error.hint);
     }
 
     #[test]
