@@ -28,6 +28,18 @@ const SOBOL_SETS: u32 = 24;
 const SOBOL_LENGTH: u32 = 1 << 16;
 
 /// The numbers of one sample of one pixel: Owen-scrambled Sobol points in sets of four dimensions.
+///
+/// ```
+/// use yarnray::math::sampler::Sampler;
+///
+/// // The first 16 samples of a pixel put one number into each sixteenth of the first dimension.
+/// let mut taken = [false; 16];
+/// for index in 0..16 {
+///     let [x, ..] = Sampler::new(1, 40, 30, index).next4();
+///     taken[(16.0 * x) as usize] = true;
+/// }
+/// assert!(taken.iter().all(|&t| t));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sampler {
     pixel: u32,

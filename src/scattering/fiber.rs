@@ -102,6 +102,17 @@ impl FiberBcsdf {
     /// S cos(theta_i) of R, TT and D in 1/steradian and the density of [`Self::sample`] at `wi`. Frame: z along the fibre, the
     /// camera's direction at azimuth 0 with sine and cosine of its latitude given. `throughput` weighs the channels
     /// in the choice of a lobe and must be the same in both calls.
+    ///
+    /// ```
+    /// use glam::Vec3A;
+    /// use yarnray::{math::Rgb, scattering::fiber::{FiberBcsdf, FiberMaterial}};
+    ///
+    /// let material = FiberMaterial { r: [0.1; 3], tt: [0.5, 0.3, 0.2], d: [0.2; 3], ..FiberMaterial::default() };
+    /// let fiber = FiberBcsdf::new(&material);
+    /// // Camera and light across the fibre, the light behind it: what passes through is red.
+    /// let (lobes, density) = fiber.evaluate(0.0, 1.0, Vec3A::NEG_X, Rgb::ONE);
+    /// assert!(lobes.tt.to_array()[0] > lobes.tt.to_array()[2] && density > 0.0);
+    /// ```
     #[inline]
     pub fn evaluate(&self, sin_o: f32, cos_o: f32, wi: Vec3A, throughput: Rgb) -> (LobeValues, f32) {
         let sin_i = wi.z;

@@ -25,6 +25,25 @@ use crate::{
 ///
 /// Everything has a default but the cloth ([`defaults`]). [`Self::build`] checks what belongs together, moves the middle
 /// of the cloth to the origin, places camera and ground, and drops yarns that no fabric uses.
+///
+/// ```
+/// use yarnray::{
+///     geometry::pattern::{draft::Draft, weave::Weave},
+///     scattering::fiber::FiberMaterial,
+///     scene::{Fabric, SceneBuilder, Yarn},
+/// };
+///
+/// let silk = FiberMaterial { r: [0.06; 3], tt: [0.8, 0.7, 0.5], ..FiberMaterial::default() };
+/// let twists = [20f64.to_radians(), -10f64.to_radians()];
+/// let mut scene = SceneBuilder::new("silk");
+/// let yarn = scene.add_yarn(Yarn::of_equal_plies("silk", 0.1, 1, 60, 0.5, twists, ("silk".to_owned(), silk)).unwrap());
+/// let weave = Weave::of(Draft::named("satin 5").unwrap(), 0.1);
+/// let curves = weave.strands().unwrap().into_iter().map(|strand| strand.curve).collect::<Vec<_>>();
+/// scene.fabrics.push(Fabric::new("satin", yarn, curves, 0.1, 1));
+/// scene.size(320, 240);
+/// let scene = scene.build().unwrap();
+/// assert_eq!((scene.fabrics[0].curves.len(), scene.render.width), (40, 320));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
     /// What messages call the scene: its file, if it has one.

@@ -243,6 +243,16 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
 
 /// Reads curves from bytes of a known format; touches nothing outside its arguments.
 ///
+/// ```
+/// use yarnray::geometry::curve_file::{FileLocation, Format, ReadOptions, parse};
+///
+/// let set = parse(b"0 0 0\n1 0 0\n2 1 0\n3 1 0\n", Format::Text, &ReadOptions::default()).unwrap();
+/// assert_eq!(set.curves[0].points.len(), 4);
+///
+/// let error = parse(b"0 0 0\n1 zero 0\n", Format::Text, &ReadOptions::default()).unwrap_err();
+/// assert_eq!(error.location, FileLocation::Line(2));
+/// ```
+///
 /// # Errors
 /// The bytes break the rules of the format, or hold more points than allowed. [`CurveFileError::file`] is absent.
 pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {

@@ -322,6 +322,21 @@ pub struct Comparison {
 impl Comparison {
     /// Computes all of it; `None` where no pixel counts.
     ///
+    /// ```
+    /// use yarnray::image::{Channel, Image, metric::{Comparison, Pair}};
+    ///
+    /// let grey = |value: f32| {
+    ///     let mut image = Image::new(16, 16);
+    ///     image.channels = ["R", "G", "B"].map(|name| Channel { name: name.into(), samples: vec![value; 256] }).into();
+    ///     image
+    /// };
+    /// let pair = Pair::new(&grey(0.55), &grey(0.5)).unwrap();
+    /// let comparison = Comparison::new(&pair).unwrap();
+    /// assert!((comparison.mean_ratio[0] - 1.1).abs() < 1e-6);
+    /// // (0.55 - 0.5)^2 / (0.5^2 + 0.01)
+    /// assert!((comparison.full().rel_mse - 0.0025 / 0.26).abs() < 1e-7);
+    /// ```
+    ///
     /// FLIP and SSIM look at the surroundings of a pixel too: there, pixels that do not count have their colours all the
     /// same (those that are not finite are black in both pictures).
     pub fn new(pair: &Pair) -> Option<Self> {

@@ -176,6 +176,30 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 
 /// Loads a scene from its text; `name` is what messages call it, and paths are relative to where that would lie.
 ///
+/// ```
+/// use yarnray::scene::load::{LoadOptions, parse};
+///
+/// let text = r#"
+/// [fiber.wool]
+/// tt = [0.6, 0.4, 0.3]
+/// [yarn.thin]
+/// radius = 0.2 # millimetres
+/// fiber = "wool"
+/// fibers = 80
+/// density = 0.4
+/// [[fabric]]
+/// yarn = "thin"
+/// source = { type = "straight", count = 3, length = 5 }
+/// "#;
+/// let scene = parse("three yarns", text, &LoadOptions::default()).unwrap();
+/// assert_eq!(scene.fabrics[0].curves.len(), 3);
+///
+/// // What is wrong with a scene is told with its place.
+/// let wrong = text.replace("fibers = 80", "fibres = 80");
+/// let told = parse("three yarns", &wrong, &LoadOptions::default()).unwrap_err().to_string();
+/// assert!(told.contains("three yarns:7") && told.contains("fibers"), "{told}");
+/// ```
+///
 /// # Errors
 /// Everything that is wrong with it, as text for the user.
 pub fn parse(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, LoadError> {

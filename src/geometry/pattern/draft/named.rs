@@ -175,6 +175,18 @@ impl Draft {
     /// wefts; `left` rises to the left), `herringbone N/M ENDS` (turns after so many ends), `satin N` or `satin N/STEP`
     /// (over all but one of N wefts), `sateen N` (the weft's side of it), `honeycomb N` (N ends and wefts).
     ///
+    /// ```
+    /// use yarnray::geometry::pattern::{draft::Draft, weave::{Extent, Weave}};
+    ///
+    /// let twill = Draft::named("twill 2/2").unwrap();
+    /// assert_eq!((twill.warps(), twill.wefts()), (4, 4));
+    /// let cloth = Weave { warps: Extent::Yarns(12), wefts: Extent::Yarns(8), ..Weave::of(twill, 0.2) };
+    /// assert_eq!(cloth.strands().unwrap().len(), 12 + 8);
+    ///
+    /// // A satin of six shafts would not be one; the message lists those that exist.
+    /// assert!(Draft::named("satin 6").is_err());
+    /// ```
+    ///
     /// # Errors
     /// No such weave, or numbers that make none.
     pub fn named(text: &str) -> Result<Self, DraftError> {
