@@ -6,6 +6,7 @@
 use divan::{Bencher, black_box, counter::ItemsCount};
 use glam::{DVec3, Vec3A};
 use yarnray::{
+    cloth::{Cloth, scatterer},
     geometry::{
         pattern::straight,
         ray::Ray,
@@ -17,7 +18,7 @@ use yarnray::{
     },
     scattering::fiber::FiberMaterial,
     scene::{Fabric, Model, Scene, SceneBuilder, Yarn},
-    trace::{HitPlace, World, scatterer},
+    trace::{HitPlace, World},
 };
 
 /// Inputs of one round, so that no branch learns its one answer.
@@ -35,7 +36,7 @@ fn yarn(plies: u32) -> Yarn {
 }
 
 /// Ten straight yarns that touch each other.
-fn cloth(plies: u32) -> Scene {
+fn straight_yarns(plies: u32) -> Scene {
     let mut scene = SceneBuilder::new("straight yarns");
     let kind = scene.add_yarn(yarn(plies));
     scene.fabrics.push(Fabric::new("yarns", kind, straight(10, 10.0, 0.5), 0.25, 1));
@@ -53,6 +54,10 @@ fn rays() -> Vec<Ray> {
             Ray::new((at + 20.0 * from).as_vec3a(), (-from).as_vec3a())
         })
         .collect()
+}
+
+fn world(scene: &Scene) -> World {
+    Cloth::new(scene, 1).expect("memory").0.into_world()
 }
 
 /// What the rays see of the yarns.
@@ -73,8 +78,8 @@ fn sampler_set_of_four(bencher: Bencher<'_, '_>) {
 
 #[divan::bench(args = [1, 2, 4])]
 fn section_crossings(bencher: Bencher<'_, '_>, plies: u32) {
-    let scene = cloth(plies);
-    let (world, _) = World::new(&scene, 1).expect("memory");
+    let scene = straight_yarns(plies);
+    let world = world(&scene);
     let sections = sections(&world, &rays());
     let shape = yarn(plies).shape();
     bencher.counter(ItemsCount::new(sections.len())).bench(|| {
@@ -90,8 +95,8 @@ fn section_crossings(bencher: Bencher<'_, '_>, plies: u32) {
 /// A scattering as the integrator uses it: the vertex, light from one direction, and the next direction.
 #[divan::bench(args = [Model::Aggregated, Model::TwoStream, Model::Paper])]
 fn vertex(bencher: Bencher<'_, '_>, model: &Model) {
-    let scene = cloth(2);
-    let (world, _) = World::new(&scene, 1).expect("memory");
+    let scene = straight_yarns(2);
+    let world = world(&scene);
     let sections = sections(&world, &rays());
     let scatterer = scatterer(&yarn(2), *model);
     let light = Vec3A::new(0.36, 0.48, 0.8);
@@ -117,8 +122,8 @@ fn vertex(bencher: Bencher<'_, '_>, model: &Model) {
 
 #[divan::bench(args = [1, 2, 4])]
 fn nearest_hit(bencher: Bencher<'_, '_>, plies: u32) {
-    let scene = cloth(plies);
-    let (world, _) = World::new(&scene, 1).expect("memory");
+    let scene = straight_yarns(plies);
+    let world = world(&scene);
     let rays = rays();
     bencher
         .counter(ItemsCount::new(ROUND))
@@ -127,8 +132,8 @@ fn nearest_hit(bencher: Bencher<'_, '_>, plies: u32) {
 
 #[divan::bench(args = [1, 2, 4])]
 fn shadow_ray(bencher: Bencher<'_, '_>, plies: u32) {
-    let scene = cloth(plies);
-    let (world, _) = World::new(&scene, 1).expect("memory");
+    let scene = straight_yarns(plies);
+    let world = world(&scene);
     let rays = rays();
     bencher.counter(ItemsCount::new(ROUND)).bench(|| {
         let mut crossings = Crossings::new();

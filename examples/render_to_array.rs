@@ -6,13 +6,13 @@ use std::{error::Error, sync::atomic::AtomicBool};
 
 use glam::DVec3;
 use yarnray::{
+    cloth::Cloth,
     geometry::pattern::straight,
     light::{AreaLight, Environment, Light, Shape},
     math::Rgb,
     render,
     scattering::fiber::FiberMaterial,
     scene::{Fabric, SceneBuilder, Yarn},
-    trace::World,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -32,8 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.lights.push(Light::Area(AreaLight { shape, radiance: Rgb::splat(200.0), two_sided: false, visible: false }));
     let scene = scene.build()?;
 
-    let (world, _) = World::new(&scene, 1)?;
-    let film = render::render(&scene, &world, &AtomicBool::new(false), |_| {})?.film;
+    let (cloth, _) = Cloth::new(&scene, 1)?;
+    let film = render::render(&scene, &cloth, &AtomicBool::new(false), |_| {})?.film;
 
     // Linear Rec.709 radiance, row by row from the top; alpha is the share of each pixel that yarns cover.
     let pixels: Vec<[f32; 4]> = (0..film.height)

@@ -8,8 +8,10 @@
 //! # The way of a picture
 //! ```text
 //! scene.toml   --input, scene::load------------>  Scene     checked; millimetres, radians; no TOML, no Embree
-//! Scene        --trace::World------------------>  strands in Embree, a scattering model for each yarn
+//! Scene        --cloth------------------------->  curves by the mode, a scattering model for each yarn
+//! curves       --trace::World------------------>  what Embree holds, and which light passes
 //! camera ray   --trace------------------------->  Hit       place on a yarn, seen in its cross-section
+//! Hit          --cloth------------------------->  the model that scatters there
 //! Hit          --geometry::section------------->  plies crossed, in order, with their fibres
 //! crossings    --scattering-------------------->  value, density, sampled direction of a vertex
 //! paths        --integrator-------------------->  radiance of one sample
@@ -17,15 +19,17 @@
 //! the run      --report, plan------------------>  statistics, metadata                  --cli-->  screen
 //! ```
 //! Only one thing looks back: during traversal Embree asks a filter whether a ray meets a ply or slips through. The
-//! filter lives in [`trace`], sees shapes and transparency only, and is a pure function of ray and hit.
+//! filter lives in [`trace`], which knows shapes and transparency only, and is a pure function of ray and hit.
 //!
 //! # The rooms, from ground to top
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
 //! * [`ffi`]: Embree, OpenImageIO and Open Image Denoise behind a safe face; the only `unsafe` code.
 //! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
+//! * [`trace`]: rays against curves and meshes, no light.
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files. [`light`]: light sources.
-//! * [`scene`]: what the user asked for. [`trace`]: rays against cloth. [`film`]: what a sample is, and what pixels collect.
+//! * [`scene`]: what the user asked for. [`cloth`]: its curves by mode, their models, and what a hit scatters by.
+//! * [`film`]: what a sample is, and what pixels collect.
 //! * [`integrator`]: light along a path. [`render`]: the driver, films in files, and pictures from films.
 //! * [`plan`]: what a scene needs and what is left out. [`report`]: what a run was, and what many were.
 //! * [`experiment`]: what parts and pictures say, held against what is true. [`cli`]: the program.
@@ -42,6 +46,7 @@
 #![deny(unsafe_code)]
 
 pub mod cli;
+pub mod cloth;
 pub mod experiment;
 pub mod ffi;
 pub mod film;

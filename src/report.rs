@@ -15,11 +15,12 @@ use glam::DMat4;
 use serde_json::{Value, json};
 
 use crate::{
+    cloth::BuildTimes,
     image::{Attribute, exr},
     plan::Plan,
     render::{Job, Rendered},
     scene::Scene,
-    trace::{BuildTimes, CurveGeometry, World},
+    trace::{CurveGeometry, World},
 };
 
 /// Seconds of each phase.

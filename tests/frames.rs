@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use yarnray::{
+    cloth::Cloth,
     image::{self, Image},
     scene::load::{LoadOptions, load},
-    trace::{CurveGeometry, World},
+    trace::CurveGeometry,
 };
 
 use crate::support::{SWATCH, directory, listing, write, yarnray};
@@ -220,8 +221,8 @@ fn plies_move_with_a_yarn_that_stretches() {
         let path = write(d, "s.toml", scene(camera, source));
         let options = LoadOptions { assignments: vec![format!("render.frame={frame}")], ..LoadOptions::default() };
         let scene = load(&path, &options).unwrap();
-        let (world, _) = World::new(&scene, 1).unwrap();
-        let CurveGeometry::Yarns(yarns) = &world.geometries()[0] else { panic!("yarns") };
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        let CurveGeometry::Yarns(yarns) = &cloth.world().geometries()[0] else { panic!("yarns") };
         let (low, high) = scene.bounds().unwrap();
         let segments = yarns.strands.segments().len() as u32;
         // The phase, and the share of the yarn at which it is.

@@ -3,11 +3,12 @@
 use std::{fmt::Write as _, path::Path};
 
 use yarnray::{
+    cloth::Cloth,
     scene::{
         Scene,
         load::{LoadOptions, load},
     },
-    trace::{CurveGeometry, World},
+    trace::CurveGeometry,
 };
 
 use crate::support::{directory, write, yarnray};
@@ -82,7 +83,7 @@ fn points(scene: &Scene) -> Vec<Vec<Point>> {
 
 /// For each yarn whether it is closed, and the phase of the plies in the middle of each segment.
 fn phases(scene: &Scene) -> Vec<(bool, Vec<f32>)> {
-    let (world, _) = World::new(scene, 1).unwrap();
+    let (cloth, _) = Cloth::new(scene, 1).unwrap();
     let closed = scene.fabrics.iter().map(|f| f.curves.iter().map(|(curve, _)| curve.closed).collect::<Vec<_>>());
     let of = |(geometry, closed): (&CurveGeometry, Vec<bool>)| {
         let CurveGeometry::Yarns(yarns) = geometry else { panic!("yarns") };
@@ -90,7 +91,7 @@ fn phases(scene: &Scene) -> Vec<(bool, Vec<f32>)> {
         let yarn = |(yarn, closed): (usize, bool)| (closed, yarns.strands.segments_of(yarn).map(phase).collect());
         closed.into_iter().enumerate().map(yarn).collect::<Vec<_>>()
     };
-    world.geometries().iter().zip(closed).flat_map(of).collect()
+    cloth.world().geometries().iter().zip(closed).flat_map(of).collect()
 }
 
 fn distance(a: Point, b: Point) -> f64 {

@@ -8,23 +8,30 @@ use std::{
 use crate::support::project;
 
 /// Every room from the ground up, and exactly the rooms that it uses. `main.rs` and `lib.rs` are the roof.
-const ROOMS: [(&str, &[&str]); 16] = [
+const ROOMS: [(&str, &[&str]); 17] = [
     ("ffi", &[]),
     ("math", &[]),
     ("image", &["ffi", "math"]),
     ("input", &[]),
     ("geometry", &["math"]),
+    ("trace", &["ffi", "geometry"]),
     ("scattering", &["geometry", "math"]),
     ("light", &["math"]),
     ("scene", &["geometry", "image", "input", "light", "math", "scattering"]),
-    ("trace", &["ffi", "geometry", "scattering", "scene"]),
+    ("cloth", &["geometry", "scattering", "scene", "trace"]),
     ("film", &["math", "scattering", "scene"]),
-    ("integrator", &["film", "geometry", "light", "math", "scattering", "scene", "trace"]),
-    ("render", &["ffi", "film", "geometry", "image", "integrator", "math", "scene", "trace"]),
+    ("integrator", &["cloth", "film", "geometry", "light", "math", "scattering", "scene", "trace"]),
+    ("render", &["cloth", "ffi", "film", "geometry", "image", "integrator", "math", "scene"]),
     ("plan", &["film", "image", "light", "scene"]),
-    ("report", &["geometry", "image", "light", "math", "plan", "render", "scene", "trace"]),
-    ("experiment", &["film", "geometry", "image", "input", "math", "render", "report", "scattering", "scene", "trace"]),
-    ("cli", &["experiment", "ffi", "geometry", "image", "input", "plan", "render", "report", "scene", "trace"]),
+    ("report", &["cloth", "geometry", "image", "light", "math", "plan", "render", "scene", "trace"]),
+    (
+        "experiment",
+        &["cloth", "film", "geometry", "image", "input", "math", "render", "report", "scattering", "scene", "trace"],
+    ),
+    (
+        "cli",
+        &["cloth", "experiment", "ffi", "geometry", "image", "input", "plan", "render", "report", "scene", "trace"],
+    ),
 ];
 
 /// All that a room takes from the foreign libraries: kept small, so that Embree could be exchanged.

@@ -12,8 +12,8 @@ use super::{
     terminal::print,
 };
 use crate::{
+    cloth::{self, Estimate},
     scene::Mode,
-    trace::{self, Estimate},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -50,7 +50,7 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
         scene.render.mode = Mode::Fiber;
     }
     if args.estimate {
-        let total: Estimate = trace::estimates(&scene).into_iter().sum();
+        let total: Estimate = cloth::estimates(&scene).into_iter().sum();
         print(&format!(
             "{} control points, {} segments; {} of curves and {} of BVH when rendered\n",
             total.points,

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, positive, terminal::print};
 use crate::{
+    cloth::{self, Estimate},
     geometry::{
         curve::{Basis, Curve, CurveSet},
         curve_file::{self, ReadOptions},
@@ -17,7 +18,6 @@ use crate::{
     plan::{Memory, Plan},
     render::film_file,
     scene::{CurveKind, Fabric, GarmentFacts, Scene},
-    trace::{self, Estimate},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -253,7 +253,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
 }
 
 fn scene_report(scene: &Scene) -> (Value, String) {
-    let estimates = trace::estimates(scene);
+    let estimates = cloth::estimates(scene);
     let not_laid = scene.garments.iter().filter(|_| scene.fabrics.is_empty());
     let not_laid = not_laid.map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
     let total: Estimate = estimates.iter().copied().chain(not_laid).sum();

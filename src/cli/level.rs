@@ -6,13 +6,13 @@ use clap::Args;
 
 use super::Failure;
 use crate::{
+    cloth,
     geometry::curve::CurveSet,
     plan::Memory,
     scene::{
         Fabric, Mode, Scene, SceneBuilder, Yarn,
         load::{LoadOptions, load_definitions},
     },
-    trace,
 };
 
 /// What is written, and of which yarn it is made.
@@ -43,10 +43,7 @@ pub(super) fn mode(level: &str) -> Mode {
 
 /// The curves of a scene's cloth in its mode; those of yarns as the scene has them, without frames or fly-aways.
 pub(super) fn curves(scene: &Scene) -> Result<CurveSet, Failure> {
-    match scene.render.mode {
-        Mode::Yarn => Ok(trace::yarns(scene)),
-        Mode::Ply | Mode::Fiber => Ok(trace::curves(scene, Memory::new(scene).limit)?),
-    }
+    Ok(cloth::curves(scene, Memory::new(scene).limit)?)
 }
 
 impl LevelArgs {

@@ -27,6 +27,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::{
+    cloth::BuildError,
     experiment::{converge::ConvergeError, table3::BenchError},
     geometry::pattern::overlap::{self, Overlap},
     image::output,
@@ -37,7 +38,6 @@ use crate::{
         Mode, Model, Scene,
         load::{LoadError, LoadOptions, load},
     },
-    trace::BuildError,
 };
 
 /// A renderer for knitted and woven cloth: yarns are curves, an analytic model answers for their fibres.

@@ -18,6 +18,7 @@ use super::{
     thread_pool, write_text,
 };
 use crate::{
+    cloth::Cloth,
     ffi::oidn::Denoiser,
     image::{self, ImageError, output::Format, png::ToneMap},
     plan::Memory,
@@ -163,12 +164,13 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     pool.install(|| {
         // Making it takes the curves.
         let yarns: Vec<usize> = scene.fabrics.iter().map(|f| f.curves.len()).collect();
-        let (world, made) = World::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
-        warn(args, &scene, &world, &yarns);
+        let (cloth, made) = Cloth::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
+        let world = cloth.world();
+        warn(args, &scene, world, &yarns);
         let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);
         log::phase("build", made.build);
-        let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, &world), args.shard);
+        let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, world), args.shard);
         let job = match old {
             Some(old) => resumed(old, &about, args)?,
             None => Job::new(&scene, args.shard)?,
@@ -181,7 +183,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
         let rendered = render::run(
             &scene,
-            &world,
+            &cloth,
             job,
             Control {
                 interrupt: &interrupt,
@@ -211,7 +213,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let mut phases = Phases { denoise, load, made, render, ..Phases::default() };
         let writing = Instant::now();
         let command = std::env::args().collect::<Vec<_>>().join(" ");
-        let record = |phases| RunRecord { scene: &scene, world: &world, rendered: &rendered, phases, threads };
+        let record = |phases| RunRecord { scene: &scene, world, rendered: &rendered, phases, threads };
         let attributes = record(phases).attributes(&command);
         // What was rendered is kept even if the denoiser fails.
         let clean = denoised.as_ref().ok().and_then(Option::as_ref);
@@ -237,7 +239,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
             attempts.note(write_text(path, &(text + "\n")));
         }
         written.extend(saver.written);
-        summary(&world, &rendered, &phases, &written);
+        summary(world, &rendered, &phases, &written);
         saver.failed.into_iter().for_each(|error| _ = attempts.note(Err::<(), _>(error)));
         attempts.finish()?;
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }

@@ -16,13 +16,13 @@ use super::{
     method::Method,
 };
 use crate::{
+    cloth::Cloth,
     film::{Film, OutOfMemory},
     image::{Channel, Image, ImageError},
     math::stats::Estimate,
     render,
     report::convergence::{Convergence, Curve, Point},
     scene::{Layers, Scene},
-    trace::World,
 };
 
 /// What to measure.
@@ -64,7 +64,7 @@ impl From<ImageError> for ConvergeError {
 /// A method with all that its renders need.
 struct Prepared {
     scene: Scene,
-    world: World,
+    cloth: Cloth,
     setup: Duration,
     converged: Converged,
 }
@@ -87,14 +87,14 @@ pub fn run(
         scene.layers = Layers::NONE;
         scene.render.time = None;
         scene.render.noise = None;
-        let (world, _) =
-            World::new(&scene, options.threads).map_err(|e| ConvergeError::Failed(format!("error: {e}")))?;
+        let (cloth, _) =
+            Cloth::new(&scene, options.threads).map_err(|e| ConvergeError::Failed(format!("error: {e}")))?;
         let setup = started.elapsed();
         let name = format!("converged picture of {method}");
         let path = converged::path(cache, &[&scene.fingerprint, &options.converged_spp.to_string()]);
         if let Some(converged) = Converged::load(&path) {
             say(&format!("{name}: from {}", path.display()));
-            return Ok(Prepared { scene, world, setup, converged });
+            return Ok(Prepared { scene, cloth, setup, converged });
         }
         let mut halves = Vec::new();
         for half in 0..2 {
@@ -102,7 +102,7 @@ pub fn run(
             let mut scene = scene.clone();
             scene.render.spp = options.converged_spp;
             scene.render.seed = seed(&scene, half);
-            let rendered = render::render(&scene, &world, interrupt, |_| {}).map_err(no_memory)?;
+            let rendered = render::render(&scene, &cloth, interrupt, |_| {}).map_err(no_memory)?;
             if interrupt.load(Ordering::Relaxed) {
                 return Err(ConvergeError::Interrupted);
             }
@@ -112,7 +112,7 @@ pub fn run(
         let converged = Converged::new(&halves[0], &halves[1])
             .ok_or_else(|| ConvergeError::Failed("error: a picture without colours".to_owned()))?;
         converged.store(&path)?;
-        Ok(Prepared { scene, world, setup, converged })
+        Ok(Prepared { scene, cloth, setup, converged })
     };
 
     // The reference's cloth is dropped before others are measured: it may fill the memory.
@@ -174,7 +174,7 @@ fn curve(
         let mut seen: Vec<Look> = Vec::new();
         // What looking takes is no rendering.
         let mut looking = Duration::ZERO;
-        let rendered = render::render(&scene, &prepared.world, interrupt, |progress| {
+        let rendered = render::render(&scene, &prepared.cloth, interrupt, |progress| {
             let last = seen.last().map_or(0, |look| look.spp);
             if progress.spp < 2 * last {
                 return;

@@ -8,6 +8,7 @@ pub mod fiber;
 pub mod garment;
 pub mod mesh;
 pub mod obj;
+pub mod occluder;
 pub mod pattern;
 pub mod proposal;
 pub mod ray;

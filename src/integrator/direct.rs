@@ -75,7 +75,9 @@ impl Integrator<'_> {
         if self.ground.is_some_and(|g| distance_to_ground(&g, ray).is_some()) {
             return 0.0;
         }
-        self.world.transmittance(&Ray { time: scratch.time, looks: false, ..*ray }, &mut scratch.shadow_crossings)
+        self.cloth
+            .world()
+            .transmittance(&Ray { time: scratch.time, looks: false, ..*ray }, &mut scratch.shadow_crossings)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     geometry::ray::Ray,
     geometry::tube::TubePlace,
     math::Rgb,
-    scattering::{lobe::LobeFrame, mis_weight},
+    scattering::{fiber::FiberBcsdf, lobe::LobeFrame, mis_weight},
     trace::{FiberGeometry, Hit},
 };
 
@@ -21,7 +21,7 @@ impl Integrator<'_> {
         &self,
         hit: &Hit,
         place: &TubePlace,
-        fibers: &FiberGeometry,
+        (fibers, fiber): (&FiberGeometry, &FiberBcsdf),
         path: &mut Path<'_>,
         sample: &mut Sample,
         scratch: &mut Scratch,
@@ -30,18 +30,22 @@ impl Integrator<'_> {
         if path.bounces >= self.max_bounces {
             return (false, false);
         }
+        let here = place.centre + place.radius * hit.normal;
         if path.bounces == 0 {
             sample.normal = hit.normal;
+            sample.depth = (path.from - here).dot(self.back);
+            self.sees(sample, here);
+            if self.layers.uv {
+                sample.uv = fibers.uvs.at(hit.segment, hit.u);
+            }
             self.describe(sample, fibers.fabric, fibers.material_index(hit.segment), fibers.ply, || {
                 fibers.yarn_of(hit.segment)
             });
         }
         let [u_choice, u_x, u_y, u_roulette] = path.sampler.next4();
         let u = path.sampler.next4();
-        let fiber = fibers.fiber_at(hit.segment);
         let frame = LobeFrame::new(place.tangent, -path.ray.direction);
 
-        let here = place.centre + place.radius * hit.normal;
         self.next_event(here, [u_choice, u_x, u_y], path, sample, scratch, counters, |direction, pdf| {
             let (lobes, own_pdf) = fiber.evaluate(frame.sin, frame.cos, frame.to_local(direction), path.throughput);
             let start = place.leave(hit.normal, direction);

@@ -17,6 +17,7 @@ use self::{
     seen::Flow,
 };
 use crate::{
+    cloth::{Cloth, Met},
     film::{ClothId, Sample},
     geometry::{
         ray::Ray,
@@ -24,9 +25,9 @@ use crate::{
     },
     light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
-    scattering::{LobeValues, fiber::FiberMaterial, mis_weight},
+    scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
     scene::{CurveKind, Fabric, Ground, Layers, Material, Scene},
-    trace::{CurveGeometry, Hit, HitPlace, SurfacePlace, World, YarnGeometry},
+    trace::{Hit, SurfacePlace, YarnGeometry},
 };
 
 /// Scattering events after which paths may end by chance, at yarns and surfaces. One event at a yarn stands for many at
@@ -72,7 +73,7 @@ impl Counters {
 /// A scene ready for paths: shared by all threads.
 #[derive(Debug)]
 pub struct Integrator<'a> {
-    world: &'a World,
+    cloth: &'a Cloth,
     ground: Option<Ground>,
     materials: &'a [Material],
     /// Environment lights, each with its index in `lights`; several are added up.
@@ -122,7 +123,7 @@ struct Path<'s> {
 
 impl<'a> Integrator<'a> {
     /// For a scene and its cloth.
-    pub fn new(scene: &'a Scene, world: &'a World) -> Self {
+    pub fn new(scene: &'a Scene, cloth: &'a Cloth) -> Self {
         let lights = LightChooser::new(&scene.lights);
         let mut environments = Vec::new();
         let mut area_lights = Vec::new();
@@ -134,7 +135,7 @@ impl<'a> Integrator<'a> {
             }
         }
         Self {
-            world,
+            cloth,
             ground: scene.ground,
             materials: &scene.materials,
             environments,
@@ -158,12 +159,11 @@ impl<'a> Integrator<'a> {
     /// Follows one path from the camera.
     pub fn sample(&self, ray: Ray, sampler: &mut Sampler, scratch: &mut Scratch, counters: &mut Counters) -> Sample {
         let mut sample = Sample::default();
-        let camera = ray.origin;
         let mut path = Path {
             ray,
             throughput: Rgb::ONE,
             pdf: f32::INFINITY,
-            from: camera,
+            from: ray.origin,
             bounces: 0,
             passes: 0,
             shares: None,
@@ -175,7 +175,7 @@ impl<'a> Integrator<'a> {
         loop {
             path.ray.time = scratch.time;
             path.ray.looks = path.bounces == 0;
-            let hit = self.world.intersect(&path.ray);
+            let hit = self.cloth.world().intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;
             if !self.area_lights.is_empty() {
@@ -189,33 +189,24 @@ impl<'a> Integrator<'a> {
                     let place = on_ground(&ground, &path.ray, t);
                     self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
                 }
-                (Some(Hit { t, place: HitPlace::Surface(place), .. }), _) => {
-                    self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
-                }
                 (Some(hit), _) => {
-                    let (go_on, scattered) = match (&hit.place, &self.world.geometries()[hit.geometry]) {
-                        (HitPlace::Yarn(section), CurveGeometry::Yarns(yarns)) => {
-                            self.scatter_at_yarn(&hit, section, yarns, &mut path, &mut sample, scratch, counters)
+                    let (go_on, scattered) = match self.cloth.at(&hit) {
+                        Met::Surface(place) => {
+                            (self.scatter_at_surface(place, hit.t, &mut path, &mut sample, scratch, counters), false)
                         }
-                        (HitPlace::Fiber(place), CurveGeometry::Fibers(fibers)) => {
-                            self.scatter_at_fiber(&hit, place, fibers, &mut path, &mut sample, scratch, counters)
+                        Met::Yarn { section, yarns, scatterer } => {
+                            let met = (yarns, scatterer);
+                            self.scatter_at_yarn(&hit, section, met, &mut path, &mut sample, scratch, counters)
                         }
-                        _ => unreachable!("a hit is of the kind of what it hit"),
+                        Met::Fiber { place, fibers, scatterer } => {
+                            let met = (fibers, scatterer);
+                            self.scatter_at_fiber(&hit, place, met, &mut path, &mut sample, scratch, counters)
+                        }
                     };
                     if scattered {
                         cloth_events += 1;
                         if first {
                             sample.alpha = 1.0;
-                            if let HitPlace::Fiber(place) = &hit.place {
-                                let point = place.centre + place.radius * hit.normal;
-                                sample.depth = (camera - point).dot(self.back);
-                                self.sees(&mut sample, point);
-                                if let (true, CurveGeometry::Fibers(fibers)) =
-                                    (self.layers.uv, &self.world.geometries()[hit.geometry])
-                                {
-                                    sample.uv = fibers.uvs.at(hit.segment, hit.u);
-                                }
-                            }
                         }
                     }
                     go_on
@@ -316,13 +307,12 @@ impl<'a> Integrator<'a> {
         &self,
         hit: &Hit,
         section: &Section<'_>,
-        yarns: &YarnGeometry,
+        (yarns, yarn): (&YarnGeometry, &YarnScatterer),
         path: &mut Path<'_>,
         sample: &mut Sample,
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> (bool, bool) {
-        let yarn = yarns.yarn_at(hit.segment);
         section.crossings(yarn.shape(), &mut scratch.crossings);
         let unscattered = yarn.transparency(&scratch.crossings);
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();

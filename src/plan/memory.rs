@@ -7,7 +7,7 @@ use crate::{film::Film, light::Light, scene::Scene};
 /// Bytes of a pixel that the denoiser is given and gives back: colour, albedo, normal, the result.
 const DENOISER_BYTES: u64 = 4 * size_of::<[f32; 3]>() as u64;
 
-/// Bytes of the parts of a render that are not curves ([`crate::trace::estimates`]).
+/// Bytes of the parts of a render that are not curves ([`crate::cloth::estimates`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// Pixels that are rendered.

@@ -4,10 +4,10 @@ use std::sync::atomic::AtomicBool;
 
 use super::*;
 use crate::{
+    cloth::Cloth,
     render,
     scene::force::{FORCEABLE, force},
     scene::load::{LoadOptions, parse},
-    trace::World,
 };
 
 /// One filled yarn under an even sky and a distant light: needs next to nothing.
@@ -48,8 +48,8 @@ fn used(scene: &Scene, name: &str) -> bool {
 
 /// Colour of each pixel, and the variance of its mean.
 fn picture(scene: &Scene) -> Vec<([f32; 3], [f32; 3])> {
-    let (world, _) = World::new(scene, 1).unwrap();
-    let film = render::render(scene, &world, &AtomicBool::new(false), |_| {}).unwrap().film;
+    let (cloth, _) = Cloth::new(scene, 1).unwrap();
+    let film = render::render(scene, &cloth, &AtomicBool::new(false), |_| {}).unwrap().film;
     (0..24)
         .flat_map(|y| (0..32).map(move |x| (x, y)))
         .map(|(x, y)| film.pixel(x, y))

@@ -30,6 +30,7 @@ use self::{
     stop::{WARM_UP, wave_end},
 };
 use crate::{
+    cloth::Cloth,
     film::{Film, Noise, Tile},
     geometry::ray::Ray,
     integrator::{Counters, Integrator, Scratch},
@@ -38,7 +39,6 @@ use crate::{
         warp::normal,
     },
     scene::{PixelFilter, Scene},
-    trace::World,
 };
 
 /// When the first checkpoint of a render is saved, if the interval is not shorter.
@@ -164,16 +164,16 @@ pub struct Rendered {
 /// If there is no memory for a film.
 pub fn render(
     scene: &Scene,
-    world: &World,
+    cloth: &Cloth,
     interrupt: &AtomicBool,
     mut progress: impl FnMut(Progress<'_>),
 ) -> Result<Rendered, OutOfMemory> {
     let job = Job::new(scene, None)?;
-    Ok(run(scene, world, job, Control { interrupt, progress: &mut progress, checkpoints: None }))
+    Ok(run(scene, cloth, job, Control { interrupt, progress: &mut progress, checkpoints: None }))
 }
 
 /// Goes on with a job until the first of the scene's limits, in the calling thread's rayon pool.
-pub fn run(scene: &Scene, world: &World, mut job: Job, mut control: Control<'_>) -> Rendered {
+pub fn run(scene: &Scene, cloth: &Cloth, mut job: Job, mut control: Control<'_>) -> Rendered {
     let settings = &scene.render;
     let total = job.samples.end.saturating_sub(job.samples.start);
     let before = job.elapsed;
@@ -192,7 +192,7 @@ pub fn run(scene: &Scene, world: &World, mut job: Job, mut control: Control<'_>)
         }
         every.map(|every| Instant::now() + every)
     };
-    let integrator = Integrator::new(scene, world);
+    let integrator = Integrator::new(scene, cloth);
     let stop = loop {
         let noise = if settings.noise.is_some() { job.noise_between_waves() } else { None };
         if job.done > first_done {

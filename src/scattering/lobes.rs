@@ -24,6 +24,7 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 use std::f64::consts::PI as PI64;
+use std::sync::Arc;
 
 use glam::Vec3A;
 
@@ -40,6 +41,7 @@ use super::{
 };
 use crate::{
     geometry::{
+        occluder::{Occluder, Transparency},
         section::{PlyCrossing, Section},
         yarn::{PlyShape, YarnShape},
     },
@@ -168,35 +170,41 @@ struct Aggregate {
 /// A yarn's shape and the averages of its fibres.
 #[derive(Clone, Debug)]
 pub struct ChordYarn {
-    shape: YarnShape,
+    occluder: Occluder,
     plies: Vec<AveragedFiber>,
     model: ChordModel,
 }
 
 impl ChordYarn {
-    /// One material for each ply of the shape.
+    /// One material for each ply of the shape, which several yarns may share.
     ///
     /// # Panics
     /// If their numbers differ.
-    pub fn new(shape: YarnShape, materials: &[&FiberMaterial], model: ChordModel) -> Self {
+    pub fn new(shape: impl Into<Arc<YarnShape>>, materials: &[&FiberMaterial], model: ChordModel) -> Self {
+        let shape = shape.into();
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
         let plies = shape.plies.iter().zip(materials).map(|(p, m)| AveragedFiber::new(m, p, model)).collect();
-        Self { shape, plies, model }
+        // As printed the model has no light that passes: a ply is opaque.
+        let transparency = if model == ChordModel::Printed { Transparency::Opaque } else { Transparency::Random };
+        Self { occluder: Occluder::new(shape, transparency), plies, model }
     }
 
-    /// The yarn's geometry.
+    /// The yarn's cross-section.
+    #[inline]
     pub fn shape(&self) -> &YarnShape {
-        &self.shape
+        self.occluder.shape()
     }
 
-    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey. As printed the model has
-    /// none: a ply is opaque.
+    /// The yarn without its colours: what rays see that only ask whether they pass.
+    #[inline]
+    pub fn occluder(&self) -> &Occluder {
+        &self.occluder
+    }
+
+    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
     #[inline]
     pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
-        if self.model == ChordModel::Printed {
-            return if crossings.is_empty() { 1.0 } else { 0.0 };
-        }
-        (-crossings.iter().map(|c| c.fibers).sum::<f32>()).exp()
+        self.occluder.transparency(crossings)
     }
 
     /// n_l of the model.
@@ -205,7 +213,7 @@ impl ChordYarn {
         if self.model != ChordModel::Printed {
             return f64::from(crossing.fibers);
         }
-        let h = f64::from(crossing.offset / self.shape.plies[crossing.ply].radius);
+        let h = f64::from(crossing.offset / self.shape().plies[crossing.ply].radius);
         self.plies[crossing.ply].printed_fibers * (1.0 - h * h).max(0.0).sqrt()
     }
 
@@ -363,8 +371,8 @@ impl<'a> ChordVertex<'a> {
         let first = -(f64::from(u[0]) * (-total).exp_m1()).ln_1p();
         Self {
             yarn,
-            fiber: LobeFrame::new(front.tangent_at_entry(&yarn.shape, section), camera),
-            ply: LobeFrame::of_ply(&yarn.shape, section, front, camera),
+            fiber: LobeFrame::new(front.tangent_at_entry(yarn.shape(), section), camera),
+            ply: LobeFrame::of_ply(yarn.shape(), section, front, camera),
             energy,
             chance: normalised([energy.r, energy.d, energy.f, energy.b].map(|e| e.weighted_mean(weight))),
             kappa_r: yarn.plies[front.ply].kappa_r,

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 use super::fiber::FiberMaterial;
 use crate::{
-    geometry::yarn::PlyShape,
+    geometry::{occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 
@@ -62,12 +62,10 @@ pub fn extinction_rate(loss: f64, density: f64) -> f64 {
 /// A ply's fibres as light sees them. Lengths in yarn radii; albedos per channel.
 #[derive(Clone, Debug)]
 pub struct PlyOptics {
-    /// Area fraction eta of fibres that keep out of each other; 0 for fibres that lie at random.
-    pub density: f32,
+    /// What passes between them.
+    pub gaps: PlyGaps,
     /// Extinction per expected fibre of light that may pass fibres as TT; at least [`LEAST_RATE`].
     pub rho: Rgb,
-    /// Extinction per expected fibre of unscattered light beyond the first eta fibres: 1 / (1 - eta).
-    pub rho_unscattered: f32,
     /// Weight that TT keeps on its way forward, at each fibre.
     pub chain: Rgb,
     /// Energy of single scattering by R, over what leaves the chain.
@@ -107,11 +105,10 @@ pub const LEAST_RATE: f64 = 1e-6;
 impl PlyOptics {
     /// For a ply among `plies` of a yarn.
     pub fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
-        let (n, radius) = (f64::from(ply.fibers), f64::from(ply.radius));
+        let n = f64::from(ply.fibers);
         let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
         let squeeze = f64::from(ply.squeeze);
-        let filled = (n * fiber * fiber / (radius * radius) * squeeze).min(0.85);
-        let density = if ply.exclusive { filled } else { 0.0 };
+        let density = ply.density();
         let sigma = 2.0 * fiber * n / (PI * core * core);
         // An ellipse is about as thick for light as the circle of its area.
         let round_core = core * squeeze.sqrt();
@@ -162,9 +159,8 @@ impl PlyOptics {
                 .clamp(0.0, 1.0)
         };
         Self {
-            density: density as f32,
+            gaps: PlyGaps::new(ply),
             rho: per_channel(&|c| rho(c).max(LEAST_RATE)),
-            rho_unscattered: extinction_rate(1.0, density) as f32,
             chain: per_channel(&chain),
             single_r: per_channel(&|c| single(r(c), c)),
             single_d: per_channel(&|c| single(d(c), c)),
@@ -181,26 +177,6 @@ impl PlyOptics {
             lead: (FRAC_PI_4 * fiber) as f32,
             fiber_chord: (2.0 * FRAC_PI_4 * fiber) as f32,
         }
-    }
-
-    /// The share of light that passes a chord with so many expected `fibers` and meets none (docs/model.md, section 3).
-    ///
-    /// Fibres on a line are a renewal process: gaps of eta, a fibre's own chord, and an exponential beyond it. The chance
-    /// that a stretch with n fibres on the mean holds none is 1 - n up to n = eta, then (1 - eta) e^(-(n - eta) / (1 - eta)).
-    #[inline]
-    pub fn unscattered(&self, fibers: f32) -> f32 {
-        if fibers < self.density {
-            1.0 - fibers
-        } else {
-            (1.0 - self.density) * (-self.rho_unscattered * (fibers - self.density)).exp()
-        }
-    }
-
-    /// The inverse of [`Self::unscattered`]: after how many expected fibres the share `passed` is left.
-    #[inline]
-    pub fn fibers_passed(&self, passed: f32) -> f32 {
-        let open = 1.0 - self.density;
-        if passed > open { 1.0 - passed } else { self.density - (passed / open).max(1e-30).ln() * open }
     }
 }
 
@@ -230,24 +206,5 @@ mod tests {
             assert!((below / above - 1.0).abs() < 1e-9, "both branches meet at density {density}");
         }
         assert!((extinction_rate(0.3, 1e-7) - 0.3).abs() < 1e-6);
-    }
-
-    #[test]
-    fn what_meets_no_fiber_falls_evenly_and_is_inverted() {
-        let material = FiberMaterial { r: [0.2; 3], tt: [0.3; 3], d: [0.1; 3], beta_r: 0.1, beta_tt: 0.1, beta_n: 0.3 };
-        for density in [1e-4, 0.1, 0.5, 0.8] {
-            let shape = crate::geometry::yarn::tests::touching_yarn(1, 50, density, 0.0, 0.0);
-            let optics = PlyOptics::new(&material, &shape.plies[0], 1);
-            assert_eq!(optics.unscattered(0.0), 1.0);
-            let mut before = 1.0;
-            for i in 1..400 {
-                let n = 0.01 * i as f32;
-                let passed = optics.unscattered(n);
-                // No jump in value or slope: the share falls by what is left at most over 1 - eta.
-                assert!(passed < before && before - passed < 0.0101, "density {density}, {n} fibres");
-                assert!((optics.fibers_passed(passed) - n).abs() < 1e-3, "density {density}, {n} fibres");
-                before = passed;
-            }
-        }
     }
 }

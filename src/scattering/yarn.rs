@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     geometry::{
+        occluder::Occluder,
         section::{Crossings, PlyCrossing, Section},
         yarn::YarnShape,
     },
@@ -38,22 +39,25 @@ pub enum YarnVertex<'a> {
 }
 
 impl YarnScatterer {
-    /// The yarn's geometry.
+    /// The yarn without its colours: what rays see that only ask whether they pass.
+    #[inline]
+    pub fn occluder(&self) -> &Occluder {
+        match self {
+            Self::Aggregated(yarn) => yarn.occluder(),
+            Self::Chord(yarn) => yarn.occluder(),
+        }
+    }
+
+    /// The yarn's cross-section.
     #[inline]
     pub fn shape(&self) -> &YarnShape {
-        match self {
-            Self::Aggregated(yarn) => yarn.shape(),
-            Self::Chord(yarn) => yarn.shape(),
-        }
+        self.occluder().shape()
     }
 
     /// The share of light that passes all plies on the ray and meets no fibre.
     #[inline]
     pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
-        match self {
-            Self::Aggregated(yarn) => yarn.transparency(crossings),
-            Self::Chord(yarn) => yarn.transparency(crossings),
-        }
+        self.occluder().transparency(crossings)
     }
 
     /// Draws what is random about a scattering, given that the ray was not let through; see [`Vertex::new`].

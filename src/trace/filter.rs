@@ -54,7 +54,7 @@ impl HitFilter for GapFilter<'_, '_> {
             return false;
         }
         let CurveGeometry::Yarns(yarns) = geometry else { return true };
-        let shape = yarns.yarn_at(hit.segment).shape();
+        let shape = yarns.occluder_at(hit.segment).shape();
         if shape.filled && !yarns.strands.flattened() {
             return true;
         }
@@ -115,7 +115,7 @@ impl HitFilter for ShadowFilter<'_> {
         }
         let CurveGeometry::Yarns(yarns) = geometry else { return true };
         let section = section_at(yarns, self.ray, hit);
-        let yarn = yarns.yarn_at(hit.segment);
+        let yarn = yarns.occluder_at(hit.segment);
         section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {
             return false;

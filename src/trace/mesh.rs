@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3, Vec3A};
 
-use crate::{ffi::embree::RawHit, geometry::ray::Ray, scene::Object};
+use crate::{
+    ffi::embree::RawHit,
+    geometry::{mesh::Mesh, ray::Ray},
+};
 
 /// A mesh in single precision.
 #[derive(Debug)]
-pub(super) struct TriangleMesh {
+pub struct TriangleMesh {
     /// Corners.
     pub(super) points: Arc<[Vec3A]>,
     /// Three indices for each triangle.
@@ -38,14 +41,14 @@ pub struct SurfacePlace {
 }
 
 impl TriangleMesh {
-    pub(super) fn new(object: &Object) -> Self {
-        let mesh = &object.mesh;
+    /// Of a mesh in millimetres, with the index of its material.
+    pub fn new(mesh: &Mesh, material: usize) -> Self {
         Self {
             points: mesh.points.iter().map(|p| p.as_vec3a()).collect(),
             triangles: mesh.triangles.iter().copied().collect(),
             normals: mesh.normals.iter().map(|n| n.as_vec3()).collect(),
             uvs: mesh.uvs.iter().map(|uv| uv.as_vec2()).collect(),
-            material: object.material,
+            material,
         }
     }
 
@@ -91,14 +94,12 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use super::*;
-    use crate::geometry::mesh::Mesh;
 
     #[test]
     fn a_place_has_point_normals_and_texture_of_its_triangle() {
         let mut mesh = Mesh::plane(DVec2::new(4.0, 2.0));
         mesh.normals = vec![DVec3::new(0.1, 1.0, 0.0).normalize(); 4];
-        let object = Object { origin: "plane".into(), mesh, material: 3 };
-        let mesh = TriangleMesh::new(&object);
+        let mesh = TriangleMesh::new(&mesh, 3);
         let ray = Ray::new(Vec3A::new(0.0, 3.0, 0.0), Vec3A::NEG_Y);
         let hit = |u, v| RawHit { t: 3.0, normal: Vec3A::Y, u, v, segment: 0, geometry: 0 };
         let place = mesh.place(&ray, &hit(0.25, 0.5));

@@ -1,65 +1,52 @@
 //! Rays against cloth and meshes: curves and triangles in Embree, the filters that let rays through gaps, and what a hit is.
 //!
+//! Nothing here knows light: yarns have a shape and a transparency, segments a material index, and
+//! [`crate::cloth`] says what scatters there.
+//!
 //! Both filters are pure functions of ray and hit (the shadow filter also of the hits it has seen, by which repeats
 //! are told), allocate nothing and may be called in any order. Exit hits never count: Embree as built by Debian does
 //! not cull the back faces of curves, and a ray born inside a yarn must leave it.
 
-mod build;
 mod filter;
 mod mesh;
-mod outgoing;
+mod variants;
 
-use std::{
-    borrow::Cow,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::sync::Arc;
 
 use glam::{Vec3A, Vec4};
 
+pub use crate::ffi::embree::EmbreeError;
 use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
     geometry::{
         curve::Basis,
+        occluder::Occluder,
         ray::Ray,
         section::{Crossings, Section},
         segment_uvs::SegmentUvs,
         strand::{Strands, TightBend},
         tube::{TubePlace, Tubes},
         walk::Walker,
-        yarn::YarnShape,
     },
-    scattering::{
-        aggregated::AggregatedYarn,
-        fiber::{FiberBcsdf, FiberMaterial},
-        lobes::{ChordModel, ChordYarn},
-        yarn::YarnScatterer,
-    },
-    scene::{Model, Scene, Yarn},
 };
-pub use build::{BuildError, Estimate};
-use build::{Given, Preparation};
 use filter::{Counting, GapFilter, ShadowFilter};
-pub use mesh::SurfacePlace;
-use mesh::TriangleMesh;
-pub use outgoing::{curves, yarns};
+pub use mesh::{SurfacePlace, TriangleMesh};
+pub use variants::PerVariant;
 
-/// Curves of one kind of yarn with all that its rays need.
+/// Curves of one kind of yarn with all that rays need.
 #[derive(Debug)]
 pub struct YarnGeometry {
     /// The fabric of the scene that it belongs to.
     pub fabric: usize,
-    /// Which ply of the scene's yarn the first ply of `yarn` is: not 0 where each ply is a curve of its own.
+    /// Which ply of the scene's yarn is the first one of `occluders`: not 0 where each ply is a curve of its own.
     pub first_ply: usize,
     /// Control points, frames and phases.
     pub strands: Strands,
-    /// Cross-section and scattering.
-    pub yarn: YarnScatterer,
-    /// The same for each variant of the fabric, in place of `yarn` where there are any.
-    pub variants: Vec<YarnScatterer>,
+    /// Cross-section and transparency; variants are mostly of other colours only, and the same here.
+    pub occluders: PerVariant<Occluder>,
 }
 
-/// Explicit fibres of one material.
+/// Explicit fibres.
 #[derive(Debug)]
 pub struct FiberGeometry {
     /// The fabric of the scene that they belong to.
@@ -70,11 +57,7 @@ pub struct FiberGeometry {
     pub first_tubes: Vec<u32>,
     /// The fibres.
     pub tubes: Tubes,
-    /// How each of them scatters.
-    pub fiber: FiberBcsdf,
-    /// The same for each variant of the fabric, in place of `fiber` where there are any.
-    pub variants: Vec<FiberBcsdf>,
-    /// Material indices: which of `variants` each segment is made of; empty without variants.
+    /// Material indices: which of the fabric's variants each segment is made of; empty without variants.
     pub material_indices: Vec<u16>,
     /// Texture coordinates along all segments.
     pub uvs: SegmentUvs,
@@ -84,7 +67,7 @@ pub struct FiberGeometry {
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "there are few of them, and rays look at them all the time")]
 pub enum CurveGeometry {
-    /// Yarns (or plies, each as a yarn of one ply) with a model for the fibres inside.
+    /// Yarns, or plies, each as a yarn of one ply; their fibres are no curves.
     Yarns(YarnGeometry),
     /// Fibres.
     Fibers(FiberGeometry),
@@ -98,15 +81,6 @@ pub struct World {
     geometries: Vec<CurveGeometry>,
     /// Their geometries in Embree come after those of the cloth.
     meshes: Vec<TriangleMesh>,
-}
-
-/// What making a [`World`] took.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BuildTimes {
-    /// Resampling, frames and phases.
-    pub generate: Duration,
-    /// Embree's BVH.
-    pub build: Duration,
 }
 
 /// A place where a ray meets cloth and does not slip between plies, or meets a mesh.
@@ -138,60 +112,16 @@ pub enum HitPlace<'a> {
 }
 
 impl World {
-    /// Prepares the scene's curves and builds Embree's BVH with `threads` threads.
+    /// Builds Embree's BVH of curves and meshes with `threads` threads: the compact one, or one up to 10 % faster.
     ///
     /// # Errors
-    /// What Embree says, mostly that memory is short; or that the scene would take more than it may.
-    pub fn new(scene: &Scene, threads: usize) -> Result<(Self, BuildTimes), BuildError> {
-        Self::with_curves(scene, borrowed(scene), threads, scene.render.max_memory, 0)
-    }
-
-    /// As [`Self::new`], within a `limit` of bytes of which some are taken `beside`: by a film, by textures. Frees the
-    /// scene's curves on the way: it has none afterwards.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn consuming(
-        scene: &mut Scene,
-        threads: usize,
-        limit: Option<u64>,
-        beside: u64,
-    ) -> Result<(Self, BuildTimes), BuildError> {
-        let curves = scene.fabrics.iter_mut().map(|fabric| Cow::Owned(fabric.take_curves())).collect();
-        Self::with_curves(scene, curves, threads, limit, beside)
-    }
-
-    fn with_curves(
-        scene: &Scene,
-        curves: Vec<Given<'_>>,
-        threads: usize,
-        limit: Option<u64>,
-        beside: u64,
-    ) -> Result<(Self, BuildTimes), BuildError> {
-        let started = Instant::now();
-        let preparation = Preparation::checked(scene, curves, limit, beside)?;
-        let curves = preparation.geometries();
-        let meshes: Vec<TriangleMesh> = scene.objects.iter().map(TriangleMesh::new).collect();
-        let generate = started.elapsed();
-        let started = Instant::now();
-        let world = Self::of(curves, meshes, scene.render.compact_bvh, threads)?;
-        Ok((world, BuildTimes { generate, build: started.elapsed() }))
-    }
-
-    /// From curves that are made already, and nothing else.
-    ///
-    /// # Errors
-    /// What Embree says.
-    pub fn of_curves(cloth: Vec<CurveGeometry>, threads: usize) -> Result<Self, BuildError> {
-        Self::of(cloth, Vec::new(), true, threads)
-    }
-
-    fn of(
+    /// What Embree says, mostly that memory is short.
+    pub fn new(
         cloth: Vec<CurveGeometry>,
         meshes: Vec<TriangleMesh>,
         compact_bvh: bool,
         threads: usize,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<Self, EmbreeError> {
         let device = Device::new(threads)?;
         let layout = if compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;
@@ -305,24 +235,15 @@ fn raw_ray(ray: &Ray) -> RawRay {
 #[inline]
 fn section_at<'a>(yarns: &'a YarnGeometry, ray: &Ray, raw: &RawHit) -> Section<'a> {
     let walker = Walker::new(&yarns.strands, raw.segment, raw.u, ray.time);
-    let section = Section::at_hit(walker, ray.origin, ray.direction, raw.t, yarns.yarn.shape().tilted);
+    let section = Section::at_hit(walker, ray.origin, ray.direction, raw.t, yarns.occluders.own().shape().tilted);
     Section { looked_at: ray.looks, ..section }
 }
 
 impl FiberGeometry {
-    /// Material index of a segment: which of `variants` it is made of, if there are any.
+    /// Material index of a segment: which of the fabric's variants it is made of, if there are any.
     #[inline]
     pub fn material_index(&self, segment: u32) -> Option<u16> {
         self.material_indices.get(segment as usize).copied()
-    }
-
-    /// How the fibre of a segment scatters.
-    #[inline]
-    pub fn fiber_at(&self, segment: u32) -> &FiberBcsdf {
-        match self.material_index(segment) {
-            None => &self.fiber,
-            Some(index) => &self.variants[usize::from(index)],
-        }
     }
 
     /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
@@ -376,48 +297,10 @@ impl CurveGeometry {
 impl YarnGeometry {
     /// The yarn that a segment is of.
     #[inline]
-    pub fn yarn_at(&self, segment: u32) -> &YarnScatterer {
-        match self.strands.material_index(segment) {
-            None => &self.yarn,
-            Some(index) => &self.variants[usize::from(index)],
+    pub fn occluder_at(&self, segment: u32) -> &Occluder {
+        if self.occluders.variants().is_empty() {
+            return self.occluders.own();
         }
+        self.occluders.at(self.strands.material_index(segment))
     }
-}
-
-fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
-    scene.fabrics.iter().map(|fabric| Cow::Borrowed(&*fabric.curves)).collect()
-}
-
-/// What the curves of each fabric will take, without making them.
-pub fn estimates(scene: &Scene) -> Vec<Estimate> {
-    Preparation::new(scene, borrowed(scene)).estimates().collect()
-}
-
-/// A yarn with one of the models.
-pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
-    scatterer_in(shape_for(yarn, model), yarn, model)
-}
-
-/// A yarn's shape with all that a model asks of it: only the aggregated one looks at how fibres lie.
-fn shape_for(yarn: &Yarn, model: Model) -> YarnShape {
-    match model {
-        Model::Aggregated => yarn.shape().packed(&yarn.packings()),
-        _ => yarn.shape(),
-    }
-}
-
-fn scatterer_in(shape: YarnShape, yarn: &Yarn, model: Model) -> YarnScatterer {
-    let materials: Vec<_> = yarn.fibers.iter().map(|(_, m)| m).collect();
-    yarn_scatterer(shape, &materials, model)
-}
-
-fn yarn_scatterer(shape: YarnShape, materials: &[&FiberMaterial], model: Model) -> YarnScatterer {
-    let chord = match model {
-        Model::Aggregated => return YarnScatterer::Aggregated(AggregatedYarn::new(shape, materials)),
-        Model::TwoStream => ChordModel::TwoStream,
-        Model::Paper => ChordModel::Paper,
-        Model::Printed => ChordModel::Printed,
-        Model::DualScattering => ChordModel::DualScattering,
-    };
-    YarnScatterer::Chord(ChordYarn::new(shape, materials, chord))
 }

@@ -4,6 +4,7 @@ use glam::Vec3A;
 
 use super::{Outcome, View};
 use crate::{
+    cloth::scatterer,
     geometry::{
         section::{Crossings, Section},
         yarn_frame::{ROUND, YarnFrame},
@@ -15,7 +16,6 @@ use crate::{
         yarn::YarnScatterer,
     },
     scene::{Model, Yarn},
-    trace::scatterer,
 };
 
 /// What is measured.

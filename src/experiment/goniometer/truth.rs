@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::{Effort, Measurement, Outcome, Tally, View};
 use crate::{
+    cloth::BuildError,
     geometry::ray::Ray,
     geometry::{
         curve::{Basis, Curve},
@@ -24,7 +25,7 @@ use crate::{
     },
     scattering::{LobeValues, fiber::FiberBcsdf, lobe::LobeFrame},
     scene::Yarn,
-    trace::{BuildError, CurveGeometry, FiberGeometry, HitPlace, World},
+    trace::{CurveGeometry, FiberGeometry, HitPlace, World},
 };
 
 /// Packings that a truth is averaged over.
@@ -43,6 +44,8 @@ const MOST_EVENTS: u32 = 100_000;
 /// One packing: fibres in Embree, and the yarn they are wound around.
 struct Sample<'a> {
     world: &'a World,
+    /// How the fibres of each of its geometries scatter.
+    fibers: Vec<FiberBcsdf>,
     strands: &'a Strands,
     view: &'a View,
     seed: u32,
@@ -78,24 +81,23 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
     for packing in 0..PACKINGS.min(effort.paths) {
         let seed = hash2(effort.seed ^ 0x7275_7468, packing as u32);
         let plies = Plies::new(&strands, &yarn.plies, &shape, seed);
-        let geometries: Vec<CurveGeometry> = (0..yarn.plies.len())
+        let (geometries, fibers) = (0..yarn.plies.len())
             .filter(|&ply| yarn.plies[ply].fibers > 0)
             .map(|ply| {
                 let (tubes, first_tubes) = plies.fibers(ply, yarn.placement);
-                CurveGeometry::Fibers(FiberGeometry {
+                let curves = FiberGeometry {
                     fabric: 0,
                     ply,
                     first_tubes,
                     tubes,
-                    fiber: FiberBcsdf::new(&yarn.fibers[ply].1),
-                    variants: Vec::new(),
                     material_indices: Vec::new(),
                     uvs: SegmentUvs::default(),
-                })
+                };
+                (CurveGeometry::Fibers(curves), FiberBcsdf::new(&yarn.fibers[ply].1))
             })
-            .collect();
-        let world = World::of_curves(geometries, rayon::current_num_threads())?;
-        let sample = Sample { world: &world, strands: &strands, view, seed };
+            .unzip();
+        let world = World::new(geometries, Vec::new(), true, rayon::current_num_threads())?;
+        let sample = Sample { world: &world, fibers, strands: &strands, view, seed };
         let count = effort.paths / PACKINGS + u64::from(packing < effort.paths % PACKINGS);
         let parts: Vec<Tally> = (0..CHUNKS).into_par_iter().map(|chunk| sample.run(chunk, count)).collect();
         let mut tally = Tally::new();
@@ -136,15 +138,11 @@ impl Sample<'_> {
         let mut ray = Ray::new((entry + towards).as_vec3a(), (-towards).as_vec3a());
         let (mut throughput, mut events) = (Rgb::ONE, 0);
         while let Some(hit) = self.world.intersect(&ray) {
-            let (HitPlace::Fiber(place), CurveGeometry::Fibers(fibers)) =
-                (&hit.place, &self.world.geometries()[hit.geometry])
-            else {
-                break;
-            };
+            let HitPlace::Fiber(place) = &hit.place else { break };
             events += 1;
             let frame = LobeFrame::new(place.tangent, -ray.direction);
             let u = [0; 4].map(|_| stream.next());
-            let Some(next) = fibers.fiber.sample(frame.sin, frame.cos, throughput, u, stream) else {
+            let Some(next) = self.fibers[hit.geometry].sample(frame.sin, frame.cos, throughput, u, stream) else {
                 return Outcome { unscattered: 0.0, scattered: None };
             };
             throughput *= next.weight;

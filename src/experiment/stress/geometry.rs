@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3A};
 
 use super::{Case, Checks, Group::Geometry, Scale};
 use crate::{
+    cloth::Cloth,
     geometry::ray::Ray,
     geometry::{
         curve::{Basis, Curve},
@@ -90,7 +91,7 @@ fn with_curves(mut scene: Scene, curves: &[Curve], radius: f64) -> Scene {
 }
 
 fn world(scene: &Scene) -> World {
-    World::new(scene, 1).expect("Embree builds the cases' scenes").0
+    Cloth::new(scene, 1).expect("Embree builds the cases' scenes").0.into_world()
 }
 
 fn open(points: Vec<DVec3>) -> Curve {
@@ -356,8 +357,9 @@ fn exact_rays(scale: Scale, checks: &mut Checks) {
                     else {
                         return None;
                     };
-                    section.crossings(yarns.yarn.shape(), &mut crossings);
-                    let own = yarns.yarn.transparency(&crossings);
+                    let yarn = yarns.occluders.own();
+                    section.crossings(yarn.shape(), &mut crossings);
+                    let own = yarn.transparency(&crossings);
                     // Below a thousandth, a shadow ray counts as blocked.
                     Some(if own < 1e-3 { 0.0 } else { own })
                 };

@@ -4,12 +4,12 @@ use std::sync::atomic::AtomicBool;
 
 use super::{Case, Checks, Group::Transport, Scale};
 use crate::{
+    cloth::Cloth,
     render::{Rendered, render},
     scene::{
         Layers,
         load::{LoadOptions, parse},
     },
-    trace::World,
 };
 
 pub(super) const CASES: &[Case] = &[
@@ -97,8 +97,8 @@ impl Pieces {
         scene.layers = Layers::NONE;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         let rendered = pool.install(|| {
-            let (world, _) = World::new(&scene, threads).expect("Embree builds the cases' scenes");
-            render(&scene, &world, &AtomicBool::new(false), |_| {}).expect("the cases' films are small")
+            let (cloth, _) = Cloth::new(&scene, threads).expect("Embree builds the cases' scenes");
+            render(&scene, &cloth, &AtomicBool::new(false), |_| {}).expect("the cases' films are small")
         });
         let (width, height) = (scene.render.width, scene.render.height);
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));

@@ -6,6 +6,7 @@ use glam::Vec3A;
 
 use super::{Case, Checks, Group::Scattering, Scale, fibers::chi_square};
 use crate::{
+    cloth::scatterer,
     experiment::goniometer::{self, Effort, Specimen, View, straight_section},
     geometry::{
         fiber::Placement,
@@ -15,7 +16,6 @@ use crate::{
     math::{Rgb, sampler::Stream},
     scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
     scene::{Model, Yarn},
-    trace::scatterer,
 };
 
 pub(super) const CASES: &[Case] = &[

@@ -155,12 +155,12 @@ impl Forward {
         let (yarn, spot) = (view.yarn, &self.spot);
         let tilt = spot.tilt(view.section, w);
         let mut depth = Rgb::ZERO;
-        view.section.plies_ahead(&yarn.shape, &spot.inside, Vec3A::ZERO, w, |ahead| {
+        view.section.plies_ahead(yarn.shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
-            let chord = yarn.shape.plies[ahead.ply].chord(ahead.offset, ahead.length);
+            let chord = yarn.shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
             let mut fibers = tilt * chord.ahead(-ahead.foot);
             if ahead.ply == spot.ply {
-                fibers = (fibers - optics.density).max(0.0);
+                fibers = (fibers - optics.gaps.density).max(0.0);
             }
             depth += optics.rho * fibers;
         });
@@ -175,12 +175,12 @@ fn first_fiber(view: &View<'_>, crossings: &[PlyCrossing], unscattered: f32, u: 
     let mut left = 1.0 - u * (1.0 - unscattered);
     let (last, before) = crossings.split_last()?;
     for (index, c) in before.iter().enumerate() {
-        let optics = &view.yarn.plies[c.ply];
-        let through = optics.unscattered(c.fibers);
+        let gaps = &view.yarn.plies[c.ply].gaps;
+        let through = gaps.unscattered(c.fibers);
         if left > through {
-            return Some((index, optics.fibers_passed(left).min(c.fibers)));
+            return Some((index, gaps.fibers_passed(left).min(c.fibers)));
         }
         left = (left / through.max(1e-30)).min(1.0);
     }
-    Some((before.len(), view.yarn.plies[last.ply].fibers_passed(left).min(last.fibers)))
+    Some((before.len(), view.yarn.plies[last.ply].gaps.fibers_passed(left).min(last.fibers)))
 }

@@ -19,11 +19,14 @@
 //! set-up time. Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light
 //! sampling and direction sampling (balance heuristic), all given the places and the directions drawn.
 
+use std::sync::Arc;
+
 use glam::Vec3A;
 
 use super::{Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
 use crate::{
     geometry::{
+        occluder::{Occluder, Transparency},
         section::{Crossings, Inside, PlyCrossing, Section},
         yarn::YarnShape,
     },
@@ -42,7 +45,7 @@ mod single;
 /// A yarn's shape and the optics of its plies.
 #[derive(Clone, Debug)]
 pub struct AggregatedYarn {
-    shape: YarnShape,
+    occluder: Occluder,
     plies: Vec<PlyOptics>,
     /// Expected energy of a node in each ply, for choosing between plies.
     node_gain: Vec<Rgb>,
@@ -52,27 +55,36 @@ pub struct AggregatedYarn {
 }
 
 impl AggregatedYarn {
-    /// One material for each ply of the shape.
+    /// One material for each ply of the shape, which several yarns may share.
     ///
     /// # Panics
     /// If their numbers differ.
-    pub fn new(shape: YarnShape, materials: &[&FiberMaterial]) -> Self {
+    pub fn new(shape: impl Into<Arc<YarnShape>>, materials: &[&FiberMaterial]) -> Self {
+        let shape = shape.into();
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
         let count = shape.plies.len();
         let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        Self { shape, plies, node_gain, plain: false }
+        let gaps = plies.iter().map(|p| p.gaps).collect();
+        Self { occluder: Occluder::new(shape, Transparency::Gaps(gaps)), plies, node_gain, plain: false }
     }
 
-    /// The yarn's geometry.
+    /// The yarn's cross-section.
+    #[inline]
     pub fn shape(&self) -> &YarnShape {
-        &self.shape
+        self.occluder.shape()
+    }
+
+    /// The yarn without its colours: what rays see that only ask whether they pass.
+    #[inline]
+    pub fn occluder(&self) -> &Occluder {
+        &self.occluder
     }
 
     /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
     #[inline]
     pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
-        crossings.iter().map(|c| self.plies[c.ply].unscattered(c.fibers)).product()
+        self.occluder.transparency(crossings)
     }
 }
 
@@ -115,8 +127,8 @@ impl<'a> View<'a> {
         } else {
             (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
         };
-        let inside = section.inside(&yarn.shape, section.point(depth), crossing.travel_at(depth));
-        let tangent = inside.fiber_tangent(&yarn.shape, section, crossing.ply);
+        let inside = section.inside(yarn.shape(), section.point(depth), crossing.travel_at(depth));
+        let tangent = inside.fiber_tangent(yarn.shape(), section, crossing.ply);
         let stretch = tangent.length();
         Spot { ply: crossing.ply, depth, inside, tangent: tangent / stretch, stretch }
     }

@@ -84,7 +84,7 @@ fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec
         crossings.iter().map(|c| of(&yarn.plies[c.ply]) * c.fibers).fold(Rgb::ZERO, |a, b| a + b)
     };
     let passed = (-sum(&|p| p.rho)).exp();
-    let unscattered = (-sum(&|p| Rgb::splat(p.rho_unscattered))).exp().mean();
+    let unscattered = (-sum(&|p| Rgb::splat(p.gaps.rate))).exp().mean();
     let Some(front) = crossings.first() else { return (vec![Rgb::ZERO; directions.len()], unscattered) };
     let optics = &yarn.plies[front.ply];
     let chain = sum(&|p| p.chain);
@@ -114,12 +114,12 @@ const CASES: [Case; 7] = [
 
 fn build(case: Case, m: &FiberMaterial) -> (AggregatedYarn, Section<'static>) {
     let (plies, fibers, density, ply_twist, fiber_twist, h, theta, phase) = case;
-    let mut yarn = yarn(plies, fibers, density, ply_twist, fiber_twist, m);
+    let mut shape = crate::geometry::yarn::tests::touching_yarn(plies, fibers, density, ply_twist, fiber_twist);
     // Crowded as fibres that keep out of each other are.
-    for ply in &mut yarn.shape.plies {
+    for ply in &mut shape.plies {
         ply.crowding = 0.06;
     }
-    (yarn, section(theta, h, phase))
+    (AggregatedYarn::new(shape, &vec![m; plies as usize]), section(theta, h, phase))
 }
 
 #[test]

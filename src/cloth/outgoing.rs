@@ -3,17 +3,18 @@
 //! Yarns are as the scene has them; plies and fibres are those that Embree would get. Lengths are millimetres, where the
 //! scene's file has them.
 
-use super::{BuildError, CurveGeometry, Preparation, borrowed};
+use super::{BuildError, Preparation, borrowed};
 use crate::{
     geometry::curve::{Curve, CurveSet},
     scene::{CurveKind, Fabric, Mode, Scene, Yarn},
+    trace::CurveGeometry,
 };
 
 /// What is said of curves whose colour changes along them.
 const MEAN_COLORS: &str = "colours along a yarn are told as their mean: curves have one colour each";
 
-/// The yarns of a scene, numbered through all fabrics.
-pub fn yarns(scene: &Scene) -> CurveSet {
+/// The yarns of a scene.
+fn yarns(scene: &Scene) -> CurveSet {
     let mut set = CurveSet { unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
     let mut mixed = false;
     for fabric in &scene.fabrics {
@@ -31,18 +32,26 @@ pub fn yarns(scene: &Scene) -> CurveSet {
     set
 }
 
-/// The curves that a scene's cloth is in its mode, as Embree would get them, with the numbers of [`yarns`].
+/// The curves that a scene's cloth is in its mode: yarns as the scene has them, without frames or fly-aways; plies and
+/// fibres as Embree would get them. Yarns are numbered through all fabrics, also those that plies and fibres are of.
 ///
 /// # Errors
-/// If they would take more memory than `limit`, bytes.
+/// If plies or fibres would take more memory than `limit`, bytes.
 pub fn curves(scene: &Scene, limit: Option<u64>) -> Result<CurveSet, BuildError> {
-    let geometries = Preparation::checked(scene, borrowed(scene), limit, 0)?.geometries();
+    match scene.render.mode {
+        Mode::Yarn => Ok(yarns(scene)),
+        Mode::Ply | Mode::Fiber => plies_or_fibers(scene, limit),
+    }
+}
+
+fn plies_or_fibers(scene: &Scene, limit: Option<u64>) -> Result<CurveSet, BuildError> {
+    let pieces = Preparation::checked(scene, borrowed(scene), limit, 0)?.pieces();
     let first_yarns: Vec<usize> = scene.fabrics.iter().scan(0, |sum, f| Some(next(sum, f.curves.len()))).collect();
     let mut set = CurveSet { unit_mm: Some(1.0), up_axis: Some(1), ..CurveSet::default() };
     let mut mixed = false;
-    for geometry in geometries {
+    for geometry in pieces.into_iter().map(|piece| piece.curves) {
         let (index, ply) = match &geometry {
-            CurveGeometry::Yarns(own) => (own.fabric, (scene.render.mode != Mode::Yarn).then_some(own.first_ply)),
+            CurveGeometry::Yarns(own) => (own.fabric, Some(own.first_ply)),
             CurveGeometry::Fibers(own) => (own.fabric, (!own.first_tubes.is_empty()).then_some(own.ply)),
         };
         let fabric = &scene.fabrics[index];

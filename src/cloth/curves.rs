@@ -1,0 +1,294 @@
+//! What stands for the cloth: the one place that turns a mode into curves.
+
+use std::{borrow::Cow, f64::consts::TAU};
+
+use super::{
+    estimate::{BuildError, Estimate, FLATTENING_BYTES, MATERIAL_INDEX_BYTES},
+    material::{self, Scatterers},
+};
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        fiber::{Plies, flyaway::Flyaways},
+        segment_uvs::SegmentUvs,
+        strand::{Along, StrandMotion, StrandOptions, Strands},
+        tube::Tubes,
+        yarn::{PlyParameters, YarnShape},
+    },
+    scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
+    scene::{CurveKind, Fabric, Mode, Model, Scene, Yarn},
+    trace::{CurveGeometry, FiberGeometry, PerVariant, YarnGeometry},
+};
+
+/// Curves for Embree, and how they scatter.
+pub(super) struct Piece {
+    pub(super) curves: CurveGeometry,
+    pub(super) scatterers: Scatterers,
+}
+
+/// A fabric's yarns with their frames: all that is needed to make any representation of them.
+struct Prepared<'a> {
+    index: usize,
+    fabric: &'a Fabric,
+    of: Of<'a>,
+}
+
+enum Of<'a> {
+    Yarns { yarn: &'a Yarn, shape: Box<YarnShape>, strands: Strands },
+    Fibers { curves: Given<'a>, material: FiberBcsdf },
+}
+
+/// The curves of a fabric: the scene's, or taken out of it.
+pub(super) type Given<'a> = Cow<'a, [(Curve, Vec<f64>)]>;
+
+/// A scene's cloth before it is turned into curves for Embree.
+pub(super) struct Preparation<'a> {
+    scene: &'a Scene,
+    fabrics: Vec<Prepared<'a>>,
+}
+
+impl<'a> Preparation<'a> {
+    /// For the curves of each fabric of a scene; those handed over are freed on the way.
+    pub(super) fn new(scene: &'a Scene, curves: impl IntoIterator<Item = Given<'a>>) -> Self {
+        let fabrics = scene
+            .fabrics
+            .iter()
+            .zip(curves)
+            .enumerate()
+            .map(|(index, (fabric, curves))| {
+                let of = match fabric.kind {
+                    CurveKind::Yarn(yarn) => {
+                        let yarn = &scene.yarns[yarn];
+                        let shape = Box::new(yarn.shape());
+                        let strands = strands(fabric, curves, &shape);
+                        Of::Yarns { yarn, shape, strands }
+                    }
+                    CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
+                };
+                Prepared { index, fabric, of }
+            })
+            .collect();
+        Self { scene, fabrics }
+    }
+
+    /// As [`Self::new`], refused if all would take more memory than `limit` with what is taken `beside`, bytes.
+    pub(super) fn checked(
+        scene: &'a Scene,
+        curves: impl IntoIterator<Item = Given<'a>>,
+        limit: Option<u64>,
+        beside: u64,
+    ) -> Result<Self, BuildError> {
+        let preparation = Self::new(scene, curves);
+        let needed: Estimate = preparation.estimates().sum();
+        match limit {
+            Some(limit) if needed.bytes() + beside > limit => Err(BuildError::Memory { needed, beside, limit }),
+            _ => Ok(preparation),
+        }
+    }
+
+    /// What each fabric will take.
+    pub(super) fn estimates(&self) -> impl Iterator<Item = Estimate> {
+        let render = &self.scene.render;
+        self.fabrics.iter().map(|prepared| prepared.estimate(render.mode, render.compact_bvh))
+    }
+
+    /// The curves for Embree, one entry for each geometry, with how they scatter.
+    pub(super) fn pieces(self) -> Vec<Piece> {
+        let (mode, model) = (self.scene.render.mode, self.scene.render.model);
+        let mut all: Vec<Piece> = self.fabrics.into_iter().flat_map(|prepared| prepared.pieces(mode, model)).collect();
+        // A yarn too short to hold a hair leaves nothing for Embree.
+        all.retain(|piece| piece.curves.count() > 0);
+        all
+    }
+}
+
+impl Prepared<'_> {
+    fn estimate(&self, mode: Mode, compact: bool) -> Estimate {
+        let mut estimate = Estimate::default();
+        match &self.of {
+            Of::Fibers { curves, .. } => {
+                let points: u64 = curves.iter().map(|(c, _)| c.points.len() as u64).sum();
+                estimate.add(points, points, false, compact);
+            }
+            Of::Yarns { yarn, shape, strands } => {
+                estimate.tight_bends = strands.tight_bends().len();
+                let plies = Plies::new(strands, &yarn.plies, shape, self.fabric.seed);
+                match mode {
+                    Mode::Yarn => {
+                        let (points, segments) = (strands.points().len(), strands.segments().len());
+                        estimate.add(points as u64, segments as u64, true, compact);
+                        if strands.flattened() {
+                            estimate.geometry_bytes += points as u64 * FLATTENING_BYTES;
+                        }
+                    }
+                    Mode::Ply => {
+                        let (points, segments) = plies.ply_counts();
+                        estimate.add(points, segments, true, compact);
+                        // What is round across the yarn is not across a ply that turns about it.
+                        if strands.flattened() || shape.elliptical || shape.ply_rate != 0.0 {
+                            estimate.geometry_bytes += points * FLATTENING_BYTES;
+                        }
+                    }
+                    Mode::Fiber => {
+                        let (points, segments) = plies.fiber_counts();
+                        estimate.add(points, segments, false, compact);
+                    }
+                }
+                if let Some(flyaways) = &yarn.flyaways {
+                    let (points, segments) = plies.flyaway_counts(flyaways);
+                    estimate.add(points, segments, false, compact);
+                }
+            }
+        }
+        if !self.fabric.variants.is_empty() {
+            estimate.geometry_bytes += estimate.segments * MATERIAL_INDEX_BYTES;
+        }
+        estimate
+    }
+
+    fn pieces(self, mode: Mode, model: Model) -> Vec<Piece> {
+        let (index, fabric) = (self.index, self.fabric);
+        let (yarn, shape, strands) = match self.of {
+            Of::Yarns { yarn, shape, strands } => (yarn, shape, strands),
+            Of::Fibers { curves, material } => return vec![Piece::of_lone_fibers(index, &curves, material)],
+        };
+        let plies = Plies::new(&strands, &yarn.plies, &shape, fabric.seed);
+        let wound = Wound { index, yarn, variants: &fabric.variants, shape: &shape, strands: &strands, plies };
+        let slots = 0..yarn.plies.len();
+        let mut all: Vec<Piece> = match mode {
+            Mode::Yarn => Vec::new(),
+            Mode::Ply => slots.clone().map(|ply| wound.ply(ply, model)).collect(),
+            Mode::Fiber => slots.clone().map(|ply| wound.fibers(ply)).collect(),
+        };
+        if let Some(flyaways) = &yarn.flyaways {
+            all.extend(slots.map(|ply| wound.flyaways(ply, flyaways)));
+        }
+        if mode == Mode::Yarn {
+            let scatterers = material::of_yarns(yarn, &fabric.variants, model, strands.mean_flattening());
+            all.push(Piece::of_yarns(index, 0, strands, scatterers));
+        }
+        all
+    }
+}
+
+impl Piece {
+    /// Yarns, or plies from the ply `first_ply` on.
+    fn of_yarns(fabric: usize, first_ply: usize, strands: Strands, scatterers: PerVariant<YarnScatterer>) -> Self {
+        let occluders = material::occluders(&scatterers);
+        let curves = CurveGeometry::Yarns(YarnGeometry { fabric, first_ply, strands, occluders });
+        Self { curves, scatterers: Scatterers::Yarns(scatterers) }
+    }
+
+    /// Fibres that are no part of a yarn.
+    fn of_lone_fibers(fabric: usize, curves: &[(Curve, Vec<f64>)], material: FiberBcsdf) -> Self {
+        let curves = CurveGeometry::Fibers(FiberGeometry {
+            fabric,
+            ply: 0,
+            first_tubes: Vec::new(),
+            tubes: Tubes::new(curves),
+            material_indices: Vec::new(),
+            uvs: SegmentUvs::default(),
+        });
+        Self { curves, scatterers: Scatterers::Fibers(PerVariant::same(material)) }
+    }
+}
+
+/// Yarns of a fabric with all that their plies and fibres are made of.
+struct Wound<'a> {
+    index: usize,
+    yarn: &'a Yarn,
+    variants: &'a [Yarn],
+    shape: &'a YarnShape,
+    strands: &'a Strands,
+    plies: Plies<'a>,
+}
+
+impl Wound<'_> {
+    /// One ply of all yarns, each as a yarn of its own.
+    fn ply(&self, ply: usize, model: Model) -> Piece {
+        let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply);
+        strands.set_material_indices(self.plies.material_indices_along(1));
+        strands.set_uvs(self.plies.uvs_along(1));
+        let scatterers = material::of_plies(self.yarn, self.variants, model, ply, alone);
+        Piece::of_yarns(self.index, ply, strands, scatterers)
+    }
+
+    /// All fibres of one ply.
+    fn fibers(&self, ply: usize) -> Piece {
+        let (tubes, first_tubes) = self.plies.fibers(ply, self.yarn.placement);
+        let count = self.yarn.plies[ply].fibers as usize;
+        self.piece(FiberGeometry {
+            fabric: self.index,
+            ply,
+            first_tubes,
+            tubes,
+            material_indices: self.plies.material_indices_along(count),
+            uvs: self.plies.uvs_along(count),
+        })
+    }
+
+    /// The fibres that leave one ply. A hair has the material and the texture coordinates of the place where it leaves.
+    fn flyaways(&self, ply: usize, flyaways: &Flyaways) -> Piece {
+        let (tubes, first_tubes, from) = self.plies.flyaways(ply, flyaways);
+        let root = |segment| from[tubes.tube_of(segment)];
+        let segments = tubes.segments().len() as u32;
+        let material_indices = (0..segments).filter_map(|s| self.strands.material_index(root(s))).collect();
+        let own = self.strands.uvs();
+        let placed = if own.is_empty() { 0 } else { segments };
+        let uvs = SegmentUvs::constant((0..placed).map(|s| own.at(root(s), 0.0)));
+        self.piece(FiberGeometry { fabric: self.index, ply, first_tubes, tubes, material_indices, uvs })
+    }
+
+    fn piece(&self, fibers: FiberGeometry) -> Piece {
+        let scatterers = Scatterers::Fibers(material::of_fibers(self.yarn, self.variants, fibers.ply));
+        Piece { curves: CurveGeometry::Fibers(fibers), scatterers }
+    }
+}
+
+fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
+    Strands::with(
+        curves,
+        Along { material_indices: &fabric.material_indices, uvs: &fabric.uvs },
+        StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref(), flow: &fabric.motion.flow },
+        &StrandOptions {
+            basis: fabric.basis,
+            tolerance: fabric.tolerance,
+            longest_segment: fabric.longest_segment,
+            ply_rate: f64::from(shape.ply_rate),
+            symmetry: shape.symmetry,
+            phases: fabric.phases.clone(),
+        },
+    )
+}
+
+/// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
+fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usize) -> (Strands, YarnShape) {
+    let strands = Strands::new(
+        plies.ply_curves(slot),
+        &StrandOptions {
+            basis: Basis::BSpline,
+            tolerance: 0.0,
+            longest_segment: f64::INFINITY,
+            ply_rate: 0.0,
+            symmetry: TAU,
+            phases: vec![0.0],
+        },
+    );
+    let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));
+    // A ply at angle alpha is longer than its yarn by 1 / cos(alpha), and its rotation-minimising frame turns with the
+    // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
+    let cos = 1.0 / (wp * ply.distance).hypot(1.0);
+    let wide = plies.mean_width(&strands);
+    let fiber_twist = (((wf - wp) * cos + wp * cos * cos) * wide).atan();
+    let alone = PlyParameters {
+        radius: 1.0,
+        aspect: 1.0,
+        distance: 0.0,
+        angle: 0.0,
+        fibers: ply.fibers,
+        fiber_radius: ply.fiber_radius / wide,
+        fiber_twist,
+    };
+    let shape = YarnShape::new(&[alone], 0.0, of.tilted).pressed(strands.mean_flattening());
+    (strands, shape)
+}

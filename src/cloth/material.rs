@@ -1,0 +1,95 @@
+//! Scattering models for all that cloth is made of: the one place that turns a model into scatterers.
+
+use std::sync::Arc;
+
+use crate::{
+    geometry::{occluder::Occluder, yarn::YarnShape},
+    scattering::{
+        aggregated::AggregatedYarn,
+        fiber::{FiberBcsdf, FiberMaterial},
+        lobes::{ChordModel, ChordYarn},
+        yarn::YarnScatterer,
+    },
+    scene::{Model, Yarn},
+    trace::PerVariant,
+};
+
+/// How the curves of one geometry scatter.
+#[derive(Debug)]
+pub enum Scatterers {
+    /// Yarns or plies, by a model for the fibres inside.
+    Yarns(PerVariant<YarnScatterer>),
+    /// Fibres.
+    Fibers(PerVariant<FiberBcsdf>),
+}
+
+/// A yarn with one of the models.
+pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
+    of_shape(shape_for(yarn, model), &materials(yarn), model)
+}
+
+/// Whole yarns, pressed flat in the mean to a ratio of the axes of their section. Variants whose plies are the same
+/// share one shape.
+pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model, flattening: f64) -> PerVariant<YarnScatterer> {
+    let pressed = |of: &Yarn| Arc::new(shape_for(of, model).pressed(flattening));
+    let shape = pressed(yarn);
+    let scatterer = |of: &Yarn| {
+        let alike = of.plies == yarn.plies && of.placement == yarn.placement;
+        of_shape(if alike { Arc::clone(&shape) } else { pressed(of) }, &materials(of), model)
+    };
+    PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
+}
+
+/// One ply of a yarn as a yarn of its own, whose shape alone is given.
+pub(super) fn of_plies(
+    yarn: &Yarn,
+    variants: &[Yarn],
+    model: Model,
+    ply: usize,
+    alone: YarnShape,
+) -> PerVariant<YarnScatterer> {
+    let shape = Arc::new(match model {
+        Model::Aggregated => alone.packed(&yarn.packings()[ply..=ply]),
+        _ => alone,
+    });
+    let scatterer = |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], model);
+    PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
+}
+
+/// The fibres of one ply of a yarn.
+pub(super) fn of_fibers(yarn: &Yarn, variants: &[Yarn], ply: usize) -> PerVariant<FiberBcsdf> {
+    let fiber = |of: &Yarn| FiberBcsdf::new(&of.fibers[ply].1);
+    PerVariant::new(fiber(yarn), variants.iter().map(fiber).collect())
+}
+
+/// What rays need of yarns that only ask whether they pass: one for all where variants differ in colour only.
+pub(super) fn occluders(yarns: &PerVariant<YarnScatterer>) -> PerVariant<Occluder> {
+    let own = yarns.own().occluder();
+    if yarns.variants().iter().all(|yarn| yarn.occluder().shares_shape(own)) {
+        return PerVariant::same(own.clone());
+    }
+    PerVariant::new(own.clone(), yarns.variants().iter().map(|yarn| yarn.occluder().clone()).collect())
+}
+
+/// A yarn's shape with all that a model asks of it: only the aggregated one looks at how fibres lie.
+fn shape_for(yarn: &Yarn, model: Model) -> YarnShape {
+    match model {
+        Model::Aggregated => yarn.shape().packed(&yarn.packings()),
+        _ => yarn.shape(),
+    }
+}
+
+fn materials(yarn: &Yarn) -> Vec<&FiberMaterial> {
+    yarn.fibers.iter().map(|(_, material)| material).collect()
+}
+
+fn of_shape(shape: impl Into<Arc<YarnShape>>, materials: &[&FiberMaterial], model: Model) -> YarnScatterer {
+    let chord = match model {
+        Model::Aggregated => return YarnScatterer::Aggregated(AggregatedYarn::new(shape, materials)),
+        Model::TwoStream => ChordModel::TwoStream,
+        Model::Paper => ChordModel::Paper,
+        Model::Printed => ChordModel::Printed,
+        Model::DualScattering => ChordModel::DualScattering,
+    };
+    YarnScatterer::Chord(ChordYarn::new(shape, materials, chord))
+}

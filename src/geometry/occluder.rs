@@ -1,0 +1,125 @@
+//! How much light passes a yarn and meets no fibre: its shape and the gaps between its fibres, whatever their colour
+//! (docs/model.md, section 3).
+
+use std::sync::Arc;
+
+use super::{
+    section::PlyCrossing,
+    yarn::{PlyShape, YarnShape},
+};
+
+/// The gaps between the fibres of a ply, along a line and counted in expected fibres.
+///
+/// Fibres on a line are a renewal process: gaps of eta, a fibre's own chord, and an exponential beyond it. The chance
+/// that a stretch with n fibres on the mean holds none is 1 - n up to n = eta, then (1 - eta) e^(-(n - eta) / (1 - eta)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlyGaps {
+    /// Area fraction eta of fibres that keep out of each other: [`PlyShape::density`].
+    pub density: f32,
+    /// Extinction per expected fibre of unscattered light beyond the first eta fibres: 1 / (1 - eta).
+    pub rate: f32,
+}
+
+impl PlyShape {
+    /// Area fraction eta of fibres that keep out of each other, at most 0.85; 0 for fibres that lie at random.
+    pub fn density(&self) -> f64 {
+        let (n, radius, fiber) = (f64::from(self.fibers), f64::from(self.radius), f64::from(self.fiber_radius));
+        let filled = (n * fiber * fiber / (radius * radius) * f64::from(self.squeeze)).min(0.85);
+        if self.exclusive { filled } else { 0.0 }
+    }
+}
+
+impl PlyGaps {
+    /// Those of a ply.
+    pub fn new(ply: &PlyShape) -> Self {
+        let density = ply.density();
+        Self { density: density as f32, rate: (1.0 / (1.0 - density)) as f32 }
+    }
+
+    /// The share of light that passes a chord with so many expected `fibers` and meets none.
+    #[inline]
+    pub fn unscattered(&self, fibers: f32) -> f32 {
+        if fibers < self.density {
+            1.0 - fibers
+        } else {
+            (1.0 - self.density) * (-self.rate * (fibers - self.density)).exp()
+        }
+    }
+
+    /// The inverse of [`Self::unscattered`]: after how many expected fibres the share `passed` is left.
+    #[inline]
+    pub fn fibers_passed(&self, passed: f32) -> f32 {
+        let open = 1.0 - self.density;
+        if passed > open { 1.0 - passed } else { self.density - (passed / open).max(1e-30).ln() * open }
+    }
+}
+
+/// What light finds between the fibres of a yarn.
+#[derive(Clone, Debug)]
+pub enum Transparency {
+    /// The gaps of each ply.
+    Gaps(Vec<PlyGaps>),
+    /// Gaps between fibres that lie at random: e^-n for n expected fibres.
+    Random,
+    /// No gaps.
+    Opaque,
+}
+
+/// A yarn as rays see it that only ask whether they pass.
+#[derive(Clone, Debug)]
+pub struct Occluder {
+    shape: Arc<YarnShape>,
+    transparency: Transparency,
+}
+
+impl Occluder {
+    /// For a shape, which several yarns may share.
+    pub fn new(shape: Arc<YarnShape>, transparency: Transparency) -> Self {
+        Self { shape, transparency }
+    }
+
+    /// The yarn's cross-section.
+    #[inline]
+    pub fn shape(&self) -> &YarnShape {
+        &self.shape
+    }
+
+    /// Whether it is the same yarn but for the colour of its fibres: with the same shape in memory.
+    pub fn shares_shape(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shape, &other.shape)
+    }
+
+    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
+    #[inline]
+    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
+        match &self.transparency {
+            Transparency::Gaps(plies) => crossings.iter().map(|c| plies[c.ply].unscattered(c.fibers)).product(),
+            Transparency::Random => (-crossings.iter().map(|c| c.fibers).sum::<f32>()).exp(),
+            Transparency::Opaque if crossings.is_empty() => 1.0,
+            Transparency::Opaque => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::yarn::tests::touching_yarn;
+
+    #[test]
+    fn what_meets_no_fiber_falls_evenly_and_is_inverted() {
+        for density in [1e-4, 0.1, 0.5, 0.8] {
+            let gaps = PlyGaps::new(&touching_yarn(1, 50, density, 0.0, 0.0).plies[0]);
+            assert_eq!(gaps.unscattered(0.0), 1.0);
+            let mut before = 1.0;
+            for i in 1..400 {
+                let n = 0.01 * i as f32;
+                let passed = gaps.unscattered(n);
+                // No jump in value or slope: the share falls by what is left at most over 1 - eta.
+                assert!(passed < before && before - passed < 0.0101, "density {density}, {n} fibres");
+                assert!((gaps.fibers_passed(passed) - n).abs() < 1e-3, "density {density}, {n} fibres");
+                before = passed;
+            }
+        }
+    }
+}
