@@ -15,7 +15,7 @@ use crate::{
         pattern::overlap::{Overlap, TOLERATED, overlap},
         proposal::{self, Proposal},
     },
-    plan::{Memory, Plan},
+    plan::{Feature, Memory, Plan},
     render::film_file,
     scene::{CurveKind, Fabric, GarmentFacts, Scene},
 };
@@ -252,27 +252,51 @@ fn garment_lines(facts: &GarmentFacts) -> String {
     text
 }
 
+/// What is told of a scene.
+struct SceneFacts<'a> {
+    scene: &'a Scene,
+    /// What each fabric takes, and all of them with what is not laid.
+    estimates: Vec<Estimate>,
+    total: Estimate,
+    plan: Plan,
+    memory: Memory,
+    /// The box around all cloth, millimetres, where the scene's file has it.
+    bounds: [DVec3; 2],
+    /// How far yarns run into each other.
+    overlap: Option<Overlap>,
+}
+
 fn scene_report(scene: &Scene) -> (Value, String) {
-    let estimates = cloth::estimates(scene);
-    let not_laid = scene.garments.iter().filter(|_| scene.fabrics.is_empty());
-    let not_laid = not_laid.map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
-    let total: Estimate = estimates.iter().copied().chain(not_laid).sum();
-    let plan = Plan::new(scene);
-    let memory = Memory::new(scene);
-    let beside = |bytes: u64, what: &str| match bytes {
-        0 => String::new(),
-        _ => format!(", {} of {what}", bytes_in_words(bytes)),
-    };
-    let render = &scene.render;
-    let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
-    let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
-    let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
-    let fabrics: Vec<Value> = scene
-        .fabrics
-        .iter()
-        .zip(&estimates)
-        .map(|(f, estimate)| {
+    let facts = SceneFacts::new(scene);
+    (facts.json(), facts.text())
+}
+
+impl<'a> SceneFacts<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let estimates = cloth::estimates(scene);
+        let not_laid = scene.garments.iter().filter(|_| scene.fabrics.is_empty());
+        let not_laid = not_laid.map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
+        let total: Estimate = estimates.iter().copied().chain(not_laid).sum();
+        let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
+        let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        // Of garments that are not laid only their tile is measured.
+        let overlap = (!scene.fabrics.is_empty())
+            .then(|| overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice()))))
+            .flatten();
+        let (plan, memory) = (Plan::new(scene), Memory::new(scene));
+        Self { scene, estimates, total, plan, memory, bounds: [low, high], overlap }
+    }
+
+    /// Features that are used, or those left out.
+    fn features(&self, used: bool) -> impl Iterator<Item = &Feature> {
+        self.plan.features.iter().filter(move |f| f.used == used)
+    }
+
+    fn json(&self) -> Value {
+        let Self { scene, total, memory, .. } = self;
+        let render = &scene.render;
+        let fabrics = scene.fabrics.iter().zip(&self.estimates).map(|(f, estimate)| {
             let (kind, number, name) = match f.kind {
                 CurveKind::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
                 CurveKind::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
@@ -281,94 +305,108 @@ fn scene_report(scene: &Scene) -> (Value, String) {
                 "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
                 "segments": estimate.segments, "length_mm": length(f), "tight_bends": estimate.tight_bends,
             })
-        })
-        .collect();
-    let reasons = |used: bool| -> Vec<Value> {
-        plan.features
-            .iter()
-            .filter(|f| f.used == used)
-            .map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes}))
-            .collect()
-    };
-    // Of garments that are not laid only their tile is measured.
-    let found = (!scene.fabrics.is_empty())
-        .then(|| overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice()))))
-        .flatten();
-    let garments: Vec<Value> = scene.garments.iter().map(garment_json).collect();
-    let report = json!({
-        "scene": scene.path, "fingerprint": scene.fingerprint,
-        "mode": render.mode.name(), "model": render.model.name(),
-        "image": {"width": render.width, "height": render.height, "spp": render.spp},
-        "fabrics": fabrics, "garments": garments, "overlap": overlap_json(found),
-        "bounds_mm": [list(low), list(high)],
-        "memory": {
-            "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
-            "texture_bytes": memory.textures, "denoiser_bytes": memory.denoiser, "limit_bytes": memory.limit,
-        },
-        "pixels": pixels,
-        "used": reasons(true), "left_out": reasons(false),
-        "warnings": scene.warnings,
-    });
-    let mut text = format!(
-        "{}\n  picture   {} x {}, {} spp, mode {}, model {}\n  bounds    {low:.3} to {high:.3} mm\n",
-        scene.path,
-        render.width,
-        render.height,
-        render.spp,
-        render.mode.name(),
-        render.model.name()
-    );
-    for (f, estimate) in scene.fabrics.iter().zip(&estimates) {
-        let what = match f.kind {
-            CurveKind::Yarn(yarn) => {
-                let yarn = &scene.yarns[yarn];
-                match yarn.plies.len() {
-                    1 => format!("yarns of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
-                    plies => format!("yarns of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
-                }
-            }
-            CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
+        });
+        let fabrics: Vec<Value> = fabrics.collect();
+        let reasons = |used: bool| -> Vec<Value> {
+            self.features(used).map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes})).collect()
         };
-        text += &format!(
-            "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
-            f.origin,
-            f.curves.len(),
-            length(f) / 1000.0,
-            f.control_points(),
-            estimate.segments
+        let garments: Vec<Value> = scene.garments.iter().map(garment_json).collect();
+        let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
+        json!({
+            "scene": scene.path, "fingerprint": scene.fingerprint,
+            "mode": render.mode.name(), "model": render.model.name(),
+            "image": {"width": render.width, "height": render.height, "spp": render.spp},
+            "fabrics": fabrics, "garments": garments, "overlap": overlap_json(self.overlap),
+            "bounds_mm": self.bounds.map(list),
+            "memory": {
+                "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
+                "texture_bytes": memory.textures, "denoiser_bytes": memory.denoiser, "limit_bytes": memory.limit,
+            },
+            "pixels": pixels,
+            "used": reasons(true), "left_out": reasons(false),
+            "warnings": scene.warnings,
+        })
+    }
+
+    fn text(&self) -> String {
+        let scene = self.scene;
+        let render = &scene.render;
+        let [low, high] = self.bounds;
+        let mut text = format!(
+            "{}\n  picture   {} x {}, {} spp, mode {}, model {}\n  bounds    {low:.3} to {high:.3} mm\n",
+            scene.path,
+            render.width,
+            render.height,
+            render.spp,
+            render.mode.name(),
+            render.model.name()
         );
-    }
-    for facts in &scene.garments {
-        text += &garment_lines(facts);
-    }
-    text += &overlap_line(found);
-    text += &format!(
-        "  memory    about {} of curves, {} of BVH, {} of film{}{}\n",
-        bytes_in_words(total.geometry_bytes),
-        bytes_in_words(total.bvh_bytes),
-        bytes_in_words(memory.film),
-        beside(memory.textures, "textures"),
-        beside(memory.denoiser, "the denoiser"),
-    );
-    if let Some(limit) = memory.limit.filter(|limit| total.bytes() + memory.bytes() > *limit) {
-        text += &format!(
-            "            more than the {} that it may take: `render` would refuse it\n",
-            bytes_in_words(limit)
-        );
-    }
-    if !scene.garments.is_empty() && scene.fabrics.is_empty() {
-        text += "  of cloth on garments, which is not laid to tell this, nothing is said below\n";
-    }
-    for used in [true, false] {
-        text += if used { "  used\n" } else { "  left out\n" };
-        for f in plan.features.iter().filter(|f| f.used == used) {
-            let verb = if used { "takes" } else { "saves" };
-            let memory = f.bytes.filter(|b| *b > 0).map(|b| format!(" ({verb} {})", bytes_in_words(b)));
-            text += &format!("    {:18}{}{}\n", f.name, f.reason, memory.unwrap_or_default());
+        for (fabric, estimate) in scene.fabrics.iter().zip(&self.estimates) {
+            text += &fabric_line(scene, fabric, estimate);
         }
+        for facts in &scene.garments {
+            text += &garment_lines(facts);
+        }
+        text += &overlap_line(self.overlap);
+        text += &self.memory_lines();
+        if !scene.garments.is_empty() && scene.fabrics.is_empty() {
+            text += "  of cloth on garments, which is not laid to tell this, nothing is said below\n";
+        }
+        for used in [true, false] {
+            text += if used { "  used\n" } else { "  left out\n" };
+            for f in self.features(used) {
+                let verb = if used { "takes" } else { "saves" };
+                let memory = f.bytes.filter(|b| *b > 0).map(|b| format!(" ({verb} {})", bytes_in_words(b)));
+                text += &format!("    {:18}{}{}\n", f.name, f.reason, memory.unwrap_or_default());
+            }
+        }
+        for warning in &scene.warnings {
+            text += &format!("  warning   {warning}\n");
+        }
+        text
     }
-    for warning in &scene.warnings {
-        text += &format!("  warning   {warning}\n");
+
+    fn memory_lines(&self) -> String {
+        let Self { total, memory, .. } = self;
+        let beside = |bytes: u64, what: &str| match bytes {
+            0 => String::new(),
+            _ => format!(", {} of {what}", bytes_in_words(bytes)),
+        };
+        let mut text = format!(
+            "  memory    about {} of curves, {} of BVH, {} of film{}{}\n",
+            bytes_in_words(total.geometry_bytes),
+            bytes_in_words(total.bvh_bytes),
+            bytes_in_words(memory.film),
+            beside(memory.textures, "textures"),
+            beside(memory.denoiser, "the denoiser"),
+        );
+        if let Some(limit) = memory.limit.filter(|limit| total.bytes() + memory.bytes() > *limit) {
+            text += &format!(
+                "            more than the {} that it may take: `render` would refuse it\n",
+                bytes_in_words(limit)
+            );
+        }
+        text
     }
-    (report, text)
+}
+
+fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
+    let what = match fabric.kind {
+        CurveKind::Yarn(yarn) => {
+            let yarn = &scene.yarns[yarn];
+            match yarn.plies.len() {
+                1 => format!("yarns of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
+                plies => format!("yarns of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
+            }
+        }
+        CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
+    };
+    format!(
+        "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
+        fabric.origin,
+        fabric.curves.len(),
+        length(fabric) / 1000.0,
+        fabric.control_points(),
+        estimate.segments
+    )
 }
