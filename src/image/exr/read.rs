@@ -20,74 +20,12 @@ use super::{
 /// Reads all channels of all parts at full resolution. Whole numbers become floats, exact up to 16 million.
 /// The picture covers the data windows of all parts, with zeros where one has nothing.
 pub(in crate::image) fn read(path: &Path) -> Result<Image, ImageError> {
-    let failed = |error: exr::error::Error| match error {
-        exr::error::Error::Io(error) => ImageError::unreadable(path, &error),
-        exr::error::Error::NotSupported(reason) => {
-            ImageError::Unsupported { path: path.into(), reason: reason.into_owned() }
-        }
-        exr::error::Error::Invalid(reason) => damaged(path, &reason),
-        exr::error::Error::Aborted => damaged(path, "unreadable"),
-    };
+    let failed = |error| failure(path, error);
     let file = File::open(path).map_err(|error| ImageError::unreadable(path, &error))?;
     let reader = exr::block::read(BufReader::new(file), false).map_err(failed)?;
-    let headers = reader.headers();
-    // In exr 1.74, damaged DWA makes the process abort (it allocates what the file says) and damaged B44 panics.
-    // The C++ library checks both.
-    let trustful = |compression| {
-        use Method::{B44, B44A, DWAA, DWAB};
-        matches!(compression, B44 | B44A | DWAA(_) | DWAB(_))
-    };
-    if let Some(header) = headers.iter().find(|header| trustful(header.compression)) {
-        let reason = format!("EXR with {} is left to OpenImageIO", header.compression);
-        return Err(ImageError::Unsupported { path: path.into(), reason });
-    }
-
-    // The window around all parts, in 64 bits: corners may be anywhere in 32.
-    let corners = |header: &Header| {
-        let start = header.own_attributes.layer_position;
-        let size = header.layer_size;
-        [
-            i64::from(start.x()),
-            i64::from(start.y()),
-            i64::from(start.x()) + size.x() as i64,
-            i64::from(start.y()) + size.y() as i64,
-        ]
-    };
-    let windows: Vec<[i64; 4]> = headers.iter().map(corners).collect();
-    let window = windows
-        .iter()
-        .copied()
-        .reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
-        .ok_or_else(|| damaged(path, "no part"))?;
-    let (width, height) = ((window[2] - window[0]) as usize, (window[3] - window[1]) as usize);
-    check_size(path, width, height, headers.iter().map(|header| header.channels.list.len()).sum())?;
-
-    let display = headers[0].shared_attributes.display_window;
-    let offset = |corner: i64, display: i32| i32::try_from(corner - i64::from(display)).unwrap_or(0);
-    let mut image = Image {
-        origin: [offset(window[0], display.position.x()), offset(window[1], display.position.y())],
-        display_size: [display.size.x(), display.size.y()],
-        attributes: read_attributes(path)?,
-        ..Image::new(width, height)
-    };
-    // The first channel of each part.
-    let mut first = Vec::new();
-    for header in headers {
-        first.push(image.channels.len());
-        let part = header.own_attributes.layer_name.as_ref().map(|name| String::from_utf8_lossy(name.bytes()));
-        let part = part.filter(|part| headers.len() > 1 && !part.is_empty());
-        for channel in &header.channels.list {
-            let name = String::from_utf8_lossy(channel.name.bytes());
-            let name = match &part {
-                // Some programs put the name of the part into the channel's as well.
-                Some(part) if !name.strip_prefix(&**part).is_some_and(|rest| rest.starts_with('.')) => {
-                    format!("{part}.{name}")
-                }
-                _ => name.into_owned(),
-            };
-            image.channels.push(Channel { name, samples: vec![0.0; width * height] });
-        }
-    }
+    check_compression(path, reader.headers())?;
+    let windows = Windows::of(path, reader.headers())?;
+    let (mut image, first) = empty_image(path, reader.headers(), &windows)?;
 
     let full_size = |_: &_, _, block: BlockIndex| block.level == Vec2(0, 0);
     let mut blocks = reader.filter_chunks(false, full_size).map_err(failed)?.sequential_decompressor(false);
@@ -101,11 +39,10 @@ pub(in crate::image) fn read(path: &Path) -> Result<Image, ImageError> {
         if !seen.insert((block.index.layer, block.index.pixel_position)) {
             return Err(damaged(path, "a block is missing"));
         }
-        let window_of_part = windows[block.index.layer];
-        let (left, top) = ((window_of_part[0] - window[0]) as usize, (window_of_part[1] - window[1]) as usize);
+        let [left, top] = windows.corner(block.index.layer);
         for line in block.lines(&header.channels) {
             let place = line.location;
-            let start = (top + place.position.y()) * width + left + place.position.x();
+            let start = (top + place.position.y()) * image.width + left + place.position.x();
             let target = image
                 .channels
                 .get_mut(first[place.layer] + place.channel)
@@ -127,4 +64,88 @@ pub(in crate::image) fn read(path: &Path) -> Result<Image, ImageError> {
         }
     }
     Ok(image)
+}
+
+fn failure(path: &Path, error: exr::error::Error) -> ImageError {
+    match error {
+        exr::error::Error::Io(error) => ImageError::unreadable(path, &error),
+        exr::error::Error::NotSupported(reason) => {
+            ImageError::Unsupported { path: path.into(), reason: reason.into_owned() }
+        }
+        exr::error::Error::Invalid(reason) => damaged(path, &reason),
+        exr::error::Error::Aborted => damaged(path, "unreadable"),
+    }
+}
+
+/// In exr 1.74, damaged DWA makes the process abort (it allocates what the file says) and damaged B44 panics. The C++
+/// library checks both.
+fn check_compression(path: &Path, headers: &[Header]) -> Result<(), ImageError> {
+    use Method::{B44, B44A, DWAA, DWAB};
+    let trustful = |header: &&Header| matches!(header.compression, B44 | B44A | DWAA(_) | DWAB(_));
+    let Some(header) = headers.iter().find(trustful) else { return Ok(()) };
+    let reason = format!("EXR with {} is left to OpenImageIO", header.compression);
+    Err(ImageError::Unsupported { path: path.into(), reason })
+}
+
+/// The data windows of all parts: left, top, and right and bottom, which are exclusive. In 64 bits: corners may be
+/// anywhere in 32.
+struct Windows {
+    parts: Vec<[i64; 4]>,
+    /// The window around all.
+    all: [i64; 4],
+}
+
+impl Windows {
+    fn of(path: &Path, headers: &[Header]) -> Result<Self, ImageError> {
+        let corners = |header: &Header| {
+            let start = header.own_attributes.layer_position;
+            let size = header.layer_size;
+            let [left, top] = [i64::from(start.x()), i64::from(start.y())];
+            [left, top, left + size.x() as i64, top + size.y() as i64]
+        };
+        let parts: Vec<[i64; 4]> = headers.iter().map(corners).collect();
+        let around = |a: [i64; 4], b: [i64; 4]| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])];
+        let all = parts.iter().copied().reduce(around).ok_or_else(|| damaged(path, "no part"))?;
+        Ok(Self { parts, all })
+    }
+
+    /// Where a part begins in the window around all.
+    fn corner(&self, part: usize) -> [usize; 2] {
+        let [left, top, ..] = self.parts[part];
+        [(left - self.all[0]) as usize, (top - self.all[1]) as usize]
+    }
+}
+
+/// The picture with all channels, still black, and the first channel of each part.
+fn empty_image(path: &Path, headers: &[Header], windows: &Windows) -> Result<(Image, Vec<usize>), ImageError> {
+    let [left, top, right, bottom] = windows.all;
+    let (width, height) = ((right - left) as usize, (bottom - top) as usize);
+    check_size(path, width, height, headers.iter().map(|header| header.channels.list.len()).sum())?;
+
+    let display = headers[0].shared_attributes.display_window;
+    let offset = |corner: i64, display: i32| i32::try_from(corner - i64::from(display)).unwrap_or(0);
+    let mut image = Image {
+        origin: [offset(left, display.position.x()), offset(top, display.position.y())],
+        display_size: [display.size.x(), display.size.y()],
+        attributes: read_attributes(path)?,
+        ..Image::new(width, height)
+    };
+    let mut first = Vec::new();
+    for header in headers {
+        first.push(image.channels.len());
+        let part = header.own_attributes.layer_name.as_ref().map(|name| String::from_utf8_lossy(name.bytes()));
+        let part = part.filter(|part| headers.len() > 1 && !part.is_empty());
+        for channel in &header.channels.list {
+            let name = String::from_utf8_lossy(channel.name.bytes());
+            let name = match &part {
+                // Some programs put the name of the part into the channel's as well.
+                Some(part) if !name.strip_prefix(&**part).is_some_and(|rest| rest.starts_with('.')) => {
+                    format!("{part}.{name}")
+                }
+                _ => name.into_owned(),
+            };
+            image.channels.push(Channel { name, samples: vec![0.0; width * height] });
+        }
+    }
+    Ok((image, first))
 }
