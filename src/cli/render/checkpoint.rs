@@ -1,0 +1,116 @@
+//! Films that are saved on the way and gone on from.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use super::{
+    super::Failure,
+    options::{Outputs, RenderArgs},
+};
+use crate::{
+    image::ImageError,
+    render::{
+        Job,
+        film_file::{self, About},
+    },
+    scene::Scene,
+};
+
+/// A shard takes its samples, all of them, and leaves a film.
+pub(super) fn check_shard(args: &RenderArgs, scene: &Scene, outputs: &Outputs) -> Result<(), Failure> {
+    if args.shard.is_none() {
+        return Ok(());
+    }
+    let r = &scene.render;
+    let wrong = [("time", r.time.is_some()), ("noise", r.noise.is_some()), ("adaptive", r.adaptive)];
+    if let Some((name, _)) = wrong.iter().find(|(_, set)| *set) {
+        return Err(Failure::Input(format!(
+            "error: --shard with render.{name}: a shard takes just its samples, or the shards would not make one picture\n  \
+             hint: leave out --{name}; --spp says how many samples all shards take together"
+        )));
+    }
+    if outputs.films.is_empty() && args.checkpoint.is_none() {
+        return Err(Failure::Input(
+            "error: --shard without a film: pictures of shards cannot be merged\n  hint: -o PART.film, or --checkpoint PART.film"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+/// The checkpoint to go on from, if there is one and it is asked for.
+pub(super) fn old_checkpoint(args: &RenderArgs) -> Result<Option<(About, Job)>, Failure> {
+    let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) else { return Ok(None) };
+    if !args.resume {
+        return Err(Failure::Input(format!(
+            "error: {} is there already\n  hint: --resume goes on with it; remove it to begin anew",
+            path.display()
+        )));
+    }
+    Ok(Some(film_file::read(path)?))
+}
+
+/// The job of a checkpoint, if it is this render's.
+pub(super) fn resumed((there, mut job): (About, Job), about: &About, args: &RenderArgs) -> Result<Job, Failure> {
+    let path = args.checkpoint.as_deref().unwrap_or(Path::new("")).display();
+    let differences = about.differences(&there);
+    if !differences.is_empty() {
+        return Err(Failure::Input(format!(
+            "error: {path} is a checkpoint of another render:\n  {}\n  hint: render with the same keys, or remove it to begin \
+             anew",
+            differences.join("\n  ")
+        )));
+    }
+    tracing::info!(checkpoint = %path, spp = job.done, "resumed from {path} at {} spp", job.done);
+    if about.shard.is_none() {
+        job.samples.end = about.spp;
+    }
+    if job.done > about.spp {
+        tracing::warn!("{path} has {} spp already: they are kept", job.done);
+    }
+    Ok(job)
+}
+
+/// Saves films: the checkpoint now and then, and all of them at the end.
+pub(super) struct Saver<'a> {
+    pub(super) args: &'a RenderArgs,
+    pub(super) about: &'a About,
+    pub(super) films: &'a [PathBuf],
+    /// Why the last ones could not be saved.
+    pub(super) failed: Vec<ImageError>,
+    /// The films that were, besides the checkpoint.
+    pub(super) written: Vec<PathBuf>,
+}
+
+impl Saver<'_> {
+    pub(super) fn needed(&self) -> bool {
+        self.args.checkpoint.is_some() || !self.films.is_empty()
+    }
+
+    pub(super) fn save(&mut self, job: &Job, last: bool) {
+        self.failed.clear();
+        let films = if last { self.films } else { &[] };
+        for path in self.args.checkpoint.iter().chain(films) {
+            let began = Instant::now();
+            match film_file::write(path, self.about, job) {
+                Ok(()) => {
+                    if films.contains(path) {
+                        self.written.push(path.clone());
+                    }
+                    let seconds = began.elapsed().as_secs_f64();
+                    let path = path.display();
+                    tracing::debug!(checkpoint = %path, spp = job.done, seconds, "saved {path} in {seconds:.3} s");
+                }
+                Err(error) => {
+                    // Hours of work are not thrown away for a disk that is full now.
+                    if !last {
+                        tracing::warn!("the render goes on without a checkpoint: {error}");
+                    }
+                    self.failed.push(error);
+                }
+            }
+        }
+    }
+}

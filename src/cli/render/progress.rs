@@ -1,0 +1,118 @@
+//! What is told of a render: before it, while it runs, and after it.
+
+use std::{
+    io::IsTerminal as _,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::{
+    super::{bytes_in_words, log},
+    options::RenderArgs,
+};
+use crate::{
+    render::{Progress, Rendered},
+    report::{self, Phases},
+    scene::Scene,
+    trace::World,
+};
+
+/// `yarns` are the numbers of yarns of each fabric.
+pub(super) fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usize]) {
+    for warning in &scene.warnings {
+        tracing::warn!("{warning}");
+    }
+    for (i, fabric) in scene.fabrics.iter().enumerate() {
+        let bends = || world.tight_bends().filter(|(of, _)| *of == i).map(|(_, bend)| bend);
+        let Some(worst) = bends().max_by(|a, b| a.fold.total_cmp(&b.fold)) else { continue };
+        tracing::warn!(
+            "{}: {} of {} yarns bend so tightly that they fold into themselves and their plies break; the worst is yarn {} \
+             at segment {}, whose inner side runs backwards by {:.1} of its radius{}",
+            fabric.origin,
+            bends().count(),
+            yarns[i],
+            worst.yarn,
+            worst.segment,
+            worst.fold,
+            match (fabric.from_file && 2 * bends().count() > yarns[i], args.log.verbose > 0) {
+                (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
+                (false, false) => " (-v shows all)",
+                (false, true) => "",
+            }
+        );
+        for bend in bends() {
+            tracing::debug!("yarn {} folds at segment {} by {:.2} of its radius", bend.yarn, bend.segment, bend.fold);
+        }
+    }
+    if scene.lights.is_empty() {
+        tracing::warn!("the scene has no light: the picture will be black");
+    }
+}
+
+pub(super) fn bar(args: &RenderArgs) -> ProgressBar {
+    if args.log.quiet || args.log.log_json || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
+    let style = ProgressStyle::with_template("{wide_bar} {percent}%  {msg}  {elapsed}");
+    bar.set_style(style.expect("the template is well formed"));
+    log::past(Some(&bar));
+    bar
+}
+
+/// Shows the progress on the bar; tells it at most once a second, or of every wave with -vv.
+pub(super) fn show(bar: &ProgressBar, last_line: &mut Option<Instant>, p: &Progress<'_>) {
+    let noise = p.noise.map_or(String::new(), |n| format!(", noise {n:.2e}"));
+    let left = p.left.as_secs_f64();
+    bar.set_position((p.share * 1000.0) as u64);
+    bar.set_message(format!("{} of {} spp{noise}  (left: {left:.0} s)", p.spp, p.spp_end));
+    let seconds = p.elapsed.as_secs_f64();
+    let line = format!("{} of {} spp{noise}, {seconds:.1} s, about {left:.0} s left", p.spp, p.spp_end);
+    let (spp, spp_end, share, noise) = (p.spp, p.spp_end, p.share, p.noise);
+    if last_line.is_none_or(|t: Instant| t.elapsed() >= Duration::from_secs(1)) {
+        *last_line = Some(Instant::now());
+        tracing::debug!(phase = "render", spp, spp_end, share, noise, seconds, seconds_left = left, "{line}");
+    } else {
+        tracing::trace!(phase = "render", spp, spp_end, share, noise, seconds, seconds_left = left, "{line}");
+    }
+}
+
+pub(super) fn summary(world: &World, rendered: &Rendered, phases: &Phases, outputs: &[PathBuf]) {
+    let s = |d: Duration| format!("{:.2} s", d.as_secs_f64());
+    let (least, spp, most) = rendered.film.samples();
+    let c = &rendered.counters;
+    for path in outputs {
+        tracing::info!(path = %path.display(), "wrote {}", path.display());
+    }
+    let denoise = if phases.denoise.is_zero() { String::new() } else { format!(", denoised in {}", s(phases.denoise)) };
+    tracing::info!(
+        spp,
+        stopped_by = rendered.stop.name(),
+        seconds = phases.total.as_secs_f64(),
+        "{spp:.0} spp in {} ({:.2} M samples/s), stopped by {}; load {}, curves {}, BVH {}{denoise}, total {}",
+        s(rendered.elapsed),
+        c.camera as f64 / 1e6 / rendered.elapsed.as_secs_f64().max(1e-9),
+        rendered.stop.name(),
+        s(phases.load),
+        s(phases.made.generate),
+        s(phases.made.build),
+        s(phases.total),
+    );
+    tracing::debug!(
+        "curves {}, BVH {}, peak memory {}; rays: {} from the camera, {} bounced, {} to lights",
+        bytes_in_words(world.geometry_bytes()),
+        bytes_in_words(world.bvh_bytes()),
+        bytes_in_words(report::peak_rss_bytes()),
+        c.camera,
+        c.bounce,
+        c.shadow
+    );
+    if c.invalid > 0 {
+        tracing::warn!("{} samples were not finite and were left out", c.invalid);
+    }
+    if least == 0 && most > 0 {
+        tracing::warn!("some pixels have no sample and are black: the time was too short for one sample each");
+    }
+}
