@@ -19,17 +19,17 @@ use super::{
 use crate::{
     cloth::Cloth,
     ffi::oidn::Denoiser,
-    image::{self, output::Format, png::ToneMap},
+    image::{self, Attribute, output::Format, png::ToneMap},
     plan::Memory,
     render::{
-        self, Checkpoints, Control, Job, Stop,
+        self, Checkpoints, Control, Job, Rendered, Stop,
         denoise::Denoised,
         film_file::About,
         live::LiveView,
         picture::{self, Frame},
     },
     report::{self, Phases, RunRecord},
-    scene::Layers,
+    scene::{Layers, Scene},
 };
 use checkpoint::{Saver, check_shard, old_checkpoint, resumed};
 use options::Outputs;
@@ -47,6 +47,64 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let mut scene = args.options.load(&args.scene)?;
     let outputs = Outputs::new(args);
+    check_and_apply(args, &outputs, &mut scene)?;
+    let memory = Memory::new(&scene);
+    memory.check()?;
+    let (pool, threads) = thread_pool(scene.render.threads)?;
+    let old = old_checkpoint(args)?;
+    let load = started.elapsed();
+    log::phase("load", load);
+    pool.install(|| {
+        // Making it takes the curves.
+        let yarns: Vec<usize> = scene.fabrics.iter().map(|f| f.curves.len()).collect();
+        let (cloth, made) = Cloth::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
+        let world = cloth.world();
+        warn(args, &scene, world, &yarns);
+        let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
+        log::phase("generate", made.generate);
+        log::phase("build", made.build);
+        let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, world), args.shard);
+        let job = match old {
+            Some(old) => resumed(old, &about, args)?,
+            None => Job::new(&scene, args.shard)?,
+        };
+        let before = job.elapsed;
+        let mut saver = Saver { args, about: &about, films: &outputs.films, failed: Vec::new(), written: Vec::new() };
+        let rendered = render_shown(args, &scene, &cloth, job, &mut saver);
+        let render = rendered.elapsed.saturating_sub(before);
+        log::phase("render", render);
+
+        let denoising = Instant::now();
+        let denoised = denoiser.map(|d| Denoised::new(&d, &rendered.film)).transpose();
+        let denoise = if scene.denoise { denoising.elapsed() } else { Duration::ZERO };
+        let mut phases = Phases { denoise, load, made, render, ..Phases::default() };
+        let writing = Instant::now();
+        let command = std::env::args().collect::<Vec<_>>().join(" ");
+        let record = |phases| RunRecord { scene: &scene, world, rendered: &rendered, phases, threads };
+        let attributes = record(phases).attributes(&command);
+        // What was rendered is kept even if the denoiser fails.
+        let clean = denoised.as_ref().ok().and_then(Option::as_ref);
+        // What one file's disk refuses, another's may take.
+        let mut attempts = Attempts::default();
+        let mut written = write_pictures(&outputs.pictures, &scene, &rendered, clean, &attributes, &mut attempts);
+        attempts.note(denoised.map(drop));
+        phases.write = writing.elapsed();
+        log::phase("write", phases.write);
+        phases.total = started.elapsed();
+        if let Some(path) = &args.stats {
+            let text = serde_json::to_string_pretty(&record(phases).to_json()).expect("numbers and text become JSON");
+            attempts.note(write_text(path, &(text + "\n")));
+        }
+        written.extend(saver.written);
+        summary(world, &rendered, &phases, &written);
+        saver.failed.into_iter().for_each(|error| _ = attempts.note(Err::<(), _>(error)));
+        attempts.finish()?;
+        if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+    })
+}
+
+/// Refuses outputs that cannot be written, before any work, and lets options of the output win over the scene's.
+fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> Result<(), Failure> {
     let denoised: Vec<PathBuf> = outputs
         .pictures
         .iter()
@@ -70,7 +128,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     for path in outputs.films.iter().chain(&args.checkpoint) {
         image::output::check_file(path)?;
     }
-    check_shard(args, &scene, &outputs)?;
+    check_shard(args, scene, outputs)?;
     scene.denoise |= args.denoise;
     if !layered {
         scene.layers = Layers::NONE;
@@ -83,93 +141,61 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     if let Some(exposure) = args.exposure {
         scene.display.exposure = exposure;
     }
-    let memory = Memory::new(&scene);
-    memory.check()?;
-    let (pool, threads) = thread_pool(scene.render.threads)?;
-    let old = old_checkpoint(args)?;
-    let load = started.elapsed();
-    log::phase("load", load);
-    pool.install(|| {
-        // Making it takes the curves.
-        let yarns: Vec<usize> = scene.fabrics.iter().map(|f| f.curves.len()).collect();
-        let (cloth, made) = Cloth::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
-        let world = cloth.world();
-        warn(args, &scene, world, &yarns);
-        let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
-        log::phase("generate", made.generate);
-        log::phase("build", made.build);
-        let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, world), args.shard);
-        let job = match old {
-            Some(old) => resumed(old, &about, args)?,
-            None => Job::new(&scene, args.shard)?,
-        };
-        let before = job.elapsed;
-        let interrupt = interrupt_flag();
-        let bar = bar(args);
-        let mut saver = Saver { args, about: &about, films: &outputs.films, failed: Vec::new(), written: Vec::new() };
-        let mut last_line = None;
-        let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
-        let rendered = render::run(
-            &scene,
-            &cloth,
-            job,
-            Control {
-                interrupt: &interrupt,
-                progress: &mut |p| {
-                    show(&bar, &mut last_line, &p);
-                    if let Some(live) = &mut live {
-                        live.show(p.film);
-                    }
-                },
-                checkpoints: saver.needed().then_some(Checkpoints {
-                    every: args.checkpoint.is_some().then(|| Duration::from_secs_f64(args.checkpoint_every)),
-                    save: &mut |job, last| saver.save(job, last),
-                }),
-            },
-        );
-        log::past(None);
-        bar.finish_and_clear();
-        if let (Some(problem), Some(address)) = (live.and_then(|l| l.finish(&rendered.film)), &args.display) {
-            tracing::warn!("the viewer at {address}: {problem}");
-        }
-        let render = rendered.elapsed.saturating_sub(before);
-        log::phase("render", render);
+    Ok(())
+}
 
-        let denoising = Instant::now();
-        let denoised = denoiser.map(|d| Denoised::new(&d, &rendered.film)).transpose();
-        let denoise = if scene.denoise { denoising.elapsed() } else { Duration::ZERO };
-        let mut phases = Phases { denoise, load, made, render, ..Phases::default() };
-        let writing = Instant::now();
-        let command = std::env::args().collect::<Vec<_>>().join(" ");
-        let record = |phases| RunRecord { scene: &scene, world, rendered: &rendered, phases, threads };
-        let attributes = record(phases).attributes(&command);
-        // What was rendered is kept even if the denoiser fails.
-        let clean = denoised.as_ref().ok().and_then(Option::as_ref);
-        // What one file's disk refuses, another's may take.
-        let (mut attempts, mut written) = (Attempts::default(), Vec::new());
-        let frame = Frame::new(&scene);
-        for path in &outputs.pictures {
-            if attempts.note(picture::write(path, &frame, &rendered.film, clean, &attributes)) {
-                written.push(path.clone());
-            }
-            if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path))
-                && attempts.note(picture::write_denoised(&path, &frame, &rendered.film, clean))
-            {
-                written.push(path);
-            }
+/// Renders, tells how far it is and shows the picture while it is made, and saves films.
+fn render_shown(args: &RenderArgs, scene: &Scene, cloth: &Cloth, job: Job, saver: &mut Saver<'_>) -> Rendered {
+    let interrupt = interrupt_flag();
+    let bar = bar(args);
+    let mut last_line = None;
+    let mut live = args.display.as_ref().map(|address| LiveView::connect(address, &scene.path));
+    let rendered = render::run(
+        scene,
+        cloth,
+        job,
+        Control {
+            interrupt: &interrupt,
+            progress: &mut |p| {
+                show(&bar, &mut last_line, &p);
+                if let Some(live) = &mut live {
+                    live.show(p.film);
+                }
+            },
+            checkpoints: saver.needed().then_some(Checkpoints {
+                every: args.checkpoint.is_some().then(|| Duration::from_secs_f64(args.checkpoint_every)),
+                save: &mut |job, last| saver.save(job, last),
+            }),
+        },
+    );
+    log::past(None);
+    bar.finish_and_clear();
+    if let (Some(problem), Some(address)) = (live.and_then(|l| l.finish(&rendered.film)), &args.display) {
+        tracing::warn!("the viewer at {address}: {problem}");
+    }
+    rendered
+}
+
+/// Writes all pictures, and those without noise beside them where a format has no room for both; gives those written.
+fn write_pictures(
+    paths: &[PathBuf],
+    scene: &Scene,
+    rendered: &Rendered,
+    clean: Option<&Denoised>,
+    attributes: &[(String, Attribute)],
+    attempts: &mut Attempts,
+) -> Vec<PathBuf> {
+    let (frame, film) = (Frame::new(scene), &rendered.film);
+    let mut written = Vec::new();
+    for path in paths {
+        if attempts.note(picture::write(path, &frame, film, clean, attributes)) {
+            written.push(path.clone());
         }
-        attempts.note(denoised.map(drop));
-        phases.write = writing.elapsed();
-        log::phase("write", phases.write);
-        phases.total = started.elapsed();
-        if let Some(path) = &args.stats {
-            let text = serde_json::to_string_pretty(&record(phases).to_json()).expect("numbers and text become JSON");
-            attempts.note(write_text(path, &(text + "\n")));
+        if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path))
+            && attempts.note(picture::write_denoised(&path, &frame, film, clean))
+        {
+            written.push(path);
         }
-        written.extend(saver.written);
-        summary(world, &rendered, &phases, &written);
-        saver.failed.into_iter().for_each(|error| _ = attempts.note(Err::<(), _>(error)));
-        attempts.finish()?;
-        if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
-    })
+    }
+    written
 }
