@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Mat3A, Vec3A};
 
-use super::{Material, Object, Scene, camera::Lens};
+use super::{Material, Object, Scene, Yarn, camera::Lens};
 use crate::{
     geometry::{fiber::flyaway::Flyaways, mesh::Mesh},
     light::{AreaLight, EnvironmentMap, Light, Shape},
@@ -46,26 +46,57 @@ pub const FORCEABLE: [&str; 21] = [
 /// # Errors
 /// The feature cannot be forced.
 pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
+    if force_layer(scene, name) || force_of_yarns(&mut scene.yarns, name) || force_around(scene, name) {
+        return Ok(());
+    }
+    Err(format!("`{name}` cannot be forced; these can: {}", FORCEABLE.join(", ")))
+}
+
+/// A layer of the picture; whether the name is one's.
+fn force_layer(scene: &mut Scene, name: &str) -> bool {
     let layers = &mut scene.layers;
+    let layer = match name {
+        "lobe_layers" => &mut layers.lobes,
+        "depth_layer" => &mut layers.depth,
+        "normal_layer" => &mut layers.normal,
+        "albedo_layer" => &mut layers.albedo,
+        "cryptomatte" => &mut layers.cryptomatte,
+        "variance_layer" => &mut layers.variance,
+        "sample_layer" => &mut layers.samples,
+        "position_layer" => &mut layers.position,
+        "uv_layer" => &mut layers.uv,
+        "motion_layer" => {
+            // Cloth whose next frame was not read stands still.
+            scene.camera_flow.get_or_insert([scene.camera; 2]);
+            &mut layers.motion
+        }
+        _ => return false,
+    };
+    *layer = true;
+    true
+}
+
+/// A feature of yarns and fibres; whether the name is one's.
+fn force_of_yarns(yarns: &mut [Yarn], name: &str) -> bool {
     match name {
         // A hair's breadth between the ply and the yarn's outline: rays have to be asked.
         "ply_filter" => {
-            for ply in scene.yarns.iter_mut().flat_map(|y| &mut y.plies) {
+            for ply in yarns.iter_mut().flat_map(|y| &mut y.plies) {
                 ply.radius = ply.radius.min(1.0 - 1e-7);
             }
         }
         "elliptical_plies" => {
-            for ply in scene.yarns.iter_mut().flat_map(|y| &mut y.plies) {
+            for ply in yarns.iter_mut().flat_map(|y| &mut y.plies) {
                 ply.aspect = ply.aspect.min(1.0 - 2e-6);
             }
         }
         "ply_twist" => {
-            for yarn in scene.yarns.iter_mut().filter(|y| y.ply_twist == 0.0) {
+            for yarn in yarns.iter_mut().filter(|y| y.ply_twist == 0.0) {
                 yarn.ply_twist = 1e-9;
             }
         }
         "all_lobes" => {
-            for (_, fiber) in scene.yarns.iter_mut().flat_map(|y| &mut y.fibers) {
+            for (_, fiber) in yarns.iter_mut().flat_map(|y| &mut y.fibers) {
                 for albedo in [&mut fiber.r, &mut fiber.tt, &mut fiber.d] {
                     if albedo.iter().all(|a| *a == 0.0) {
                         *albedo = [1e-12; 3];
@@ -84,10 +115,18 @@ pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
                 loop_height: [0.0; 2],
                 loop_turns: 1.0,
             };
-            for yarn in &mut scene.yarns {
+            for yarn in yarns {
                 yarn.flyaways.get_or_insert(none);
             }
         }
+        _ => return false,
+    }
+    true
+}
+
+/// A light, a lens or a mesh; whether the name is one's.
+fn force_around(scene: &mut Scene, name: &str) -> bool {
+    match name {
         "environment_image" => {
             for light in &mut scene.lights {
                 if let Light::Environment(sky) = light {
@@ -127,23 +166,9 @@ pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
             let material = scene.materials.len() - 1;
             scene.objects.push(Object { origin: "forced".to_owned(), mesh, material });
         }
-        "lobe_layers" => layers.lobes = true,
-        "depth_layer" => layers.depth = true,
-        "normal_layer" => layers.normal = true,
-        "albedo_layer" => layers.albedo = true,
-        "cryptomatte" => layers.cryptomatte = true,
-        "variance_layer" => layers.variance = true,
-        "sample_layer" => layers.samples = true,
-        "position_layer" => layers.position = true,
-        "uv_layer" => layers.uv = true,
-        // Cloth whose next frame was not read stands still.
-        "motion_layer" => {
-            layers.motion = true;
-            scene.camera_flow.get_or_insert([scene.camera; 2]);
-        }
-        _ => return Err(format!("`{name}` cannot be forced; these can: {}", FORCEABLE.join(", "))),
+        _ => return false,
     }
-    Ok(())
+    true
 }
 
 /// A place outside of the cloth, seen from its middle.
