@@ -5,148 +5,19 @@
 //! reports every key nobody asked for. Whoever reads a table asks for all of its keys before judging their values together:
 //! what returns early leaves valid keys to be called unknown.
 
+mod range;
+#[cfg(test)]
+mod tests;
+mod title;
+
 use std::cell::{Cell, RefCell};
-use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Span, listed, nearest, shortened};
 use super::document::{Document, Entry, Node, Table, Value};
-
-/// Which numbers are allowed. Not-a-number and infinity never are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    low: Limit,
-    high: Limit,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Limit {
-    None,
-    Including(f64),
-    Excluding(f64),
-}
-
-impl Range {
-    /// Every number.
-    pub const FINITE: Range = Range { low: Limit::None, high: Limit::None };
-    /// Above 0.
-    pub const POSITIVE: Range = Range::above(0.0);
-    /// At least 0.
-    pub const NOT_NEGATIVE: Range = Range::at_least(0.0);
-    /// From 0 to 1, both included.
-    pub const UNIT: Range = Range::between(0.0, 1.0);
-
-    /// `low` and larger numbers.
-    pub const fn at_least(low: f64) -> Range {
-        Range { low: Limit::Including(low), high: Limit::None }
-    }
-
-    /// Numbers larger than `low`.
-    pub const fn above(low: f64) -> Range {
-        Range { low: Limit::Excluding(low), high: Limit::None }
-    }
-
-    /// `high` and smaller numbers.
-    pub const fn at_most(high: f64) -> Range {
-        Range { low: Limit::None, high: Limit::Including(high) }
-    }
-
-    /// Numbers smaller than `high`.
-    pub const fn below(high: f64) -> Range {
-        Range { low: Limit::None, high: Limit::Excluding(high) }
-    }
-
-    /// From `low` to `high`, both included.
-    pub const fn between(low: f64, high: f64) -> Range {
-        Range { low: Limit::Including(low), high: Limit::Including(high) }
-    }
-
-    /// This range up to `high`, included.
-    pub const fn and_at_most(self, high: f64) -> Range {
-        Range { low: self.low, high: Limit::Including(high) }
-    }
-
-    /// This range up to but without `high`.
-    pub const fn and_below(self, high: f64) -> Range {
-        Range { low: self.low, high: Limit::Excluding(high) }
-    }
-
-    /// Whether the number is allowed.
-    pub fn contains(&self, value: f64) -> bool {
-        let above_low = match self.low {
-            Limit::None => true,
-            Limit::Including(low) => value >= low,
-            Limit::Excluding(low) => value > low,
-        };
-        let below_high = match self.high {
-            Limit::None => true,
-            Limit::Including(high) => value <= high,
-            Limit::Excluding(high) => value < high,
-        };
-        value.is_finite() && above_low && below_high
-    }
-}
-
-/// The range in words, to stand after "must be": "at least 0", "above 0", "from 0 to 1", "finite".
-impl fmt::Display for Range {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.low, self.high) {
-            (Limit::Including(low), Limit::Including(high)) => return write!(formatter, "from {low} to {high}"),
-            (Limit::None, Limit::None) => return write!(formatter, "finite"),
-            _ => {}
-        }
-        match self.low {
-            Limit::None => {}
-            Limit::Including(low) => write!(formatter, "at least {low}")?,
-            Limit::Excluding(low) => write!(formatter, "above {low}")?,
-        }
-        if self.low != Limit::None && self.high != Limit::None {
-            write!(formatter, " and ")?;
-        }
-        match self.high {
-            Limit::None => Ok(()),
-            Limit::Including(high) => write!(formatter, "at most {high}"),
-            Limit::Excluding(high) => write!(formatter, "below {high}"),
-        }
-    }
-}
-
-/// How messages call a table.
-#[derive(Clone, Debug)]
-struct Title {
-    /// The names from the outside to here, with dots: `yarn.silk1`.
-    path: String,
-    /// The whole name: `[yarn.silk1]`, `[[light]] 2`; empty for the outermost table.
-    text: String,
-    /// What tables inside have to say after their own name: ` of [[light]] 2`.
-    suffix: String,
-}
-
-impl Title {
-    fn join(&self, key: &str) -> String {
-        let bare = |character: char| character.is_ascii_alphanumeric() || matches!(character, '_' | '-');
-        let key =
-            if !key.is_empty() && key.chars().all(bare) { key.to_owned() } else { format!("\"{}\"", shortened(key)) };
-        if self.path.is_empty() { key } else { format!("{}.{key}", self.path) }
-    }
-
-    fn table(&self, key: &str) -> Title {
-        let path = self.join(key);
-        Title { text: format!("[{path}]{}", self.suffix), suffix: self.suffix.clone(), path }
-    }
-
-    /// Counts from 1, as one would count in the file.
-    fn element(&self, key: &str, number: usize) -> Title {
-        let path = self.join(key);
-        let text = format!("[[{path}]] {number}{}", self.suffix);
-        Title { suffix: format!(" of {text}"), text, path }
-    }
-
-    /// ` in [yarn.silk1]`, or nothing for the outermost table.
-    fn inside(&self) -> String {
-        if self.text.is_empty() { String::new() } else { format!(" in {}", self.text) }
-    }
-}
+pub use range::Range;
+use range::number_text;
+use title::Title;
 
 /// Reads one table and reports what is wrong with it.
 ///
@@ -586,17 +457,3 @@ impl<'a> Reader<'a> {
         }
     }
 }
-
-/// A number as a user would write it.
-fn number_text(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-5..1e16).contains(&size) && size.is_finite() {
-        format!("{value:e}")
-    } else {
-        // TOML's own spelling of what Rust calls NaN.
-        format!("{value}").replace("NaN", "nan")
-    }
-}
-
-#[cfg(test)]
-mod tests;
