@@ -1,38 +1,26 @@
 //! `[[fabric]]`: curves from a file or a generator, and the yarn they are of.
 
-use std::{
-    f64::consts::TAU,
-    path::{Path, PathBuf},
-};
+mod make;
 
-use glam::{DAffine3, DMat3, DVec3};
-use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+use glam::DAffine3;
 
 use super::{
-    super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Mode, Taken, Yarn, defaults, transform_curves},
+    super::{Mode, Yarn, defaults},
     Context, Range, Reader, UNITS,
-    color::{self, ColorPlan, FabricCoordinates},
-    dyes::Dyes,
+    color::{self, ColorPlan},
     garment::{self, GarmentPlan},
     mesh::prim_pattern,
     pattern::{self, KnitPlan},
-    placement, radians, sequence,
-    weave::{self, WeavePlan, Woven},
+    placement, radians,
+    weave::{self, WeavePlan},
     yarns::Library,
 };
 use crate::{
-    geometry::{
-        curve::{Basis, Curve, CurveSet},
-        curve_file::{self, CurveFileError, ReadOptions},
-        pattern::straight,
-        stage,
-    },
+    geometry::{curve::Basis, curve_file::ReadOptions},
     input::diagnostic::Span,
-    math::sampler::Stream,
 };
-
-/// Columns that a yarn counts where nothing is known of its cloth.
-const COLUMNS: f32 = 256.0;
 
 /// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
 const SHOWN_CELLS: [u32; 2] = [6, 6];
@@ -307,250 +295,4 @@ fn source(
     }
     table.finish();
     made
-}
-
-/// Curves of one kind of yarn, before they are moved to their place.
-struct Made {
-    origin: String,
-    from_file: bool,
-    kind: CurveKind,
-    curves: Vec<(Curve, Vec<f64>)>,
-    /// Where their points are in the cloth, if that is known.
-    coordinates: Option<FabricCoordinates>,
-    /// Their colours, if they are not the fabric's.
-    color: Option<ColorPlan>,
-    /// Colours that came with them.
-    dyes: Option<Dyes>,
-    motion: FabricMotion,
-    /// Whether there are no more points than are needed.
-    exact: bool,
-}
-
-impl Made {
-    fn new(
-        origin: String,
-        kind: CurveKind,
-        curves: Vec<(Curve, Vec<f64>)>,
-        coordinates: Option<FabricCoordinates>,
-    ) -> Self {
-        Self {
-            origin,
-            from_file: false,
-            kind,
-            curves,
-            coordinates,
-            color: None,
-            dyes: None,
-            motion: FabricMotion::default(),
-            exact: false,
-        }
-    }
-}
-
-impl FabricPlan {
-    /// Reads or makes the curves: one fabric for each kind of yarn.
-    pub(super) fn make(
-        self,
-        index: usize,
-        context: &Context<'_>,
-        library: &Library,
-        detail: &Detail,
-        warnings: &mut Vec<String>,
-        garments: &mut Vec<GarmentFacts>,
-    ) -> Option<Vec<Fabric>> {
-        let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(CurveKind::Yarn);
-        let (kind, own_radius) = match &self.kind {
-            KindName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
-            KindName::Fiber(name) => {
-                (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), defaults::FIBER_RADIUS)
-            }
-        };
-        let radius = self.radius.unwrap_or(own_radius);
-        let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
-            let with = |mut curve: Curve| {
-                let radii = curve.radii.take().unwrap_or_else(|| vec![radius; curve.points.len()]);
-                (curve, radii)
-            };
-            curves.into_iter().map(with).collect()
-        };
-        let made = match self.source {
-            Source::Garment(plan) => {
-                let (tension, places) = (self.color.tension(), self.color.needs_places() || detail.uv);
-                let (panels, facts) = {
-                    let name = match &self.kind {
-                        KindName::Yarn(name) | KindName::Fiber(name) => name.as_str(),
-                    };
-                    plan.make((name, radius), tension, places, context, library, detail, warnings)?
-                };
-                garments.push(facts);
-                panels
-                    .into_iter()
-                    .map(|panel| {
-                        let kind = panel.yarn.as_deref().map_or(Some(kind), place_of)?;
-                        let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
-                        Some(Made { color: panel.color, motion: panel.motion, exact: true, ..made })
-                    })
-                    .collect::<Option<Vec<Made>>>()?
-            }
-            Source::Knit(plan) => {
-                let plan = plan.sized(2.0 * radius, context, warnings)?;
-                let colors = match kind {
-                    CurveKind::Yarn(base) if !self.color.is_plain() => {
-                        let of_rows = |widths: &[u32]| self.color.stitches(widths, base, context, library);
-                        plan.colors(context, &of_rows, warnings)?
-                    }
-                    _ => Default::default(),
-                };
-                let (curves, coordinates, origin) = plan.curves(2.0 * radius, colors, context)?;
-                let curves = with_radius(curves, radius);
-                plan.warn_of_overlap(&curves, warnings);
-                vec![Made::new(origin, kind, curves, Some(coordinates))]
-            }
-            Source::Weave(plan) => {
-                let Woven { origin, sides } = plan.make(context)?;
-                let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
-                let weft = plan.weft_yarn.as_deref().map_or(Some(kind), place_of)?;
-                let [warp_radius, weft_radius] = plan.radii();
-                let (mut warps, wefts) = (with_radius(warps, warp_radius), with_radius(wefts, weft_radius));
-                let dyes = || Dyes::of_threads(&plan.colors);
-                if weft == kind {
-                    warps.extend(wefts);
-                    coordinates.join(weft_coordinates);
-                    vec![Made { dyes: dyes(), ..Made::new(origin, kind, warps, Some(coordinates)) }]
-                } else {
-                    let warp = Made::new(format!("warp of {origin}"), kind, warps, Some(coordinates));
-                    let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
-                    vec![Made { dyes: dyes(), ..warp }, Made { dyes: dyes(), ..weft }]
-                }
-            }
-            Source::Straight { count, length, spacing } => {
-                let curves = with_radius(straight(count, length, spacing), radius);
-                vec![Made::new(format!("{count} straight"), kind, curves, None)]
-            }
-            Source::File(file) => {
-                let mut colors = None;
-                let mut read = |path: &Path, frame: Option<f64>| {
-                    let (mut set, scale) = file.read(path, frame, context, warnings)?;
-                    colors.get_or_insert_with(|| std::mem::take(&mut set.colors));
-                    let own_radii = |mut curve: Curve| {
-                        let given = curve.radii.take().filter(|_| self.radius.is_none());
-                        let radii = given.map_or_else(
-                            || vec![radius; curve.points.len()],
-                            |r| r.iter().map(|r| r * scale).collect(),
-                        );
-                        (curve, radii)
-                    };
-                    let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
-                    if file.up == Up::Z || (file.up == Up::Auto && set.up_axis == Some(2)) {
-                        // z up becomes y up: a quarter turn about x.
-                        let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
-                        transform_curves(&mut curves, &DAffine3::from_mat3(turn));
-                    }
-                    Some(curves)
-                };
-                let (path, curves, motion) = sequence::read(&file, detail, context, &mut read)?;
-                let dyes = colors.filter(|_| file.colors).map(|colors| Dyes::of_curves(&colors));
-                if let Some(None) = dyes {
-                    warnings.push(format!("{}: `colors` is asked for, but no curve has one", path.display()));
-                }
-                let made = Made::new(path.display().to_string(), kind, curves, None);
-                vec![Made { from_file: true, motion, dyes: dyes.flatten(), ..made }]
-            }
-        };
-        let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
-        let name = self.name.unwrap_or_else(|| self.kind.into_name());
-        let fabric = |Made { origin, from_file, kind, curves, coordinates, color, dyes, motion, exact }: Made| {
-            let phases =
-                self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
-            let of_file = match curves.first().map(|(curve, _)| curve.basis) {
-                Some(Basis::BSpline) => Basis::BSpline,
-                _ => Basis::CatmullRom,
-            };
-            let mut fabric = Fabric {
-                name: name.clone(),
-                origin,
-                from_file,
-                kind,
-                curves,
-                motion,
-                variants: Vec::new(),
-                material_indices: Vec::new(),
-                uvs: Vec::new(),
-                taken: Taken::default(),
-                phases,
-                seed: self.seed,
-                basis: detail.basis.unwrap_or(of_file),
-                tolerance: if exact { 0.0 } else { detail.tolerance },
-                longest_segment: detail.longest_segment,
-            };
-            fabric.transform(&self.transform);
-            let coordinates = match detail.uv {
-                false => coordinates,
-                true => {
-                    let places = coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, &fabric));
-                    fabric.uvs = places.uvs(&fabric);
-                    Some(places)
-                }
-            };
-            color.as_ref().unwrap_or(&self.color).apply(
-                &mut fabric,
-                dyes.as_ref(),
-                |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
-                context,
-                library,
-            )?;
-            Some(fabric)
-        };
-        made.into_iter().map(fabric).collect()
-    }
-}
-
-impl CurveFile {
-    /// Reads one file; points become millimetres. Gives the scale, by which radii have not been multiplied yet.
-    fn read(
-        &self,
-        path: &Path,
-        frame: Option<f64>,
-        context: &Context<'_>,
-        warnings: &mut Vec<String>,
-    ) -> Option<(CurveSet, f64)> {
-        let options = ReadOptions { frame, ..self.options.clone() };
-        let read = if stage::is_stage(path) && path.is_file() {
-            let open = context.stages.open(path).map_err(CurveFileError::from);
-            open.and_then(|stage| curve_file::read_stage(&stage, &options))
-        } else {
-            curve_file::read(path, &options)
-        };
-        let mut set = match read {
-            Ok(set) => set,
-            Err(error) => {
-                context.error(self.span, error.to_string(), None);
-                return None;
-            }
-        };
-        if set.curves.is_empty() {
-            let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-            let hint =
-                is_obj.then(|| "curves of an OBJ file are its lines (`l`); its triangles go into a [[mesh]]".into());
-            context.error(self.span, format!("{}: it holds no curve that can be drawn", path.display()), hint);
-            return None;
-        }
-        let mut note = |text: String| {
-            // Of a stage that is read at several times, once.
-            if !warnings.contains(&text) {
-                warnings.push(text);
-            }
-        };
-        set.notes.iter().for_each(|text| note(format!("{}: {text}", path.display())));
-        // What a file knows of itself is so, whatever the scene says, which may have been written for another file.
-        if let (Some(own), Some(asked)) = (set.unit_mm, self.unit)
-            && own != asked
-        {
-            let path = path.display();
-            note(format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"));
-        }
-        let scale = set.unit_mm.or(self.unit).unwrap_or(context.unit);
-        set.curves.par_iter_mut().for_each(|c| c.points.iter_mut().for_each(|p| *p *= scale));
-        Some((set, scale))
-    }
 }
