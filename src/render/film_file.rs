@@ -318,7 +318,7 @@ fn header_json(about: &About, job: &Job) -> Value {
             "middle_bits": middle.map(f64::to_bits),
         },
         "collected": layer_names(about.collected),
-        "story": metadata,
+        "metadata": metadata,
         "spp": about.spp,
         "shard": about.shard.map(|s| [s.index, s.count]),
         "crop": [x, y, x + job.film.width, y + job.film.height],
@@ -347,44 +347,53 @@ fn floats<const N: usize>(v: &Value) -> Option<[f32; N]> {
     v.as_array()?.iter().map(bit).collect::<Option<Vec<f32>>>()?.try_into().ok()
 }
 
-fn parse_header(v: &Value, length: u64) -> Option<Header> {
-    let word = |v: &Value| u32::try_from(v.as_u64()?).ok();
-    let words = |v: &Value| -> Option<Vec<u32>> { v.as_array()?.iter().map(word).collect() };
-    let text = |v: &Value| v.as_str().map(str::to_owned);
-    let keys =
-        v["keys"].as_array()?.iter().map(|pair| Some((text(&pair[0])?, text(&pair[1])?))).collect::<Option<_>>()?;
-    let metadata = v["story"].as_array()?.iter().map(|item| {
-        let value = match item[1].as_str()? {
-            "text" => Attribute::Text(text(&item[2])?),
-            "float" => Attribute::Float(f32::from_bits(word(&item[2])?)),
-            "double" => Attribute::Double(f64::from_bits(item[2].as_u64()?)),
-            "whole" => Attribute::Whole(i32::try_from(item[2].as_i64()?).ok()?),
-            "ratio" => Attribute::Ratio(i32::try_from(item[2][0].as_i64()?).ok()?, word(&item[2][1])?),
-            "matrix" => {
-                let all = floats::<16>(&item[2])?;
-                Attribute::Matrix(std::array::from_fn(|i| std::array::from_fn(|k| all[4 * i + k])))
-            }
-            "chromaticities" => {
-                let all = floats::<8>(&item[2])?;
-                Attribute::Chromaticities(std::array::from_fn(|i| [all[2 * i], all[2 * i + 1]]))
-            }
-            _ => return None,
-        };
-        Some((text(&item[0])?, value))
-    });
-    let f = &v["frame"];
-    let layers_of = |list: &Value| {
-        let mut layers = Layers::NONE;
-        for name in list.as_array()? {
-            let (_, of) = Layers::NAMES.iter().find(|(known, _)| name == known)?;
-            *of(&mut layers) = true;
+fn word(v: &Value) -> Option<u32> {
+    u32::try_from(v.as_u64()?).ok()
+}
+
+fn words(v: &Value) -> Option<Vec<u32>> {
+    v.as_array()?.iter().map(word).collect()
+}
+
+fn text(v: &Value) -> Option<String> {
+    v.as_str().map(str::to_owned)
+}
+
+/// A name and its value.
+fn parse_attribute(item: &Value) -> Option<(String, Attribute)> {
+    let value = match item[1].as_str()? {
+        "text" => Attribute::Text(text(&item[2])?),
+        "float" => Attribute::Float(f32::from_bits(word(&item[2])?)),
+        "double" => Attribute::Double(f64::from_bits(item[2].as_u64()?)),
+        "whole" => Attribute::Whole(i32::try_from(item[2].as_i64()?).ok()?),
+        "ratio" => Attribute::Ratio(i32::try_from(item[2][0].as_i64()?).ok()?, word(&item[2][1])?),
+        "matrix" => {
+            let all = floats::<16>(&item[2])?;
+            Attribute::Matrix(std::array::from_fn(|i| std::array::from_fn(|k| all[4 * i + k])))
         }
-        Some(layers)
+        "chromaticities" => {
+            let all = floats::<8>(&item[2])?;
+            Attribute::Chromaticities(std::array::from_fn(|i| [all[2 * i], all[2 * i + 1]]))
+        }
+        _ => return None,
     };
-    let frame = Frame {
+    Some((text(&item[0])?, value))
+}
+
+fn parse_layers(names: &Value) -> Option<Layers> {
+    let mut layers = Layers::NONE;
+    for name in names.as_array()? {
+        let (_, of) = Layers::NAMES.iter().find(|(known, _)| name == known)?;
+        *of(&mut layers) = true;
+    }
+    Some(layers)
+}
+
+fn parse_frame(f: &Value) -> Option<Frame> {
+    Some(Frame {
         width: word(&f["width"])?,
         height: word(&f["height"])?,
-        layers: layers_of(&f["layers"])?,
+        layers: parse_layers(&f["layers"])?,
         storage: Storage {
             compression: Compression::NAMES.iter().find(|(n, _)| f["compression"] == *n)?.1,
             half_lobes: f["half_lobes"].as_bool()?,
@@ -399,7 +408,16 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
             let bits = f["middle_bits"].as_array()?.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?;
             <[u64; 3]>::try_from(bits).ok()?.map(f64::from_bits)
         },
-    };
+    })
+}
+
+fn parse_header(v: &Value, length: u64) -> Option<Header> {
+    let keys =
+        v["keys"].as_array()?.iter().map(|pair| Some((text(&pair[0])?, text(&pair[1])?))).collect::<Option<_>>()?;
+    // Files of builds before this one have it under the second name.
+    let metadata = v.get("metadata").or_else(|| v.get("story"))?;
+    let metadata = metadata.as_array()?.iter().map(parse_attribute).collect::<Option<_>>()?;
+    let frame = parse_frame(&v["frame"])?;
     let shard = match words(&v["shard"]).as_deref() {
         None if v["shard"].is_null() => None,
         Some(&[index, count]) if 1 <= index && index <= count => Some(Shard { index, count }),
@@ -416,14 +434,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let counters: Vec<u64> = v["counters"].as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
     let [camera, bounce, shadow, cloth_paths, events, invalid] = counters.try_into().ok()?;
     Some(Header {
-        about: About {
-            keys,
-            frame,
-            collected: layers_of(&v["collected"])?,
-            metadata: metadata.collect::<Option<_>>()?,
-            spp: word(&v["spp"])?,
-            shard,
-        },
+        about: About { keys, frame, collected: parse_layers(&v["collected"])?, metadata, spp: word(&v["spp"])?, shard },
         crop,
         samples,
         next: words(&v["next"])?.try_into().ok()?,
@@ -434,4 +445,31 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
         counters: Counters { camera, bounce, shadow, cloth_paths, events, invalid },
         elapsed: Duration::from_nanos(v["nanoseconds"].as_u64()?),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneBuilder;
+
+    #[test]
+    fn metadata_come_back_under_their_name_and_under_the_earlier_one() {
+        let mut scene = SceneBuilder::new("a test");
+        scene.size(8, 6);
+        let scene = scene.build().unwrap();
+        let metadata = vec![
+            ("frame".to_owned(), Attribute::Whole(-3)),
+            ("shutter".to_owned(), Attribute::Double(0.1)),
+            ("comment".to_owned(), Attribute::Text("a \"b\"".to_owned())),
+        ];
+        let about = About::new(&scene, "4.3.3", metadata.clone(), None);
+        let mut header = header_json(&about, &Job::new(&scene, None).unwrap());
+        assert_eq!(parse_header(&header, 1).unwrap().about.metadata, metadata);
+        let keys = header.as_object_mut().unwrap();
+        let list = keys.remove("metadata").unwrap();
+        keys.insert("story".to_owned(), list);
+        assert_eq!(parse_header(&header, 1).unwrap().about.metadata, metadata);
+        header.as_object_mut().unwrap().remove("story");
+        assert!(parse_header(&header, 1).is_none());
+    }
 }
