@@ -11,11 +11,12 @@ use super::{
         Context,
         color::{ColorPlan, FabricCoordinates},
         dyes::Dyes,
+        pattern::KnitPlan,
         sequence,
-        weave::Woven,
+        weave::{WeavePlan, Woven},
         yarns::Library,
     },
-    CurveFile, Detail, FabricPlan, KindName, Source, Up,
+    CurveFile, Detail, FabricKeys, FabricPlan, KindName, Source, Up,
 };
 use crate::{
     geometry::{
@@ -79,150 +80,191 @@ impl FabricPlan {
         warnings: &mut Vec<String>,
         garments: &mut Vec<GarmentFacts>,
     ) -> Option<Vec<Fabric>> {
-        let place_of = |name: &str| library.yarns.keys().position(|n| n == name).map(CurveKind::Yarn);
-        let (kind, own_radius) = match &self.kind {
-            KindName::Yarn(name) => (place_of(name)?, library.yarns[name].radius),
-            KindName::Fiber(name) => {
-                (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), defaults::FIBER_RADIUS)
-            }
-        };
-        let radius = self.radius.unwrap_or(own_radius);
-        let with_radius = |curves: Vec<Curve>, radius: f64| -> Vec<(Curve, Vec<f64>)> {
-            let with = |mut curve: Curve| {
-                let radii = curve.radii.take().unwrap_or_else(|| vec![radius; curve.points.len()]);
-                (curve, radii)
-            };
-            curves.into_iter().map(with).collect()
-        };
-        let made = match self.source {
+        let Self { keys, source } = self;
+        let base = Base::new(&keys, context, library)?;
+        let made = match source {
             Source::Garment(plan) => {
-                let (tension, places) = (self.color.tension(), self.color.needs_places() || detail.uv);
-                let (panels, facts) = {
-                    let name = match &self.kind {
-                        KindName::Yarn(name) | KindName::Fiber(name) => name.as_str(),
-                    };
-                    plan.make((name, radius), tension, places, context, library, detail, warnings)?
-                };
+                let tension = keys.color.tension();
+                let places = keys.color.needs_places() || detail.uv;
+                let yarn = (keys.kind.name(), base.radius);
+                let (panels, facts) = plan.make(yarn, tension, places, context, library, detail, warnings)?;
                 garments.push(facts);
                 panels
                     .into_iter()
                     .map(|panel| {
-                        let kind = panel.yarn.as_deref().map_or(Some(kind), place_of)?;
+                        let kind = base.named_or_own(panel.yarn.as_deref())?;
                         let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
                         Some(Made { color: panel.color, motion: panel.motion, exact: true, ..made })
                     })
                     .collect::<Option<Vec<Made>>>()?
             }
-            Source::Knit(plan) => {
-                let plan = plan.sized(2.0 * radius, context, warnings)?;
-                let colors = match kind {
-                    CurveKind::Yarn(base) if !self.color.is_plain() => {
-                        let of_rows = |widths: &[u32]| self.color.stitches(widths, base, context, library);
-                        plan.colors(context, &of_rows, warnings)?
-                    }
-                    _ => Default::default(),
-                };
-                let (curves, coordinates, origin) = plan.curves(2.0 * radius, colors, context)?;
-                let curves = with_radius(curves, radius);
-                plan.warn_of_overlap(&curves, warnings);
-                vec![Made::new(origin, kind, curves, Some(coordinates))]
-            }
-            Source::Weave(plan) => {
-                let Woven { origin, sides } = plan.make(context)?;
-                let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
-                let weft = plan.weft_yarn.as_deref().map_or(Some(kind), place_of)?;
-                let [warp_radius, weft_radius] = plan.radii();
-                let (mut warps, wefts) = (with_radius(warps, warp_radius), with_radius(wefts, weft_radius));
-                let dyes = || Dyes::of_threads(&plan.colors);
-                if weft == kind {
-                    warps.extend(wefts);
-                    coordinates.join(weft_coordinates);
-                    vec![Made { dyes: dyes(), ..Made::new(origin, kind, warps, Some(coordinates)) }]
-                } else {
-                    let warp = Made::new(format!("warp of {origin}"), kind, warps, Some(coordinates));
-                    let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
-                    vec![Made { dyes: dyes(), ..warp }, Made { dyes: dyes(), ..weft }]
-                }
-            }
+            Source::Knit(plan) => vec![base.knit(plan, &keys.color, warnings)?],
+            Source::Weave(plan) => base.weave(&plan)?,
             Source::Straight { count, length, spacing } => {
-                let curves = with_radius(straight(count, length, spacing), radius);
-                vec![Made::new(format!("{count} straight"), kind, curves, None)]
+                let curves = with_radius(straight(count, length, spacing), base.radius);
+                vec![Made::new(format!("{count} straight"), base.kind, curves, None)]
             }
-            Source::File(file) => {
-                let mut colors = None;
-                let mut read = |path: &Path, frame: Option<f64>| {
-                    let (mut set, scale) = file.read(path, frame, context, warnings)?;
-                    colors.get_or_insert_with(|| std::mem::take(&mut set.colors));
-                    let own_radii = |mut curve: Curve| {
-                        let given = curve.radii.take().filter(|_| self.radius.is_none());
-                        let radii = given.map_or_else(
-                            || vec![radius; curve.points.len()],
-                            |r| r.iter().map(|r| r * scale).collect(),
-                        );
-                        (curve, radii)
-                    };
-                    let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
-                    if file.up == Up::Z || (file.up == Up::Auto && set.up_axis == Some(2)) {
-                        // z up becomes y up: a quarter turn about x.
-                        let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
-                        transform_curves(&mut curves, &DAffine3::from_mat3(turn));
-                    }
-                    Some(curves)
-                };
-                let (path, curves, motion) = sequence::read(&file, detail, context, &mut read)?;
-                let dyes = colors.filter(|_| file.colors).map(|colors| Dyes::of_curves(&colors));
-                if let Some(None) = dyes {
-                    warnings.push(format!("{}: `colors` is asked for, but no curve has one", path.display()));
-                }
-                let made = Made::new(path.display().to_string(), kind, curves, None);
-                vec![Made { from_file: true, motion, dyes: dyes.flatten(), ..made }]
+            Source::File(file) => vec![base.file(&file, keys.radius.is_none(), detail, warnings)?],
+        };
+        let mut stream = Stream::new(keys.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
+        made.into_iter().map(|made| made.into_fabric(&keys, &mut stream, detail, context, library)).collect()
+    }
+}
+
+/// What the curves of a fabric are where nothing else is said.
+struct Base<'a> {
+    kind: CurveKind,
+    /// Where curves have none of their own, millimetres.
+    radius: f64,
+    context: &'a Context<'a>,
+    library: &'a Library,
+}
+
+impl<'a> Base<'a> {
+    fn new(keys: &FabricKeys, context: &'a Context<'a>, library: &'a Library) -> Option<Self> {
+        let (kind, own_radius) = match &keys.kind {
+            KindName::Yarn(name) => (place_of(name, library)?, library.yarns[name].radius),
+            KindName::Fiber(name) => {
+                (CurveKind::Fiber(library.fibers.keys().position(|n| n == name)?), defaults::FIBER_RADIUS)
             }
         };
-        let mut stream = Stream::new(self.seed ^ (index as u32).wrapping_mul(0x9e37_79b9));
-        let name = self.name.unwrap_or_else(|| self.kind.into_name());
-        let fabric = |Made { origin, from_file, kind, curves, coordinates, color, dyes, motion, exact }: Made| {
-            let phases =
-                self.phases.clone().unwrap_or_else(|| curves.iter().map(|_| TAU * f64::from(stream.next())).collect());
-            let of_file = match curves.first().map(|(curve, _)| curve.basis) {
-                Some(Basis::BSpline) => Basis::BSpline,
-                _ => Basis::CatmullRom,
-            };
-            let mut fabric = Fabric {
-                name: name.clone(),
-                origin,
-                from_file,
-                kind,
-                curves,
-                motion,
-                variants: Vec::new(),
-                material_indices: Vec::new(),
-                uvs: Vec::new(),
-                taken: Taken::default(),
-                phases,
-                seed: self.seed,
-                basis: detail.basis.unwrap_or(of_file),
-                tolerance: if exact { 0.0 } else { detail.tolerance },
-                longest_segment: detail.longest_segment,
-            };
-            fabric.transform(&self.transform);
-            let coordinates = match detail.uv {
-                false => coordinates,
-                true => {
-                    let places = coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, &fabric));
-                    fabric.uvs = places.uvs(&fabric);
-                    Some(places)
-                }
-            };
-            color.as_ref().unwrap_or(&self.color).apply(
-                &mut fabric,
-                dyes.as_ref(),
-                |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
-                context,
-                library,
-            )?;
-            Some(fabric)
+        Some(Self { kind, radius: keys.radius.unwrap_or(own_radius), context, library })
+    }
+
+    fn named_or_own(&self, yarn: Option<&str>) -> Option<CurveKind> {
+        yarn.map_or(Some(self.kind), |name| place_of(name, self.library))
+    }
+
+    fn knit(&self, plan: KnitPlan, color: &ColorPlan, warnings: &mut Vec<String>) -> Option<Made> {
+        let Self { kind, radius, context, library } = *self;
+        let plan = plan.sized(2.0 * radius, context, warnings)?;
+        let colors = match kind {
+            CurveKind::Yarn(base) if !color.is_plain() => {
+                let of_rows = |widths: &[u32]| color.stitches(widths, base, context, library);
+                plan.colors(context, &of_rows, warnings)?
+            }
+            _ => Default::default(),
         };
-        made.into_iter().map(fabric).collect()
+        let (curves, coordinates, origin) = plan.curves(2.0 * radius, colors, context)?;
+        let curves = with_radius(curves, radius);
+        plan.warn_of_overlap(&curves, warnings);
+        Some(Made::new(origin, kind, curves, Some(coordinates)))
+    }
+
+    /// Warp and weft: apart if they are of different yarns.
+    fn weave(&self, plan: &WeavePlan) -> Option<Vec<Made>> {
+        let Woven { origin, sides } = plan.make(self.context)?;
+        let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
+        let weft = self.named_or_own(plan.weft_yarn.as_deref())?;
+        let [warp_radius, weft_radius] = plan.radii();
+        let (mut warps, wefts) = (with_radius(warps, warp_radius), with_radius(wefts, weft_radius));
+        let dyes = || Dyes::of_threads(&plan.colors);
+        if weft == self.kind {
+            warps.extend(wefts);
+            coordinates.join(weft_coordinates);
+            return Some(vec![Made { dyes: dyes(), ..Made::new(origin, self.kind, warps, Some(coordinates)) }]);
+        }
+        let warp = Made::new(format!("warp of {origin}"), self.kind, warps, Some(coordinates));
+        let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
+        Some(vec![Made { dyes: dyes(), ..warp }, Made { dyes: dyes(), ..weft }])
+    }
+
+    /// The curves of a file, with radii of their own if they may keep them.
+    fn file(&self, file: &CurveFile, keep_radii: bool, detail: &Detail, warnings: &mut Vec<String>) -> Option<Made> {
+        let Self { kind, radius, context, .. } = *self;
+        let mut colors = None;
+        let mut read = |path: &Path, frame: Option<f64>| {
+            let (mut set, scale) = file.read(path, frame, context, warnings)?;
+            colors.get_or_insert_with(|| std::mem::take(&mut set.colors));
+            let own_radii = |mut curve: Curve| {
+                let given = curve.radii.take().filter(|_| keep_radii);
+                let radii =
+                    given.map_or_else(|| vec![radius; curve.points.len()], |r| r.iter().map(|r| r * scale).collect());
+                (curve, radii)
+            };
+            let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
+            if file.up == Up::Z || (file.up == Up::Auto && set.up_axis == Some(2)) {
+                // z up becomes y up: a quarter turn about x.
+                let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+                transform_curves(&mut curves, &DAffine3::from_mat3(turn));
+            }
+            Some(curves)
+        };
+        let (path, curves, motion) = sequence::read(file, detail, context, &mut read)?;
+        let dyes = colors.filter(|_| file.colors).map(|colors| Dyes::of_curves(&colors));
+        if let Some(None) = dyes {
+            warnings.push(format!("{}: `colors` is asked for, but no curve has one", path.display()));
+        }
+        let made = Made::new(path.display().to_string(), kind, curves, None);
+        Some(Made { from_file: true, motion, dyes: dyes.flatten(), ..made })
+    }
+}
+
+/// Where a yarn stands among the scene's.
+fn place_of(yarn: &str, library: &Library) -> Option<CurveKind> {
+    library.yarns.keys().position(|n| n == yarn).map(CurveKind::Yarn)
+}
+
+/// Curves with their own radii, or with this one.
+fn with_radius(curves: Vec<Curve>, radius: f64) -> Vec<(Curve, Vec<f64>)> {
+    let with = |mut curve: Curve| {
+        let radii = curve.radii.take().unwrap_or_else(|| vec![radius; curve.points.len()]);
+        (curve, radii)
+    };
+    curves.into_iter().map(with).collect()
+}
+
+impl Made {
+    /// The fabric, moved to its place, with its colours; `stream` gives phases where the scene says none.
+    fn into_fabric(
+        self,
+        keys: &FabricKeys,
+        stream: &mut Stream,
+        detail: &Detail,
+        context: &Context<'_>,
+        library: &Library,
+    ) -> Option<Fabric> {
+        let Self { origin, from_file, kind, curves, coordinates, color, dyes, motion, exact } = self;
+        let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
+        let phases = keys.phases.clone().unwrap_or_else(random);
+        let of_file = match curves.first().map(|(curve, _)| curve.basis) {
+            Some(Basis::BSpline) => Basis::BSpline,
+            _ => Basis::CatmullRom,
+        };
+        let mut fabric = Fabric {
+            name: keys.name.clone().unwrap_or_else(|| keys.kind.name().to_owned()),
+            origin,
+            from_file,
+            kind,
+            curves,
+            motion,
+            variants: Vec::new(),
+            material_indices: Vec::new(),
+            uvs: Vec::new(),
+            taken: Taken::default(),
+            phases,
+            seed: keys.seed,
+            basis: detail.basis.unwrap_or(of_file),
+            tolerance: if exact { 0.0 } else { detail.tolerance },
+            longest_segment: detail.longest_segment,
+        };
+        fabric.transform(&keys.transform);
+        let coordinates = match detail.uv {
+            false => coordinates,
+            true => {
+                let places = coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, &fabric));
+                fabric.uvs = places.uvs(&fabric);
+                Some(places)
+            }
+        };
+        color.as_ref().unwrap_or(&keys.color).apply(
+            &mut fabric,
+            dyes.as_ref(),
+            |f| coordinates.unwrap_or_else(|| FabricCoordinates::along(COLUMNS, f)),
+            context,
+            library,
+        )?;
+        Some(fabric)
     }
 }
 

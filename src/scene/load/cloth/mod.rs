@@ -107,7 +107,7 @@ enum KindName {
 }
 
 impl KindName {
-    fn into_name(self) -> String {
+    fn name(&self) -> &str {
         match self {
             Self::Yarn(name) | Self::Fiber(name) => name,
         }
@@ -116,6 +116,12 @@ impl KindName {
 
 /// A fabric whose text is sound and whose curves are not read yet.
 pub(super) struct FabricPlan {
+    keys: FabricKeys,
+    source: Source,
+}
+
+/// What is said of a fabric, wherever its curves come from.
+struct FabricKeys {
     name: Option<String>,
     kind: KindName,
     radius: Option<f64>,
@@ -123,7 +129,6 @@ pub(super) struct FabricPlan {
     seed: u32,
     color: ColorPlan,
     transform: DAffine3,
-    source: Source,
 }
 
 /// Reads one `[[fabric]]`; `curves` takes the place of the fabric's file or generator.
@@ -179,7 +184,8 @@ pub(super) fn plan(
     }
     table.finish();
     let kind = fiber.map(KindName::Fiber).or(yarn.map(KindName::Yarn))?;
-    Some(FabricPlan { name, kind, radius, phases, seed, color, transform, source: source? })
+    let keys = FabricKeys { name, kind, radius, phases, seed, color, transform };
+    Some(FabricPlan { keys, source: source? })
 }
 
 fn file_source(
