@@ -121,6 +121,51 @@ struct Work {
     neighbours: Vec<Neighbour>,
 }
 
+/// How FIRE goes on: its step in time, and how much speeds turn towards forces.
+struct Fire {
+    /// The longest step.
+    longest: f64,
+    dt: f64,
+    alpha: f64,
+    /// Steps in a row in which energy fell.
+    downhill: u32,
+}
+
+impl Fire {
+    /// Goes faster while energy falls by the `power` of forces, and starts anew where it rises; gives the share of speeds
+    /// to keep, and what to add to them of forces.
+    fn adapt(&mut self, power: f64, force: f64, speed: f64) -> (f64, f64) {
+        if power > 0.0 {
+            self.downhill += 1;
+            if self.downhill > 5 {
+                self.dt = (self.dt * 1.1).min(self.longest);
+                self.alpha *= 0.99;
+            }
+        } else {
+            self.downhill = 0;
+            self.dt = (0.5 * self.dt).max(0.02 * self.longest);
+            self.alpha = 0.1;
+        }
+        match power > 0.0 && force > 0.0 {
+            true => (1.0 - self.alpha, self.alpha * speed / force),
+            false => (0.0, 0.0),
+        }
+    }
+}
+
+/// One step of all points.
+#[derive(Clone, Copy)]
+struct Step {
+    /// Share of the speeds that is kept.
+    keep: f64,
+    /// How much of the forces is added to them.
+    push: f64,
+    /// In time.
+    dt: f64,
+    /// Square of the distance beyond which a point has gone far.
+    far: f64,
+}
+
 impl Rods {
     /// Whether a segment begins at a point.
     fn has_segment(&self) -> Vec<bool> {
@@ -154,7 +199,7 @@ impl Rods {
         let weight = (n as f64).sqrt();
         let mut cell_speed = DVec2::ZERO;
         let time = TIME / run.firm.max(1.0).sqrt();
-        let (mut dt, mut alpha, mut downhill) = (0.5 * time, 0.1, 0);
+        let mut fire = Fire { longest: time, dt: 0.5 * time, alpha: 0.1, downhill: 0 };
         // Where points were when neighbours were looked for, and how many have gone far since then.
         let mut before: Vec<DVec3> = Vec::new();
         let (mut gone, mut since) = (n, 0);
@@ -199,45 +244,12 @@ impl Rods {
             {
                 return (step, largest);
             }
-            if power > 0.0 {
-                downhill += 1;
-                if downhill > 5 {
-                    dt = (dt * 1.1).min(time);
-                    alpha *= 0.99;
-                }
-            } else {
-                downhill = 0;
-                dt = (0.5 * dt).max(0.02 * time);
-                alpha = 0.1;
-            }
-            let (keep, turn) = match power > 0.0 && force > 0.0 {
-                true => (1.0 - alpha, alpha * speed / force),
-                false => (0.0, 0.0),
-            };
+            let (keep, turn) = fire.adapt(power, force, speed);
+            let dt = fire.dt;
             #[cfg(test)]
             let last = passing::before(self);
-            let limit = STEP / dt;
             let far = (0.5 * MARGIN - strained).max(0.0).powi(2);
-            let advance = |(points, speeds, forces, before): Moving<'_>| -> usize {
-                let mut gone = 0;
-                for (((p, v), f), b) in points.iter_mut().zip(speeds).zip(forces).zip(before) {
-                    *v = *v * keep + *f * (turn + dt);
-                    let size2 = v.length_squared();
-                    if size2 > limit * limit {
-                        *v *= limit / size2.sqrt();
-                    }
-                    *p += *v * dt;
-                    gone += usize::from(p.distance_squared(*b) > far);
-                }
-                gone
-            };
-            gone = if n <= CHUNK {
-                advance((&mut self.points, &mut speeds, &work.forces, &before))
-            } else {
-                let parts = self.points.par_chunks_mut(CHUNK).zip(speeds.par_chunks_mut(CHUNK));
-                let parts = parts.zip(work.forces.par_chunks(CHUNK)).zip(before.par_chunks(CHUNK));
-                parts.map(|(((p, v), f), b)| advance((p, v, f, b))).sum()
-            };
+            gone = self.advance(&mut speeds, &work.forces, &before, Step { keep, push: turn + dt, dt, far });
             if let Some(period) = self.period {
                 cell_speed = cell_speed * keep + cell_force * (turn + dt);
                 // In a step the cell's rim moves no farther than a point may.
@@ -254,6 +266,31 @@ impl Rods {
             }
         }
         (run.steps, largest)
+    }
+
+    /// Moves all points by one step; gives how many are farther than `step.far` (squared) from where they were before.
+    fn advance(&mut self, speeds: &mut [DVec3], forces: &[DVec3], before: &[DVec3], step: Step) -> usize {
+        let Step { keep, push, dt, far } = step;
+        let limit = STEP / dt;
+        let advance = |(points, speeds, forces, before): Moving<'_>| -> usize {
+            let mut gone = 0;
+            for (((p, v), f), b) in points.iter_mut().zip(speeds).zip(forces).zip(before) {
+                *v = *v * keep + *f * push;
+                let size2 = v.length_squared();
+                if size2 > limit * limit {
+                    *v *= limit / size2.sqrt();
+                }
+                *p += *v * dt;
+                gone += usize::from(p.distance_squared(*b) > far);
+            }
+            gone
+        };
+        if self.points.len() <= CHUNK {
+            return advance((&mut self.points, speeds, forces, before));
+        }
+        let parts = self.points.par_chunks_mut(CHUNK).zip(speeds.par_chunks_mut(CHUNK));
+        let parts = parts.zip(forces.par_chunks(CHUNK)).zip(before.par_chunks(CHUNK));
+        parts.map(|(((p, v), f), b)| advance((p, v, f, b))).sum()
     }
 
     /// How far each segment has gone since points were at `before`; half of what its cell has been strained with it.
