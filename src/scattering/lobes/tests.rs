@@ -1,9 +1,20 @@
 //! The models against counted light, and what they sample against what they say.
 
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
+
+use glam::Vec3A;
+
 use super::*;
 use crate::{
-    geometry::{section::Crossings, yarn::tests::touching_yarn},
-    scattering::testing::{SILK, lossless, material, section, silk, sphere},
+    geometry::{
+        section::{Crossings, Section},
+        yarn::tests::touching_yarn,
+    },
+    math::{Rgb, sampler::Stream},
+    scattering::{
+        LobeValues, mis_weight,
+        testing::{SILK, lossless, material, section, silk, sphere},
+    },
 };
 
 const MODELS: [ChordModel; 4] =
