@@ -147,3 +147,6 @@ fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
     Preparation::new(scene, borrowed(scene)).estimates().collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -207,4 +207,14 @@ mod tests {
         }
         assert!((extinction_rate(0.3, 1e-7) - 0.3).abs() < 1e-6);
     }
+
+    /// What loses all at each fibre falls as what meets none.
+    #[test]
+    fn the_rate_of_unscattered_light_is_that_of_chains_that_keep_nothing() {
+        for density in [1e-3, 0.1, 0.5, 0.8] {
+            let ply = &crate::geometry::yarn::tests::touching_yarn(1, 50, density, 0.0, 0.0).plies[0];
+            let rate = f64::from(PlyGaps::new(ply).rate);
+            assert!((rate / extinction_rate(1.0, ply.density()) - 1.0).abs() < 1e-6, "density {density}: {rate}");
+        }
+    }
 }

@@ -1,0 +1,103 @@
+//! What stands for a scene's cloth, and what scatters where a ray meets it.
+
+use glam::{DVec3, Vec3A};
+
+use super::*;
+use crate::{
+    geometry::{ray::Ray, section::Crossings},
+    math::sampler::Stream,
+    scene::load::{LoadOptions, parse},
+};
+
+/// Two straight yarns, one of each kind, and a single fibre and a box beside them.
+fn scene(mode: &str, more_of_b: &str) -> Scene {
+    let yarn = "radius = 0.5\nplies = 2\nply_twist = 20\nfibers = 40\ndensity = 0.2\n";
+    let text = format!(
+        "[render]\nmode = \"{mode}\"\n\
+         [fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n[fiber.g]\nr = 0.1\ntt = 0.1\nd = 0.1\n\
+         [yarn.a]\n{yarn}fiber = \"f\"\n[yarn.b]\n{yarn}fiber = \"g\"\n{more_of_b}\
+         [[fabric]]\nyarn = \"a\"\nrows = [\"a\", \"b\"]\n\
+         source = {{ type = \"straight\", count = 2, length = 20, spacing = 3 }}\n\
+         [[fabric]]\nfiber = \"f\"\nradius = 0.5\ntranslate = [0, 10, 0]\n\
+         source = {{ type = \"straight\", count = 1, length = 20 }}\n\
+         [[mesh]]\nshape = \"box\"\nsize = [4, 4, 4]\ntranslate = [0, -10, 0]\nalbedo = 0.5\n\
+         [[light]]\ntype = \"environment\"\nradiance = 1\n"
+    );
+    parse("a test", &text, &LoadOptions::default()).unwrap()
+}
+
+/// The middle of a curve of a fabric.
+fn middle(scene: &Scene, fabric: usize, curve: usize) -> DVec3 {
+    let points = &scene.fabrics[fabric].curves[curve].0.points;
+    points[points.len() / 2]
+}
+
+/// A ray along -z that passes a place at this distance.
+fn past(at: DVec3, offset: f64) -> Ray {
+    Ray::new((at + DVec3::new(0.0, offset, 50.0)).as_vec3a(), Vec3A::NEG_Z)
+}
+
+const PACKED: &str = "[yarn.b.packing]\ntype = \"measured\"\n";
+
+#[test]
+fn what_rays_pass_is_what_the_model_of_each_yarn_says() {
+    // Of yarns that differ in colour only, rays know one.
+    for (more, known) in [("", 0), (PACKED, 2)] {
+        let scene = scene("yarn", more);
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        let (mut crossings, mut stream) = (Crossings::new(), Stream::new(1));
+        let mut compared = 0;
+        for i in 0..400 {
+            let ray = past(middle(&scene, 0, i % 2), 0.9 * f64::from(stream.next()) - 0.45);
+            let Some(hit) = cloth.world().intersect(&ray) else { continue };
+            let Met::Yarn { section, yarns, scatterer } = cloth.at(&hit) else { panic!("{hit:?}") };
+            assert_eq!(yarns.occluders.variants().len(), known);
+            section.crossings(scatterer.shape(), &mut crossings);
+            let want = scatterer.transparency(&crossings);
+            // Below a thousandth, a shadow ray counts as blocked.
+            let want = if want < 1e-3 { 0.0 } else { want };
+            let passed = cloth.world().transmittance(&ray, &mut crossings);
+            assert!((passed - want).abs() < 2e-5, "{passed} {want}");
+            compared += 1;
+        }
+        assert!(compared > 200, "{compared}");
+    }
+}
+
+#[test]
+fn a_hit_is_joined_to_the_material_of_what_it_met() {
+    for mode in ["yarn", "ply", "fiber"] {
+        let scene = scene(mode, "");
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        for yarn in 0..2 {
+            // Between two plies, or fibres, a ray passes.
+            let hit =
+                (0..40).find_map(|i| cloth.world().intersect(&past(middle(&scene, 0, yarn), 0.02 * f64::from(i))));
+            let hit = hit.unwrap();
+            let own = |all: &Scatterers| match (all, cloth.at(&hit)) {
+                (Scatterers::Yarns(all), Met::Yarn { scatterer, .. }) => std::ptr::eq(&all.variants()[yarn], scatterer),
+                (Scatterers::Fibers(all), Met::Fiber { scatterer, .. }) => {
+                    std::ptr::eq(&all.variants()[yarn], scatterer)
+                }
+                _ => false,
+            };
+            assert!(own(&cloth.scatterers[hit.geometry]), "{mode}, yarn {yarn}: {hit:?}");
+        }
+        let hit = cloth.world().intersect(&past(middle(&scene, 1, 0), 0.1)).unwrap();
+        assert!(matches!(cloth.at(&hit), Met::Fiber { fibers, .. } if fibers.fabric == 1), "{mode}: {hit:?}");
+        let (low, high) = scene.objects[0].mesh.bounds().unwrap();
+        let hit = cloth.world().intersect(&past(0.5 * (low + high), 0.1)).unwrap();
+        assert!(matches!(cloth.at(&hit), Met::Surface(place) if place.material == scene.objects[0].material));
+    }
+}
+
+#[test]
+fn every_mode_and_model_makes_what_was_estimated() {
+    for mode in ["yarn", "ply", "fiber"] {
+        let scene = scene(mode, "");
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        let made: usize = cloth.world().of_fabric(0).map(|geometry| geometry.curves().2.len()).sum();
+        assert_eq!(estimates(&scene)[0].segments, made as u64, "{mode}");
+        assert_eq!(cloth.scatterers.len(), cloth.world().geometries().len());
+    }
+}
