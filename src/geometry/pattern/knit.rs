@@ -290,7 +290,15 @@ impl Knit {
             Some(cell) => Some((cell, row)),
             None => kinds.of_row.get(row).copied().flatten().map(|k| (&kinds.cells[k], 0)),
         };
-        let laying = Laying { loops: &loops, surface: &surface, cells: &cell_of, even, yarn: self.yarn(size), points };
+        let laying = Laying {
+            loops: &loops,
+            surface: &surface,
+            cells: &cell_of,
+            even,
+            own_cells: cell.is_some(),
+            yarn: self.yarn(size),
+            points,
+        };
         let mut threads = laying.threads(&ways);
         let steps = if even { EDGE_STEPS } else { PIECE_STEPS };
         let run = Run {

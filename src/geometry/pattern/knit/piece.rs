@@ -1,6 +1,8 @@
 //! A whole piece: loops are laid out as their cell has them or in their closed form, yarns led from row to row, and what
 //! is not at rest yet relaxed.
 
+pub(super) mod follow;
+
 use std::{collections::HashSet, f64::consts::TAU};
 
 use glam::{DVec2, DVec3, IVec3};
@@ -71,6 +73,8 @@ pub(super) struct Laying<'a> {
     pub(super) cells: &'a dyn Fn(usize) -> Option<(&'a Cell, usize)>,
     /// Whether all of the piece repeats as its cell does.
     pub(super) even: bool,
+    /// Whether cells are of the chart's own rows; else of knit and purl stitches that stand where others may.
+    pub(super) own_cells: bool,
     /// Length of yarn in a stitch, and its points.
     pub(super) yarn: f64,
     pub(super) points: u32,
@@ -78,13 +82,16 @@ pub(super) struct Laying<'a> {
 
 /// Stitches and rows at the edges that find their place anew.
 const EDGE: usize = 2;
+/// The longest segment, in diameters.
+const LONGEST: f64 = 1.0;
 /// Length of yarn beyond the first and the last stitch, in diameters.
 const TAIL: f64 = 6.0;
 
 impl Laying<'_> {
     /// The yarns: each goes through its rows, turns at the edges of a flat piece, and goes round and round in a tube.
     pub(super) fn threads(&self, ways: &[Way]) -> Vec<Thread> {
-        let pieces = self.loops.pieces();
+        let mut pieces = self.loops.pieces();
+        self.follow(&mut pieces);
         ways.iter().map(|way| self.thread(way, &pieces)).collect()
     }
 
@@ -244,13 +251,7 @@ impl Laying<'_> {
 
     fn lay(&self, course: &Course, k: usize, piece: &Piece, edge: bool, out: &mut Thread) {
         let row = course.row;
-        let own = match course.visits[k].1 {
-            Visit::Loop(i) => Some(&self.loops.loops[i as usize]),
-            Visit::Pass { .. } | Visit::Float { .. } => None,
-        };
-        let is_float = matches!(course.visits[k].1, Visit::Float { .. });
         let finished = self.loops.border.finished;
-        let cell = usize::try_from(row).ok().filter(|_| !is_float).and_then(|r| (self.cells)(r));
         let held = |grid: [f32; 2]| {
             let head = grid[1] - row as f32;
             !finished && ((row == 0 && head < 0.1) || (row + 1 == self.loops.rows && head > 0.9))
@@ -261,9 +262,9 @@ impl Laying<'_> {
             (false, false) => State::Move,
         };
         let first = out.points.len();
-        match (cell, &self.surface) {
+        match (self.cell_of(course, k), &self.surface) {
             // As the cell has it.
-            (Some((cell, r)), Surface::Plane { width, height }) if self.even => {
+            (Some((cell, r)), Surface::Plane { width, height }) => {
                 let n = self.loops.wide as f64;
                 let left = DVec3::new(-0.5 * n * width, f64::from(row) * height - r as f64 * height, 0.0);
                 let rest = cell.rest(r, course.first + k);
@@ -275,25 +276,12 @@ impl Laying<'_> {
                 return;
             }
             // Bent round.
-            (Some((cell, r)), Surface::Round { .. }) if self.plain(own) => {
-                let Some(own) = own else { return };
-                let [width, height] = cell.gauge();
-                let count = course.visits.len() as f64;
+            (Some((cell, r)), Surface::Round { .. }) => {
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
-                    let head = f64::from(g[1] - r as f32);
-                    let lean = own.foot - own.at + (self.head(own) - own.foot) * head;
-                    let at = own.at + lean + (p.x / width - (k as f64 + 0.5)) / count;
-                    // A cell of several rows has its own room for what passes.
-                    let base = if cell.high > 1 { f64::from(row) } else { self.loops.up(row) };
-                    let up = base + p.y / height - r as f64;
+                    let place = self.place_of(course, k, (cell, r), p, f64::from(g[1] - r as f32));
                     let grid = [g[0], g[1] - r as f32 + row as f32];
-                    out.push(
-                        self.surface.place(&Place { at, up, out: p.z }),
-                        rest,
-                        grid,
-                        state(grid, self.even && !edge),
-                    );
+                    out.push(self.surface.place(&place), rest, grid, state(grid, self.even && !edge));
                 }
                 self.lead(course, k, piece, first, out);
                 return;
@@ -335,7 +323,9 @@ impl Laying<'_> {
     fn plain(&self, own: Option<&Loop>) -> bool {
         own.is_some_and(|l| {
             let above = |c: &u32| self.loops.loops[*c as usize].parents.len() == 1;
-            l.parents.len() <= 1 && l.layer == 0.0 && l.children.iter().all(above)
+            let next = l.held.is_none_or(|row| row == l.row + 1);
+            let usual = self.own_cells || (l.sign != 0.0 && l.twist == 0.0 && next);
+            usual && l.parents.len() <= 1 && l.layer == 0.0 && l.children.iter().all(above)
         })
     }
 
@@ -381,6 +371,11 @@ impl Thread {
                 && *last == 0.0
             {
                 *last = from.distance(to).max(0.1);
+                if *last > LONGEST {
+                    // Along a long segment its neighbours would count as other strands.
+                    self.go_on(&[from, to]);
+                    self.pop();
+                }
             }
         }
         self.points.append(&mut next.points);

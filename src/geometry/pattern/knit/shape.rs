@@ -36,7 +36,7 @@ pub(in super::super) struct Piece {
 /// far legs lean (stitch 4.13 wide): the densest plain stitch of this form whose strands keep apart, found by a search.
 const DEPTH: f64 = 0.763;
 const REACH: f64 = 0.775 / 2.28;
-const LEAN: f64 = 0.982 / 4.13;
+pub(super) const LEAN: f64 = 0.982 / 4.13;
 /// Distance of loops that lie over each other, and of cables that pass each other.
 const LAYER: f64 = 0.85;
 const CABLE: f64 = 2.6;

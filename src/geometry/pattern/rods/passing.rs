@@ -28,12 +28,14 @@ const NEAR: f64 = 0.3;
 
 /// Looks at a step from `before`.
 pub(super) fn watch(before: &Rods, after: &Rods, has: &[bool], work: &Work) {
-    let next = |rods: &Rods, i: usize| {
-        let strand = rods.strands.iter().find(|s| s.start + s.count == i + 1);
-        match strand.and_then(|s| s.jump.map(|jump| (s.start, jump))) {
-            Some((start, jump)) => rods.points[start] + jump,
-            None => rods.points[(i + 1).min(rods.points.len() - 1)],
-        }
+    // The strand that ends at a point and goes on with its first one.
+    let mut joined = vec![None; after.points.len()];
+    for (k, s) in after.strands.iter().enumerate().filter(|(_, s)| s.jump.is_some()) {
+        joined[s.start + s.count - 1] = Some(k);
+    }
+    let next = |rods: &Rods, i: usize| match joined[i].map(|k: usize| &rods.strands[k]) {
+        Some(s) => rods.points[s.start] + s.jump.unwrap_or_default(),
+        None => rods.points[(i + 1).min(rods.points.len() - 1)],
     };
     for i in (0..after.points.len()).filter(|&i| has[i]) {
         for other in &work.neighbours[work.starts[i] as usize..work.starts[i + 1] as usize] {

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    super::{super::rods::passing::passed, loops::Visit},
+    super::{super::rods::passing::passed, loops::Visit, piece::follow::threaded},
     *,
 };
 
@@ -238,5 +238,64 @@ fn yarns_do_not_pass_each_other_in_pieces() {
         ("floats in a tube", in_colors(&TWO_COLORS, Form::Tube)),
     ] {
         assert_eq!(passed(|| drop(piece.strands(1.0).unwrap())), 0, "{name}");
+    }
+}
+
+/// The yarn of each stitch of a piece of one yarn from left to right, by its row from the cast-on edge and its column. Round
+/// pieces are unrolled.
+fn yarn_of_stitches(piece: &Knit) -> BTreeMap<(i32, i32), Vec<DVec3>> {
+    let made = piece.knitted(1.0).unwrap();
+    let n = f64::from(piece.stitches);
+    let radius = made.gauge[0] * n / TAU;
+    let unrolled = |p: DVec3, wale: f32| match piece.form {
+        Form::Flat => p,
+        _ => {
+            // The turn nearest to where the stitch belongs.
+            let (turn, own) = (p.x.atan2(p.z) / TAU, f64::from(wale) / n);
+            DVec3::new((turn + (own - turn).round()) * TAU * radius, p.y, p.x.hypot(p.z) - radius)
+        }
+    };
+    let mut stitches: BTreeMap<(i32, i32), Vec<DVec3>> = BTreeMap::new();
+    for (p, [wale, course]) in made.strands[0].curve.points.iter().zip(&made.strands[0].coordinates) {
+        stitches.entry((course.floor() as i32, wale.floor() as i32)).or_default().push(unrolled(*p, *wale));
+    }
+    for own in stitches.values_mut().filter(|own| own[0].x > own[own.len() - 1].x) {
+        own.reverse();
+    }
+    stitches
+}
+
+/// Stitches that are not drawn through what the chart says, away from the sides.
+fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
+    let (rows, stitches) = (piece.worked().unwrap(), yarn_of_stitches(piece));
+    let is_drawn = |r: i32, k: i32| {
+        let [before, own, after] = [k - 1, k, k + 1].map(|k| stitches[&(r, k)].as_slice());
+        let ring = [&stitches[&(r - 1, k)][..], &stitches[&(r - 1, k + 1)][..1]].concat();
+        let half = own.len() / 2;
+        let to = [&before[before.len() / 2..], &own[..=half]].concat();
+        let from = [&own[half..], &after[..=after.len() / 2]].concat();
+        // Cast-on loops are twisted.
+        let sign = if rows[r as usize][k as usize].purl == (r > 0) { -1 } else { 1 };
+        [threaded(&ring, &to), threaded(&ring, &from)] == [sign, -sign]
+    };
+    let all = (0..rows.len() as i32).flat_map(|r| (2..piece.stitches as i32 - 2).map(move |k| (r, k)));
+    all.filter(|&(r, k)| !is_drawn(r, k)).collect()
+}
+
+#[test]
+fn pieces_are_drawn_through_each_other_from_edge_to_edge() {
+    for (pattern, form, stitches) in [
+        ("stockinette", Form::Flat, 10),
+        ("rib2x2", Form::Flat, 16),
+        ("rib1x1", Form::Flat, 10),
+        ("seed", Form::Flat, 10),
+        ("stockinette", Form::Tube, 24),
+        ("rib2x2", Form::Tube, 32),
+        ("rib1x1", Form::Tube, 32),
+    ] {
+        let piece = Knit { form: form.clone(), ..knit(pattern, stitches, 6) };
+        let passes = passed(|| drop(piece.strands(1.0).unwrap()));
+        let undrawn = undrawn(&piece);
+        assert!(passes == 0 && undrawn.is_empty(), "{pattern} {form:?}: {passes} passes, {undrawn:?}");
     }
 }
