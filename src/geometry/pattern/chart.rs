@@ -16,6 +16,7 @@
 //! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
 //! | `t3f`, `t3b` | the same with purl stitches behind |
 //! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
+//! | `mb`, `bobble` | five loops out of one stitch (`k yo k yo k`), turn, five purled, turn, all of them knitted together |
 //!
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
 
@@ -78,13 +79,15 @@ pub enum Step {
         /// Whether those behind are purled.
         purl: bool,
     },
+    /// Five loops out of one stitch, five more on the way back, and one through all of them.
+    Bobble,
 }
 
 impl Step {
     /// Stitches of the row below that it takes, and stitches that it makes.
     pub fn takes_and_makes(self) -> (u32, u32) {
         match self {
-            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck => (1, 1),
+            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble => (1, 1),
             Self::Together { take, .. } => (take.into(), 1),
             Self::FrontBack => (1, 2),
             Self::YarnOver | Self::MakeOne { .. } => (0, 1),
@@ -112,6 +115,8 @@ pub enum Act {
         /// Whether the left leg of the twisted strand is on top.
         left: bool,
     },
+    /// A bobble grows out of the stitch below; one loop is left of it.
+    Bobble,
 }
 
 /// A stitch: what it is made of in the row below, and how.
@@ -203,7 +208,7 @@ const WIDEST_CABLE: u8 = 24;
 /// How far from what is asked a number of stitches is looked for that a chart fits.
 const LARGEST_STEP_ASIDE: usize = 200;
 const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
-                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, with spaces between them";
+                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, with spaces between them";
 
 impl Chart {
     /// A pattern by its name.
@@ -384,6 +389,7 @@ impl Row {
                 Step::MakeOne { left } => out.push(Stitch { act: Act::Lift { left }, parents: 0, ..plain }),
                 Step::Slip { front } => out.push(Stitch { act: Act::Pass { front }, ..plain }),
                 Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
+                Step::Bobble => out.push(Stitch { act: Act::Bobble, ..plain }),
                 Step::Cable { front, back, left, purl } => {
                     let (front, back) = (u32::from(front), u32::from(back));
                     let ahead = |i| Stitch { first_parent: at + if left { back } else { 0 } + i, layer: 1, ..plain };
@@ -438,6 +444,7 @@ fn parse_step(token: &str) -> Option<(usize, Step)> {
         "yo" => Step::YarnOver,
         "m1l" | "m1" => Step::MakeOne { left: true },
         "m1r" => Step::MakeOne { left: false },
+        "mb" | "bobble" => Step::Bobble,
         _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
     };
     Some((1, named))

@@ -10,7 +10,7 @@ use super::{
         rods::{Rods, Run, Strand},
     },
     loops::{Border, Loops, Visit},
-    shape::{Piece, Place, points_of, spaced},
+    shape::{Piece, Place, bobble::CLOSED, points_of, spaced},
 };
 
 /// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
@@ -111,8 +111,9 @@ impl Cell {
 
     fn relax(&mut self, loops: &Loops, points: u32, size: [Option<f64>; 2]) {
         let free = size.map(|s| s.is_none());
-        let run =
-            Run { steps: STEPS[0], growing: STEPS[0] / 5, thin: 0.5, free, load: BLOCKING, firm: 1.0, calm: 0.01 };
+        // The many strands of a bobble begin close to each other.
+        let (growing, thin) = if loops.has_bobbles() { (STEPS[0] / 3, 0.3) } else { (STEPS[0] / 5, 0.5) };
+        let run = Run { steps: STEPS[0], growing, thin, free, load: BLOCKING, firm: 1.0, calm: 0.01 };
         self.rods.relax(&run);
         self.refine(points);
         let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };
@@ -174,22 +175,32 @@ impl Cell {
             let at = |i: isize| old.points[strand.start + i.rem_euclid(n) as usize] + jump * i.div_euclid(n) as f64;
             let counts: Vec<isize> = visits.windows(2).map(|w| (w[1] - w[0]) as isize).collect();
             let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
-            let middle = |k: usize| (visits[k] - strand.start) as isize + counts[k] / 2;
+            let is_bobble = |k: usize| matches!(course.visits[k].1, Visit::Loop(i) if loops.loops[i as usize].bobble);
+            // Points of a visit before its head, and how far from there it is looked for.
+            let before = |k: usize| if is_bobble(k) { (CLOSED * counts[k] as f64) as isize } else { counts[k] / 2 };
+            let around = |k: usize| match is_loop(k) {
+                true if is_bobble(k) => (counts[k] - before(k)) / 2,
+                true => counts[k] / 4,
+                false => 0,
+            };
+            let middle = |k: usize| (visits[k] - strand.start) as isize + before(k);
             // First by how much all have slid, then each for itself.
             let height =
                 |s: isize| -> f64 { (0..counts.len()).filter(|&k| is_loop(k)).map(|k| at(middle(k) + s).y).sum() };
-            let most = counts.iter().copied().max().unwrap_or(0) / 2;
+            let most = (0..counts.len()).filter(|&k| !is_bobble(k)).map(|k| counts[k] / 2).max().unwrap_or(0);
             let slid = (-most..=most).max_by(|&a, &b| height(a).total_cmp(&height(b))).unwrap_or(0);
             let head = |k: usize| {
-                let (from, reach) = (middle(k) + slid, if is_loop(k) { counts[k] / 4 } else { 0 });
+                let (from, reach) = (middle(k) + slid, around(k));
                 let highest = (from - reach..=from + reach).max_by(|&a, &b| at(a).y.total_cmp(&at(b).y));
                 highest.unwrap_or(from)
             };
             let heads: Vec<isize> = (0..counts.len()).map(head).collect();
             let start = |k: usize| {
-                let before = (k + counts.len() - 1) % counts.len();
-                let from = heads[before] - if k == 0 { n } else { 0 };
-                from + (heads[k] - from) * counts[before] / (counts[before] + counts[k])
+                let last = (k + counts.len() - 1) % counts.len();
+                let from = heads[last] - if k == 0 { n } else { 0 };
+                let after = if is_bobble(last) { 2 * (counts[last] - before(last)) } else { counts[last] };
+                let before = if is_bobble(k) { 2 * before(k) } else { counts[k] };
+                from + (heads[k] - from) * after / (after + before)
             };
             let mut starts: Vec<isize> = (0..counts.len()).map(start).collect();
             starts.push(starts[0] + n);
@@ -200,7 +211,11 @@ impl Cell {
                 let count = (starts[k + 1] - starts[k]) as f64;
                 for i in starts[k]..starts[k + 1] {
                     let share = (i - starts[k]) as f64 / count;
-                    let rise = if is_loop(k) { 0.5 - 0.5 * (TAU * share).cos() } else { 0.0 };
+                    let rise = match is_loop(k) {
+                        true if is_bobble(k) => (1.0 - (share - CLOSED).abs() / (1.0 - CLOSED)).max(0.3),
+                        true => 0.5 - 0.5 * (TAU * share).cos(),
+                        false => 0.0,
+                    };
                     self.rods.points.push(at(i));
                     self.rods.rest.push(old.rest[strand.start + i.rem_euclid(n) as usize]);
                     let (column, row) = (f64::from(course.visits[k].0), f64::from(course.row));

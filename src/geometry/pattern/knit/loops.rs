@@ -3,7 +3,7 @@
 mod maker;
 
 use self::maker::{LIFTED, Maker};
-use super::{super::chart::Stitch, colors::Hold};
+use super::{super::chart::Stitch, colors::Hold, shape::REACH};
 
 /// A loop of yarn that a needle has held.
 #[derive(Clone, Debug)]
@@ -30,6 +30,8 @@ pub(in super::super) struct Loop {
     pub(in super::super) yarn: f64,
     /// Where its feet are across the cloth: half way between its own middle and those of its parents.
     pub(in super::super) foot: f64,
+    /// Whether it closes a bobble, which is drawn through what it is.
+    pub(in super::super) bobble: bool,
 }
 
 impl Loop {
@@ -47,6 +49,7 @@ impl Loop {
             layer: 0.0,
             yarn: 1.0,
             foot: at,
+            bobble: false,
         }
     }
 
@@ -121,6 +124,8 @@ pub(in super::super) struct Loops {
     /// How far up each row begins, in rows: those whose stitches change places have more room below them.
     heights: Vec<f64>,
     room: f64,
+    /// Whether any stitch is a bobble.
+    bobbles: bool,
 }
 
 /// What is beside the last stitch of a row, above the last row and below the first one.
@@ -172,6 +177,16 @@ impl Loops {
     /// How much higher rows are with the room that some have below them.
     pub(in super::super) fn room(&self) -> f64 {
         self.room
+    }
+
+    pub(in super::super) fn has_bobbles(&self) -> bool {
+        self.bobbles
+    }
+
+    /// How far feet and heads reach beyond the line where they hold each other, in mean rows: bobbles must not make them
+    /// longer as they make rows higher.
+    pub(in super::super) fn reach(&self) -> f64 {
+        if self.bobbles { REACH / self.room } else { REACH }
     }
 
     /// Every loop with what is drawn through it: parent and child.

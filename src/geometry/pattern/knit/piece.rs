@@ -324,7 +324,7 @@ impl Laying<'_> {
         own.is_some_and(|l| {
             let above = |c: &u32| self.loops.loops[*c as usize].parents.len() == 1;
             let next = l.held.is_none_or(|row| row == l.row + 1);
-            let usual = self.own_cells || (l.sign != 0.0 && l.twist == 0.0 && next);
+            let usual = self.own_cells || (l.sign != 0.0 && l.twist == 0.0 && !l.bobble && next);
             usual && l.parents.len() <= 1 && l.layer == 0.0 && l.children.iter().all(above)
         })
     }

@@ -5,10 +5,13 @@
 //! the line where its children are drawn through it. The depth takes its sign from the loop itself at its feet and from
 //! its children at its head; where several loops lie over each other, each has a depth of its own.
 
+pub(super) mod bobble;
+
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use self::bobble::PILED;
 use super::{
     colors::Hold,
     loops::{Border, Course, Loop, Loops, Visit},
@@ -35,13 +38,17 @@ pub(in super::super) struct Piece {
 /// How deep a loop dives, how far feet and heads reach beyond the line where they hold each other (rows 2.28 apart), and how
 /// far legs lean (stitch 4.13 wide): the densest plain stitch of this form whose strands keep apart, found by a search.
 const DEPTH: f64 = 0.763;
-const REACH: f64 = 0.775 / 2.28;
+pub(super) const REACH: f64 = 0.775 / 2.28;
 pub(super) const LEAN: f64 = 0.982 / 4.13;
 /// Distance of loops that lie over each other, and of cables that pass each other.
 const LAYER: f64 = 0.85;
 const CABLE: f64 = 2.6;
 /// Width of a strand that is lifted between two stitches.
 const NARROW: f64 = 0.9;
+/// How wide a stitch is out of which a bobble grows.
+const HOLDS_BOBBLE: f64 = 1.35;
+/// How wide the foot is of what closes a bobble.
+const CLOSING: f64 = 0.6;
 /// How far yarn lies off the cloth where it passes stitches.
 const FLOAT: f64 = 1.7;
 /// Places of a piece.
@@ -76,30 +83,33 @@ impl Loops {
     /// How deep the feet of a loop dive: behind all that it is drawn through.
     fn foot_depth(&self, own: &Loop) -> f64 {
         let over = own.parents.iter().any(|&p| self.loops[p as usize].sign == 0.0);
-        DEPTH + LAYER * own.parents.len().saturating_sub(1) as f64 + if over { 0.5 } else { 0.0 }
+        let others = LAYER * own.parents.len().saturating_sub(1) as f64;
+        DEPTH + if own.bobble { PILED } else { others } + if over { 0.5 } else { 0.0 }
     }
 
     /// Where the feet of a visit are: its middle, and how far up and out.
     fn foot(&self, course: &Course, visit: &Visit) -> Foot {
-        let row = self.up(course.row);
+        let (row, reach) = (self.up(course.row), self.reach());
         match visit {
             Visit::Loop(i) => {
                 let l = &self.loops[*i as usize];
                 let stack = l.parents.len().saturating_sub(1) as f64;
-                let (reach, out) = match l.sign {
+                let (below, out) = match l.sign {
                     // Behind the stitches that it lies between, or in front of purl ones.
-                    0.0 if l.is_lifted() => (REACH, DEPTH * l.layer + if l.layer > 0.0 { 0.6 } else { 0.0 }),
+                    0.0 if l.is_lifted() => (reach, DEPTH * l.layer + if l.layer > 0.0 { 0.6 } else { 0.0 }),
                     0.0 => (0.0, 0.0),
-                    sign => (REACH + 0.12 * stack, -sign * self.foot_depth(l)),
+                    // A bobble begins as any other loop.
+                    sign if l.bobble => (reach, -sign * DEPTH),
+                    sign => (reach + 0.12 * stack, -sign * self.foot_depth(l)),
                 };
                 let behind = if l.is_lifted() { -l.layer } else { l.sign };
-                Foot { at: l.foot, up: row - reach, out, behind }
+                Foot { at: l.foot, up: row - below, out, behind }
             }
             Visit::Pass { at, front } => {
                 let out = if *front { FLOAT } else { -FLOAT };
-                Foot { at: *at, up: row - 0.5 * REACH, out, behind: 0.0 }
+                Foot { at: *at, up: row - 0.5 * reach, out, behind: 0.0 }
             }
-            Visit::Float { at } => Foot { at: *at, up: row - 0.5 * REACH + course.lift, out: -FLOAT, behind: 0.0 },
+            Visit::Float { at } => Foot { at: *at, up: row - 0.5 * reach + course.lift, out: -FLOAT, behind: 0.0 },
         }
     }
 
@@ -147,7 +157,10 @@ impl Loops {
                         let ends = [left.unwrap_or(end(-1.0)), joints[k].unwrap_or(end(1.0))];
                         let (column, visit) = &course.visits[k];
                         match visit {
-                            Visit::Loop(i) => self.loop_piece(&self.loops[*i as usize], *column, own, ends, step),
+                            Visit::Loop(i) => match &self.loops[*i as usize] {
+                                l if l.bobble => self.bobble(l, *column, own, ends, step),
+                                l => self.loop_piece(l, *column, own, ends, step),
+                            },
                             Visit::Pass { .. } | Visit::Float { .. } => pass_piece(*column, course.row, own, ends),
                         }
                     })
@@ -175,11 +188,11 @@ impl Loops {
         let head_at =
             if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
         let bound = own.held == Some(own.row);
-        let head_up = self.up(own.held.unwrap_or(own.row + 1)) + REACH + if bound { 0.5 } else { 0.0 };
+        let head_up = self.up(own.held.unwrap_or(own.row + 1)) + self.reach() + if bound { 0.5 } else { 0.0 };
         let swap = self.swap(own, head_up - foot.up, head_at - foot.at);
         let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
         let foot_depth = self.foot_depth(own);
-        let spread = 1.0 + 0.8 * (count - 1.0);
+        let spread = if children().any(|c| c.bobble) { HOLDS_BOBBLE } else { 1.0 + 0.8 * (count - 1.0) };
         let crossing = match over {
             true if own.is_lifted() => 0.46,
             true => 0.35,
@@ -197,7 +210,11 @@ impl Loops {
             let inside = smooth(t.min(TAU - t) / reach);
             let (side, end) = if k <= STEPS / 2 { (-1.0, ends[0]) } else { (1.0, ends[1]) };
             let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth((head - crossing) / 0.24 + 0.5) };
-            let wide = if own.is_lifted() { NARROW } else { mix(1.0, spread) };
+            let wide = match own.is_lifted() {
+                true => NARROW,
+                // What closes a bobble goes through heads that lie close.
+                false => mix(if own.bobble { CLOSING } else { 1.0 }, spread),
+            };
             let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * wide * turned;
             let moved = swap.map_or(upper, |s| s.moved(head));
             let at = foot.at
@@ -212,6 +229,10 @@ impl Loops {
                 mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
             };
             out += swap.map_or(0.0, |s| s.raised(head));
+            if own.bobble {
+                // The last one of those that it is drawn through lies in the cloth.
+                out += PILED * (1.0 - smooth((head - 0.42) / 0.16));
+            }
             if own.twist != 0.0 {
                 let bump = 1.0 - smooth((head - crossing).abs() / 0.25);
                 out += side * own.twist * 0.55 * bump;
@@ -290,7 +311,7 @@ impl Loops {
             return None;
         }
         // Heads reach so far up from the row below, and feet down from that above.
-        Some(Swap { from: (2.0 * REACH / high).min(0.4), front, over, depth })
+        Some(Swap { from: (2.0 * self.reach() / high).min(0.4), front, over, depth })
     }
 }
 

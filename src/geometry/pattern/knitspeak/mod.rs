@@ -48,7 +48,7 @@ const MOST_STITCHES: u32 = 20_000;
 const MOST_NESTED: usize = 16;
 
 const KNOWN: &str = "k, p, ktbl, ptbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, m1l, m1r, sl1, \
-                     sl1 wyif, tuck and cables such as c4f and 2/1 LC are known; write repeats as *...; rep from * to end, \
+                     sl1 wyif, tuck, mb and cables such as c4f and 2/1 LC are known; write repeats as *...; rep from * to end, \
                      [...] 3 times";
 
 /// The rows of a chart, from the cast-on edge up, each from left to right as seen from the right side.

@@ -35,10 +35,10 @@ fn lace_keeps_its_count() {
 #[test]
 fn charts_know_every_stitch_that_is_understood() {
     let all = "Row 1: k1, p1, k1 tbl, p1 tbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, sl1, \
-               sl1 wyif, tuck, miss, c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC\nRow 2: k to last 2 sts, p2, yo";
-    let rows = rows(all, 49);
+               sl1 wyif, tuck, miss, mb, c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC\nRow 2: k to last 2 sts, p2, yo";
+    let rows = rows(all, 50);
     let chart = crate::geometry::pattern::chart::Chart::parse(&rows).unwrap();
-    assert_eq!(chart.work(49, 2, 1 << 20).unwrap().len(), 2);
+    assert_eq!(chart.work(50, 2, 1 << 20).unwrap().len(), 2);
 }
 
 #[test]

@@ -241,6 +241,7 @@ fn step(word: &str) -> Option<Steps> {
         "tuck" => return one("tuck", 1, 1),
         "miss" => return one("miss", 1, 1),
         "slwyif" => return one("slwyif", 1, 1),
+        "mb" | "bobble" => return one("mb", 1, 1),
         _ => {}
     }
     if word.contains('/') {

@@ -1,7 +1,10 @@
 //! Makes the loops of a chart's stitches: where they are, what they are drawn through, and the edges.
 
 use super::{
-    super::super::chart::{Act, Stitch, Top},
+    super::{
+        super::chart::{Act, Stitch, Top},
+        shape::bobble::{BELLY, BOBBLE},
+    },
     Border, Course, Loop, Loops, Visit,
 };
 
@@ -154,6 +157,7 @@ impl<'a> Maker<'a> {
                 let base = Loop { layer: s.layer.into(), ..Loop::laid(r as i32, at) };
                 let new = match s.act {
                     Act::Draw | Act::Lift { .. } => Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base }),
+                    Act::Bobble => Some(Loop { sign: 1.0, bobble: true, yarn: BOBBLE, ..base }),
                     Act::Over => Some(Loop { yarn: OVER, ..base }),
                     Act::Tuck => Some(Loop { yarn: TUCKED, ..base }),
                     Act::Pass { front } => {
@@ -182,7 +186,7 @@ impl<'a> Maker<'a> {
                         self.lift(own, under, s, twist);
                         continue;
                     }
-                    (Act::Draw, Some((below, down))) => {
+                    (Act::Draw | Act::Bobble, Some((below, down))) => {
                         let all = s.first_parent..s.first_parent + u32::from(s.parents);
                         let order: Vec<u32> = match s.top {
                             Top::Left => all.collect(),
@@ -194,7 +198,7 @@ impl<'a> Maker<'a> {
                         };
                         order.into_iter().for_each(|p| self.content(below, p as usize, down, &mut content));
                     }
-                    (Act::Draw, None) => {
+                    (Act::Draw | Act::Bobble, None) => {
                         let all = s.first_parent..s.first_parent + u32::from(s.parents);
                         content.extend(all.filter_map(|p| self.cast.get(p as usize)).map(|&c| (c, 0)));
                     }
@@ -281,10 +285,11 @@ impl<'a> Maker<'a> {
     }
 
     /// How far up each row begins, in mean rows, and how much higher rows are than without room to change places: three
-    /// stitches that become one take it, cables, and stitches that lean far.
+    /// stitches that become one take it, cables, and stitches that lean far; and, above them, bobbles.
     fn heights(&self) -> (Vec<f64>, f64) {
         const TRIPLE: f64 = 0.8;
         const CROSSING: f64 = 0.5;
+        let belly = |r: usize| if self.rows[r].iter().any(|s| s.act == Act::Bobble) { BELLY } else { 0.0 };
         let room = |r: usize| {
             let Some((below, _)) = self.under(r) else { return 0.0 };
             let turn = if self.border.turns { self.rows[r].len() as f64 } else { 1.0 };
@@ -296,7 +301,7 @@ impl<'a> Maker<'a> {
                     _ => lean,
                 }
             };
-            self.rows[r].iter().zip(&self.middles[r]).map(of).fold(0.0, f64::max)
+            self.rows[r].iter().zip(&self.middles[r]).map(of).fold(belly(below), f64::max)
         };
         let mut up = 0.0;
         let mut heights: Vec<f64> = Vec::with_capacity(self.rows.len());
@@ -304,6 +309,9 @@ impl<'a> Maker<'a> {
             up += room(r);
             heights.push(up);
             up += 1.0;
+        }
+        if !self.border.stacked {
+            up += belly(self.rows.len() - 1);
         }
         let room = up / self.rows.len() as f64;
         heights.iter_mut().for_each(|h| *h /= room);
@@ -324,6 +332,7 @@ impl<'a> Maker<'a> {
             wide: self.rows[0].len(),
             heights,
             room,
+            bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
         }
     }
 }

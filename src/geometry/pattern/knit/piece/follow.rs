@@ -116,8 +116,14 @@ impl<'a> Laying<'a> {
             let point = points[j].lerp(points[j + 1], t);
             vector(&self.place_of(course, k, (cell, r), point, head)) - vector(&piece.places[i])
         };
+        let is_bobble = matches!(course.visits[k].1, Visit::Loop(i) if self.loops.loops[i as usize].bobble);
         let sides = |share: f64| [by(share, 0.0), by(1.0 - share, 0.0)];
-        Some(Moved { foot: sides(followed.foot), leg: sides(followed.leg), head: by(0.5, 1.0) })
+        // Of a bobble only the feet are as those of other loops.
+        let foot = sides(if is_bobble { 0.0 } else { followed.foot });
+        Some(match is_bobble {
+            true => Moved { foot, leg: foot, head: 0.5 * (foot[0] + foot[1]) },
+            false => Moved { foot, leg: sides(followed.leg), head: by(0.5, 1.0) },
+        })
     }
 
     /// What a cell has moved beside something that no cell has.

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    super::{super::rods::passing::passed, loops::Visit, piece::follow::threaded},
+    super::{super::rods::passing::passed, loops::Visit, piece::follow::threaded, shape::bobble},
     *,
 };
 
@@ -77,6 +77,10 @@ fn expected(loops: &Loops) -> Passes {
     let mut sums = Passes::new();
     for (parent, child) in loops.links() {
         let (p, c) = (&loops.loops[parent as usize], &loops.loops[child as usize]);
+        // In and out three times: not linked in the end.
+        if c.bobble {
+            continue;
+        }
         let sign = c.sign as i32 * if p.twist == 0.0 { 1 } else { -1 };
         let course = loops.courses.iter().position(|course| course.row == c.row).unwrap();
         let row = visits_of(loops, course);
@@ -192,6 +196,56 @@ fn cables() {
         (&["p k6 p", "p c6b p", "4: p k6 p"], 8),
         (&["k8", "4/4lc", "2: k8"], 8),
     ]);
+}
+
+#[test]
+fn bobbles() {
+    all_drawn(&[
+        (&["k5", "k2 mb k2", "2: k5"], 5),
+        (&["p5", "p2 mb p2", "2: p5"], 5),
+        (&["4: k6", "mb k5", "3: k6", "k3 mb k2"], 6),
+        (&["k6", "k4 mb k", "k ssk yo k3", "2: k6"], 6),
+    ]);
+}
+
+/// The loops of a bobble, by their numbers in the order of the yarn: 0 to 4 out of the stitch below, 5 to 9 on the way back,
+/// 10 through these.
+#[test]
+fn loops_of_a_bobble_are_drawn_as_they_are_knitted() {
+    let chart = Chart::parse(&["k5", "k2 mb k2", "2: k5"]).unwrap();
+    let rows = chart.work(5, 4, 100).unwrap();
+    let loops = Loops::new(&rows, 5, Border::cell(5));
+    let pieces = loops.pieces();
+    let line = |row: usize, k: usize| -> Vec<DVec3> {
+        pieces[row][k].places.iter().map(|p| DVec3::new(p.at * 4.4, p.up * 3.5 * loops.room(), p.out)).collect()
+    };
+    let (below, before, own, after) = (line(0, 2), line(1, 1), line(1, 2), line(1, 3));
+    let parts = bobble::loops();
+    let middle = |r: &std::ops::Range<usize>| (r.start + r.end) / 2;
+    // From the head of one loop to that of the next: to number n.
+    let mut ways: Vec<Vec<DVec3>> = vec![[&before[before.len() / 2..], &own[..=middle(&parts[0])]].concat()];
+    ways.extend(parts.windows(2).map(|w| own[middle(&w[0])..=middle(&w[1])].to_vec()));
+    ways.push([&own[middle(&parts[10])..], &after[..=after.len() / 2]].concat());
+    // Three knit stitches of one, and what is laid over the needle between them.
+    let mut expected: BTreeMap<_, _> = (0..6).map(|n| ((11, n), if n % 2 == 0 { 1 } else { -1 })).collect();
+    for child in 0..5 {
+        // The first on the way back is drawn through the last on the way there.
+        expected.extend([((4 - child, 5 + child), 1), ((4 - child, 6 + child), -1)]);
+        // Those on the way back go from right to left.
+        expected.extend([((5 + child, 10), -1), ((5 + child, 11), 1)]);
+    }
+    // What comes before a loop and leads from it is not drawn through it.
+    let beside = |ring: usize, way: usize| ring < 11 && way <= ring + 1;
+    expected.retain(|&(ring, way), _| !beside(ring, way));
+    let rings: Vec<Vec<DVec3>> = parts.iter().map(|r| own[r.clone()].to_vec()).chain([below]).collect();
+    let mut found = BTreeMap::new();
+    for (i, ring) in rings.iter().enumerate() {
+        found.extend(
+            ways.iter().enumerate().filter(|(n, _)| !beside(i, *n)).map(|(n, way)| ((i, n), threaded(ring, way))),
+        );
+    }
+    found.retain(|_, sum| *sum != 0);
+    assert_eq!(found, expected);
 }
 
 #[test]
