@@ -21,7 +21,7 @@ pub(super) struct KnitArgs {
     /// A pattern with a name.
     #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
     pattern: Option<String>,
-    /// A row of a chart, from the cast-on edge, as in 'k2 p2' or '12: k' (repeatable).
+    /// A row of a chart, from the cast-on edge, as in 'k2 p2', '12: k' or 'k3 mb k3' (repeatable); the README lists the steps.
     #[arg(long, value_name = "ROW")]
     chart: Vec<String>,
     /// Stitches cast on; 20, or as many as the width takes.
@@ -47,8 +47,8 @@ pub(super) struct KnitArgs {
     /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2, if not given.
     #[arg(long, value_name = "D", value_parser = positive)]
     yarn_per_stitch: Option<f64>,
-    /// Cast on and bound off, or with open loops.
-    #[arg(long, default_value = "finished", value_parser = ["finished", "live"])]
+    /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
+    #[arg(long, default_value = "finished", value_parser = ["finished", "slipped", "live"])]
     edges: String,
     /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
     #[arg(long, conflicts_with_all = ["edges", "form", "profile"])]
@@ -120,6 +120,7 @@ impl KnitArgs {
             edges: match self.edges.as_str() {
                 _ if self.tile => Edges::Tile,
                 "live" => Edges::Live,
+                "slipped" => Edges::Slipped,
                 _ => Edges::Finished,
             },
             yarn_per_stitch: self.yarn_per_stitch,

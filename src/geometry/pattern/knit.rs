@@ -30,7 +30,7 @@ pub use self::{
 };
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
-    chart::{Chart, ChartError, Stitch},
+    chart::{Act, Chart, ChartError, Stitch},
     revolution::Revolution,
     rods::Run,
     tile::RelaxedRows,
@@ -55,6 +55,8 @@ pub enum Edges {
     /// Cast on (long-tail) and bound off.
     #[default]
     Finished,
+    /// The same, and the first stitch of each row of a flat piece is slipped: a chain along both sides.
+    Slipped,
     /// Open loops at the top, nothing below the first row.
     Live,
     /// No edges at all: a flat patch whose rows are yarns that go on at one border as they begin at the other.
@@ -198,7 +200,7 @@ impl Knit {
 
     /// The ways of its yarns.
     fn ways(&self) -> Vec<Way> {
-        let (finished, round) = (self.edges == Edges::Finished, self.form != Form::Flat);
+        let (finished, round) = (self.is_finished(), self.form != Form::Flat);
         let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
         self.colors.as_ref().unwrap_or(&one()).ways(finished, round)
     }
@@ -236,7 +238,25 @@ impl Knit {
     }
 
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
-        self.chart.work(self.stitches, self.rows, MAX_POINTS / u64::from(self.points).max(1))
+        let mut rows = self.chart.work(self.stitches, self.rows, MAX_POINTS / u64::from(self.points).max(1))?;
+        if self.has_slipped_sides() {
+            // Rows begin on the left and on the right by turns. The first one holds the cast-on edge.
+            for (r, row) in rows.iter_mut().enumerate().skip(1).filter(|(_, row)| row.len() > 2) {
+                let first = if r % 2 == 0 { 0 } else { row.len() - 1 };
+                if row[first].act == Act::Draw && row[first].parents == 1 && row[first].layer == 0 {
+                    row[first].act = Act::Pass { front: false };
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn is_finished(&self) -> bool {
+        matches!(self.edges, Edges::Finished | Edges::Slipped)
+    }
+
+    fn has_slipped_sides(&self) -> bool {
+        self.edges == Edges::Slipped && self.form == Form::Flat
     }
 
     /// The yarns of the piece, in the unit of `diameter`.
@@ -255,8 +275,15 @@ impl Knit {
         if self.edges == Edges::Tile {
             return self.patch(diameter);
         }
+        if self.edges == Edges::Slipped && self.form != Form::Flat {
+            return Err(ChartError::new(None, "what is knitted round has no sides to slip", "edges = \"finished\""));
+        }
+        if self.edges == Edges::Slipped && self.colors.is_some() {
+            let hint = "edges = \"finished\" where several yarns come and go at the sides";
+            return Err(ChartError::new(None, "slipped sides are knitted of one yarn", hint));
+        }
         let rows = self.worked()?;
-        let finished = self.edges == Edges::Finished;
+        let finished = self.is_finished();
         let round = self.form != Form::Flat;
         let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished };
         let ways = self.ways();
@@ -296,6 +323,7 @@ impl Knit {
             cells: &cell_of,
             even,
             own_cells: cell.is_some(),
+            slipped: self.has_slipped_sides(),
             yarn: self.yarn(size),
             points,
         };

@@ -298,7 +298,8 @@ fn counted(
     let stitch_width = table.f64("stitch_width", Range::between(1.0, 20.0));
     let row_height = table.f64("row_height", Range::between(0.5, 20.0));
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
-    let edges = table.one_of_or("edges", Edges::Finished, &[("finished", Edges::Finished), ("live", Edges::Live)]);
+    let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
+    let edges = table.one_of_or("edges", Edges::Finished, &kinds);
     let tile = table.bool_or("tile", false);
     if tile && (table.has("edges") || form.as_ref().is_some_and(|f| *f != Form::Flat)) {
         table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));

@@ -70,6 +70,9 @@ impl Field {
 impl<'a> Laying<'a> {
     /// The cell that says where a visit lies, and its row there; none where that is its closed form.
     pub(super) fn cell_of(&self, course: &Course, k: usize) -> Option<(&'a Cell, usize)> {
+        if self.slipped && (k == 0 || k + 1 == course.visits.len()) {
+            return None;
+        }
         let own = match course.visits[k].1 {
             Visit::Loop(i) => Some(&self.loops.loops[i as usize]),
             Visit::Pass { .. } => None,

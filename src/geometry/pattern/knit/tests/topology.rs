@@ -353,3 +353,21 @@ fn pieces_are_drawn_through_each_other_from_edge_to_edge() {
         assert!(passes == 0 && undrawn.is_empty(), "{pattern} {form:?}: {passes} passes, {undrawn:?}");
     }
 }
+
+#[test]
+fn slipped_sides_are_chains() {
+    let piece = Knit { edges: Edges::Slipped, ..knit("stockinette", 10, 9) };
+    assert_eq!(passed(|| drop(piece.strands(1.0).unwrap())), 0);
+    assert_eq!(undrawn(&piece), []);
+    let stitches = yarn_of_stitches(&piece);
+    // Rows that begin on the left slip their first stitch, and the next one is drawn through that of the row before.
+    for r in [1, 3, 5] {
+        let ring = [&stitches[&(r, 0)][..], &stitches[&(r, 1)][..1]].concat();
+        let through = |r: i32| threaded(&ring, &stitches[&(r, 0)][..stitches[&(r, 0)].len() / 2]);
+        assert_eq!((through(r + 1), through(r + 2)), (0, 1), "row {r}");
+    }
+    let found = measured(&piece.strands(1.0).unwrap());
+    assert!(found.share <= 0.02, "{found:?}");
+    let tube = Knit { form: Form::Tube, ..piece };
+    assert!(tube.strands(1.0).unwrap_err().problem.contains("sides"));
+}
