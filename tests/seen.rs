@@ -170,6 +170,40 @@ fn motion_is_that_of_yarns_and_camera_until_the_next_frame() {
 }
 
 #[test]
+fn motion_is_that_of_meshes_as_well() {
+    let view = "type = \"orthographic\"\nposition = [0, 0, 90]\ntarget = [0, 0, 0]\nsize = 40\n";
+    let d = directory();
+    let square = |x: f64, y: f64| {
+        let corners = [[-8.0, -8.0], [8.0, -8.0], [8.0, 8.0], [-8.0, 8.0]];
+        corners.map(|[u, v]| format!("v {} {} 0\n", x + u, y + v)).concat() + "f 1 2 3 4\n"
+    };
+    write(d.path(), "m.0001.obj", square(0.0, 0.0));
+    write(d.path(), "m.0002.obj", square(3.0, -2.0));
+    // Half as large in the scene, beside a yarn that stands still.
+    let mesh = "[[mesh]]\npath = \"m.####.obj\"\nunit = \"mm\"\nscale = 0.5\n";
+    let source = "type = \"straight\", count = 1, length = 1";
+    write(d.path(), "s.toml", scene(view, "[\"motion\"]", source) + mesh);
+    let moved = |frame: &str| {
+        let image = read(d.path(), &["--frames", frame]);
+        let (u, v) = (image.channel("forward.u").expect("u"), image.channel("forward.v").expect("v"));
+        let at = (0..u.len()).max_by(|&a, &b| u[a].abs().total_cmp(&u[b].abs())).expect("pixels");
+        [u[at], v[at]]
+    };
+    let [u, v] = moved("1");
+    assert!((u - 1.5).abs() < 2e-3 && (v + 1.0).abs() < 2e-3, "{u} {v}");
+    // After the last file it stands still.
+    assert_eq!(moved("2"), [0.0, 0.0]);
+    write(d.path(), "m.0002.obj", square(3.0, -2.0) + "f 1 2 3\n");
+    let run = yarnray(d.path(), &["render", "s.toml", "-q", "--frames", "1", "-o", "out.exr"]);
+    assert_eq!(run.status, Some(2));
+    assert!(
+        run.stderr.contains("m.0002.obj: 4 points and 3 triangles, where the frame before has 4 and 2"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
 fn texture_coordinates_run_over_the_cloth_as_a_tint_does() {
     for mode in ["yarn", "ply", "fiber"] {
         let view = "type = \"frame\"\ndirection = [0, 0, 1]\nprojection = \"orthographic\"";

@@ -99,7 +99,8 @@ impl Cloth {
         let pieces = Preparation::checked(scene, curves, limit, beside)?.pieces();
         let (geometries, scatterers) =
             pieces.into_iter().map(|Piece { curves, scatterers }| (curves, scatterers)).unzip();
-        let meshes = scene.objects.iter().map(|object| TriangleMesh::new(&object.mesh, object.material)).collect();
+        let meshes =
+            scene.objects.iter().map(|object| TriangleMesh::new(&object.mesh, &object.next, object.material)).collect();
         let generate = started.elapsed();
         let started = Instant::now();
         let world = World::new(geometries, meshes, scene.render.compact_bvh, threads)?;

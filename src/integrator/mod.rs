@@ -402,7 +402,15 @@ fn on_ground(ground: &Ground, ray: &Ray, t: f32) -> SurfacePlace {
     let mut point = ray.origin + t * ray.direction;
     point.y = ground.height;
     let normal = if ray.direction.y < 0.0 { Vec3A::Y } else { Vec3A::NEG_Y };
-    SurfacePlace { point, normal, shading: normal, uv: Vec2::ZERO, uv_per_length: 0.0, material: ground.material }
+    SurfacePlace {
+        point,
+        next: point,
+        normal,
+        shading: normal,
+        uv: Vec2::ZERO,
+        uv_per_length: 0.0,
+        material: ground.material,
+    }
 }
 
 /// Where a ray meets the ground.

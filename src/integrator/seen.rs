@@ -44,9 +44,15 @@ impl Integrator<'_> {
     /// Notes a place that stands still in the world.
     #[inline]
     pub(super) fn sees(&self, sample: &mut Sample, point: Vec3A) {
+        self.sees_moving(sample, point, point);
+    }
+
+    /// Notes a place that is elsewhere one frame later.
+    #[inline]
+    pub(super) fn sees_moving(&self, sample: &mut Sample, point: Vec3A, next: Vec3A) {
         sample.position = point;
         if let Some(flow) = &self.flow {
-            sample.motion = flow.pixels(point, point);
+            sample.motion = flow.pixels(point, next);
         }
     }
 

@@ -40,7 +40,7 @@ impl Integrator<'_> {
         if path.bounces == 0 {
             sample.alpha = 1.0;
             sample.depth = (path.from - place.point).dot(self.back);
-            self.sees(sample, place.point);
+            self.sees_moving(sample, place.point, place.next);
             sample.uv = place.uv;
             sample.normal = place.shading;
             sample.albedo = albedo;

@@ -154,6 +154,7 @@ impl SceneBuilder {
         }
         for object in &mut objects {
             object.mesh.transform(&DAffine3::from_translation(-middle));
+            object.next.iter_mut().for_each(|p| *p -= middle);
         }
         for light in &mut lights {
             light.translate(-middle);

@@ -77,7 +77,7 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
             texture.as_ref().map(|AlbedoTexture { texture, repeat }| (texture.size(), texture.hash(), repeat));
         keys.add(&format!("material.{i}"), &(surface, texture));
     }
-    for (i, Object { origin: _, mesh, material }) in objects.iter().enumerate() {
+    for (i, Object { origin: _, mesh, material, next }) in objects.iter().enumerate() {
         let Mesh { points, normals, uvs, triangles } = mesh;
         let mut hash = Hash::default();
         points.iter().chain(normals).for_each(|p| hash.numbers(&p.to_array()));
@@ -85,6 +85,11 @@ pub fn identity(scene: &Scene) -> Vec<(String, String)> {
         triangles.iter().flatten().for_each(|i| hash.bytes(&i.to_le_bytes()));
         let lengths = [points.len(), normals.len(), uvs.len(), triangles.len()];
         keys.add(&format!("mesh.{i}"), &(material, lengths, hash.word()));
+        if !next.is_empty() {
+            let mut hash = Hash::default();
+            next.iter().for_each(|p| hash.numbers(&p.to_array()));
+            keys.add(&format!("mesh.{i}.next"), &hash.word());
+        }
     }
     keys.add("ground", ground);
     keys.add("middle", middle);

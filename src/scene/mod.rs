@@ -405,6 +405,9 @@ pub struct Object {
     pub mesh: Mesh,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// Its points one frame later, for the layer of motion; empty if they are the same. It stands still while the shutter is
+    /// open.
+    pub next: Vec<DVec3>,
 }
 
 /// A checked scene: millimetres, radians, origin at the middle of the cloth.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{DVec3, Vec2, Vec3, Vec3A};
 
 use crate::{
     ffi::embree::RawHit,
@@ -21,6 +21,8 @@ pub struct TriangleMesh {
     /// For each point, or empty.
     uvs: Vec<Vec2>,
     material: usize,
+    /// The points one frame later, or empty.
+    next: Vec<Vec3A>,
 }
 
 /// A place on a mesh or on the ground.
@@ -28,6 +30,8 @@ pub struct TriangleMesh {
 pub struct SurfacePlace {
     /// Where it is.
     pub point: Vec3A,
+    /// Where it is one frame later.
+    pub next: Vec3A,
     /// Unit normal of the flat surface, on the side from which the ray came.
     pub normal: Vec3A,
     /// Unit normal for shading, on the same side.
@@ -41,14 +45,15 @@ pub struct SurfacePlace {
 }
 
 impl TriangleMesh {
-    /// Of a mesh in millimetres, with the index of its material.
-    pub fn new(mesh: &Mesh, material: usize) -> Self {
+    /// Of a mesh in millimetres, its points one frame later (none if it stands still), and the index of its material.
+    pub fn new(mesh: &Mesh, next: &[DVec3], material: usize) -> Self {
         Self {
             points: mesh.points.iter().map(|p| p.as_vec3a()).collect(),
             triangles: mesh.triangles.iter().copied().collect(),
             normals: mesh.normals.iter().map(|n| n.as_vec3()).collect(),
             uvs: mesh.uvs.iter().map(|uv| uv.as_vec2()).collect(),
             material,
+            next: next.iter().map(|p| p.as_vec3a()).collect(),
         }
     }
 
@@ -56,7 +61,8 @@ impl TriangleMesh {
         (size_of_val(&*self.points)
             + size_of_val(&*self.triangles)
             + size_of_val(&*self.normals)
-            + size_of_val(&*self.uvs)) as u64
+            + size_of_val(&*self.uvs)
+            + size_of_val(&*self.next)) as u64
     }
 
     /// What is at a hit.
@@ -65,7 +71,9 @@ impl TriangleMesh {
         let [a, b, c] = corners.map(|i| self.points[i]);
         let (u, v) = (hit.u, hit.v);
         // From the corners, which rounds less than from the far end of the ray.
-        let point = a + u * (b - a) + v * (c - a);
+        let at = |[a, b, c]: [Vec3A; 3]| a + u * (b - a) + v * (c - a);
+        let point = at([a, b, c]);
+        let next = if self.next.is_empty() { point } else { at(corners.map(|i| self.next[i])) };
         let towards = |n: Vec3A| if n.dot(ray.direction) > 0.0 { -n } else { n };
         let across = (b - a).cross(c - a);
         let normal = towards(across.normalize_or(-ray.direction));
@@ -85,13 +93,13 @@ impl TriangleMesh {
             uv = ta + u * (tb - ta) + v * (tc - ta);
             uv_per_length = ((tb - ta).perp_dot(tc - ta).abs() / across.length().max(1e-30)).sqrt();
         }
-        SurfacePlace { point, normal, shading, uv, uv_per_length, material: self.material }
+        SurfacePlace { point, next, normal, shading, uv, uv_per_length, material: self.material }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, DVec3};
+    use glam::DVec2;
 
     use super::*;
 
@@ -99,11 +107,13 @@ mod tests {
     fn a_place_has_point_normals_and_texture_of_its_triangle() {
         let mut mesh = Mesh::plane(DVec2::new(4.0, 2.0));
         mesh.normals = vec![DVec3::new(0.1, 1.0, 0.0).normalize(); 4];
-        let mesh = TriangleMesh::new(&mesh, 3);
+        let next: Vec<DVec3> = mesh.points.iter().map(|p| *p * 2.0).collect();
+        let mesh = TriangleMesh::new(&mesh, &next, 3);
         let ray = Ray::new(Vec3A::new(0.0, 3.0, 0.0), Vec3A::NEG_Y);
         let hit = |u, v| RawHit { t: 3.0, normal: Vec3A::Y, u, v, segment: 0, geometry: 0 };
         let place = mesh.place(&ray, &hit(0.25, 0.5));
         assert!((place.point - Vec3A::new(1.0, 0.0, 0.0)).length() < 1e-6, "{place:?}");
+        assert!((place.next - Vec3A::new(2.0, 0.0, 0.0)).length() < 1e-6, "{place:?}");
         assert!((place.uv - Vec2::new(0.75, 0.5)).length() < 1e-6);
         assert!((place.uv_per_length - 1.0 / 8f32.sqrt()).abs() < 1e-6);
         assert_eq!((place.normal, place.material), (Vec3A::Y, 3));

@@ -278,29 +278,22 @@ pub(super) fn prim_pattern(table: &Reader<'_>, key: &str) -> Option<PrimPattern>
 }
 
 impl MeshPlan {
-    /// Reads the file, if there is one, and puts the mesh in its place.
-    pub(super) fn make(self, context: &Context<'_>, materials: &mut Vec<(MaterialPlan, Material)>) -> Option<Object> {
+    /// Reads the file, if there is one, and puts the mesh in its place; that of the next frame as well if `flow` says so.
+    pub(super) fn make(
+        self,
+        flow: bool,
+        context: &Context<'_>,
+        materials: &mut Vec<(MaterialPlan, Material)>,
+    ) -> Option<Object> {
+        let mut next = Vec::new();
         let (origin, mut mesh) = match self.source {
             Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
-            Source::File(MeshFile { path, span, unit, z_up, prim, frame }) => {
-                let path = numbered(&path, frame).filter(|_| !path.exists()).unwrap_or(path);
-                let read = if stage::is_stage(&path) {
-                    of_stage(&context.stages, &path, prim.as_ref(), f64::from(frame))
-                } else {
-                    obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
-                };
-                let (mut mesh, own_unit, up_axis) = match read {
-                    Ok(read) => read,
-                    Err(error) => {
-                        context.error(span, error, None);
-                        return None;
-                    }
-                };
-                let scale = unit.or(own_unit).unwrap_or(context.unit);
-                let z_up = z_up.unwrap_or(up_axis == Some(2));
-                let up =
-                    if z_up { DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DAffine3::IDENTITY };
-                mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));
+            Source::File(file) => {
+                let (path, mut mesh) = file.read(file.frame, context)?;
+                if let Some(later) = flow.then(|| file.later(&path)).flatten() {
+                    let (path, later) = file.read(later, context)?;
+                    next = file.moved(&mesh, later, &path, context)?;
+                }
                 if self.smooth && mesh.normals.is_empty() {
                     mesh.smooth();
                 }
@@ -308,11 +301,61 @@ impl MeshPlan {
             }
         };
         mesh.transform(&self.transform);
+        next.iter_mut().for_each(|p| *p = self.transform.transform_point3(*p));
         if let Some((_, span, _)) = &self.material.texture
             && mesh.uvs.is_empty()
         {
             context.error(*span, format!("{origin} has no texture coordinates for this texture"), None);
         }
-        Some(Object { origin, mesh, material: self.material.make(context, materials)? })
+        Some(Object { origin, mesh, material: self.material.make(context, materials)?, next })
+    }
+}
+
+impl MeshFile {
+    /// The file of a frame.
+    fn of_frame(&self, frame: u32) -> PathBuf {
+        numbered(&self.path, frame).filter(|_| !self.path.exists()).unwrap_or_else(|| self.path.clone())
+    }
+
+    /// The next frame, if what is in the file of this one may move until then.
+    fn later(&self, own: &Path) -> Option<u32> {
+        let next = self.frame.checked_add(1)?;
+        let path = self.of_frame(next);
+        (stage::is_stage(own) || path != own && path.exists()).then_some(next)
+    }
+
+    /// The mesh of a frame, millimetres, +y up, and its file.
+    fn read(&self, frame: u32, context: &Context<'_>) -> Option<(PathBuf, Mesh)> {
+        let path = self.of_frame(frame);
+        let read = if stage::is_stage(&path) {
+            of_stage(&context.stages, &path, self.prim.as_ref(), f64::from(frame))
+        } else {
+            obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
+        };
+        let (mut mesh, own_unit, up_axis) = read.map_err(|error| context.error(self.span, error, None)).ok()?;
+        let scale = self.unit.or(own_unit).unwrap_or(context.unit);
+        let z_up = self.z_up.unwrap_or(up_axis == Some(2));
+        let up = if z_up { DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DAffine3::IDENTITY };
+        mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));
+        Some((path, mesh))
+    }
+
+    /// Points of the next frame's mesh; none if nothing moves.
+    fn moved(&self, mesh: &Mesh, later: Mesh, path: &Path, context: &Context<'_>) -> Option<Vec<DVec3>> {
+        if mesh.triangles == later.triangles && mesh.points.len() == later.points.len() {
+            return Some(if mesh.points == later.points { Vec::new() } else { later.points });
+        }
+        let message = format!(
+            "{}: {} points and {} triangles, where the frame before has {} and {}, or others",
+            path.display(),
+            later.points.len(),
+            later.triangles.len(),
+            mesh.points.len(),
+            mesh.triangles.len()
+        );
+        let hint =
+            "the layer of motion follows a mesh whose frames have the same faces; leave it out of `layers` otherwise";
+        context.error(self.span, message, Some(hint.to_owned()));
+        None
     }
 }

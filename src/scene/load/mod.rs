@@ -366,7 +366,8 @@ impl Plans {
             .flatten()
             .collect();
         let mut made = Vec::new();
-        let objects = self.meshes.into_iter().flatten().filter_map(|plan| plan.make(context, &mut made)).collect();
+        let objects = self.meshes.into_iter().flatten();
+        let objects = objects.filter_map(|plan| plan.make(self.detail.flow, context, &mut made)).collect();
         let lights = self.lights.into_iter().flatten().filter_map(|light| light.make(context)).collect();
         let ground = self.ground.and_then(|plan| plan.make(context, &mut made));
         Some(SceneBuilder {
