@@ -126,10 +126,10 @@ fn stitches_go_with_the_cloth_and_plies_keep_their_places() {
         worst[0] = worst[0].max(distance(*r, [x, y - w * sin, z + w * cos]));
         // Where it bends each point stays over its place of the panel: aside by no more than its height times the slope.
         let [_, _, height] = bent(u, v);
-        worst[1] = worst[1].max(distance(*q, [u, v, height + w]));
+        worst[1] = worst[1].max(distance(*q, [u, v, height + w]) - 8.0 / 30.0 * w.abs());
     }
     assert!(worst[0] < 2e-3, "{worst:?}");
-    assert!(worst[1] < 0.9, "{worst:?}");
+    assert!(worst[1] < 0.5, "{worst:?}");
     // Plies wind as at rest: by the same angle at each place of a yarn. One that is closed comes back turned as it bends, and
     // that is spread over all of it.
     let [a, b, c] = [&rest, &bent_one, &turned_one].map(phases);

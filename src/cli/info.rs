@@ -274,14 +274,14 @@ fn scene_report(scene: &Scene) -> (Value, String) {
 impl<'a> SceneFacts<'a> {
     fn new(scene: &'a Scene) -> Self {
         let estimates = cloth::estimates(scene);
-        let not_laid = scene.garments.iter().filter(|_| scene.fabrics.is_empty());
-        let not_laid = not_laid.map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
+        // A survey lays nothing on garments: their fabrics have no curves.
+        let not_laid = scene.garments.iter().map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
         let total: Estimate = estimates.iter().copied().chain(not_laid).sum();
         let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
         let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
         // Of garments that are not laid only their tile is measured.
-        let overlap = (!scene.fabrics.is_empty())
+        let overlap = (scene.fabrics.iter().any(|f| !f.curves.is_empty()))
             .then(|| overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice()))))
             .flatten();
         let (plan, memory) = (Plan::new(scene), Memory::new(scene));
@@ -293,10 +293,15 @@ impl<'a> SceneFacts<'a> {
         self.plan.features.iter().filter(move |f| f.used == used)
     }
 
+    /// Fabrics with curves.
+    fn laid(&self) -> impl Iterator<Item = (&Fabric, &Estimate)> {
+        self.scene.fabrics.iter().zip(&self.estimates).filter(|(f, _)| !f.curves.is_empty())
+    }
+
     fn json(&self) -> Value {
         let Self { scene, total, memory, .. } = self;
         let render = &scene.render;
-        let fabrics = scene.fabrics.iter().zip(&self.estimates).map(|(f, estimate)| {
+        let fabrics = self.laid().map(|(f, estimate)| {
             let (kind, number, name) = match f.kind {
                 CurveKind::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
                 CurveKind::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
@@ -341,7 +346,7 @@ impl<'a> SceneFacts<'a> {
             render.mode.name(),
             render.model.name()
         );
-        for (fabric, estimate) in scene.fabrics.iter().zip(&self.estimates) {
+        for (fabric, estimate) in self.laid() {
             text += &fabric_line(scene, fabric, estimate);
         }
         for facts in &scene.garments {
@@ -349,9 +354,6 @@ impl<'a> SceneFacts<'a> {
         }
         text += &overlap_line(self.overlap);
         text += &self.memory_lines();
-        if !scene.garments.is_empty() && scene.fabrics.is_empty() {
-            text += "  of cloth on garments, which is not laid to tell this, nothing is said below\n";
-        }
         for used in [true, false] {
             text += if used { "  used\n" } else { "  left out\n" };
             for f in self.features(used) {

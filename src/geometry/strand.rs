@@ -48,6 +48,8 @@ pub struct TightBend {
     pub segment: usize,
     /// By how much the inner side of the bend runs backwards, in yarn radii; above a half, and finite for any curve.
     pub fold: f64,
+    /// At how many places the yarn bends so; this is the worst of them.
+    pub places: usize,
 }
 
 /// Yarns of one kind in one geometry of Embree; where they move, at times evenly spaced over the shutter's.

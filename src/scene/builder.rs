@@ -268,6 +268,7 @@ impl Fabric {
         Self {
             name: name.into(),
             origin: "a program".to_owned(),
+            panels: Vec::new(),
             from_file: false,
             kind,
             motion: FabricMotion::default(),

@@ -225,6 +225,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         // Names are for messages and mattes: what covers a pixel is counted by number.
         name: _,
         origin: _,
+        panels: _,
         from_file: _,
         kind,
         curves,

@@ -262,6 +262,8 @@ pub struct Fabric {
     pub name: String,
     /// Where the curves came from, for messages.
     pub origin: String,
+    /// Of cloth on a garment: from which of its curves on they lie on the panel of a name.
+    pub panels: Vec<(usize, String)>,
     /// Whether a file gave the curves: its unit or radius may have been meant otherwise.
     pub from_file: bool,
     /// What they are.
@@ -328,6 +330,13 @@ impl Fabric {
     /// Whether any of its yarns is pressed flat.
     pub fn is_pressed(&self) -> bool {
         self.taken.pressed || self.curves.iter().any(|(curve, _)| curve.flattening.is_some())
+    }
+
+    /// The name of the garment's panel on which a curve lies, if it has one.
+    pub fn panel_of(&self, curve: usize) -> Option<&str> {
+        let after = self.panels.partition_point(|(first, _)| *first <= curve);
+        let (_, name) = self.panels.get(after.checked_sub(1)?)?;
+        (!name.is_empty()).then_some(name)
     }
 
     /// Takes the curves out of it, and leaves what statistics tell of them.

@@ -97,7 +97,7 @@ impl CameraSetup {
         };
         let still = match self.margin {
             None => Camera { position: self.camera.position - middle, ..self.camera },
-            Some(margin) if fabrics.is_empty() => {
+            Some(margin) if fabrics.iter().all(|f| f.curves.is_empty()) => {
                 let meshes: Vec<_> = objects.iter().map(|o| Cloud { points: &o.mesh.points, radii: &[] }).collect();
                 frame_all(margin, &meshes)
             }

@@ -13,7 +13,7 @@ mod variants;
 
 use std::sync::Arc;
 
-use glam::{Vec3A, Vec4};
+use glam::{DVec3, Vec3A, Vec4};
 
 pub use crate::ffi::embree::EmbreeError;
 use crate::{
@@ -221,6 +221,16 @@ impl World {
             };
             bends.iter().map(move |bend| (geometry.fabric(), bend))
         })
+    }
+
+    /// Where in the scene's own space a bend of a fabric lies, millimetres.
+    pub fn place_of(&self, fabric: usize, bend: &TightBend) -> Option<DVec3> {
+        let yarns = self.geometries.iter().find_map(|geometry| match geometry {
+            CurveGeometry::Yarns(yarns) if geometry.fabric() == fabric => Some(yarns),
+            _ => None,
+        })?;
+        let segment = yarns.strands.segments_of(bend.yarn).nth(bend.segment)?;
+        Some(yarns.strands.frame(segment, 0.5).centre.as_dvec3())
     }
 }
 

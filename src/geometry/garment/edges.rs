@@ -11,12 +11,17 @@ use crate::geometry::pattern::{StrandKind, tile::chain};
 /// How panels are sewn together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeamKind {
-    /// They only meet.
+    /// Their edges lie beside each other.
     None,
-    /// A yarn goes to and fro behind both edges, and is not seen from the right side.
+    /// The outermost stitches are turned in, and a yarn goes to and fro between them where it is not seen.
     Mattress,
-    /// Threads over and over both edges on the wrong side.
+    /// Both edges are turned in and lie against each other, with a needle's thread through them and two loopers' around.
     Overlock,
+}
+
+impl SeamKind {
+    /// How many kinds there are.
+    pub(super) const COUNT: usize = 3;
 }
 
 /// A way along the edge of cloth: fine vertices of the sewn mesh one after the other, the cloth to the left.
@@ -115,10 +120,13 @@ pub(super) enum Finish {
     Chain { link: f64, radius: f64 },
     /// Thread over and over the edge, as far in as `reach`.
     Overcast { radius: f64, reach: f64 },
-    /// To and fro behind a seam, a turn each `step`.
-    Mattress { step: f64, radius: f64 },
-    /// Over both edges behind a seam.
-    Overlock { radius: f64, reach: f64 },
+    /// To and fro between edges that are turned in, a turn each `step`. Places are mm from the seam's plane and out, on the
+    /// left side and on the right.
+    Mattress { step: f64, radius: f64, hooks: [[f64; 2]; 2] },
+    /// Through both edges that lie against each other, a stitch each `step`.
+    Needle { step: f64, radius: f64, line: [[f64; 2]; 2] },
+    /// From the needle's line over the edge and back, on the left side or on the right.
+    Looper { step: f64, radius: f64, line: [f64; 2], edge: [f64; 2], side: f64 },
 }
 
 /// Length of a link as it relaxes, in diameters.
@@ -144,8 +152,7 @@ impl Edging {
         let step = match finish {
             Finish::Chain { link, .. } => link,
             Finish::Overcast { radius, .. } => 2.6 * radius,
-            Finish::Mattress { step, .. } => step,
-            Finish::Overlock { radius, .. } => 6.0 * radius,
+            Finish::Mattress { step, .. } | Finish::Needle { step, .. } | Finish::Looper { step, .. } => step,
         };
         let mut lengths = vec![0.0];
         for pair in way.vertices.windows(2) {
@@ -171,6 +178,7 @@ pub(super) fn finish(poses: &[Pose], edgings: &[&Edging]) -> Vec<Vec<LaidYarn>> 
                     closed: edging.way.closed,
                     radius,
                     kind: StrandKind::Course,
+                    panel: edging.way.panel,
                     coordinates: Vec::new(),
                 }
             };
@@ -206,36 +214,50 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
             }
             radius
         }
-        Finish::Mattress { step: _, radius } => {
-            let d = 2.0 * radius;
+        Finish::Mattress { radius, hooks: [left, right], .. } => {
+            // A rung, under the bars between two stitches of one side, a rung back, and under those of the other.
             for i in 0..count {
-                for (along, side, deep) in [
-                    (0.0, 1.3, 1.5),
-                    (0.2, 1.0, 1.7),
-                    (0.5, 0.0, 1.75),
-                    (0.7, -1.0, 1.7),
-                    (0.8, -1.3, 1.5),
-                    (0.9, -1.0, 1.6),
-                ] {
-                    out.push(rail.place(share(i as f64 + along), side * d, -deep * d));
+                for (along, [side, out_of], sign) in
+                    [(0.06, left, 1.0), (0.44, left, 1.0), (0.56, right, -1.0), (0.94, right, -1.0)]
+                {
+                    out.push(rail.place(share(i as f64 + along), sign * side, out_of));
                 }
             }
             radius
         }
-        Finish::Overlock { radius, reach } => {
-            let d = 2.0 * radius;
+        Finish::Needle { radius, line: [left, right], .. } => {
             for i in 0..count {
-                for (along, side, deep) in [
-                    (0.0, 1.0, 1.0),
-                    (0.15, 0.95, 1.9),
-                    (0.3, 0.0, 2.2),
-                    (0.45, -0.95, 1.9),
-                    (0.5, -1.0, 1.0),
-                    (0.65, -0.95, 1.7),
-                    (0.8, 0.0, 2.0),
-                    (0.95, 0.95, 1.7),
+                // Along the one side, and through to the loopers of the other.
+                for (along, [side, out_of], sign) in [
+                    (0.0, right, -1.0),
+                    (0.03, left, 0.2),
+                    (0.1, left, 1.0),
+                    (0.5, left, 1.0),
+                    (0.9, left, 1.0),
+                    (0.97, left, 0.2),
                 ] {
-                    out.push(rail.place(share(i as f64 + along), side * reach, -(deep * d + 0.4 * reach)));
+                    out.push(rail.place(share(i as f64 + along), sign * side, out_of));
+                }
+            }
+            radius
+        }
+        Finish::Looper { radius, line, edge, side, .. } => {
+            let middle = [0.5 * (line[0] + edge[0]), 0.5 * (line[1] + edge[1])];
+            let (over, back) = ([-0.5 * edge[0], edge[1] - 2.0 * radius], [0.6 * edge[0], edge[1] - 2.0 * radius]);
+            // Loops of both sides meet at the edge, one a little before the other.
+            let shift = 0.06 * side;
+            for i in 0..count {
+                for (along, [off, out_of]) in [
+                    (0.0, line),
+                    (0.22, middle),
+                    (0.4, edge),
+                    (0.44, back),
+                    (0.5, over),
+                    (0.56, back),
+                    (0.6, edge),
+                    (0.78, middle),
+                ] {
+                    out.push(rail.place(share(i as f64 + along + shift), side * off, out_of));
                 }
             }
             radius

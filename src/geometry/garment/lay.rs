@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    lattice::{Lattice, Sheet},
+    lattice::Lattice,
+    sheet::Sheet,
     strain::{Shape, Shapes, Strain, UNSTRAINED},
 };
 use crate::{
@@ -26,6 +27,8 @@ pub struct LaidYarn {
     pub radius: f64,
     /// What it is in the cloth.
     pub kind: StrandKind,
+    /// On which panel it lies; a seam's is one of both.
+    pub panel: u32,
     /// At each control point its stitch and row from the panel's lower left corner; empty where it was not asked for.
     pub coordinates: Vec<[f32; 2]>,
 }
@@ -63,6 +66,8 @@ impl Run {
 
 /// A yarn goes on over so many stitches, then another begins: pieces of work for all threads.
 const LONGEST: usize = 6000;
+/// So much of a turn's way do cut threads go beyond their last stitch.
+pub(super) const CUT_END: f64 = 0.65;
 /// A row's end and the next row's are joined if they are no further apart, in stitches.
 const FURTHEST: usize = 3;
 
@@ -76,7 +81,7 @@ pub(super) fn lay(
     let lattice = sheets[0].lattice;
     let chains: Vec<(usize, Vec<Run>)> = (0..2)
         .filter(|&axis| shapes.has_axis(axis))
-        .flat_map(|axis| chains(lattice, axis).into_iter().map(move |chain| (axis, chain)))
+        .flat_map(|axis| chains(lattice, axis, shapes.is_woven()).into_iter().map(move |chain| (axis, chain)))
         .collect();
     // What repeats is centred on the panel, but where it goes round.
     let shift = [0, 1].map(|axis| {
@@ -101,6 +106,7 @@ pub(super) fn lay(
                 closed,
                 radius: shape.radius,
                 kind: shape.kind,
+                panel: lattice.panel,
                 coordinates: layer.places.unwrap_or_default(),
             }
         };
@@ -109,8 +115,10 @@ pub(super) fn lay(
     frames.collect()
 }
 
-/// Runs of an axis, each joined to the nearest of the next line.
-fn chains(lattice: &Lattice, axis: usize) -> Vec<Vec<Run>> {
+/// Runs of an axis, each joined to the nearest of the next line. Of a weave only wefts are, at selvedges: warps end, and so
+/// does what was cut to be sewn.
+fn chains(lattice: &Lattice, axis: usize, woven: bool) -> Vec<Vec<Run>> {
+    let turns = |run: &Run| !woven || (axis == 0 && lattice.is_free(run.end(), run.line + 1));
     let mut done: Vec<Vec<Run>> = Vec::new();
     let mut open: Vec<Vec<Run>> = Vec::new();
     for line in 0..lattice.counts[1 - axis] {
@@ -127,7 +135,7 @@ fn chains(lattice: &Lattice, axis: usize) -> Vec<Vec<Run>> {
                 let backwards = !before.backwards;
                 let start = if backwards { last } else { first };
                 let length: usize = chain.iter().map(|r| r.last - r.first).sum();
-                start.abs_diff(before.end()) <= FURTHEST && length < LONGEST
+                start.abs_diff(before.end()) <= FURTHEST && length < LONGEST && turns(&before)
             });
             let mut chain = mate.map_or_else(Vec::new, |i| waiting.remove(i));
             let backwards = chain.last().is_some_and(|run| !run.backwards);
@@ -159,8 +167,7 @@ impl<'a> Layer<'a> {
 
     /// A place in stitches across, rows up, mm out.
     fn push(&mut self, p: Vec3, run: &Run) {
-        let (at, normal) = self.sheet.at(p.x, p.y);
-        self.out.push((at + normal * p.z).as_dvec3());
+        self.out.push(self.sheet.place(p).as_dvec3());
         if let Some(places) = &mut self.places {
             // Colours are by stitches of the panel: what reaches over the border is of the last one.
             let mut place = [p.x, p.y];
@@ -170,7 +177,9 @@ impl<'a> Layer<'a> {
                 let head = (p.y - run.line as f32).clamp(-0.2, 1.2);
                 place[1] = run.line as f32 + head.clamp(0.02, 0.98);
             }
-            places.push(place);
+            // They are counted from the flat panel's corner: what is turned in has the colour of the stitch beside it.
+            let before = self.sheet.lattice.turned_in.map(|n| n as f32);
+            places.push([0, 1].map(|k| (place[k] - before[k]).max(0.02)));
         }
     }
 
@@ -259,8 +268,8 @@ impl<'a> Layer<'a> {
     fn turn(&mut self, run: &Run, next: &Run) {
         let outward = if run.backwards { -1.0 } else { 1.0 };
         let corner = if self.axis == 0 { [run.end(), run.line + 1] } else { [run.line + 1, run.end()] };
-        // At a seam the selvedge goes to the wrong side.
-        let sewn = !self.sheet.lattice.is_free(corner[0], corner[1]);
+        // Where panels lie beside each other the selvedge goes to the wrong side.
+        let sewn = !self.sheet.lattice.is_free(corner[0], corner[1]) && !self.sheet.is_turned_in(corner[0], corner[1]);
         let bulge = self.bulge() * outward * if sewn { 0.3 } else { 1.0 };
         let deep = if sewn { 1.5 * self.shapes.diameter as f32 } else { 0.0 };
         let from = self.place(run.line, run.end(), 0, UNSTRAINED);
@@ -280,15 +289,20 @@ impl<'a> Layer<'a> {
         let from = self.place(run.line, corner, 0, UNSTRAINED);
         let bulge = self.bulge();
         let d = self.shapes.diameter as f32;
-        let inward = (run.last - run.first).min(3) as f32;
-        // Out, up or down, behind, and in.
-        let way = [
+        // Not round the bend of what is turned in.
+        let at = if self.axis == 0 { [corner, run.line] } else { [run.line, corner] };
+        let furthest = if self.sheet.is_turned_in(at[0], at[1]) { 1 } else { 3 };
+        let inward = (run.last - run.first).min(furthest) as f32;
+        // Out, up or down, behind, and in; threads of a weave are cut at the edge.
+        let darned = [
             (0.62 * bulge, 0.05, 0.0),
             (0.7 * bulge, 0.25, -0.9 * d),
             (-0.3, 0.3, -1.6 * d),
             (-0.6 * inward, 0.3, -1.6 * d),
             (-inward, 0.3, -1.5 * d),
         ];
+        let cut = [(0.3 * bulge, 0.0, 0.0), (CUT_END as f32 * bulge, 0.0, 0.0), (bulge, 0.0, 0.0)];
+        let way: &[(f32, f32, f32)] = if self.shapes.is_woven() { &cut } else { &darned };
         let place = |(along, up, out): (f32, f32, f32)| {
             let mut p = from;
             p[self.axis] += outward * along;
@@ -296,7 +310,7 @@ impl<'a> Layer<'a> {
             p.z = if out == 0.0 { p.z } else { out };
             p
         };
-        let places: Vec<Vec3> = way.into_iter().map(place).collect();
+        let places: Vec<Vec3> = way.iter().copied().map(place).collect();
         if first {
             places.into_iter().rev().for_each(|p| self.push(p, run));
         } else {

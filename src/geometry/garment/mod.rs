@@ -1,30 +1,37 @@
 //! Yarns on garments: a mesh whose texture coordinates are its flat panels, and cloth that repeats, laid over them.
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
-//! divides each panel into stitches, `strain` relaxes the cloth's tile at the strains that occur, `lay` lays its yarns
-//! from row to row, `edges` ends them, and `body` keeps them outside of who wears them. All lengths are millimetres.
+//! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `lay`
+//! lays its yarns from row to row over the `sheet` of a frame, `sewing` says what is at the borders, of which `fold` turns
+//! in what is sewn and `edges` makes the yarns, and `body` keeps them outside of who wears them. All lengths are
+//! millimetres.
 
 mod body;
+mod border;
 mod edges;
+mod fold;
 mod lattice;
 mod lay;
 pub mod mesh;
 mod panels;
+mod sewing;
+mod sheet;
 mod strain;
 mod subdivide;
 mod surface;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use self::{
     body::Body,
-    edges::{Edging, Finish, finish, ways},
-    lattice::{Division, Lattice},
-    lay::{lay, turn},
+    edges::{Edging, finish},
+    lattice::Lattice,
+    lay::lay,
     panels::Panels,
+    sewing::Sewing,
     strain::Shapes,
-    surface::{BorderEdge, Pose, Surface},
+    surface::Surface,
 };
 pub use self::{
     edges::SeamKind,
@@ -51,6 +58,8 @@ pub struct Cloth {
     pub grain: f64,
     /// Control points of a stitch.
     pub points: usize,
+    /// How these panels are sewn, if not as all are; of two cloths that say it the later one counts.
+    pub seam: Option<SeamKind>,
 }
 
 /// What is laid on a garment.
@@ -68,6 +77,8 @@ pub struct Options {
     pub tension: Option<Tension>,
     /// Whether yarns know their stitches.
     pub coordinates: bool,
+    /// Only stitches so near to a place of the first frame are laid, mm; all if absent.
+    pub near: Option<(DVec3, f64)>,
 }
 
 /// What is known of a garment before any yarn is laid.
@@ -108,6 +119,7 @@ pub struct Garment {
     surface: Surface,
     lattices: Vec<Lattice>,
     shapes: Vec<Shapes>,
+    sewing: Sewing,
     edgings: Vec<Edging>,
     options: Options,
     report: Report,
@@ -150,22 +162,27 @@ impl Garment {
         let widest = options.cloths.iter().map(|c| c.tile.stitch().x).fold(0.0, f64::max);
         let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
         let borders = surface.borders(panels.panels.len());
+        let pose = surface.pose(&points);
+        let wanted = |at: DVec3| options.near.is_none_or(|(middle, radius)| at.distance(middle) <= radius);
+        let lays = |anchor| wanted(surface.at(&pose, anchor).0);
+        let sewing = Sewing::new(&options, &shapes, &borders, &cloth);
         let lattices: Vec<Lattice> = borders
             .iter()
             .enumerate()
-            .map(|(panel, border)| {
-                let (own, shapes) = (&options.cloths[cloth[panel]], &shapes[cloth[panel]]);
-                Lattice::new(&surface, panel as u32, border, &division(own, shapes))
-            })
+            .map(|(panel, border)| Lattice::new(&surface, panel as u32, border, &sewing.division(panel), &lays))
             .collect();
         if lattices.iter().all(|l| l.stitches == 0) {
+            if let Some((at, radius)) = options.near {
+                let problem = format!("no stitch lies within {radius:.3} mm of {at:.3} mm");
+                return Err(GarmentError::new(problem, "a place on the cloth in its first frame, or a larger radius"));
+            }
             let stitch = options.cloths[0].tile.stitch();
             let problem = format!("no panel has room for a stitch of {:.3} x {:.3} mm", stitch.x, stitch.y);
             return Err(GarmentError::new(problem, "a finer gauge, another `unit`, or is the mesh cut short?"));
         }
         let mut notes = panels.notes.clone();
         for (lattice, panel) in lattices.iter().zip(&panels.panels) {
-            if lattice.stitches == 0 {
+            if lattice.stitches == 0 && options.near.is_none() {
                 notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
             }
             if lattice.doubled * 100 > lattice.stitches as usize {
@@ -176,7 +193,8 @@ impl Garment {
                 return Err(GarmentError::at(panel.line, problem, "lay the panel out flat, without overlaps"));
             }
         }
-        let edgings = edgings(&surface.pose(&points), &borders, &lattices, &cloth, &options, &shapes);
+        let mut edgings = sewing.edgings(&pose, &borders, &lattices);
+        edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
         let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let report = Report {
@@ -200,12 +218,23 @@ impl Garment {
             notes,
             bounds: (low, high),
         };
-        Ok(Self { panels, surface, lattices, shapes, edgings, options, report })
+        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, options, report })
     }
 
     /// What is known of it.
     pub fn report(&self) -> &Report {
         &self.report
+    }
+
+    /// The most columns and rows of the panels of a cloth; `None` if none is of it.
+    pub fn counts(&self, cloth: usize) -> Option<[usize; 2]> {
+        let own = self.lattices.iter().zip(&self.report.cloth).filter(|(l, c)| **c == cloth && l.stitches > 0);
+        own.map(|(l, _)| l.counts).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+    }
+
+    /// What the yarns of a cloth are.
+    pub fn kinds(&self, cloth: usize) -> Vec<StrandKind> {
+        self.shapes[cloth].strands.iter().map(|s| s.kind).collect()
     }
 
     /// Lays the yarns in some frames, which have the first one's topology: the same yarns with the same points in each.
@@ -238,7 +267,8 @@ impl Garment {
             if lattice.stitches == 0 {
                 continue;
             }
-            let sheets: Vec<_> = poses.iter().map(|pose| lattice.sheet(&self.surface, pose)).collect();
+            let sheets: Vec<_> =
+                poses.iter().map(|p| lattice.sheet(&self.surface, p, self.sewing.folds(cloth))).collect();
             let yarns = lay(&sheets, &self.shapes[cloth], self.options.tension, self.options.coordinates);
             for (frame, yarns) in laid.iter_mut().zip(yarns) {
                 frame[cloth].extend(yarns);
@@ -307,82 +337,6 @@ fn matches(pattern: &str, name: &str) -> bool {
         }
     }
     p[i..].iter().all(|c| *c == '*')
-}
-
-/// How a panel is divided for its cloth.
-fn division(cloth: &Cloth, shapes: &Shapes) -> Division {
-    let stitch = cloth.tile.stitch();
-    let d = shapes.diameter;
-    let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
-    let (mut free, mut sewn) = (DVec2::ZERO, DVec2::ZERO);
-    for axis in 0..2 {
-        // Sideways loops reach beyond their line; at its ends lines turn. Half a yarn is left to the border itself, and
-        // under a chain some more.
-        let beyond = shapes.reach[axis] * stitch[axis];
-        let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
-        free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
-        // At a seam rows turn to the wrong side, and loops reach behind those of the other panel.
-        sewn[axis] = 0.5 * d * if knitted && axis == 1 { 0.3 } else { 1.0 };
-    }
-    Division { stitch, repeat: cloth.tile.counts, free, sewn }
-}
-
-/// What runs along the edges of all panels, as they lie in the first frame.
-fn edgings(
-    first: &Pose,
-    borders: &[Vec<BorderEdge>],
-    lattices: &[Lattice],
-    cloth: &[usize],
-    options: &Options,
-    shapes: &[Shapes],
-) -> Vec<Edging> {
-    let mut free = Vec::new();
-    let mut sewn = Vec::new();
-    for (panel, border) in borders.iter().enumerate() {
-        for (i, edge) in border.iter().enumerate() {
-            match edge.sewn_to {
-                None => free.push((edge.vertices, panel as u32, None)),
-                // Each seam once; what is knitted in the round has none.
-                Some((other, mate)) => {
-                    let first = (panel as u32, i as u32) < (other, mate);
-                    if first && !(other == panel as u32 && lattices[panel].ring) {
-                        sewn.push((edge.vertices, panel as u32, Some(other)));
-                    }
-                }
-            }
-        }
-    }
-    let mut out = Vec::new();
-    for way in ways(&free) {
-        let own = cloth[way.panel as usize];
-        let (tile, d) = (&options.cloths[own].tile, shapes[own].diameter);
-        let knitted = tile.strands.iter().all(|s| s.kind == StrandKind::Course);
-        let finish = if knitted {
-            Finish::Chain { link: tile.stitch().x.max(2.9 * d), radius: 0.5 * d }
-        } else {
-            Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
-        };
-        out.push(Edging::new(way, finish, own, first));
-    }
-    if options.seam != SeamKind::None {
-        // Ways of a seam keep to one pair of panels.
-        let mut pairs: Vec<(u32, Option<u32>)> = sewn.iter().map(|s| (s.1, s.2)).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        for pair in pairs {
-            let own: Vec<_> = sewn.iter().filter(|s| (s.1, s.2) == pair).copied().collect();
-            for way in ways(&own) {
-                let own = cloth[way.panel as usize];
-                let (stitch, d) = (options.cloths[own].tile.stitch(), shapes[own].diameter);
-                let finish = match options.seam {
-                    SeamKind::Overlock => Finish::Overlock { radius: 0.25 * d, reach: (1.6 * d).max(1.0) },
-                    _ => Finish::Mattress { step: (2.0 * stitch.y).max(4.0 * d), radius: 0.4 * d },
-                };
-                out.push(Edging::new(way, finish, own, first));
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! what is known is mixed (as Sperl, Narain and Wojtan do with simulated patterns in "Mechanics-Aware Deformation of Yarn
 //! Pattern Geometry", 2021).
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::pattern::{
@@ -38,6 +38,10 @@ pub(super) struct Shapes {
     pub(super) length: f64,
     /// The thickest yarn's diameter, mm.
     pub(super) diameter: f64,
+    /// Between which heights the middles of yarns lie, mm.
+    pub(super) heights: [f64; 2],
+    /// How far they lie beyond their rows and columns, below (to the left) and above (to the right), in stitches.
+    pub(super) beyond: [DVec2; 2],
 }
 
 /// One yarn of [`Shapes`].
@@ -59,6 +63,13 @@ impl Shape {
     /// Along which axis of the panel it goes.
     pub(super) fn axis(&self) -> usize {
         usize::from(self.kind == StrandKind::Warp)
+    }
+
+    /// Where segments of its splines join, at all nodes: control points lie further out.
+    fn joins(&self) -> impl Iterator<Item = DVec3> {
+        self.control.chunks(self.count).flat_map(|control| {
+            control.windows(3).map(|w| (w[0].as_dvec3() + 4.0 * w[1].as_dvec3() + w[2].as_dvec3()) / 6.0)
+        })
     }
 }
 
@@ -118,8 +129,20 @@ impl Shapes {
             let beyond = shape.control.iter().map(|p| (own(p) - 1.0).max(-own(p))).fold(0.0, f64::max);
             reach[across] = reach[across].max(beyond);
         }
+        let (mut heights, mut beyond) = ([f64::INFINITY, f64::NEG_INFINITY], [DVec2::ZERO; 2]);
+        for shape in &strands {
+            let across = 1 - shape.axis();
+            for p in shape.joins() {
+                heights = [heights[0].min(p.z), heights[1].max(p.z)];
+                let own = p[across] - shape.index as f64;
+                beyond[0][across] = beyond[0][across].max(-own);
+                beyond[1][across] = beyond[1][across].max(own - 1.0);
+            }
+        }
         Ok(Self {
             counts,
+            heights,
+            beyond,
             strands,
             nodes: nodes.map(|n| n.into_iter().map(|v| v as f32).collect()),
             reach,
@@ -132,6 +155,11 @@ impl Shapes {
     pub(super) fn of_line(&self, axis: usize, line: usize) -> Option<&Shape> {
         let index = line % self.counts[1 - axis];
         self.strands.iter().find(|s| s.axis() == axis && s.index == index)
+    }
+
+    /// Whether it has warps and wefts.
+    pub(super) fn is_woven(&self) -> bool {
+        self.strands.iter().any(|s| s.kind != StrandKind::Course)
     }
 
     /// Whether yarns go along an axis.

@@ -1,5 +1,7 @@
 use std::fmt::Write;
 
+use glam::DVec2;
+
 use super::*;
 use crate::{
     geometry::{
@@ -21,10 +23,11 @@ fn options(tile: Tile) -> Options {
     Options {
         unit_mm: 1.0,
         uv_mm: None,
-        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12 }],
+        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12, seam: None }],
         seam: SeamKind::Mattress,
         tension: None,
         coordinates: true,
+        near: None,
     }
 }
 
@@ -99,6 +102,46 @@ fn a_flat_square_holds_its_stitches_within_its_border() {
 }
 
 #[test]
+fn warps_are_threads_of_their_own_and_wefts_turn_at_selvedges() {
+    let (_, yarns) = laid(&square(), options(woven()));
+    let warps: Vec<&LaidYarn> = yarns.iter().filter(|y| y.kind == StrandKind::Warp).collect();
+    let wefts = yarns.iter().filter(|y| y.kind == StrandKind::Weft).count();
+    assert!(warps.len() > 35 && wefts == 1, "{} {wefts}", warps.len());
+    for warp in warps {
+        // From edge to edge, aside by no more than it bends.
+        let (x, y) = (warp.points.iter().map(|p| p.x), warp.points.iter().map(|p| p.y));
+        let extent = |v: &mut dyn Iterator<Item = f64>| {
+            let (low, high) = v.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+            high - low
+        };
+        let (across, up) = (extent(&mut x.into_iter()), extent(&mut y.into_iter()));
+        assert!(across < 2.0 && up > 95.0, "{across} {up}");
+    }
+    // Where they were cut to be sewn, wefts end as well.
+    let [first, ..] = sewn(&woven(), 0, SeamKind::Overlock);
+    assert!(first.iter().filter(|y| y.kind == StrandKind::Weft).count() > 10);
+}
+
+#[test]
+fn a_part_is_laid_as_in_the_whole() {
+    let (all, whole) = laid(&square(), options(stockinette()));
+    let near = Some((DVec3::new(50.0, 50.0, 0.0), 20.0));
+    let (part, yarns) = laid(&square(), Options { near, ..options(stockinette()) });
+    let share = part.all_stitches() as f64 / all.all_stitches() as f64;
+    assert!((share - 0.126).abs() < 0.02, "{share}");
+    // In the middle every point of the one is one of the other.
+    let middle = |yarns: &[LaidYarn]| -> Vec<DVec3> {
+        let points = yarns.iter().flat_map(|y| y.points.clone());
+        points.filter(|p| p.distance(DVec3::new(50.0, 50.0, 0.0)) < 14.0).collect()
+    };
+    let (one, other) = (middle(&whole), middle(&yarns));
+    assert!(one.len() == other.len() && one.len() > 500, "{} {}", one.len(), other.len());
+    assert!(other.iter().all(|p| one.contains(p)));
+    let nowhere = Options { near: Some((DVec3::splat(900.0), 20.0)), ..options(stockinette()) };
+    assert!(Garment::new(&square(), nowhere).err().unwrap().problem.contains("no stitch lies within 20.000 mm"));
+}
+
+#[test]
 fn rows_are_few_yarns_and_long() {
     let (report, yarns) = laid(&square(), options(stockinette()));
     // One yarn to and fro, and the chain around.
@@ -131,30 +174,39 @@ fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
     assert!(overlapping(&yarns) < 0.12);
 }
 
-/// Two panels that meet at 80 mm along an axis, laid without a seam's yarn: the distance of their yarns' middle lines, the least
-/// in each stitch along the seam, in diameters.
-fn distances_at_seam(tile: &Tile, axis: usize) -> Vec<f64> {
+/// Two panels that meet at 80 mm along an axis, sewn: the yarns of each panel, and those of the seam.
+fn sewn(tile: &Tile, axis: usize, seam: SeamKind) -> [Vec<LaidYarn>; 3] {
     let mut text = String::new();
     sheet(&mut text, "first", 8, 8, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
     sheet(&mut text, "second", 8, 8, 10.0, 200.0, &|u, v| DVec3::new(u, v, 0.0) + 80.0 * DVec3::AXES[axis]);
     let mesh = GarmentMesh::parse(&text).unwrap();
-    let (_, yarns) = laid(&mesh, Options { seam: SeamKind::None, ..options(tile.clone()) });
-    let (mut first, mut second) = (Vec::new(), Vec::new());
-    for yarn in &yarns {
+    let (_, yarns) = laid(&mesh, Options { seam, ..options(tile.clone()) });
+    let mut out = [const { Vec::new() }; 3];
+    for yarn in yarns {
         let middle = yarn.points.iter().sum::<DVec3>() / yarn.points.len() as f64;
-        // Chains go round both.
-        if yarn.closed {
-            continue;
-        }
-        let side = if middle[axis] < 80.0 { &mut first } else { &mut second };
-        for w in yarn.points.windows(4) {
-            let points = [w[0], w[1], w[2], w[3]].map(|p| p.extend(0.0));
-            side.extend((0..6).map(|k| evaluate(Basis::BSpline, points, f64::from(k) / 6.0).at.truncate()));
+        let of_cloth = (2.0 * yarn.radius - tile.diameter()).abs() < 1e-9;
+        // What finishes free edges goes round both.
+        match yarn.closed {
+            true => {}
+            false => out[if of_cloth { usize::from(middle[axis] > 80.0) } else { 2 }].push(yarn),
         }
     }
+    out
+}
+
+/// Places along yarns, close to each other.
+fn along(yarns: &[LaidYarn]) -> Vec<DVec3> {
+    let segment = |w: &[DVec3]| {
+        let points = [w[0], w[1], w[2], w[3]].map(|p| p.extend(0.0));
+        (0..6).map(move |k| evaluate(Basis::BSpline, points, f64::from(k) / 6.0).at.truncate())
+    };
+    yarns.iter().flat_map(|yarn| yarn.points.windows(4).flat_map(segment)).collect()
+}
+
+/// The distance of both panels' middle lines, the least in each stitch along the seam, in diameters.
+fn distances(panels: [&[DVec3]; 2], tile: &Tile, axis: usize) -> Vec<f64> {
     let near = |p: &&DVec3| (p[axis] - 80.0).abs() < 6.0;
-    let (first, second): (Vec<&DVec3>, Vec<&DVec3>) =
-        (first.iter().filter(near).collect(), second.iter().filter(near).collect());
+    let [first, second] = panels.map(|panel| panel.iter().filter(near).collect::<Vec<&DVec3>>());
     let step = tile.stitch()[1 - axis];
     let windows = (15.0 / step) as usize..(65.0 / step) as usize;
     let least = |window: usize| {
@@ -166,11 +218,44 @@ fn distances_at_seam(tile: &Tile, axis: usize) -> Vec<f64> {
 }
 
 #[test]
-fn panels_meet_at_seams_within_a_yarn() {
-    for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0), (woven(), 1)] {
-        let distances = distances_at_seam(&tile, axis);
-        // They touch: without a gap, and not far into each other.
-        assert!(distances.iter().all(|d| (0.8..1.2).contains(d)), "{axis}: {distances:.2?}");
+fn panels_meet_at_seams_without_overlap() {
+    let mut wrong = Vec::new();
+    for kind in [SeamKind::None, SeamKind::Mattress, SeamKind::Overlock] {
+        for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0), (woven(), 1)] {
+            let [first, second, _] = sewn(&tile, axis, kind).map(|yarns| along(&yarns));
+            let distances = distances([&first, &second], &tile, axis);
+            let (least, most) = distances.iter().fold((f64::MAX, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
+            eprintln!("{kind:?} {axis}: {least:.3} to {most:.3}");
+            // Not into each other, and with less than a yarn between them.
+            if least < 0.95 || most > 2.0 {
+                wrong.push(format!("{kind:?} {axis}, woven {}: {distances:.2?}", tile.strands.len() > 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn seams_are_turned_in_and_sewn_where_nobody_looks() {
+    for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0)] {
+        let d = tile.diameter();
+        let deepest = |places: &[DVec3]| places.iter().map(|p| p.z).fold(f64::MAX, f64::min);
+        for kind in [SeamKind::None, SeamKind::Mattress, SeamKind::Overlock] {
+            let [first, second, threads] = sewn(&tile, axis, kind).map(|yarns| along(&yarns));
+            if kind == SeamKind::None {
+                assert!(threads.is_empty() && deepest(&first) > -3.0 * d && deepest(&second) > -3.0 * d);
+                continue;
+            }
+            // Both edges go in, as deep as each other, and the thread stays below what is seen.
+            assert!(deepest(&first) < -3.0 * d && (deepest(&first) - deepest(&second)).abs() < d);
+            assert!(threads.iter().all(|p| p.z < -0.8 * d && (p[axis] - 80.0).abs() < 5.0 * d), "{kind:?} {axis}");
+            let crossings = threads.windows(2).filter(|w| (w[0][axis] < 80.0) != (w[1][axis] < 80.0)).count();
+            let step = if kind == SeamKind::Mattress { 2.0 * tile.stitch().y } else { 4.0 };
+            assert!(crossings as f64 > 0.8 * 2.0 * 80.0 / step, "{kind:?} {axis}: {crossings}");
+            // An overlock goes round both edges, below the deepest loop; a mattress seam stays between them.
+            let under = deepest(&threads) < deepest(&first);
+            assert_eq!(under, kind == SeamKind::Overlock, "{axis}: {} {}", deepest(&threads), deepest(&first));
+        }
     }
 }
 

@@ -6,7 +6,9 @@ use glam::{DVec2, DVec3, Vec2, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    Along, FLATTEST, Pose, StrandMotion, StrandOptions, Strands, TightBend, frames::PointFrame, winding::Winding,
+    Along, FLATTEST, Pose, StrandMotion, StrandOptions, Strands, TightBend,
+    frames::PointFrame,
+    winding::{Tight, Winding},
 };
 use crate::geometry::{
     chain::{Chain, Fit, nearest_indices, resample, uvs_of_segments},
@@ -88,7 +90,7 @@ struct Strand {
     flattening: Vec<Vec2>,
     material_indices: Vec<u16>,
     uvs: SegmentUvs,
-    tight: Option<(usize, f64)>,
+    tight: Option<Tight>,
     length: f64,
 }
 
@@ -238,7 +240,8 @@ impl Joined {
         self.material_indices.extend(strand.material_indices);
         self.uvs.append(&strand.uvs);
         self.length += strand.length;
-        self.tight_bends.extend(strand.tight.map(|(segment, fold)| TightBend { yarn, segment, fold }));
+        let bend = |Tight { segment, fold, places }| TightBend { yarn, segment, fold, places };
+        self.tight_bends.extend(strand.tight.map(bend));
     }
 
     fn finish(mut self, basis: Basis, flow: usize) -> Strands {

@@ -216,6 +216,7 @@ fn tight_bends_are_found_where_they_are() {
     let bend = s.tight_bends()[0];
     let place = s.frame(bend.segment as u32, 0.5);
     assert!(place.centre.x.abs() < 1.5 && bend.fold > 0.5 && bend.fold < 3.0, "{bend:?} at {}", place.centre);
+    assert_eq!(bend.places, 1);
 }
 
 /// Curvature of real files is without bounds: a point given twice, a step there and back.

@@ -20,8 +20,26 @@ pub(super) struct Winding {
     pub(super) knots: Vec<Knot>,
     /// By how much a closed chain turns the normal against itself.
     angle: f64,
-    /// The tightest place: its segment and its fold, in yarn radii, where plies are seen to break.
-    pub(super) tight: Option<(usize, f64)>,
+    /// Where plies are seen to break, if they are.
+    pub(super) tight: Option<Tight>,
+}
+
+/// The tightest of the places where a yarn folds into itself.
+#[derive(Clone, Copy)]
+pub(super) struct Tight {
+    pub(super) segment: usize,
+    /// In yarn radii.
+    pub(super) fold: f64,
+    /// How many such places there are.
+    pub(super) places: usize,
+}
+
+impl Tight {
+    /// That of a yarn of which both are parts.
+    fn and(self, other: Self) -> Self {
+        let worst = if other.fold > self.fold { other } else { self };
+        Self { places: self.places + other.places, ..worst }
+    }
 }
 
 /// A knot of a chain.
@@ -47,7 +65,7 @@ impl Winding {
             .collect();
         // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
         let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
-        let mut tight: Option<(usize, f64)> = None;
+        let mut tight: Option<Tight> = None;
         for (mut stretch, its_tight) in stretches {
             if let Some(end) = knots.pop() {
                 let first = stretch[0];
@@ -60,11 +78,7 @@ impl Winding {
                 }
             }
             knots.append(&mut stretch);
-            if let Some((_, fold)) = its_tight
-                && tight.is_none_or(|(_, worst)| fold > worst)
-            {
-                tight = its_tight;
-            }
+            tight = tight.into_iter().chain(its_tight).reduce(Tight::and);
         }
         let (start, end) = (knots[0].normal, knots[knots.len() - 1]);
         let angle = end.tangent.dot(start.cross(end.normal)).atan2(start.dot(end.normal));
@@ -98,7 +112,7 @@ impl Winding {
 
 /// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
 /// knots from there to there, and the tightest bend.
-fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, Option<(usize, f64)>) {
+fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, Option<Tight>) {
     let [a, b, c, d] = GAUSS;
     let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (Weights::new(chain.basis, u), weight));
     let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
@@ -109,7 +123,7 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
     let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
     let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
     let mut turned = 0.0;
-    let (mut fold, mut tight): (f64, Option<(usize, f64)>) = (0.0, None);
+    let (mut fold, mut tight): (f64, Option<Tight>) = (0.0, None);
     let mut knots = Vec::with_capacity(end - start + 1);
     knots.push(Knot { tangent, normal, turned });
     for segment in start..end {
@@ -127,9 +141,11 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
             let forward = distance / (0.5 * (here.at.w + next.at.w)).max(1e-300);
             // An angle is at most pi / 2 times its chord.
             if fold > 0.0 || FRAC_PI_2 * tangent.distance(next_tangent) > forward {
+                let before = fold;
                 fold = (fold + tangent.angle_between(next_tangent) - forward).max(0.0);
-                if fold > SEEN_FOLD && tight.is_none_or(|(_, worst)| fold > worst) {
-                    tight = Some((segment, fold));
+                if fold > SEEN_FOLD {
+                    let here = Tight { segment, fold, places: usize::from(before <= SEEN_FOLD) };
+                    tight = tight.into_iter().chain([here]).reduce(Tight::and);
                 }
             }
             (here, tangent) = (next, next_tangent);

@@ -187,7 +187,8 @@ impl ColorPlan {
         let woven = coordinates.kinds.iter().any(|kind| *kind != StrandKind::Course);
         let cells = self.cells(coordinates.extent, coordinates.stitch, woven, base, context, library)?;
         for map in cells.maps() {
-            let asked = (0..fabric.curves.len()).any(|curve| std::ptr::eq(cells.of(curve, &coordinates), map));
+            let asked = (0..fabric.curves.len().max(coordinates.kinds.len()))
+                .any(|curve| std::ptr::eq(cells.of(curve, &coordinates), map));
             let wrong = map.cells.iter().find_map(|&yarn| other_build(yarns[yarn], yarns[base]));
             if let Some(problem) = wrong.filter(|_| asked) {
                 context.error(self.header, problem, Some(SAME_BUILD.to_owned()));
@@ -198,6 +199,14 @@ impl ColorPlan {
             None => None,
             Some(tint) => Some(tint.open(coordinates.extent, coordinates.stitch, context)?),
         };
+        if fabric.curves.is_empty() {
+            // Of cloth that is not laid, what may lie on it.
+            let mut known: Vec<usize> = cells.maps().flat_map(|map| map.cells.iter().copied()).collect();
+            known.sort_unstable();
+            known.dedup();
+            fabric.variants = known.into_iter().map(|yarn| yarns[yarn].clone()).collect();
+            return Some(());
+        }
         let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, print, shades, yarns: &yarns };
         let mut variants = Variants::default();
         let curves = fabric.curves.iter().enumerate();

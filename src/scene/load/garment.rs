@@ -1,6 +1,9 @@
 //! `source = { type = "garment" }`: cloth laid on a mesh with its panels as texture coordinates.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use glam::{DVec2, DVec3};
 
@@ -70,6 +73,19 @@ struct Rule {
     yarn: Option<String>,
     /// Its colours, if they are not the fabric's.
     color: Option<ColorPlan>,
+    /// How it is sewn, if not as all are.
+    seam: Option<SeamKind>,
+}
+
+const SEAMS: [(&str, SeamKind); 3] =
+    [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
+
+impl Rule {
+    /// What messages call it.
+    fn origin(&self, mesh: &Path) -> String {
+        let group = self.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
+        format!("{}{group}, {}", mesh.display(), self.cloth.name)
+    }
 }
 
 /// A garment whose text is sound and whose mesh is not read yet.
@@ -81,6 +97,8 @@ pub(super) struct GarmentPlan {
     scale: f64,
     uv_unit: Option<f64>,
     seam: SeamKind,
+    /// Place and radius of what is laid, mm, if that is not all.
+    near: Option<(DVec3, f64)>,
     body: Option<(PathBuf, Span)>,
     /// Which meshes of a stage are the garment, and which its body.
     prims: [Option<PrimPattern>; 2],
@@ -104,11 +122,16 @@ pub(super) fn garment(
     let prims = [prim_pattern(source, "prim"), prim_pattern(source, "body_prim")];
     let z_up = source.one_of("up", &[("y", false), ("z", true)]);
     let uv_unit = source.one_of("uv_unit", &UNITS);
-    let seams = [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
-    let seam = source.one_of("seam", &seams);
+    let seam = source.one_of("seam", &SEAMS);
     let body = source.string("body").map(|p| {
         let span = source.span("body").unwrap_or(source.header());
         (context.resolve(p, span), span)
+    });
+    let near = source.table("near").and_then(|table| {
+        let at = table.required_vec3("at", Range::FINITE).map(|at| context.position(at));
+        let radius = table.required_f64("radius", Range::POSITIVE).map(|r| r * context.unit);
+        table.finish();
+        at.zip(radius)
     });
     let own = match source.table("cloth") {
         Some(table) => cloth(table, context),
@@ -122,7 +145,8 @@ pub(super) fn garment(
     };
     let (gauge, per) = (stitch(fabric, None), per(fabric));
     let grain = grain(fabric);
-    let first = own.clone().map(|cloth| Rule { group: None, cloth, stitch: gauge, grain, yarn: None, color: None });
+    let first =
+        own.clone().map(|cloth| Rule { group: None, cloth, stitch: gauge, grain, yarn: None, color: None, seam: None });
     let panels: Vec<Option<Rule>> = fabric
         .tables("panel")
         .into_iter()
@@ -151,6 +175,7 @@ pub(super) fn garment(
                 },
                 yarn,
                 color: colored.then_some(color),
+                seam: table.one_of("seam", &SEAMS),
             };
             table.finish();
             Some(rule)
@@ -162,7 +187,7 @@ pub(super) fn garment(
     for panel in panels {
         rules.push(panel?);
     }
-    Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, body, prims, z_up, rules })
+    Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, near, body, prims, z_up, rules })
 }
 
 fn grain(table: &Reader<'_>) -> f64 {
@@ -305,6 +330,8 @@ pub(super) struct MadePanels {
     pub(super) yarn: Option<String>,
     pub(super) color: Option<ColorPlan>,
     pub(super) curves: Vec<(Curve, Vec<f64>)>,
+    /// From which of the curves on they lie on the panel of a name.
+    pub(super) panels: Vec<(usize, String)>,
     pub(super) coordinates: FabricCoordinates,
     pub(super) motion: FabricMotion,
 }
@@ -333,7 +360,13 @@ impl GarmentPlan {
             .iter()
             .map(|rule| {
                 let tile = rule.cloth.tile(rule.stitch, radius_of(rule), context, warnings)?;
-                Some(Cloth { group: rule.group.clone(), tile, grain: rule.grain, points: rule.cloth.points })
+                Some(Cloth {
+                    group: rule.group.clone(),
+                    tile,
+                    grain: rule.grain,
+                    points: rule.cloth.points,
+                    seam: rule.seam,
+                })
             })
             .collect();
         let tell = |error: GarmentError| {
@@ -372,6 +405,7 @@ impl GarmentPlan {
             seam: self.seam,
             tension,
             coordinates: colored || self.rules.iter().any(|r| r.color.is_some()),
+            near: self.near,
         };
         let garment = match Garment::new(rest, options) {
             Ok(garment) => garment,
@@ -403,11 +437,6 @@ impl GarmentPlan {
             bounds: report.bounds,
             repairs: Vec::new(),
         };
-        if detail.survey {
-            facts.repairs.clone_from(&notes);
-            return Some((Vec::new(), facts));
-        }
-
         let mut meshes = Vec::new();
         for pose in &frames.poses {
             let (a, b) = (&read[&pose.before], &read[&pose.after]);
@@ -423,6 +452,10 @@ impl GarmentPlan {
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
         check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
+        if detail.survey {
+            facts.repairs.clone_from(&notes);
+            return Some((self.not_laid(&garment, &sizes, shown), facts));
+        }
         let mut meshes: Vec<GarmentMesh> =
             meshes.into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, mesh)| mesh).collect();
         // Plies wind by lengths in the first frame, so that they keep their places from frame to frame.
@@ -441,6 +474,7 @@ impl GarmentPlan {
                 return None;
             }
         };
+        let names: Vec<String> = garment.report().panels.iter().map(|p| p.group.clone()).collect();
         drop(garment);
         let at_rest = if with_rest { laid.pop() } else { None };
         debug_assert_eq!(laid.len(), times);
@@ -451,16 +485,36 @@ impl GarmentPlan {
         facts.yarn_length = lengths.iter().sum();
         facts.weight = weight(&lengths);
         facts.repairs = notes;
-        Some((self.made(first, [later, flow], at_rest, &sizes), facts))
+        Some((self.made(first, [later, flow], at_rest, (&sizes, &names)), facts))
     }
 
-    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm.
+    /// What a survey tells of each rule that has panels: all but its yarns, which are not laid.
+    fn not_laid(self, garment: &Garment, sizes: &[DVec2], shown: usize) -> Vec<MadePanels> {
+        let mut out = Vec::new();
+        for (i, rule) in self.rules.into_iter().enumerate() {
+            let Some(counts) = garment.counts(i) else { continue };
+            // The place of the last stitch says how many there are.
+            let last = counts.map(|n| n as f32 - 0.5);
+            out.push(MadePanels {
+                origin: rule.origin(&self.path),
+                yarn: rule.yarn,
+                color: rule.color,
+                curves: Vec::new(),
+                panels: Vec::new(),
+                coordinates: FabricCoordinates::laid(vec![vec![last]], garment.kinds(i), sizes[i].as_vec2().to_array()),
+                motion: FabricMotion { later: vec![Vec::new(); shown - 1], ..FabricMotion::default() },
+            });
+        }
+        out
+    }
+
+    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm, and `names` of all panels.
     fn made(
         self,
         first: Laid,
         [mut later, mut flow]: [Vec<Laid>; 2],
         mut rest: Option<Laid>,
-        sizes: &[DVec2],
+        (sizes, names): (&[DVec2], &[String]),
     ) -> Vec<MadePanels> {
         let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
             std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
@@ -475,23 +529,30 @@ impl GarmentPlan {
                 rest: rest.as_mut().map(|laid| points(laid, i)),
                 flow: flow.iter_mut().map(|laid| points(laid, i)).collect(),
             };
+            let mut panels: Vec<(usize, String)> = Vec::new();
+            for (k, yarn) in yarns.iter().enumerate() {
+                let name = &names[yarn.panel as usize];
+                if panels.last().is_none_or(|(_, before)| before != name) {
+                    panels.push((k, name.clone()));
+                }
+            }
             let mut kinds = Vec::with_capacity(yarns.len());
             let mut places = Vec::with_capacity(yarns.len());
             let curves = yarns
                 .into_iter()
-                .map(|LaidYarn { points, closed, radius, kind, coordinates }| {
+                .map(|LaidYarn { points, closed, radius, kind, coordinates, .. }| {
                     kinds.push(kind);
                     places.push(coordinates);
                     let radii = vec![radius; points.len()];
                     (Curve { basis: Basis::BSpline, closed, points, radii: None, flattening: None }, radii)
                 })
                 .collect();
-            let group = rule.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
             out.push(MadePanels {
-                origin: format!("{}{group}, {}", self.path.display(), rule.cloth.name),
+                origin: rule.origin(&self.path),
                 yarn: rule.yarn,
                 color: rule.color,
                 curves,
+                panels,
                 coordinates: FabricCoordinates::laid(places, kinds, sizes[i].as_vec2().to_array()),
                 motion,
             });

@@ -34,6 +34,8 @@ const COLUMNS: f32 = 256.0;
 /// Curves of one kind of yarn, before they are moved to their place.
 struct Made {
     origin: String,
+    /// The first yarn of each panel of a garment, and its name.
+    panels: Vec<(usize, String)>,
     from_file: bool,
     kind: CurveKind,
     curves: Vec<(Curve, Vec<f64>)>,
@@ -57,6 +59,7 @@ impl Made {
     ) -> Self {
         Self {
             origin,
+            panels: Vec::new(),
             from_file: false,
             kind,
             curves,
@@ -94,7 +97,8 @@ impl FabricPlan {
                     .map(|panel| {
                         let kind = base.named_or_own(panel.yarn.as_deref())?;
                         let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
-                        Some(Made { color: panel.color, motion: panel.motion, exact: true, ..made })
+                        let (color, motion, panels) = (panel.color, panel.motion, panel.panels);
+                        Some(Made { color, motion, panels, exact: true, ..made })
                     })
                     .collect::<Option<Vec<Made>>>()?
             }
@@ -224,7 +228,7 @@ impl Made {
         context: &Context<'_>,
         library: &Library,
     ) -> Option<Fabric> {
-        let Self { origin, from_file, kind, curves, coordinates, color, dyes, motion, exact } = self;
+        let Self { origin, panels, from_file, kind, curves, coordinates, color, dyes, motion, exact } = self;
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -234,6 +238,7 @@ impl Made {
         let mut fabric = Fabric {
             name: keys.name.clone().unwrap_or_else(|| keys.kind.name().to_owned()),
             origin,
+            panels,
             from_file,
             kind,
             curves,

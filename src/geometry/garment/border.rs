@@ -1,0 +1,127 @@
+//! Where the edges of stitches lie on a panel's border, within it or, to be turned in, beyond.
+
+use glam::DVec2;
+
+use super::{
+    edges::SeamKind,
+    surface::{Anchor, BorderEdge},
+};
+
+/// An edge of the border as stitches see it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    pub(super) border: BorderEdge,
+    /// How much of the cloth is left out at it, mm: negative where the cloth goes on to be turned in.
+    pub(super) margin: f64,
+    /// How it is sewn, if it is.
+    pub(super) seam: SeamKind,
+}
+
+/// A place of the panel near a seam that is turned in, or beyond it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NearSeam {
+    /// Ends of the seam's edge among the points of the sewn mesh.
+    pub(super) vertices: [u32; 2],
+    /// How far along the edge it is nearest, from 0 to 1.
+    pub(super) share: f32,
+    /// How far beyond the seam it is, mm; 0 on the panel.
+    pub(super) over: f32,
+    /// How it is sewn.
+    pub(super) kind: SeamKind,
+}
+
+/// The nearest place of an edge, and how far along it is, from 0 to 1.
+fn on(edge: &BorderEdge, from: DVec2) -> (DVec2, f64) {
+    let [a, b] = edge.ends;
+    let t = ((from - a).dot(b - a) / (b - a).length_squared().max(1e-300)).clamp(0.0, 1.0);
+    (a.lerp(b, t), t)
+}
+
+/// Distance inwards from the line through an edge.
+fn inside(edge: &BorderEdge, at: DVec2) -> f64 {
+    let [a, b] = edge.ends;
+    (b - a).normalize_or(DVec2::X).perp_dot(at - a)
+}
+
+/// The edge nearest to a point; of two that meet there the one that it lies straight before.
+fn nearest(from: DVec2, edges: &[Edge]) -> Option<&Edge> {
+    edges.iter().min_by(|a, b| key(a, from).total_cmp(&key(b, from)))
+}
+
+fn key(edge: &Edge, from: DVec2) -> f64 {
+    on(&edge.border, from).0.distance_squared(from) - 1e-6 * inside(&edge.border, from).powi(2)
+}
+
+/// Whether an edge goes rather up or down than across.
+pub(super) fn is_side(edge: &BorderEdge) -> bool {
+    let d = edge.ends[1] - edge.ends[0];
+    d.y.abs() > d.x.abs()
+}
+
+/// Where a panel begins from the left, and its circumference, if its straight left and right sides are sewn together.
+pub(super) fn closing(panel: u32, border: &[BorderEdge]) -> Option<(f64, f64)> {
+    let sides: Vec<&BorderEdge> = border.iter().filter(|e| is_side(e)).collect();
+    let low = sides.iter().flat_map(|e| e.ends).map(|p| p.x).fold(f64::INFINITY, f64::min);
+    let high = sides.iter().flat_map(|e| e.ends).map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
+    let width = high - low;
+    let straight = |e: &&&BorderEdge| {
+        let Some((other, edge)) = e.sewn_to else { return false };
+        let Some(mate) = border.get(edge as usize).filter(|_| other == panel) else { return false };
+        let level = (e.ends[0].y - mate.ends[1].y).abs().max((e.ends[1].y - mate.ends[0].y).abs());
+        let apart = (e.ends[0].x - mate.ends[1].x).abs();
+        level < 0.02 * width && apart > 0.98 * width
+    };
+    let sound = sides.iter().filter(straight).count();
+    (!sides.is_empty() && width > 0.0 && sound == sides.len()).then_some((low, width))
+}
+
+/// The place on the border nearest to a point, moved by the margins of the edges around, and whether the border is free
+/// there; the point itself if no border is within `reach`.
+pub(super) fn onto_border(from: DVec2, edges: &[Edge], reach: f64) -> (DVec2, bool) {
+    let close = |e: &&Edge| on(&e.border, from).0.distance_squared(from) < (reach + e.margin.abs()).powi(2);
+    let near: Vec<Edge> = edges.iter().filter(close).copied().collect();
+    let Some(Edge { border, margin, .. }) = nearest(from, &near) else { return (from, false) };
+    let mut at = on(border, from).0;
+    if *margin < 0.0 {
+        at += (border.ends[1] - border.ends[0]).normalize_or(DVec2::X).perp() * *margin;
+    }
+    for _ in 0..4 {
+        for Edge { border, margin, .. } in near.iter().filter(|e| e.margin >= 0.0) {
+            let [a, b] = border.ends;
+            let d = (b - a).normalize_or(DVec2::X);
+            let (along, off) = ((at - a).dot(d), d.perp_dot(at - a));
+            if (-1e-9..=a.distance(b) + 1e-9).contains(&along) && off < *margin && off > -2.0 * margin - 1e-9 {
+                at += d.perp() * (margin - off);
+            }
+        }
+    }
+    (at, border.sewn_to.is_none())
+}
+
+/// The place of the border nearest to a point.
+pub(super) fn nearest_anchor(from: DVec2, edges: &[Edge]) -> Anchor {
+    nearest(from, edges).map_or(Anchor::NONE, |Edge { border, .. }| {
+        let ([a, b], t) = (border.anchors, on(border, from).1);
+        let mix = |k: usize| a.share[k] + (b.share[k] - a.share[k]) * t as f32;
+        Anchor { face: a.face, share: [mix(0), mix(1)] }
+    })
+}
+
+/// Whether a point outside of the panel is on what is turned in at a seam.
+pub(super) fn is_turned_in(at: DVec2, edges: &[Edge]) -> bool {
+    let Some(Edge { border, margin, .. }) = nearest(at, edges) else { return false };
+    let out = -inside(border, at);
+    // Straight before the seam, not beside its ends.
+    *margin < 0.0 && out > 0.0 && out < -margin && out > 0.8 * on(border, at).0.distance(at)
+}
+
+/// Where a place lies against the nearest of the seams that are turned in, within a distance of it.
+pub(super) fn near_seam(at: DVec2, edges: &[Edge], within: f64, on_panel: bool) -> Option<NearSeam> {
+    let turned = edges.iter().filter(|e| e.margin < 0.0);
+    let edge = turned.min_by(|a, b| key(a, at).total_cmp(&key(b, at)))?;
+    let (to, share) = on(&edge.border, at);
+    let distance = to.distance(at);
+    let over = if on_panel { 0.0 } else { distance as f32 };
+    let found = NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam };
+    (distance < within).then_some(found)
+}

@@ -1,0 +1,128 @@
+//! How cloth is turned in where it is sewn: seen from the right side both panels go down into a line.
+//!
+//! Across a seam, s is the distance from it on the cloth (negative for what was left beyond the line, to be turned in),
+//! z the height over the cloth. Both panels do the same on either side of the plane through the line, so that yarns that
+//! stay on their side by their radius do not meet.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::edges::SeamKind;
+
+/// How a cloth is turned in at each kind of seam.
+pub(super) type Folds = [Option<Fold>; SeamKind::COUNT];
+
+/// The way of cloth across a seam: flat, round a bend to upright, straight on, and perhaps apart again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fold {
+    /// Radius of the bend in the middle of the cloth, mm.
+    pub(super) radius: f64,
+    /// How far from the seam's plane the middle is where it goes straight down, mm.
+    pub(super) half: f64,
+    /// For what length it does, mm, and by what angle it turns then, radians.
+    wall: f64,
+    flare: f64,
+    /// Radius at which cloth keeps its length, mm.
+    neutral: f64,
+    /// Yarns do not bend about less than this, mm.
+    least: f64,
+    /// How far the cloth's wrong side and its right side are from its middle, mm.
+    sides: [f64; 2],
+}
+
+/// A place on the way: the angle by which the cloth is turned there, how far the bend has moved down, and what is straight
+/// behind it, mm.
+struct Turned {
+    angle: f64,
+    down: f64,
+    straight: f64,
+}
+
+impl Fold {
+    /// Of cloth whose yarns' middles lie between two heights, of yarn of a diameter; `None` where cloth stays flat.
+    pub(super) fn new(kind: SeamKind, [low, high]: [f64; 2], diameter: f64) -> Option<Self> {
+        let (wall, flare) = match kind {
+            SeamKind::None => return None,
+            // Where the edges part the sewing yarn has room between them. Before, somewhere on the wall, loops of both sides
+            // touch.
+            SeamKind::Mattress => (1.8 * diameter, 50_f64.to_radians()),
+            SeamKind::Overlock => (f64::INFINITY, 0.0),
+        };
+        let radius = 0.9 * diameter - low;
+        let sides = [0.5 * diameter - low, 0.5 * diameter + high];
+        let half = high + 0.51 * diameter;
+        Some(Self { radius, half, wall, flare, neutral: radius + 0.5 * low, least: 0.3 * diameter, sides })
+    }
+
+    /// The distance from the seam at which the bend begins, mm.
+    pub(super) fn begin(&self) -> f64 {
+        self.half + self.radius
+    }
+
+    /// The distance on the cloth at which it goes straight down, mm.
+    pub(super) fn upright(&self) -> f64 {
+        self.begin() - self.neutral * FRAC_PI_2
+    }
+
+    fn turned(&self, s: f64) -> Turned {
+        let after = self.upright() - s;
+        if after <= 0.0 {
+            return Turned { angle: (self.begin() - s) / self.neutral, down: 0.0, straight: 0.0 };
+        }
+        let parted = (after - self.wall).max(0.0);
+        let turned = (parted / self.neutral).min(self.flare);
+        Turned { angle: FRAC_PI_2 + turned, down: after.min(self.wall), straight: parted - turned * self.neutral }
+    }
+
+    /// Where a place of the cloth comes to lie: distance from the seam's plane and height, mm.
+    pub(super) fn bend(&self, s: f64, z: f64) -> [f64; 2] {
+        if s >= self.begin() {
+            return [s, z];
+        }
+        self.off(s, z.max(self.least - self.radius))
+    }
+
+    /// What lies so far before the right side of what is turned in, at a distance on the cloth.
+    pub(super) fn before(&self, s: f64, clear: f64) -> [f64; 2] {
+        self.off(s, self.sides[1] + clear)
+    }
+
+    /// What lies so far behind its wrong side.
+    pub(super) fn behind(&self, s: f64, clear: f64) -> [f64; 2] {
+        self.off(s, -self.sides[0] - clear)
+    }
+
+    fn off(&self, s: f64, z: f64) -> [f64; 2] {
+        let Turned { angle, down, straight } = self.turned(s);
+        let (sin, cos) = angle.sin_cos();
+        let out = self.radius + z;
+        [self.begin() - out * sin - straight * cos, out * cos - self.radius - down - straight * sin]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cloth_goes_on_evenly_and_stays_on_its_side() {
+        for kind in [SeamKind::Mattress, SeamKind::Overlock] {
+            let fold = Fold::new(kind, [-0.8, 0.7], 1.0).unwrap();
+            assert_eq!(fold.bend(fold.begin(), 0.3), [fold.begin(), 0.3]);
+            let [s, z] = fold.bend(fold.upright(), 0.0);
+            assert!((s - fold.half).abs() < 1e-9 && (z + fold.radius).abs() < 1e-9);
+            let mut before = fold.bend(6.0, 0.0);
+            for i in 1..900 {
+                let here = fold.bend(6.0 - 0.01 * f64::from(i), 0.0);
+                let step = (here[0] - before[0]).hypot(here[1] - before[1]);
+                // Outside of the neutral line cloth is drawn out.
+                assert!((0.0099..0.0135).contains(&step), "{i}: {step}");
+                before = here;
+            }
+            // Right sides face each other and do not meet, and what is turned in lies under the cloth.
+            let across = |s: f64| fold.bend(s, 0.7)[0] - 0.5;
+            assert!((0..600).map(|i| across(3.0 - 0.01 * f64::from(i))).all(|gap| gap > 0.0));
+            assert!(fold.bend(-2.0, 0.0)[1] < -2.0);
+        }
+        assert_eq!(Fold::new(SeamKind::None, [-0.8, 0.7], 1.0), None);
+    }
+}
