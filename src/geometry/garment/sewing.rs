@@ -200,7 +200,7 @@ impl Sewing {
                     fold(trim).map_or([d, 0.0], |f| f.behind(0.35 * f.upright() - 0.3 * over, radius))
                 };
                 let edge = |(trim, over): (&Trim, f64)| {
-                    let beyond = over + trim.turn + 0.5 * trim.diameter + radius;
+                    let beyond = over + trim.turn + trim.diameter + 2.0 * radius;
                     fold(trim).map_or([d, 0.0], |f| f.behind(-beyond, radius))
                 };
                 let (line, edge) = (sides.map(line), sides.map(edge));
