@@ -18,6 +18,10 @@
 //! samples      --render, film------------------>  pixels    --render::picture, image-->  EXR, PNG, ...
 //! the run      --report, plan------------------>  statistics, metadata                  --cli-->  screen
 //! ```
+//! A program needs few of them: [`scene`] (a [`scene::SceneBuilder`], or [`scene::load`] for files), [`cloth::Cloth`] and
+//! [`render`] make a picture; [`geometry::curve_file`] and [`geometry::pattern`] read and make curves; [`image`] reads
+//! pictures and compares them; [`experiment::goniometer`] measures yarns. What is not for others is not public.
+//!
 //! Only one thing looks back: during traversal Embree asks a filter whether a ray meets a ply or slips through. The
 //! filter lives in [`trace`], which knows shapes and transparency only, and is a pure function of ray and hit.
 //!
@@ -44,21 +48,25 @@
 //! * `f32` for rays and directions, `f64` for set-up and sums.
 
 #![deny(unsafe_code)]
+#![allow(
+    rustdoc::private_intra_doc_links,
+    reason = "the map names all rooms; `cargo doc --document-private-items` shows those that are not public"
+)]
 
 pub mod cli;
 pub mod cloth;
 pub mod experiment;
-pub mod ffi;
+pub(crate) mod ffi;
 pub mod film;
 pub mod geometry;
 pub mod image;
-pub mod input;
-pub mod integrator;
+pub(crate) mod input;
+pub(crate) mod integrator;
 pub mod light;
 pub mod math;
-pub mod plan;
+pub(crate) mod plan;
 pub mod render;
-pub mod report;
+pub(crate) mod report;
 pub mod scattering;
 pub mod scene;
 #[cfg(test)]

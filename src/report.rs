@@ -1,13 +1,13 @@
 //! What a run was: one record, written as statistics or as the metadata of a picture; and what was found by comparing
 //! pictures, as text, JSON and pages.
 
-pub mod compare;
-pub mod convergence;
-pub mod fidelity;
-pub mod machine;
-pub mod page;
-pub mod plot;
-pub mod table3;
+pub(crate) mod compare;
+pub(crate) mod convergence;
+pub(crate) mod fidelity;
+pub(crate) mod machine;
+pub(crate) mod page;
+pub(crate) mod plot;
+pub(crate) mod table3;
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ use crate::{
 
 /// Seconds of each phase.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Phases {
+pub(crate) struct Phases {
     /// Reading scene, curves and images.
     pub load: Duration,
     /// Curves, and Embree's BVH.
@@ -42,7 +42,7 @@ pub struct Phases {
 
 /// Everything that is known of a run.
 #[derive(Debug)]
-pub struct RunRecord<'a> {
+pub(crate) struct RunRecord<'a> {
     /// What was rendered.
     pub scene: &'a Scene,
     /// With what.
@@ -56,7 +56,7 @@ pub struct RunRecord<'a> {
 }
 
 /// The most memory this process has held, in bytes; 0 where the system does not say.
-pub fn peak_rss_bytes() -> u64 {
+pub(crate) fn peak_rss_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     line.and_then(|l| l.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()).map_or(0, |kib| kib * 1024)
@@ -64,7 +64,7 @@ pub fn peak_rss_bytes() -> u64 {
 
 impl RunRecord<'_> {
     /// The statistics of `--stats`.
-    pub fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let scene = self.scene;
         let render = &scene.render;
         let film = &self.rendered.film;
@@ -144,7 +144,7 @@ impl RunRecord<'_> {
     }
 
     /// The metadata of an EXR.
-    pub fn attributes(&self, command_line: &str) -> Vec<(String, Attribute)> {
+    pub(crate) fn attributes(&self, command_line: &str) -> Vec<(String, Attribute)> {
         let mut out = metadata(self.scene, self.world);
         let film = &self.rendered.film;
         let noise = film.noise().map(|n| [n.estimate, n.low, n.high]);
@@ -156,7 +156,7 @@ impl RunRecord<'_> {
 }
 
 /// The metadata that all parts of a render share: what the picture is of.
-pub fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
+pub(crate) fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)> {
     [
         ("scene", scene.path.clone()),
         ("fingerprint", scene.fingerprint.clone()),
@@ -202,7 +202,7 @@ fn as_ratio(rate: f64) -> [u32; 2] {
 }
 
 /// The metadata of a picture that was merged from so many parts.
-pub fn merged_attributes(
+pub(crate) fn merged_attributes(
     metadata: &[(String, Attribute)],
     job: &Job,
     parts: usize,

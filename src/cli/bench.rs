@@ -38,7 +38,7 @@ after the last row that was finished; converged pictures are kept in the directo
 pub(super) struct BenchArgs {
     /// The suite file.
     suite: PathBuf,
-    /// Measure what the suite's table [quick] says.
+    /// Measure what the suite's table `[quick]` says.
     #[arg(long)]
     quick: bool,
     /// Only rows whose name contains this (repeatable).

@@ -27,7 +27,7 @@ use crate::{
 
 /// What to measure.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub(crate) struct Options {
     /// The methods, a curve each.
     pub methods: Vec<Method>,
     /// The method that counts as true; `None` measures noise only.
@@ -48,7 +48,7 @@ pub struct Options {
 
 /// Why there is no result.
 #[derive(Debug)]
-pub enum ConvergeError {
+pub(crate) enum ConvergeError {
     /// A scene cannot be loaded or built, or a file written: text for the user.
     Failed(String),
     /// The user or the system asked to stop.
@@ -74,7 +74,7 @@ struct Prepared {
 ///
 /// # Errors
 /// See [`ConvergeError`].
-pub fn run(
+pub(crate) fn run(
     load: impl Fn(Method) -> Result<Scene, String>,
     options: &Options,
     cache: &Path,

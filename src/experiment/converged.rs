@@ -19,7 +19,7 @@ use crate::{
 
 /// A converged picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Converged {
+pub(crate) struct Converged {
     /// Both halves.
     pub halves: Halves,
     /// Samples per pixel of both together.
@@ -33,7 +33,7 @@ pub struct Converged {
 
 /// One of the halves, as a render gives it.
 #[derive(Clone, Debug)]
-pub struct Half {
+pub(crate) struct Half {
     /// R, G, B, A, and the parts of light if wanted.
     pub image: Image,
     /// Samples per pixel.
@@ -44,7 +44,7 @@ pub struct Half {
 
 impl Converged {
     /// Puts two halves together; `None` if a picture lacks colours.
-    pub fn new(first: &Half, second: &Half) -> Option<Self> {
+    pub(crate) fn new(first: &Half, second: &Half) -> Option<Self> {
         let colors = |image: &Image| image.rgb().map(interleaved);
         let alpha =
             |image: &Image| image.channel("A").map_or_else(|| vec![1.0; image.width * image.height], <[f32]>::to_vec);
@@ -60,7 +60,7 @@ impl Converged {
     }
 
     /// Reads what [`Self::store`] has written; `None` if there is no such file, or another program has written it.
-    pub fn load(path: &Path) -> Option<Self> {
+    pub(crate) fn load(path: &Path) -> Option<Self> {
         let image = image::read(path).ok()?;
         let plane = |layer: &str| image.layer_rgb(layer).map(interleaved);
         let number = |name: &str| match image.attribute(name)? {
@@ -86,7 +86,7 @@ impl Converged {
     ///
     /// # Errors
     /// What writing a file can say.
-    pub fn store(&self, path: &Path) -> Result<(), ImageError> {
+    pub(crate) fn store(&self, path: &Path) -> Result<(), ImageError> {
         let (mean, variance) = (self.halves.mean(), self.halves.variance());
         let mut layers: Vec<(String, &[[f32; 3]])> = vec![
             (String::new(), &mean),
@@ -139,12 +139,12 @@ fn lobes(image: &Image) -> Option<[Vec<[f32; 3]>; 5]> {
 }
 
 /// The file of a converged picture that everything in `parts` decides, together with the program itself.
-pub fn path(cache: &Path, parts: &[&str]) -> PathBuf {
+pub(crate) fn path(cache: &Path, parts: &[&str]) -> PathBuf {
     cache.join(format!("{}.exr", key(parts)))
 }
 
 /// A name for everything in `parts` and for this program.
-pub fn key(parts: &[&str]) -> String {
+pub(crate) fn key(parts: &[&str]) -> String {
     let mut hasher = DefaultHasher::new();
     parts.hash(&mut hasher);
     exr::SOFTWARE.hash(&mut hasher);

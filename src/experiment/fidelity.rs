@@ -23,7 +23,7 @@ use crate::{
 ///
 /// # Errors
 /// [`BenchError::Suite`] or [`BenchError::Interrupted`]; cases that fail are listed as missing.
-pub fn run(
+pub(crate) fn run(
     suite: &Suite,
     renderer: &mut impl Renderer,
     directory: &Path,

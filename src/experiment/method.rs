@@ -6,7 +6,7 @@ use crate::scene::{Mode, Model};
 
 /// A mode and, where one is named, a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Method {
+pub(crate) struct Method {
     /// How yarns are represented.
     pub mode: Mode,
     /// The yarns' scattering model; `None` leaves it to the scene.
@@ -18,7 +18,7 @@ impl Method {
     ///
     /// # Errors
     /// What is wrong with the text, and which names are known.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
         fn named<T: Copy>(what: &str, name: &str, names: &[(&str, T)]) -> Result<T, String> {
             names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
                 let known: Vec<&str> = names.iter().map(|(known, _)| *known).collect();

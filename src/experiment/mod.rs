@@ -4,14 +4,14 @@
 //! error against run time; [`table3`] what explicit fibres and aggregated yarns cost at equal quality, [`fidelity`] how far
 //! apart their pictures are, as a [`suite`] says.
 
-pub mod converge;
-pub mod converged;
-pub mod fidelity;
+pub(crate) mod converge;
+pub(crate) mod converged;
+pub(crate) mod fidelity;
 pub mod goniometer;
-pub mod method;
-pub mod stress;
-pub mod suite;
-pub mod table3;
+pub(crate) mod method;
+pub(crate) mod stress;
+pub(crate) mod suite;
+pub(crate) mod table3;
 
 /// Names of the lobes in the files that experiments write.
 pub const LOBES: [&str; 5] = crate::scattering::LobeValues::NAMES;

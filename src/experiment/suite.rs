@@ -15,7 +15,7 @@ use crate::{
 
 /// What a suite measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
+pub(crate) enum Measure {
     /// Time, memory and error at equal quality: [`super::table3`].
     Cost,
     /// How far pictures are from the reference: [`super::fidelity`].
@@ -24,7 +24,7 @@ pub enum Measure {
 
 /// A checked suite.
 #[derive(Clone, Debug)]
-pub struct Suite {
+pub(crate) struct Suite {
     /// The file, as it was named.
     pub path: String,
     /// What it calls itself.
@@ -59,7 +59,7 @@ pub struct Suite {
 
 /// A further way to render a case.
 #[derive(Clone, Debug)]
-pub struct OtherWay {
+pub(crate) struct OtherWay {
     /// What it is called.
     pub name: String,
     /// Mode and model.
@@ -70,7 +70,7 @@ pub struct OtherWay {
 
 /// A scene under a light.
 #[derive(Clone, Debug)]
-pub struct Case {
+pub(crate) struct Case {
     /// Row and light.
     pub name: String,
     /// The scene file.
@@ -89,7 +89,7 @@ pub struct Case {
 
 /// Which cases are measured against time.
 #[derive(Clone, Debug)]
-pub struct ConvergePlan {
+pub(crate) struct ConvergePlan {
     /// Names of cases.
     pub cases: Vec<String>,
     /// Renders behind every point.
@@ -121,7 +121,7 @@ impl ConvergePlan {
 
 impl Case {
     /// The options with which the case's scene is loaded for a method; `more` stands over all others.
-    pub fn options(&self, suite: &Suite, method: Method, more: &[String]) -> LoadOptions {
+    pub(crate) fn options(&self, suite: &Suite, method: Method, more: &[String]) -> LoadOptions {
         let mut assignments = self.set.clone();
         assignments.extend_from_slice(more);
         assignments.push(format!("render.mode=\"{}\"", method.mode.name()));
@@ -140,7 +140,7 @@ impl Suite {
     ///
     /// # Errors
     /// Everything that is wrong with it, as text for the user.
-    pub fn load(path: &Path, quick: bool) -> Result<Self, LoadError> {
+    pub(crate) fn load(path: &Path, quick: bool) -> Result<Self, LoadError> {
         let mut sources = Sources::new();
         let diagnostics = Diagnostics::new();
         let name = path.display().to_string();
@@ -154,7 +154,7 @@ impl Suite {
     }
 
     /// The case of a name.
-    pub fn case(&self, name: &str) -> Option<&Case> {
+    pub(crate) fn case(&self, name: &str) -> Option<&Case> {
         self.cases.iter().find(|case| case.name == name)
     }
 }

@@ -36,7 +36,7 @@ use crate::{
 
 /// One render.
 #[derive(Clone, Debug)]
-pub struct Job<'a> {
+pub(crate) struct Job<'a> {
     /// What to render.
     pub case: &'a Case,
     /// How.
@@ -55,7 +55,7 @@ pub struct Job<'a> {
 
 /// A finished render: its picture and its statistics, as `render --stats` writes them.
 #[derive(Clone, Debug)]
-pub struct Done {
+pub(crate) struct Done {
     /// The picture.
     pub image: Image,
     /// The statistics.
@@ -64,7 +64,7 @@ pub struct Done {
 
 /// Why a case or the suite ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum BenchError {
+pub(crate) enum BenchError {
     /// This case cannot be measured: text for the user.
     Case(String),
     /// The suite cannot go on.
@@ -83,7 +83,7 @@ impl fmt::Display for BenchError {
 }
 
 /// Who renders: processes in earnest, something quicker in tests.
-pub trait Renderer {
+pub(crate) trait Renderer {
     /// A name for everything that changes the picture of a case, its samples aside.
     ///
     /// # Errors
@@ -100,7 +100,7 @@ pub trait Renderer {
 
 /// Renders each job by a process of this very program.
 #[derive(Debug)]
-pub struct Processes<'a> {
+pub(crate) struct Processes<'a> {
     /// Threads of each; `None` for all.
     pub threads: Option<usize>,
     /// Where pictures lie until they are read.
@@ -216,7 +216,7 @@ const MOST_OFTEN: f64 = 10.0;
 ///
 /// # Errors
 /// [`BenchError::Suite`] or [`BenchError::Interrupted`]; cases that fail are listed as missing.
-pub fn run(
+pub(crate) fn run(
     suite: &Suite,
     renderer: &mut impl Renderer,
     directory: &Path,

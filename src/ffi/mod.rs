@@ -6,7 +6,7 @@
 //! - What C allocates is released by `Drop`.
 #![allow(unsafe_code, reason = "calling C is unsafe; this folder is where it is checked")]
 
-pub mod embree;
-pub mod oidn;
+pub(crate) mod embree;
+pub(crate) mod oidn;
 #[cfg(feature = "oiio")]
-pub mod oiio;
+pub(crate) mod oiio;

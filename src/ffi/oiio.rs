@@ -38,7 +38,7 @@ const MESSAGE_SIZE: usize = 1024;
 
 /// Why OpenImageIO did not do what it was asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum OiioError {
+pub(crate) enum OiioError {
     /// The library itself cannot be loaded; the loader's reason.
     Missing(String),
     /// The picture has more samples than the caller allows: width, height, channels.
@@ -63,56 +63,54 @@ impl std::error::Error for OiioError {}
 
 /// How the samples of a file are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sample {
+pub(crate) enum Sample {
     /// Eight bits: 0 to 1 become 0 to 255.
     U8,
-    /// Floating point of 16 bits.
-    Half,
     /// Floating point of 32 bits.
     Float,
 }
 
 /// A picture as OpenImageIO hands it over; its memory belongs to C.
-pub struct Picture(face::YarnrayOiioImage);
+pub(crate) struct Picture(face::YarnrayOiioImage);
 
 impl Picture {
     /// Pixels in a row.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         to_usize(self.0.width)
     }
 
     /// Number of rows.
-    pub fn height(&self) -> usize {
+    pub(crate) fn height(&self) -> usize {
         to_usize(self.0.height)
     }
 
     /// Number of channels.
-    pub fn channel_count(&self) -> usize {
+    pub(crate) fn channel_count(&self) -> usize {
         to_usize(self.0.channels)
     }
 
     /// The first pixel, seen from the upper left corner of the display window.
-    pub fn origin(&self) -> [i32; 2] {
+    pub(crate) fn origin(&self) -> [i32; 2] {
         [self.0.x, self.0.y]
     }
 
     /// Width and height of the display window.
-    pub fn display_size(&self) -> [usize; 2] {
+    pub(crate) fn display_size(&self) -> [usize; 2] {
         [to_usize(self.0.display_width), to_usize(self.0.display_height)]
     }
 
     /// The channel that is the alpha, if there is one. Colours are associated with it.
-    pub fn alpha_channel(&self) -> Option<usize> {
+    pub(crate) fn alpha_channel(&self) -> Option<usize> {
         usize::try_from(self.0.alpha_channel).ok()
     }
 
     /// Whether the samples are integers in the file and still carry the sRGB curve.
-    pub fn is_srgb_encoded(&self) -> bool {
+    pub(crate) fn is_srgb_encoded(&self) -> bool {
         self.0.srgb_encoded != 0
     }
 
     /// The name of every channel, in the order of the samples.
-    pub fn channel_names(&self) -> Vec<String> {
+    pub(crate) fn channel_names(&self) -> Vec<String> {
         // SAFETY: yarnray_oiio_read fills `names` with `names_size` bytes, which live as long as `self`.
         let bytes = unsafe { slice::from_raw_parts(self.0.names.cast::<u8>(), self.0.names_size) };
         bytes
@@ -123,7 +121,7 @@ impl Picture {
     }
 
     /// All samples: rows from the top, pixels from the left, the channels of a pixel together.
-    pub fn samples(&self) -> &[f32] {
+    pub(crate) fn samples(&self) -> &[f32] {
         let count = self.width() * self.height() * self.channel_count();
         // SAFETY: yarnray_oiio_read allocates width x height x channels floats, zeroed, which live as long as `self`.
         unsafe { slice::from_raw_parts(self.0.data, count) }
@@ -140,7 +138,7 @@ impl Drop for Picture {
 }
 
 /// Whether OpenImageIO is in this process already.
-pub fn is_loaded() -> bool {
+pub(crate) fn is_loaded() -> bool {
     matches!(FACE.get(), Some(Ok(_)))
 }
 
@@ -148,7 +146,8 @@ pub fn is_loaded() -> bool {
 ///
 /// # Errors
 /// [`OiioError::Missing`].
-pub fn version() -> Result<String, OiioError> {
+#[cfg(test)]
+pub(crate) fn version() -> Result<String, OiioError> {
     // SAFETY: the function takes nothing and catches every exception.
     let number = unsafe { face()?.yarnray_oiio_version() };
     Ok(format!("{}.{}.{}", number / 10000, number / 100 % 100, number % 100))
@@ -158,7 +157,7 @@ pub fn version() -> Result<String, OiioError> {
 ///
 /// # Errors
 /// [`OiioError::Missing`].
-pub fn can_write(path: &Path) -> Result<bool, OiioError> {
+pub(crate) fn can_write(path: &Path) -> Result<bool, OiioError> {
     let face = face()?;
     let path = c_path(path)?;
     // SAFETY: the path ends in NUL and outlives the call.
@@ -169,7 +168,7 @@ pub fn can_write(path: &Path) -> Result<bool, OiioError> {
 ///
 /// # Errors
 /// [`OiioError`]: the library is missing, the picture too large, or not readable.
-pub fn read(path: &Path, sample_limit: usize) -> Result<Picture, OiioError> {
+pub(crate) fn read(path: &Path, sample_limit: usize) -> Result<Picture, OiioError> {
     let face = face()?;
     let path = c_path(path)?;
     let mut message = [0_u8; MESSAGE_SIZE];
@@ -214,14 +213,19 @@ pub fn read(path: &Path, sample_limit: usize) -> Result<Picture, OiioError> {
 ///
 /// # Panics
 /// If there are not width x height x channels samples.
-pub fn write(path: &Path, size: [usize; 2], channels: usize, samples: &[f32], sample: Sample) -> Result<(), OiioError> {
+pub(crate) fn write(
+    path: &Path,
+    size: [usize; 2],
+    channels: usize,
+    samples: &[f32],
+    sample: Sample,
+) -> Result<(), OiioError> {
     assert_eq!(samples.len(), size[0] * size[1] * channels, "as many samples as pixels times channels");
     let face = face()?;
     let path = c_path(path)?;
     let number = |value| i32::try_from(value).map_err(|_| OiioError::TooLarge(size[0], size[1], channels));
     let kind = match sample {
         Sample::U8 => face::YARNRAY_OIIO_U8,
-        Sample::Half => face::YARNRAY_OIIO_HALF,
         Sample::Float => face::YARNRAY_OIIO_FLOAT,
     };
     let mut message = [0_u8; MESSAGE_SIZE];
@@ -243,7 +247,7 @@ pub fn write(path: &Path, size: [usize; 2], channels: usize, samples: &[f32], sa
 
 /// A picture in OpenImageIO's texture cache.
 #[derive(Debug)]
-pub struct TextureFile {
+pub(crate) struct TextureFile {
     raw: ptr::NonNull<face::YarnrayOiioTexture>,
     size: [usize; 2],
 }
@@ -259,7 +263,7 @@ impl TextureFile {
     ///
     /// # Errors
     /// [`OiioError`]
-    pub fn open(path: &Path, copy: &Path) -> Result<Self, OiioError> {
+    pub(crate) fn open(path: &Path, copy: &Path) -> Result<Self, OiioError> {
         let face = face()?;
         let (path, copy) = (c_path(path)?, c_path(copy)?);
         let mut message = [0_u8; MESSAGE_SIZE];
@@ -283,13 +287,13 @@ impl TextureFile {
     }
 
     /// Width and height in pixels.
-    pub fn size(&self) -> [usize; 2] {
+    pub(crate) fn size(&self) -> [usize; 2] {
         self.size
     }
 
     /// The linear colour at (u, v), filtered over `width`; black where the file can no longer be read.
     #[inline]
-    pub fn sample(&self, u: f32, v: f32, width: f32) -> [f32; 3] {
+    pub(crate) fn sample(&self, u: f32, v: f32, width: f32) -> [f32; 3] {
         let mut rgb = [0.0; 3];
         if let Some(Ok(face)) = FACE.get() {
             // SAFETY: the texture is open until it is dropped, and `rgb` takes three floats.
@@ -309,7 +313,7 @@ impl Drop for TextureFile {
 }
 
 /// Bytes that textures take in memory now; 0 while OpenImageIO is not loaded.
-pub fn texture_bytes() -> u64 {
+pub(crate) fn texture_bytes() -> u64 {
     match FACE.get() {
         // SAFETY: the function takes nothing and catches every exception.
         Some(Ok(face)) => u64::try_from(unsafe { face.yarnray_oiio_texture_bytes() }).unwrap_or(0),

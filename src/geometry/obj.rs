@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 1 << 31;
 
 /// Why a mesh could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MeshError {
+pub(crate) struct MeshError {
     path: PathBuf,
     /// Counted from 1; 0 where no line is at fault.
     line: usize,
@@ -68,7 +68,7 @@ impl<R: BufRead> BufRead for Counting<'_, R> {
 ///
 /// # Errors
 /// What is wrong with the file, and in which line.
-pub fn read(path: &Path) -> Result<Mesh, MeshError> {
+pub(crate) fn read(path: &Path) -> Result<Mesh, MeshError> {
     let fail = |line: usize, reason: String| MeshError { path: path.into(), line, reason };
     let file = File::open(path).map_err(|e| fail(0, in_words(&e)))?;
     let meta = file.metadata().map_err(|e| fail(0, in_words(&e)))?;

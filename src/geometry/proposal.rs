@@ -22,7 +22,7 @@ const UNITS: [(&str, f64); 5] = [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("in",
 
 /// A guess, in the file's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Proposal {
+pub(crate) struct Proposal {
     /// The largest radius at which yarns hardly overlap.
     pub radius: f64,
     /// How far they overlap at that radius.
@@ -35,7 +35,7 @@ pub struct Proposal {
 
 impl Proposal {
     /// Looks at the curves around the middle of a file. `None` if they are too few to tell, or never come near each other.
-    pub fn new(set: &CurveSet) -> Option<Self> {
+    pub(crate) fn new(set: &CurveSet) -> Option<Self> {
         let curves = around_the_middle(set);
         // Points are seldom farther apart than a few radii, or nearer than a tenth of one.
         let mut steps: Vec<f64> =
@@ -109,7 +109,7 @@ fn bends(curves: &[Curve]) -> [f64; 2] {
 }
 
 /// Width, height and depth of cloth in centimetres, for each unit that a file may be in.
-pub fn sizes(set: &CurveSet) -> Vec<(&'static str, DVec3)> {
+pub(crate) fn sizes(set: &CurveSet) -> Vec<(&'static str, DVec3)> {
     let all = || set.curves.iter().flat_map(|c| &c.points).copied();
     let size = all().reduce(DVec3::max).zip(all().reduce(DVec3::min)).map_or(DVec3::ZERO, |(high, low)| high - low);
     UNITS.into_iter().map(|(name, millimetres)| (name, size * millimetres / 10.0)).collect()

@@ -150,7 +150,7 @@ impl Tubes {
 }
 
 /// The open curve of some control points with their radii.
-pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
+pub(crate) fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
     // Catmull-Rom ends are mirrored points, which every reader makes for itself.
     let kept = if basis == Basis::BSpline { points } else { &points[1..points.len() - 1] };
     Curve {
@@ -164,7 +164,7 @@ pub fn curve_of(basis: Basis, points: &[Vec4]) -> Curve {
 
 /// The control points of the uniform cubic B-spline that passes through `knots` (at least two), with the radius `w`
 /// of each knot. At its ends the curve does not bend.
-pub fn spline_through(knots: &[Vec3], radii: impl Fn(usize) -> f32) -> Vec<Vec4> {
+pub(crate) fn spline_through(knots: &[Vec3], radii: impl Fn(usize) -> f32) -> Vec<Vec4> {
     let points = chain::spline_through(knots.iter().map(|knot| knot.as_dvec3()));
     let knot_of = |i: usize| i.saturating_sub(1).min(knots.len() - 1);
     points.iter().enumerate().map(|(i, p)| p.as_vec3().extend(radii(knot_of(i)))).collect()

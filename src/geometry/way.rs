@@ -23,7 +23,7 @@ const MOST_STATIONS: usize = 64;
 
 /// A point of a way in the unwound yarn. Lengths are in yarn radii.
 #[derive(Clone, Copy, Debug)]
-pub struct Station {
+pub(crate) struct Station {
     /// Distance along the way.
     pub depth: f32,
     /// In the section of the unwound yarn.
@@ -39,11 +39,11 @@ pub struct Station {
 }
 
 /// A way through a yarn, from its start on.
-pub type Way = ArrayVec<Station, MOST_STATIONS>;
+pub(crate) type Way = ArrayVec<Station, MOST_STATIONS>;
 
 /// A stretch of a way that passes a ply.
 #[derive(Clone, Copy, Debug)]
-pub struct Passage {
+pub(crate) struct Passage {
     /// Where it enters the ply's core; where it only grazes the ply's outer fibres, the nearest point.
     pub enter: Station,
     /// Where it leaves the core.

@@ -8,10 +8,10 @@ use super::{
 };
 
 /// Identifiers kept for each pixel, those of the largest coverage.
-pub const DEPTH: usize = 6;
+pub(crate) const DEPTH: usize = 6;
 
 /// The identifier of a name: MurmurHash3, kept from being infinite, subnormal or not a number as a float.
-pub fn id(name: &str) -> u32 {
+pub(crate) fn id(name: &str) -> u32 {
     let hash = murmur3(name.as_bytes());
     if matches!(hash >> 23 & 0xff, 0 | 0xff) { hash ^ 1 << 23 } else { hash }
 }
@@ -32,14 +32,14 @@ fn murmur3(bytes: &[u8]) -> u32 {
 }
 
 /// The channels of a layer: `NAME00.R` the first identifier, `NAME00.G` its coverage, `NAME00.B` the second, and so on.
-pub fn channels(layer: &str) -> impl Iterator<Item = ChannelSpec> {
+pub(crate) fn channels(layer: &str) -> impl Iterator<Item = ChannelSpec> {
     let parts = (0..DEPTH / 2).flat_map(|pair| ["R", "G", "B", "A"].map(|part| (pair, part)));
     // Identifiers are exact in 32 bits only.
     parts.map(move |(pair, part)| ChannelSpec::new(format!("{layer}{pair:02}.{part}"), Sample::F32))
 }
 
 /// The metadata by which programs find a layer and the names in it.
-pub fn attributes<'a>(layer: &str, names: impl Iterator<Item = &'a str>) -> Vec<(String, Attribute)> {
+pub(crate) fn attributes<'a>(layer: &str, names: impl Iterator<Item = &'a str>) -> Vec<(String, Attribute)> {
     // Sorted, so that equal pictures are equal files.
     let manifest: BTreeMap<&str, String> = names.map(|name| (name, format!("{:08x}", id(name)))).collect();
     let manifest = serde_json::to_string(&manifest).expect("text becomes JSON");
@@ -56,7 +56,7 @@ pub fn attributes<'a>(layer: &str, names: impl Iterator<Item = &'a str>) -> Vec<
 
 /// The samples of a pixel in the order of [`channels`]: what covers it with its number of samples, of `total`. Several
 /// entries of one identifier count together.
-pub fn rank(covering: &mut Vec<(u32, u32)>, total: u32) -> [f32; 2 * DEPTH] {
+pub(crate) fn rank(covering: &mut Vec<(u32, u32)>, total: u32) -> [f32; 2 * DEPTH] {
     covering.sort_unstable();
     covering.dedup_by(|next, kept| {
         let same = next.0 == kept.0;

@@ -8,15 +8,15 @@
 //! Colours are linear, with the primaries of Rec. 709, and associated with alpha wherever there is one.
 //! The top row comes first. What is rendered, and what a number means, is not this room's business.
 
-pub mod cryptomatte;
-pub mod error;
+pub(crate) mod cryptomatte;
+pub(crate) mod error;
 pub mod exr;
 pub mod metric;
 mod oiio;
 pub mod output;
 mod palette;
 pub mod png;
-pub mod texture;
+pub(crate) mod texture;
 
 use std::{fs::File, io::Read as _, path::Path};
 

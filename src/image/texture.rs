@@ -89,10 +89,10 @@ impl Texture {
 }
 
 /// Most bytes of all textures together that are kept in memory, as `ffi/oiio.cpp` sets it.
-pub const CACHE_BYTES: u64 = 1024 << 20;
+pub(crate) const CACHE_BYTES: u64 = 1024 << 20;
 
 /// Bytes that textures take in memory now.
-pub fn bytes() -> u64 {
+pub(crate) fn bytes() -> u64 {
     #[cfg(feature = "oiio")]
     return crate::ffi::oiio::texture_bytes();
     #[cfg(not(feature = "oiio"))]

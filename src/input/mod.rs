@@ -4,6 +4,6 @@
 //! reads it key by key and collects what is wrong; [`diagnostic`] shows that to the user. Scenes and suites are read
 //! with them; this module knows the keys of neither.
 
-pub mod diagnostic;
-pub mod document;
-pub mod reader;
+pub(crate) mod diagnostic;
+pub(crate) mod document;
+pub(crate) mod reader;

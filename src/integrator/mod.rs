@@ -72,7 +72,7 @@ impl Counters {
 
 /// A scene ready for paths: shared by all threads.
 #[derive(Debug)]
-pub struct Integrator<'a> {
+pub(crate) struct Integrator<'a> {
     cloth: &'a Cloth,
     ground: Option<Ground>,
     materials: &'a [Material],
@@ -99,7 +99,7 @@ pub struct Integrator<'a> {
 
 /// A worker's own memory: reused from sample to sample.
 #[derive(Debug, Default)]
-pub struct Scratch {
+pub(crate) struct Scratch {
     /// The time of the path in work: where what moves is for all its rays.
     time: f32,
     crossings: Crossings,
@@ -123,7 +123,7 @@ struct Path<'s> {
 
 impl<'a> Integrator<'a> {
     /// For a scene and its cloth.
-    pub fn new(scene: &'a Scene, cloth: &'a Cloth) -> Self {
+    pub(crate) fn new(scene: &'a Scene, cloth: &'a Cloth) -> Self {
         let lights = LightChooser::new(&scene.lights);
         let mut environments = Vec::new();
         let mut area_lights = Vec::new();
@@ -157,7 +157,13 @@ impl<'a> Integrator<'a> {
     }
 
     /// Follows one path from the camera.
-    pub fn sample(&self, ray: Ray, sampler: &mut Sampler, scratch: &mut Scratch, counters: &mut Counters) -> Sample {
+    pub(crate) fn sample(
+        &self,
+        ray: Ray,
+        sampler: &mut Sampler,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> Sample {
         let mut sample = Sample::default();
         let mut path = Path {
             ray,

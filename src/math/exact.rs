@@ -6,7 +6,7 @@
 //! to the bit.
 
 /// What can be summed up exactly, and kept in a file.
-pub trait Exact: Copy + Default {
+pub(crate) trait Exact: Copy + Default {
     /// Bytes in a file, little-endian.
     const BYTES: usize;
     /// Adds another sum.
@@ -72,16 +72,16 @@ impl Whole96 {
 /// Terms of either sign: steps of 2^-40, sums below 2^55; larger ones stay at the limit. A term of 2^-16 or more, in
 /// size, keeps all of its bits; one of a millionth keeps 20 of 24.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sum(Whole96);
+pub(crate) struct Sum(Whole96);
 
 /// Squares: steps of 2^-48, sums below 2^48; larger ones stay at the limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SquareSum(Whole96);
+pub(crate) struct SquareSum(Whole96);
 
 /// Terms of layers beside the picture, in half the memory: steps of 2^-28, sums below 2^35; larger ones stay at the
 /// limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NarrowSum(i64);
+pub(crate) struct NarrowSum(i64);
 
 exact!(
     Sum,
@@ -124,7 +124,7 @@ where
 
 impl Sum {
     /// Terms must be smaller than this: then 2^16 of them fit.
-    pub const LIMIT: f32 = (1u64 << 39) as f32;
+    pub(crate) const LIMIT: f32 = (1u64 << 39) as f32;
     const STEPS: f64 = (1u64 << 40) as f64;
     const MOST: i128 = (1 << 95) - 1;
 
@@ -136,7 +136,7 @@ impl Sum {
 
     /// Adds a term; one beyond [`Self::LIMIT`] counts as the limit, NaN as nothing.
     #[inline]
-    pub fn add(&mut self, value: f32) {
+    pub(crate) fn add(&mut self, value: f32) {
         // A power of two: exact. Ordinary values take the short way through a register.
         let steps = f64::from(value.clamp(-Self::LIMIT, Self::LIMIT)) * Self::STEPS;
         let steps = if steps.abs() < 9.2e18 { i128::from(steps as i64) } else { steps as i128 };
@@ -145,7 +145,7 @@ impl Sum {
 
     /// The sum.
     #[inline]
-    pub fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         self.0.signed() as f64 / Self::STEPS
     }
 }
@@ -161,7 +161,7 @@ impl SquareSum {
 
     /// Adds the square of a value.
     #[inline]
-    pub fn add_square_of(&mut self, value: f32) {
+    pub(crate) fn add_square_of(&mut self, value: f32) {
         let value = f64::from(value);
         let steps = value * value * Self::STEPS;
         let steps = if steps < 9.2e18 { (steps as i64) as u128 } else { (steps as u128).min(Self::MOST) };
@@ -170,7 +170,7 @@ impl SquareSum {
 
     /// The sum.
     #[inline]
-    pub fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         self.0.unsigned() as f64 / Self::STEPS
     }
 }
@@ -180,13 +180,13 @@ impl NarrowSum {
 
     /// Adds a term.
     #[inline]
-    pub fn add(&mut self, value: f32) {
+    pub(crate) fn add(&mut self, value: f32) {
         self.0 = self.0.saturating_add((f64::from(value) * Self::STEPS) as i64);
     }
 
     /// The sum.
     #[inline]
-    pub fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         self.0 as f64 / Self::STEPS
     }
 }

@@ -6,7 +6,7 @@ use glam::Vec3A;
 ///
 /// Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017: no branch, no singular direction.
 #[inline]
-pub fn orthonormal_basis(n: Vec3A) -> (Vec3A, Vec3A) {
+pub(crate) fn orthonormal_basis(n: Vec3A) -> (Vec3A, Vec3A) {
     let sign = 1f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
@@ -15,7 +15,7 @@ pub fn orthonormal_basis(n: Vec3A) -> (Vec3A, Vec3A) {
 
 /// Sine and cosine of any finite angle in radians, to 2e-7 for |x| < 100; several times as fast as the library's.
 #[inline]
-pub fn sin_cos(x: f32) -> (f32, f32) {
+pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     // Reduce to [-pi/4, pi/4] by quarter turns, pi/2 in three parts (Cody and Waite), then Taylor-like minimax
     // polynomials of single precision (coefficients as in the Cephes library, S. Moshier).
     let quarters = (x * std::f32::consts::FRAC_2_PI).round_ties_even();

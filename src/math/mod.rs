@@ -2,13 +2,13 @@
 //!
 //! Knows nothing of curves, light or files. `f32` serves rays and directions, `f64` tables and sums.
 
-pub mod exact;
-pub mod frame;
+pub(crate) mod exact;
+pub(crate) mod frame;
 pub mod rgb;
 pub mod sampler;
-pub mod special;
-pub mod srgb;
-pub mod stats;
-pub mod warp;
+pub(crate) mod special;
+pub(crate) mod srgb;
+pub(crate) mod stats;
+pub(crate) mod warp;
 
 pub use rgb::Rgb;

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 /// e^-x I1(x), the scaled modified Bessel function of the first kind, order 1, for x >= 0.
 ///
 /// Power series below 20, asymptotic series above; relative error below 1e-14.
-pub fn bessel_i1_scaled(x: f64) -> f64 {
+pub(crate) fn bessel_i1_scaled(x: f64) -> f64 {
     if x < 20.0 {
         // I1(x) = x/2 sum_k (x^2/4)^k / (k! (k+1)!)
         let q = 0.25 * x * x;
@@ -34,7 +34,7 @@ pub fn bessel_i1_scaled(x: f64) -> f64 {
 
 /// The share of a wrapped normal distribution of standard deviation `sigma` (radians) that lies within a
 /// quarter turn of its centre. 1 for sigma -> 0, 1/2 for sigma -> infinity.
-pub fn front_share_of_wrapped_normal(sigma: f64) -> f64 {
+pub(crate) fn front_share_of_wrapped_normal(sigma: f64) -> f64 {
     if sigma > 4.0 {
         return 0.5 + 2.0 / PI * (-0.5 * sigma * sigma).exp();
     }
@@ -49,7 +49,7 @@ pub fn front_share_of_wrapped_normal(sigma: f64) -> f64 {
 
 /// Density (1/radian) at distance `d` radians from the centre of a normal distribution wrapped round the circle.
 #[inline]
-pub fn wrapped_normal(d: f32, sigma: f32) -> f32 {
+pub(crate) fn wrapped_normal(d: f32, sigma: f32) -> f32 {
     use std::f32::consts::{PI, TAU};
     let d = d - TAU * (d / TAU).round_ties_even();
     if sigma > 2.5 {
@@ -74,14 +74,14 @@ pub fn wrapped_normal(d: f32, sigma: f32) -> f32 {
 }
 
 /// The escape probability of light born evenly within a disc of optical radius `t`: Pade-like fit, 0.2 %.
-pub fn escape_probability_of_disc(t: f64) -> f64 {
+pub(crate) fn escape_probability_of_disc(t: f64) -> f64 {
     const V: [f64; 3] = [0.512_569_29, 0.209_805_44, 0.832_947_66];
     (1.0 + V[0] * t + V[1] * t * t)
         / (1.0 + (V[0] + 8.0 / (3.0 * PI)) * t + V[2] * t * t + V[1] * FRAC_PI_2 * t * t * t)
 }
 
 /// Nodes and weights of Gauss-Legendre quadrature with four points on [0, 1].
-pub const GAUSS_LEGENDRE_4: [(f64, f64); 4] = [
+pub(crate) const GAUSS_LEGENDRE_4: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
     (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
     (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),

@@ -8,7 +8,7 @@ const STUDENT: [f64; 30] = [
 
 /// Mean and spread of repeated measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Their mean.
     pub mean: f64,
     /// Their standard deviation (n - 1 in the denominator); 0 for one measurement.
@@ -19,7 +19,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// Of these measurements; `None` for none.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub(crate) fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {
             return None;
@@ -31,27 +31,27 @@ impl Estimate {
     }
 
     /// Half the width of the interval that holds the expected value with 95 % (Student); infinite for one measurement.
-    pub fn half_width(&self) -> f64 {
+    pub(crate) fn half_width(&self) -> f64 {
         let Some(freedom) = self.count.checked_sub(2) else { return f64::INFINITY };
         STUDENT.get(freedom).copied().unwrap_or(1.96 + 2.5 / self.count as f64) * self.deviation
             / (self.count as f64).sqrt()
     }
 
     /// Deviation over mean.
-    pub fn relative_deviation(&self) -> f64 {
+    pub(crate) fn relative_deviation(&self) -> f64 {
         self.deviation / self.mean.abs()
     }
 }
 
 /// The ratio of two means and its standard deviation, from the relative deviations of both (they vary independently).
-pub fn ratio(above: &Estimate, below: &Estimate) -> (f64, f64) {
+pub(crate) fn ratio(above: &Estimate, below: &Estimate) -> (f64, f64) {
     let ratio = above.mean / below.mean;
     (ratio, ratio.abs() * above.relative_deviation().hypot(below.relative_deviation()))
 }
 
 /// A power law through points: value = scale x argument^slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PowerLaw {
+pub(crate) struct PowerLaw {
     /// The exponent.
     pub slope: f64,
     /// Standard error of the exponent; 0 for two points.
@@ -63,7 +63,7 @@ pub struct PowerLaw {
 impl PowerLaw {
     /// The line of least squares through the logarithms. `None` unless there are two points with different arguments;
     /// points that are not positive are left out.
-    pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
+    pub(crate) fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()
             .filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite())
@@ -83,14 +83,14 @@ impl PowerLaw {
     }
 
     /// The value at an argument.
-    pub fn at(&self, x: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64) -> f64 {
         10f64.powf(self.log_scale + self.slope * x.log10())
     }
 }
 
 /// When a falling series gets to a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reached {
+pub(crate) enum Reached {
     /// Between two points, or at one.
     At(f64),
     /// Beyond the last point, if the error goes on falling as one over time.
@@ -102,7 +102,7 @@ pub enum Reached {
 /// The argument at which `points`, sorted by argument, first fall to `value`, along straight lines between logarithms.
 /// Before the first point and beyond the last the value is taken to fall as one over the argument, but beyond only
 /// if `goes_on`.
-pub fn reach(points: &[(f64, f64)], value: f64, goes_on: bool) -> Reached {
+pub(crate) fn reach(points: &[(f64, f64)], value: f64, goes_on: bool) -> Reached {
     let mut before: Option<(f64, f64)> = None;
     for &(x, y) in points {
         if y <= value {

@@ -8,7 +8,7 @@ use super::frame::sin_cos;
 
 /// A point of the unit disc, uniform in area (Shirley and Chiu's concentric map).
 #[inline]
-pub fn disc(u: Vec2) -> Vec2 {
+pub(crate) fn disc(u: Vec2) -> Vec2 {
     let p = 2.0 * u - Vec2::ONE;
     if p == Vec2::ZERO {
         return Vec2::ZERO;
@@ -21,14 +21,14 @@ pub fn disc(u: Vec2) -> Vec2 {
 
 /// A direction about +z with density cos(theta) / pi per steradian.
 #[inline]
-pub fn cosine_hemisphere(u: Vec2) -> Vec3A {
+pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3A {
     let p = disc(u);
     Vec3A::new(p.x, p.y, (1.0 - p.length_squared()).max(0.0).sqrt())
 }
 
 /// A direction about +z, uniform in the cone of which `one_minus_cos` is 1 - cos of its half angle.
 #[inline]
-pub fn cone(u: Vec2, one_minus_cos: f32) -> Vec3A {
+pub(crate) fn cone(u: Vec2, one_minus_cos: f32) -> Vec3A {
     let below = u.x * one_minus_cos;
     let sin_theta = (below * (2.0 - below)).max(0.0).sqrt();
     let (sin, cos) = sin_cos(TAU * u.y);
@@ -38,7 +38,7 @@ pub fn cone(u: Vec2, one_minus_cos: f32) -> Vec3A {
 /// A standard normal deviate from one uniform number, to 1e-6 or so in the centre and finite at 0 and 1
 /// (Giles, "Approximating the erfinv function", GPU Computing Gems 2011).
 #[inline]
-pub fn normal(u: f32) -> f32 {
+pub(crate) fn normal(u: f32) -> f32 {
     let x = (2.0 * u - 1.0).clamp(-0.999_999_9, 0.999_999_9);
     let w = -((1.0 - x) * (1.0 + x)).ln();
     let horner = |w: f32, c: [f32; 9]| c.iter().fold(0.0, |p, &c| p * w + c);

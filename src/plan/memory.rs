@@ -9,7 +9,7 @@ const DENOISER_BYTES: u64 = 4 * size_of::<[f32; 3]>() as u64;
 
 /// Bytes of the parts of a render that are not curves ([`crate::cloth::estimates`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Memory {
+pub(crate) struct Memory {
     /// Pixels that are rendered.
     pub pixels: [u32; 2],
     /// The film, with its layers.
@@ -24,11 +24,11 @@ pub struct Memory {
 
 /// A film, with what else is known, does not fit into memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooLarge(Memory);
+pub(crate) struct TooLarge(Memory);
 
 impl Memory {
     /// Of a scene's render.
-    pub fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let [x0, y0, x1, y1] = scene.render.crop;
         let pixels = [x1 - x0, y1 - y0];
         let count = u64::from(pixels[0]) * u64::from(pixels[1]);
@@ -48,7 +48,7 @@ impl Memory {
     }
 
     /// All of it.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.film + self.textures + self.denoiser
     }
 
@@ -56,7 +56,7 @@ impl Memory {
     ///
     /// # Errors
     /// [`TooLarge`] if it does not.
-    pub fn check(&self) -> Result<(), TooLarge> {
+    pub(crate) fn check(&self) -> Result<(), TooLarge> {
         if self.limit.is_some_and(|limit| self.bytes() > limit) { Err(TooLarge(*self)) } else { Ok(()) }
     }
 }

@@ -4,7 +4,7 @@
 
 mod memory;
 
-pub use memory::{Memory, TooLarge};
+pub(crate) use memory::{Memory, TooLarge};
 
 use crate::{
     film::Tile,
@@ -14,7 +14,7 @@ use crate::{
 
 /// One feature of the renderer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Feature {
+pub(crate) struct Feature {
     /// Stable name, as in `--stats`.
     pub name: &'static str,
     /// Whether the scene needs it.
@@ -27,14 +27,14 @@ pub struct Feature {
 
 /// Every feature, used or left out.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub(crate) struct Plan {
     /// In a fixed order.
     pub features: Vec<Feature>,
 }
 
 impl Plan {
     /// Decides for a scene.
-    pub fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let mut list = List::default();
         list.add_cloth(scene);
         list.add_sections(scene);
@@ -45,7 +45,7 @@ impl Plan {
     }
 
     /// Names of the features that are used, or of those left out.
-    pub fn names(&self, used: bool) -> Vec<&'static str> {
+    pub(crate) fn names(&self, used: bool) -> Vec<&'static str> {
         self.features.iter().filter(|f| f.used == used).map(|f| f.name).collect()
     }
 }

@@ -42,7 +42,7 @@ const TILE_EXTRA: usize = 36;
 
 /// What a film is of. Known before the first sample, and the same for all parts of a render but for `shard`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct About {
+pub(crate) struct About {
     /// Every key that changes the picture's bits, with its value; the program's and Embree's version among them.
     pub keys: Vec<(String, String)>,
     /// How the picture is written.
@@ -59,7 +59,7 @@ pub struct About {
 
 impl About {
     /// Of a scene's render, or of a part of it.
-    pub fn new(scene: &Scene, embree: &str, metadata: Vec<(String, Attribute)>, shard: Option<Shard>) -> Self {
+    pub(crate) fn new(scene: &Scene, embree: &str, metadata: Vec<(String, Attribute)>, shard: Option<Shard>) -> Self {
         let collected = scene.collected();
         let mut keys = vec![("yarnray".to_owned(), exr::SOFTWARE.to_owned()), ("embree".to_owned(), embree.to_owned())];
         keys.extend(scene.identity.iter().cloned());
@@ -72,7 +72,7 @@ impl About {
     }
 
     /// What stands in the way of going on with a job about `there`: keys with their values, none if nothing does.
-    pub fn differences(&self, there: &Self) -> Vec<String> {
+    pub(crate) fn differences(&self, there: &Self) -> Vec<String> {
         identity::differences(&there.keys, &self.keys)
     }
 }
@@ -87,7 +87,7 @@ fn shard_name(shard: Option<Shard>) -> String {
 
 /// The first part of a film file: all but the pixels.
 #[derive(Clone, Debug)]
-pub struct Header {
+pub(crate) struct Header {
     /// What the film is of.
     pub about: About,
     /// The pixels: x0, y0, x1, y1, the latter exclusive.
@@ -111,7 +111,7 @@ pub struct Header {
 ///
 /// # Errors
 /// [`ImageError::Write`]; an older file of this name is then as it was.
-pub fn write(path: &Path, about: &About, job: &Job) -> Result<(), ImageError> {
+pub(crate) fn write(path: &Path, about: &About, job: &Job) -> Result<(), ImageError> {
     output::write_durable(path, |file| write_to(&mut BufWriter::with_capacity(1 << 20, file), about, job))
 }
 
@@ -142,7 +142,7 @@ fn write_to(out: &mut impl Write, about: &About, job: &Job) -> io::Result<()> {
 ///
 /// # Errors
 /// [`ImageError::Read`]: no film file, one of another version, cut short, or damaged.
-pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
+pub(crate) fn read(path: &Path) -> Result<(About, Job), ImageError> {
     let (header, file) = open(path)?;
     let film = Film::new(header.crop, header.about.collected, header.light_scale);
     let mut film = film.map_err(|error| unreadable(path, &error.to_string()))?;
@@ -171,7 +171,7 @@ pub fn read(path: &Path) -> Result<(About, Job), ImageError> {
 ///
 /// # Errors
 /// [`ImageError`]: the file cannot be read, or is damaged.
-pub fn check(path: &Path) -> Result<Header, ImageError> {
+pub(crate) fn check(path: &Path) -> Result<Header, ImageError> {
     let (header, file) = open(path)?;
     read_tiles(path, &header, file, |_| true)?;
     Ok(header)
@@ -218,12 +218,12 @@ fn read_tiles(
 ///
 /// # Errors
 /// [`ImageError`]: the file cannot be read, or its first part is damaged.
-pub fn read_header(path: &Path) -> Result<Header, ImageError> {
+pub(crate) fn read_header(path: &Path) -> Result<Header, ImageError> {
     open(path).map(|(header, _)| header)
 }
 
 /// Whether a file begins as film files do.
-pub fn is_film(path: &Path) -> bool {
+pub(crate) fn is_film(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     File::open(path).and_then(|mut f| f.read_exact(&mut start)).is_ok() && start == *MAGIC
 }

@@ -67,14 +67,14 @@ impl Shared {
 }
 
 /// A connection to a viewer, or to where one should be.
-pub struct LiveView {
+pub(crate) struct LiveView {
     shared: Arc<Shared>,
     last: Option<Instant>,
 }
 
 impl LiveView {
     /// Starts to connect to `address`, as in `localhost:14158`; `name` is what the viewer calls the picture.
-    pub fn connect(address: &str, name: &str) -> Self {
+    pub(crate) fn connect(address: &str, name: &str) -> Self {
         let shared = Arc::new(Shared::default());
         let (address, name, theirs) = (address.to_owned(), name.replace('\0', ""), Arc::clone(&shared));
         thread::spawn(move || {
@@ -88,7 +88,7 @@ impl LiveView {
     }
 
     /// Shows what a film holds, unless an older picture is still waiting to go out.
-    pub fn show(&mut self, film: &Film) {
+    pub(crate) fn show(&mut self, film: &Film) {
         let early = self.last.is_some_and(|last| last.elapsed() < PAUSE);
         let desk = self.shared.desk();
         if early || desk.ended || desk.next.is_some() {
@@ -101,7 +101,7 @@ impl LiveView {
     }
 
     /// Shows the finished picture, and waits a moment for it to go out. Returns why the viewer does not have it.
-    pub fn finish(self, film: &Film) -> Option<String> {
+    pub(crate) fn finish(self, film: &Film) -> Option<String> {
         let until = Instant::now() + FAREWELL;
         if !self.shared.desk().ended {
             let frame = Frame::new(film);

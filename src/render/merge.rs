@@ -17,7 +17,7 @@ use crate::{
 
 /// Why parts do not make a picture.
 #[derive(Debug)]
-pub enum MergeError {
+pub(crate) enum MergeError {
     /// A file cannot be read.
     File(ImageError),
     /// The files do not fit together; what is wrong, in words.
@@ -61,7 +61,7 @@ const OF_THE_PART: [&str; 2] = ["shard", "render.crop"];
 ///
 /// # Errors
 /// Which files do not fit and why, or what is missing.
-pub fn merge(paths: &[PathBuf], partial: bool) -> Result<(About, Job), MergeError> {
+pub(crate) fn merge(paths: &[PathBuf], partial: bool) -> Result<(About, Job), MergeError> {
     let mut parts: Vec<(&Path, Header)> = Vec::new();
     for path in paths {
         parts.push((path, film_file::read_header(path)?));

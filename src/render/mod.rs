@@ -5,10 +5,10 @@
 //! for any way to split its samples among runs and machines.
 
 mod adaptive;
-pub mod denoise;
-pub mod film_file;
-pub mod live;
-pub mod merge;
+pub(crate) mod denoise;
+pub(crate) mod film_file;
+pub(crate) mod live;
+pub(crate) mod merge;
 pub mod picture;
 mod stop;
 

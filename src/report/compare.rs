@@ -8,11 +8,12 @@ use crate::image::metric::{Comparison, EPSILON, Errors, TRIMMED, flip};
 
 /// Names of metrics for thresholds; those of errors may be followed by `_2`, `_4` or `_8`, the edge of the boxes that were
 /// averaged.
-pub const METRICS: [&str; 7] = ["mean_ratio", "ssim", "flip_ldr", "flip_hdr", "rmse", "relmse", "relmse_trimmed"];
+pub(crate) const METRICS: [&str; 7] =
+    ["mean_ratio", "ssim", "flip_ldr", "flip_hdr", "rmse", "relmse", "relmse_trimmed"];
 
 /// A metric by its name, as a threshold compares it: of `mean_ratio` the largest distance of a channel from 1.
 /// `None` for an unknown name; NaN where the pictures do not have it.
-pub fn metric(comparison: &Comparison, name: &str) -> Option<f64> {
+pub(crate) fn metric(comparison: &Comparison, name: &str) -> Option<f64> {
     let (base, factor) = match name.rsplit_once('_').and_then(|(base, n)| Some((base, n.parse::<usize>().ok()?))) {
         Some((base, factor)) if matches!(factor, 2 | 4 | 8) => (base, factor),
         _ => (name, 1),
@@ -34,12 +35,12 @@ pub fn metric(comparison: &Comparison, name: &str) -> Option<f64> {
 }
 
 /// Whether a metric is worse than a limit. A similarity is worse when it is lower; what is not a number is worse than any.
-pub fn exceeds(name: &str, value: f64, limit: f64) -> bool {
+pub(crate) fn exceeds(name: &str, value: f64, limit: f64) -> bool {
     value.is_nan() || if name == "ssim" { value < limit } else { value > limit }
 }
 
 /// The comparison as JSON.
-pub fn to_json(comparison: &Comparison) -> Value {
+pub(crate) fn to_json(comparison: &Comparison) -> Value {
     let errors: Vec<Value> = comparison
         .errors
         .iter()
@@ -64,7 +65,7 @@ pub fn to_json(comparison: &Comparison) -> Value {
 }
 
 /// The comparison for people, some lines.
-pub fn to_text(comparison: &Comparison, names: [&str; 2]) -> String {
+pub(crate) fn to_text(comparison: &Comparison, names: [&str; 2]) -> String {
     let colors = |c: [f64; 3]| format!("R {:.5}  G {:.5}  B {:.5}", c[0], c[1], c[2]);
     let known = |v: Option<f64>| v.map_or("none".to_owned(), |v| format!("{v:.5}"));
     let [pixels, counted] = comparison.pixels;
@@ -97,7 +98,7 @@ pub fn to_text(comparison: &Comparison, names: [&str; 2]) -> String {
 }
 
 /// The comparison as a page of its own: metrics, a slider between the pictures, the error map.
-pub fn to_html(comparison: &Comparison, names: [&str; 2], pictures: [&Picture; 2], map: &Picture) -> String {
+pub(crate) fn to_html(comparison: &Comparison, names: [&str; 2], pictures: [&Picture; 2], map: &Picture) -> String {
     let table: Markup = html! {
         table {
             tr { th { "" } th { "R" } th { "G" } th { "B" } }

@@ -12,7 +12,7 @@ use crate::{
 
 /// What was measured of one scene.
 #[derive(Clone, Debug)]
-pub struct Convergence {
+pub(crate) struct Convergence {
     /// The scene file.
     pub scene: String,
     /// Size of the pictures.
@@ -31,7 +31,7 @@ pub struct Convergence {
 
 /// One method's error against its time.
 #[derive(Clone, Debug)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// Mode and model: "fiber", "yarn:aggregated".
     pub method: String,
     /// Seconds before the first sample: loading, curves, BVH.
@@ -44,7 +44,7 @@ pub struct Curve {
 
 /// Where a render stood after a wave; means and spread over seeds.
 #[derive(Clone, Copy, Debug)]
-pub struct Point {
+pub(crate) struct Point {
     /// Samples per pixel.
     pub spp: u32,
     /// Seconds of rendering. With [`Curve::setup_seconds`] the total clock.
@@ -67,22 +67,22 @@ impl Curve {
     }
 
     /// The law that the noise follows; -1 is expected of independent samples.
-    pub fn noise_fit(&self) -> Option<PowerLaw> {
+    pub(crate) fn noise_fit(&self) -> Option<PowerLaw> {
         PowerLaw::fit(&self.noise())
     }
 
     /// The law that noise and model error follow together.
-    pub fn error_fit(&self) -> Option<PowerLaw> {
+    pub(crate) fn error_fit(&self) -> Option<PowerLaw> {
         PowerLaw::fit(&self.error())
     }
 
     /// Seconds of rendering until the noise is at the target.
-    pub fn time_of_noise(&self, target: f64) -> Reached {
+    pub(crate) fn time_of_noise(&self, target: f64) -> Reached {
         reach(&self.noise(), target, true)
     }
 
     /// Seconds of rendering until noise and model error together are at the target.
-    pub fn time_of_error(&self, target: f64) -> Reached {
+    pub(crate) fn time_of_error(&self, target: f64) -> Reached {
         // Model error stays: nothing is said of what comes after the last wave, except of the reference.
         reach(&self.error(), target, self.points.iter().all(|p| p.error.is_none()))
     }
@@ -111,7 +111,7 @@ fn reached_json(reached: Reached) -> Value {
 }
 
 /// A time for people.
-pub fn reached_text(reached: Reached) -> String {
+pub(crate) fn reached_text(reached: Reached) -> String {
     match reached {
         Reached::At(t) => format!("{t:.3} s"),
         Reached::Later(t) => format!("{t:.3} s (extrapolated)"),
@@ -121,7 +121,7 @@ pub fn reached_text(reached: Reached) -> String {
 
 impl Convergence {
     /// One line for each point.
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let mut out = "method,spp,render_seconds,total_seconds,seeds,noise_relmse,noise_half_width_95,error_relmse,error_half_width_95\n"
             .to_owned();
         for curve in &self.curves {
@@ -144,7 +144,7 @@ impl Convergence {
     }
 
     /// Everything.
-    pub fn to_json(&self) -> Value {
+    pub(crate) fn to_json(&self) -> Value {
         let estimate = |e: Estimate| json!({"mean": e.mean, "deviation": e.deviation, "half_width_95": e.half_width()});
         let fit = |f: Option<PowerLaw>| {
             f.map(|f| json!({"slope": f.slope, "slope_error": f.slope_error, "at_one_second": f.at(1.0)}))
@@ -184,7 +184,7 @@ impl Convergence {
     }
 
     /// Both errors of each method against the time of rendering.
-    pub fn to_svg(&self) -> String {
+    pub(crate) fn to_svg(&self) -> String {
         let mut series = Vec::new();
         for (group, c) in self.curves.iter().enumerate() {
             let slope = |f: Option<PowerLaw>| {
@@ -206,7 +206,7 @@ impl Convergence {
     }
 
     /// Slopes and times, a line for each method.
-    pub fn to_text(&self) -> String {
+    pub(crate) fn to_text(&self) -> String {
         let mut out = String::new();
         for c in &self.curves {
             let slope = c.noise_fit().map_or("?".to_owned(), |f| format!("{:.3} +- {:.3}", f.slope, f.slope_error));

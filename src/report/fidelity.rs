@@ -13,7 +13,7 @@ const FARTHEST: f64 = 0.10;
 
 /// One way to render a case, against the reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Way {
+pub(crate) struct Way {
     /// Mode and model, or what the suite calls it.
     pub name: String,
     /// Means and distances, on the cloth.
@@ -24,7 +24,7 @@ pub struct Way {
 
 /// A fabric under a light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Fabric and light.
     pub name: String,
     /// Whether the fabric was kept out of development.
@@ -45,7 +45,7 @@ pub struct Row {
 
 /// All of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Table {
+pub(crate) struct Table {
     /// What the suite calls itself.
     pub title: String,
     /// The suite file.
@@ -73,7 +73,7 @@ impl Row {
 
 impl Table {
     /// The table as Markdown: how many cases meet the goal, then every case.
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         let mut out = format!("# {}\n\n", self.title);
         let _ = writeln!(
             out,
@@ -148,7 +148,7 @@ impl Table {
     }
 
     /// The table as JSON.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
     }
 }

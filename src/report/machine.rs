@@ -1,7 +1,7 @@
 //! What a measurement ran on.
 
 /// The processor, its cores and the memory, as far as the system tells.
-pub fn describe() -> String {
+pub(crate) fn describe() -> String {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let field = |text: &str, name: &str| {
         let line = text.lines().find(|line| line.starts_with(name))?;
@@ -16,6 +16,6 @@ pub fn describe() -> String {
 }
 
 /// The commit that this program was built from.
-pub fn commit() -> &'static str {
+pub(crate) fn commit() -> &'static str {
     env!("YARNRAY_COMMIT")
 }

@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// A picture for a page: linear colours, the top row first.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub(crate) struct Picture {
     /// Pixels in a row.
     pub width: usize,
     /// Linear Rec. 709.
@@ -22,18 +22,18 @@ pub struct Picture {
 
 impl Picture {
     /// Number of rows.
-    pub fn height(&self) -> usize {
+    pub(crate) fn height(&self) -> usize {
         self.colors.len() / self.width.max(1)
     }
 
     /// The colours of a map from values to eight bits.
-    pub fn of_map(values: &[f32], width: usize, color: impl Fn(f32) -> [u8; 3]) -> Self {
+    pub(crate) fn of_map(values: &[f32], width: usize, color: impl Fn(f32) -> [u8; 3]) -> Self {
         let linear = |byte: u8| png::srgb_to_linear(f32::from(byte) / 255.0);
         Self { width, colors: values.iter().map(|v| color(*v).map(linear)).collect() }
     }
 
     /// Half as wide and as high, but for pictures of a single row or column.
-    pub fn halved(&self) -> Self {
+    pub(crate) fn halved(&self) -> Self {
         if self.width < 2 || self.height() < 2 {
             return self.clone();
         }
@@ -91,7 +91,7 @@ fn address(bytes: &[u8]) -> String {
 }
 
 /// A whole page.
-pub fn document(title: &str, body: &Markup) -> String {
+pub(crate) fn document(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -108,12 +108,12 @@ pub fn document(title: &str, body: &Markup) -> String {
 }
 
 /// A picture with words below it.
-pub fn figure(picture: &Picture, caption: &str) -> Markup {
+pub(crate) fn figure(picture: &Picture, caption: &str) -> Markup {
     figure_shown(picture, &Display::default(), caption)
 }
 
 /// A picture with its caption, shown with an exposure and a tone curve.
-pub fn figure_shown(picture: &Picture, display: &Display, caption: &str) -> Markup {
+pub(crate) fn figure_shown(picture: &Picture, display: &Display, caption: &str) -> Markup {
     html! {
         figure {
             img src=(picture.address(display)) width=(shown_width(picture)) alt=(caption);
@@ -129,7 +129,7 @@ fn shown_width(picture: &Picture) -> usize {
 
 /// Two pictures of the same size, one over the other, with a line between them that follows the pointer, and an exposure
 /// that begins at `stops`.
-pub fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2], stops: f32) -> Markup {
+pub(crate) fn slider(id: &str, names: [&str; 2], pictures: [&Picture; 2], stops: f32) -> Markup {
     let (width, height) = (pictures[0].width, pictures[0].height());
     html! {
         figure.slider id=(id) data-width=(width) data-height=(height) {

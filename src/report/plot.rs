@@ -13,7 +13,7 @@ const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a6a00"
 
 /// One series of points.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// For the legend.
     pub name: String,
     /// Argument, value, and half the width of its interval.
@@ -38,7 +38,7 @@ fn shown(p: &&[f64; 3]) -> bool {
 }
 
 /// A plot of series that fall. Points that are not positive are left out.
-pub fn log_log(title: &str, axes: [&str; 2], series: &[Series], level: Option<f64>) -> String {
+pub(crate) fn log_log(title: &str, axes: [&str; 2], series: &[Series], level: Option<f64>) -> String {
     let scale = Axes::around(series, level);
     let left = FRAME[0];
     let height = HEIGHT + 18.0 * series.len() as f64;
@@ -190,7 +190,7 @@ impl Series {
 }
 
 /// Round values from `low` to `high`, four to nine of them, each with the digits that tell it from its neighbours.
-pub fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+pub(crate) fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let span = high - low;
     if !(span > 0.0 && span.is_finite()) {
         return vec![(low, format!("{low}"))];
@@ -208,7 +208,7 @@ fn number(v: f64) -> String {
 }
 
 /// Text as it stands in SVG.
-pub fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

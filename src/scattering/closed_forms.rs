@@ -12,12 +12,12 @@ fn depth_of(loss: f64) -> f64 {
 
 /// a_F^n.
 #[inline]
-pub fn passed(loss: f64, n: f64) -> f64 {
+pub(crate) fn passed(loss: f64, n: f64) -> f64 {
     if n > 0.0 { (-depth_of(loss) * n).exp() } else { 1.0 }
 }
 
 /// a_1B / a_B of Eq. 9: sum over i < n of a_F^2i, continued to real n.
-pub fn once_back(loss: f64, n: f64) -> f64 {
+pub(crate) fn once_back(loss: f64, n: f64) -> f64 {
     let x = depth_of(loss);
     if n <= 0.0 {
         0.0
@@ -31,7 +31,7 @@ pub fn once_back(loss: f64, n: f64) -> f64 {
 /// a_3B / a_B^3 of Eq. 9, continued to real n; 0 for n <= 1, where the printed form turns negative.
 ///
 /// = a_F^(2n-2) (sinh(m x) - m sinh x) / (4 sinh^3 x), m = 2n - 1; relative error below 1e-11.
-pub fn thrice_back(loss: f64, n: f64) -> f64 {
+pub(crate) fn thrice_back(loss: f64, n: f64) -> f64 {
     if n <= 1.0 {
         return 0.0;
     }
@@ -62,7 +62,7 @@ pub fn thrice_back(loss: f64, n: f64) -> f64 {
 /// Over the paths of [`once_back`]: the mean number of fibres passed on the way in, which is that on the way out.
 ///
 /// What Eq. 12 needs and the paper's appendix leaves out: v_B = beta_B^2 + 2 beta_F^2 of this. 0 for n <= 1.
-pub fn mean_steps(loss: f64, n: f64) -> f64 {
+pub(crate) fn mean_steps(loss: f64, n: f64) -> f64 {
     if n <= 1.0 {
         return 0.0;
     }
@@ -74,7 +74,7 @@ pub fn mean_steps(loss: f64, n: f64) -> f64 {
 
 /// (a_1B, a_3B) of Eq. 9 for infinitely many fibres: a_B / (1 - a_F^2) and a_B^3 a_F^2 / (1 - a_F^2)^3. `back`, a_B, is at
 /// most `loss`, 1 - a_F, so that both are finite for fibres that lose nothing else.
-pub fn endless_back(loss: f64, back: f64) -> (f64, f64) {
+pub(crate) fn endless_back(loss: f64, back: f64) -> (f64, f64) {
     // 1 - a_F^2
     let turned = loss * (2.0 - loss);
     if turned <= 0.0 {
@@ -85,25 +85,25 @@ pub fn endless_back(loss: f64, back: f64) -> (f64, f64) {
 }
 
 /// The mean number of fibres passed on the way in (see [`mean_steps`]) for infinitely many fibres: a_F^2 / (1 - a_F^2), at most 1e6.
-pub fn endless_steps(loss: f64) -> f64 {
+pub(crate) fn endless_steps(loss: f64) -> f64 {
     let turned = loss * (2.0 - loss);
     if turned > 1e-6 { (1.0 - turned) / turned } else { 1e6 }
 }
 
 /// E[a_F^N] for a Poisson number of mean n.
 #[inline]
-pub fn poisson_passed(loss: f64, n: f64) -> f64 {
+pub(crate) fn poisson_passed(loss: f64, n: f64) -> f64 {
     (-n * loss).exp()
 }
 
 /// `E[a_1B] / a_B` for a Poisson number of mean n.
-pub fn poisson_once_back(loss: f64, n: f64) -> f64 {
+pub(crate) fn poisson_once_back(loss: f64, n: f64) -> f64 {
     let e = loss * (2.0 - loss);
     if e > 0.0 { -(-n * e).exp_m1() / e } else { n }
 }
 
 /// `E[a_3B] / a_B^3` for a Poisson number of mean n; relative error below 1e-10.
-pub fn poisson_thrice_back(loss: f64, n: f64) -> f64 {
+pub(crate) fn poisson_thrice_back(loss: f64, n: f64) -> f64 {
     let e = loss * (2.0 - loss);
     let q = (1.0 - loss) * (1.0 - loss);
     let t = n * e;
@@ -137,7 +137,7 @@ pub fn poisson_thrice_back(loss: f64, n: f64) -> f64 {
 
 /// The mean number of fibres passed on the way in (see [`mean_steps`]) for a Poisson number of fibres of mean n; `beyond_first` leaves out paths that turn back at the
 /// very first fibre, which are single scattering.
-pub fn poisson_mean_steps(loss: f64, n: f64, beyond_first: bool) -> f64 {
+pub(crate) fn poisson_mean_steps(loss: f64, n: f64, beyond_first: bool) -> f64 {
     let e = loss * (2.0 - loss);
     let q = (1.0 - loss) * (1.0 - loss);
     let t = n * e;
@@ -156,7 +156,7 @@ pub fn poisson_mean_steps(loss: f64, n: f64, beyond_first: bool) -> f64 {
 
 /// (reflected, transmitted) by n fibres with all orders of turning back, light absorbed at the share `absorbed`:
 /// Kubelka-Munk. Transmitted contains the unscattered e^-n.
-pub fn two_stream(absorbed: f64, back: f64, n: f64) -> (f64, f64) {
+pub(crate) fn two_stream(absorbed: f64, back: f64, n: f64) -> (f64, f64) {
     let k = absorbed + back;
     let g = (absorbed * (k + back)).max(0.0).sqrt();
     let z = 2.0 * g * n;

@@ -12,13 +12,13 @@ use crate::math::{Rgb, frame::sin_cos, sampler::Stream, warp::normal};
 
 /// kappa of a lobe whose longitudinal standard deviation in theta_h is `beta` radians.
 #[inline]
-pub fn kappa_of_variance(beta_squared: Rgb) -> Rgb {
+pub(crate) fn kappa_of_variance(beta_squared: Rgb) -> Rgb {
     Rgb::splat(0.25) / beta_squared.max(Rgb::splat(MIN_VARIANCE))
 }
 
 /// The narrowest lobe that single precision carries, as a variance: beta of about 1e-4 radians, which is a
 /// hundredth of a pixel of any real camera.
-pub const MIN_VARIANCE: f32 = 1e-8;
+pub(crate) const MIN_VARIANCE: f32 = 1e-8;
 
 /// Above this kappa the normalisation follows its asymptote to 4e-6.
 const KAPPA_ASYMPTOTIC: f32 = 1e5;
@@ -31,7 +31,7 @@ const Q: [f32; 5] = [0.021_957_702, 0.017_794_89, 0.218_347_29, 0.351_789_57, 1.
 
 /// The sines and cosines of two latitudes.
 #[derive(Clone, Copy, Debug)]
-pub struct Latitudes {
+pub(crate) struct Latitudes {
     /// (c_i - c_o)^2 + (s_i + s_o)^2, which is 0 at the specular latitude.
     off_specular: f32,
     /// c_i c_o
@@ -41,7 +41,7 @@ pub struct Latitudes {
 impl Latitudes {
     /// From the sine and cosine of each direction's latitude.
     #[inline]
-    pub fn new(sin_i: f32, cos_i: f32, sin_o: f32, cos_o: f32) -> Self {
+    pub(crate) fn new(sin_i: f32, cos_i: f32, sin_o: f32, cos_o: f32) -> Self {
         let (c, s) = (cos_i - cos_o, sin_i + sin_o);
         Self { off_specular: c * c + s * s, cosines: cos_i * cos_o }
     }
@@ -49,13 +49,13 @@ impl Latitudes {
 
 /// M for three values of kappa at once, in 1/radian; relative error below 1e-5.
 #[inline]
-pub fn kernel(kappa: Rgb, at: Latitudes) -> Rgb {
+pub(crate) fn kernel(kappa: Rgb, at: Latitudes) -> Rgb {
     normalised_kernel(kappa, normalisation(kappa), at)
 }
 
 /// The factor of M that depends on kappa only: for lobes whose width never changes.
 #[inline]
-pub fn normalisation(kappa: Rgb) -> Rgb {
+pub(crate) fn normalisation(kappa: Rgb) -> Rgb {
     let bounded = kappa.min(Rgb::splat(KAPPA_ASYMPTOTIC));
     let beyond = kappa / bounded.max(Rgb::splat(1e-30));
     let beyond = beyond.max(Rgb::ONE);
@@ -66,7 +66,7 @@ pub fn normalisation(kappa: Rgb) -> Rgb {
 
 /// [`kernel`] with [`normalisation`] of the same kappa at hand.
 #[inline]
-pub fn normalised_kernel(kappa: Rgb, normalisation: Rgb, at: Latitudes) -> Rgb {
+pub(crate) fn normalised_kernel(kappa: Rgb, normalisation: Rgb, at: Latitudes) -> Rgb {
     let x = kappa * (2.0 * at.cosines);
     // (1 - e^-2x) / 2x
     let spread = x.select_below(1e-6, Rgb::ONE, x.one_minus_exp_neg() / x.max(Rgb::splat(1e-30)));
@@ -75,18 +75,18 @@ pub fn normalised_kernel(kappa: Rgb, normalisation: Rgb, at: Latitudes) -> Rgb {
 
 /// M for one kappa.
 #[inline]
-pub fn kernel_scalar(kappa: f32, at: Latitudes) -> f32 {
+pub(crate) fn kernel_scalar(kappa: f32, at: Latitudes) -> f32 {
     kernel(Rgb::splat(kappa), at).to_array()[0]
 }
 
 /// The diffuse lobe's M, in 1/radian: the limit of [`kernel`] for kappa -> 0.
-pub const DIFFUSE: f32 = FRAC_2_PI;
+pub(crate) const DIFFUSE: f32 = FRAC_2_PI;
 
 /// Draws sin(theta_o) with density M cos^2(theta_o) per radian of theta_o.
 ///
 /// `u` drives the first try and where it falls along the lobe; `stream` serves further tries.
 #[inline]
-pub fn sample_sine(kappa: f32, sin_i: f32, cos_i: f32, u: [f32; 2], stream: &mut Stream) -> f32 {
+pub(crate) fn sample_sine(kappa: f32, sin_i: f32, cos_i: f32, u: [f32; 2], stream: &mut Stream) -> f32 {
     let w = sample_polar_cosine(kappa, u[0], stream);
     let across = (1.0 - w * w).max(0.0).sqrt() * (2.0 * u[1] - 1.0);
     (across * cos_i - w * sin_i).clamp(-1.0, 1.0)
@@ -94,7 +94,7 @@ pub fn sample_sine(kappa: f32, sin_i: f32, cos_i: f32, u: [f32; 2], stream: &mut
 
 /// Draws sin(theta_o) with density (2/pi) cos^2(theta_o): the latitude of a point uniform on the 3-sphere.
 #[inline]
-pub fn sample_sine_diffuse(u: [f32; 2]) -> f32 {
+pub(crate) fn sample_sine_diffuse(u: [f32; 2]) -> f32 {
     u[0].sqrt() * sin_cos(TAU * u[1]).1
 }
 

@@ -29,7 +29,7 @@ const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
 /// when hard cores of area fraction `density` keep fibres apart.
 ///
 /// rate = (b - W0(a b e^b)) / eta with b = eta / (1 - eta): 1 - a for sparse fibres, 1 / (1 - eta) for a = 0.
-pub fn extinction_rate(loss: f64, density: f64) -> f64 {
+pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
     let b = density / (1.0 - density);
     if b < 1e-4 {
         return loss;
@@ -61,7 +61,7 @@ pub fn extinction_rate(loss: f64, density: f64) -> f64 {
 
 /// A ply's fibres as light sees them. Lengths in yarn radii; albedos per channel.
 #[derive(Clone, Debug)]
-pub struct PlyOptics {
+pub(crate) struct PlyOptics {
     /// What passes between them.
     pub gaps: PlyGaps,
     /// Extinction per expected fibre of light that may pass fibres as TT; at least [`LEAST_RATE`].
@@ -100,11 +100,11 @@ pub struct PlyOptics {
 
 /// The least extinction per fibre. Where TT loses nothing at all a chain ends nowhere; which place is then drawn for an end
 /// that has no weight must still be defined.
-pub const LEAST_RATE: f64 = 1e-6;
+pub(crate) const LEAST_RATE: f64 = 1e-6;
 
 impl PlyOptics {
     /// For a ply among `plies` of a yarn.
-    pub fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
+    pub(crate) fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
         let n = f64::from(ply.fibers);
         let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
         let squeeze = f64::from(ply.squeeze);

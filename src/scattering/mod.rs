@@ -20,12 +20,12 @@
 //! [`lobes`] has the paper's model as printed and in its most charitable reading, and a two-stream variant, to compare.
 
 pub mod aggregated;
-pub mod closed_forms;
+pub(crate) mod closed_forms;
 pub mod fiber;
-pub mod kernel;
+pub(crate) mod kernel;
 pub(crate) mod lobe;
 pub mod lobes;
-pub mod medium;
+pub(crate) mod medium;
 pub mod surface;
 #[cfg(test)]
 mod testing;

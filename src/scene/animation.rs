@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// A path with the number of a frame in it: `####` becomes `0007`, `{frame}` becomes `7`. `None` for a path that has
 /// no place for a number, and so is the same for all frames.
-pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
+pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     let text = path.to_str()?;
     if !text.contains('#') && !text.contains("{frame}") {
         return None;
@@ -26,7 +26,7 @@ pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
 }
 
 /// The smallest number for which a numbered file exists.
-pub fn first_number(path: &Path) -> Option<u32> {
+pub(crate) fn first_number(path: &Path) -> Option<u32> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let numbers_in = |name: &str| -> Vec<u32> {
         let runs = name.split(|c: char| !c.is_ascii_digit());

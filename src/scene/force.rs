@@ -17,7 +17,7 @@ use crate::{
 const FAINT: f32 = 1e-30;
 
 /// Names of features that can be forced, as the plan of a render has them.
-pub const FORCEABLE: [&str; 21] = [
+pub(crate) const FORCEABLE: [&str; 21] = [
     "ply_filter",
     "elliptical_plies",
     "ply_twist",
@@ -45,7 +45,7 @@ pub const FORCEABLE: [&str; 21] = [
 ///
 /// # Errors
 /// The feature cannot be forced.
-pub fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
+pub(crate) fn force(scene: &mut Scene, name: &str) -> Result<(), String> {
     if force_layer(scene, name) || force_of_yarns(&mut scene.yarns, name) || force_around(scene, name) {
         return Ok(());
     }

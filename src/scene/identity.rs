@@ -22,7 +22,7 @@ const LONGEST_VALUE: usize = 120;
 /// they have one.
 ///
 /// Every structure is taken apart field by field: a new field does not compile before it has its place here.
-pub fn identity(scene: &Scene) -> Vec<(String, String)> {
+pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
     let Scene {
         path: _,
         render,
@@ -307,7 +307,7 @@ fn of_light(light: &Light, path: &str, keys: &mut Keys) {
 }
 
 /// One word for an identity.
-pub fn fingerprint(identity: &[(String, String)]) -> String {
+pub(crate) fn fingerprint(identity: &[(String, String)]) -> String {
     let mut text = String::new();
     for (key, value) in identity {
         // Writing to a string cannot fail.
@@ -318,7 +318,7 @@ pub fn fingerprint(identity: &[(String, String)]) -> String {
 
 /// Keys whose values differ, or that only one has: "render.seed: 1 there, 2 here", one for each. A table is left out
 /// where one of its own keys tells more.
-pub fn differences(there: &[(String, String)], here: &[(String, String)]) -> Vec<String> {
+pub(crate) fn differences(there: &[(String, String)], here: &[(String, String)]) -> Vec<String> {
     let find = |of: &[(String, String)], key: &str| of.iter().find(|(k, _)| k == key).map(|(_, value)| value.clone());
     let mut differing: Vec<(&String, Option<String>, Option<String>)> = Vec::new();
     for (key, _) in there.iter().chain(here) {

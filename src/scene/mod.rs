@@ -5,15 +5,15 @@
 //! plain value in millimetres and radians with its origin at the middle of the cloth; it knows nothing of TOML or
 //! Embree.
 
-pub mod animation;
+pub(crate) mod animation;
 pub mod builder;
 pub mod camera;
 pub mod defaults;
-pub mod force;
-pub mod identity;
+pub(crate) mod force;
+pub(crate) mod identity;
 mod layers;
 pub mod load;
-pub mod motion;
+pub(crate) mod motion;
 pub mod view;
 
 use std::sync::Arc;

@@ -151,7 +151,7 @@ pub(crate) struct Outcome {
 pub(crate) struct Tally {
     count: u64,
     unscattered: f64,
-    /// [forward, backward][lobe][channel]
+    /// `[forward, backward][lobe][channel]`
     halves: [[[f64; 3]; 5]; 2],
     energy: Vec<[f64; 3]>,
     largest: f64,

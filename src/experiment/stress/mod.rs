@@ -26,7 +26,7 @@ const ENERGY_ABOVE_ONE_RAY: f64 = 0.03;
 
 /// Which part of the renderer a case is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub(crate) enum Group {
     /// Lobes, models, closed forms.
     Scattering,
     /// Curves and rays.
@@ -37,7 +37,7 @@ pub enum Group {
 
 impl Group {
     /// Its name in files and on the command line.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Scattering => "scattering",
             Self::Geometry => "geometry",
@@ -48,7 +48,7 @@ impl Group {
 
 /// How much is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
+pub(crate) enum Scale {
     /// Every case, smaller: seconds.
     Quick,
     /// Minutes.
@@ -64,7 +64,7 @@ impl Scale {
 
 /// One extreme.
 #[derive(Clone, Copy, Debug)]
-pub struct Case {
+pub(crate) struct Case {
     /// Which part.
     pub group: Group,
     /// Stable name.
@@ -76,7 +76,7 @@ pub struct Case {
 
 /// What a figure has to keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bound {
+pub(crate) enum Bound {
     /// Not above.
     AtMost(f64),
     /// Not below.
@@ -104,7 +104,7 @@ impl Bound {
 
 /// One thing that was checked, with the worst that was found.
 #[derive(Clone, Debug)]
-pub struct Check {
+pub(crate) struct Check {
     /// What the figure is.
     pub what: &'static str,
     /// The worst figure.
@@ -119,7 +119,7 @@ pub struct Check {
 
 impl Check {
     /// Whether the worst figure keeps the bound.
-    pub fn passed(&self) -> bool {
+    pub(crate) fn passed(&self) -> bool {
         self.bound.keeps(self.worst)
     }
 }
@@ -176,7 +176,7 @@ impl Checks {
 
 /// What became of a case.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// The case.
     pub case: Case,
     /// All it checked.
@@ -189,18 +189,18 @@ pub struct Outcome {
 
 impl Outcome {
     /// Whether every check passed.
-    pub fn passed(&self) -> bool {
+    pub(crate) fn passed(&self) -> bool {
         self.panic.is_none() && !self.checks.is_empty() && self.checks.iter().all(Check::passed)
     }
 }
 
 /// All cases, in the order of the report.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [closed_forms::CASES, fibers::CASES, yarns::CASES, geometry::CASES, transport::CASES].concat()
 }
 
 /// Runs one case. A panic is caught and counts as a failure.
-pub fn run(case: &Case, scale: Scale) -> Outcome {
+pub(crate) fn run(case: &Case, scale: Scale) -> Outcome {
     let started = Instant::now();
     let mut checks = Checks::default();
     let died = catch_unwind(AssertUnwindSafe(|| (case.run)(scale, &mut checks))).err().map(|payload| {
@@ -211,7 +211,7 @@ pub fn run(case: &Case, scale: Scale) -> Outcome {
 }
 
 /// Some digits of a figure; whole numbers as they are.
-pub fn figure(v: f64) -> String {
+pub(crate) fn figure(v: f64) -> String {
     if v == 0.0 || (v.fract() == 0.0 && v.abs() < 1e6) {
         format!("{v}")
     } else if (1e-3..1e4).contains(&v.abs()) {
@@ -222,7 +222,7 @@ pub fn figure(v: f64) -> String {
 }
 
 /// The report for programs.
-pub fn to_json(outcomes: &[Outcome], scale: Scale, elapsed: Duration) -> Value {
+pub(crate) fn to_json(outcomes: &[Outcome], scale: Scale, elapsed: Duration) -> Value {
     let check = |c: &Check| {
         let (relation, bound) = match c.bound {
             Bound::AtMost(b) => ("at most", b),
@@ -255,7 +255,7 @@ pub fn to_json(outcomes: &[Outcome], scale: Scale, elapsed: Duration) -> Value {
 }
 
 /// The report as a Markdown table.
-pub fn to_markdown(outcomes: &[Outcome], scale: Scale, elapsed: Duration) -> String {
+pub(crate) fn to_markdown(outcomes: &[Outcome], scale: Scale, elapsed: Duration) -> String {
     let failed = outcomes.iter().filter(|o| !o.passed()).count();
     let checks: usize = outcomes.iter().map(|o| o.checks.len()).sum();
     let mut out = format!(

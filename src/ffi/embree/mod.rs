@@ -19,8 +19,8 @@ use std::{
 
 use embree4_sys as sys;
 
-pub use query::{CommittedScene, HitFilter, RawHit, RawRay};
-pub use scene::{BvhLayout, CurveBasis, SceneBuilder};
+pub(crate) use query::{CommittedScene, HitFilter, RawHit, RawRay};
+pub(crate) use scene::{BvhLayout, CurveBasis, SceneBuilder};
 
 /// What Embree said when a call failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,20 +41,14 @@ impl std::error::Error for EmbreeError {}
 
 /// Bytes that Embree holds, as its memory monitor reports them.
 #[derive(Debug, Default)]
-pub struct MemoryCounter {
+pub(crate) struct MemoryCounter {
     now: AtomicI64,
-    peak: AtomicI64,
 }
 
 impl MemoryCounter {
     /// Bytes held now.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.now.load(Ordering::Relaxed).max(0).unsigned_abs()
-    }
-
-    /// The most bytes held at any time, which includes what a build needs and gives back.
-    pub fn peak_bytes(&self) -> u64 {
-        self.peak.load(Ordering::Relaxed).max(0).unsigned_abs()
     }
 }
 
@@ -63,14 +57,13 @@ unsafe extern "C" fn monitor_memory(counter: *mut std::ffi::c_void, bytes: isize
     // SAFETY: the pointer is the `MemoryCounter` given at registration; `Device` keeps it alive until after
     // the device is released, and all access is atomic.
     let counter = unsafe { &*counter.cast::<MemoryCounter>() };
-    let now = counter.now.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
-    counter.peak.fetch_max(now, Ordering::Relaxed);
+    counter.now.fetch_add(bytes as i64, Ordering::Relaxed);
     true
 }
 
 /// An Embree device and its memory counter.
 #[derive(Debug)]
-pub struct Device {
+pub(crate) struct Device {
     handle: sys::RTCDevice,
     memory: Arc<MemoryCounter>,
 }
@@ -84,7 +77,7 @@ unsafe impl Sync for Device {}
 
 impl Device {
     /// Opens a device whose builds use `threads` threads.
-    pub fn new(threads: usize) -> Result<Arc<Self>, EmbreeError> {
+    pub(crate) fn new(threads: usize) -> Result<Arc<Self>, EmbreeError> {
         let config = CString::new(format!("threads={threads},user_threads={threads}")).expect("digits hold no NUL");
         // SAFETY: the string outlives the call; a null result is handled below.
         let handle = unsafe { sys::rtcNewDevice(config.as_ptr()) };
@@ -103,12 +96,12 @@ impl Device {
     }
 
     /// What Embree holds for this device.
-    pub fn memory(&self) -> &MemoryCounter {
+    pub(crate) fn memory(&self) -> &MemoryCounter {
         &self.memory
     }
 
     /// The version of the library in use, as `major.minor.patch`.
-    pub fn version(&self) -> String {
+    pub(crate) fn version(&self) -> String {
         // SAFETY: the handle is valid until `Drop`.
         let v = unsafe { sys::rtcGetDeviceProperty(self.handle, sys::RTC_DEVICE_PROPERTY_VERSION) };
         format!("{}.{}.{}", v / 10_000, v / 100 % 100, v % 100)

@@ -13,7 +13,7 @@ use super::scene::{Buffers, Handle};
 
 /// A ray as Embree takes it; no field may be NaN.
 #[derive(Clone, Copy, Debug)]
-pub struct RawRay {
+pub(crate) struct RawRay {
     /// Where it starts.
     pub origin: Vec3A,
     /// Where it goes, of any length: the unit of distances along the ray.
@@ -28,7 +28,7 @@ pub struct RawRay {
 
 /// A point where a ray meets the outside or the inside of a curve's tube, or a triangle from either side.
 #[derive(Clone, Copy, Debug)]
-pub struct RawHit {
+pub(crate) struct RawHit {
     /// Distance along the ray in lengths of its direction.
     pub t: f32,
     /// Outward normal, not of unit length.
@@ -44,7 +44,7 @@ pub struct RawHit {
 }
 
 /// Decides which hits count. Called during traversal, in any order, and possibly more than once for one hit.
-pub trait HitFilter {
+pub(crate) trait HitFilter {
     /// Whether the hit stands. A hit that does not stand lets the ray pass.
     fn accept(&mut self, hit: &RawHit) -> bool;
 }
@@ -102,7 +102,7 @@ unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilter
 
 /// A scene that can be traced, from any number of threads.
 #[derive(Debug)]
-pub struct CommittedScene {
+pub(crate) struct CommittedScene {
     scene: Handle,
     _buffers: Vec<Buffers>,
 }
@@ -121,7 +121,7 @@ impl CommittedScene {
 
     /// The nearest hit that `filter` lets stand.
     #[inline]
-    pub fn intersect<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> Option<RawHit> {
+    pub(crate) fn intersect<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> Option<RawHit> {
         let mut context = QueryContext::new(filter);
         let mut query = sys::RTCRayHit { ray: embree_ray(ray), hit: no_hit() };
         let mut args = sys::RTCIntersectArguments {
@@ -150,7 +150,7 @@ impl CommittedScene {
 
     /// Whether any hit stands that `filter` is asked about.
     #[inline]
-    pub fn occluded<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> bool {
+    pub(crate) fn occluded<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> bool {
         let mut context = QueryContext::new(filter);
         let mut query = embree_ray(ray);
         let mut args = sys::RTCOccludedArguments {

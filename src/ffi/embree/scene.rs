@@ -9,7 +9,7 @@ use super::{CommittedScene, Device, EmbreeError, last_error};
 
 /// The basis in which Embree reads control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CurveBasis {
+pub(crate) enum CurveBasis {
     /// `RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE`
     CatmullRom,
     /// `RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE`
@@ -18,7 +18,7 @@ pub enum CurveBasis {
 
 /// The trade that the BVH makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum BvhLayout {
+pub(crate) enum BvhLayout {
     /// About 44 bytes per cubic segment; 3 to 10 % slower to trace.
     #[default]
     Compact,
@@ -28,7 +28,7 @@ pub enum BvhLayout {
 
 /// A scene that still takes geometry.
 #[derive(Debug)]
-pub struct SceneBuilder {
+pub(crate) struct SceneBuilder {
     scene: Handle,
     buffers: Vec<Buffers>,
 }
@@ -51,7 +51,7 @@ impl Drop for Handle {
 
 impl SceneBuilder {
     /// An empty scene on `device`.
-    pub fn new(device: &Arc<Device>, layout: BvhLayout) -> Result<Self, EmbreeError> {
+    pub(crate) fn new(device: &Arc<Device>, layout: BvhLayout) -> Result<Self, EmbreeError> {
         // SAFETY: the device is valid; a null result is handled below.
         let raw = unsafe { sys::rtcNewScene(device.handle) };
         if let Some(error) = last_error(device.handle, "making a scene") {
@@ -74,7 +74,7 @@ impl SceneBuilder {
     ///
     /// # Panics
     /// If a segment reaches beyond the points, or there are no points or not as many at all times.
-    pub fn add_round_curves(
+    pub(crate) fn add_round_curves(
         &mut self,
         basis: CurveBasis,
         points: Vec<Arc<[Vec4]>>,
@@ -134,7 +134,11 @@ impl SceneBuilder {
     ///
     /// # Panics
     /// If a triangle names a point that is not there.
-    pub fn add_triangles(&mut self, points: Arc<[Vec3A]>, triangles: Arc<[[u32; 3]]>) -> Result<u32, EmbreeError> {
+    pub(crate) fn add_triangles(
+        &mut self,
+        points: Arc<[Vec3A]>,
+        triangles: Arc<[[u32; 3]]>,
+    ) -> Result<u32, EmbreeError> {
         assert!(
             triangles.iter().flatten().all(|&i| (i as usize) < points.len()),
             "a triangle names a point that is not there"
@@ -204,7 +208,7 @@ impl SceneBuilder {
     }
 
     /// Builds the BVH. Afterwards the scene can be traced and no longer changed.
-    pub fn commit(self) -> Result<CommittedScene, EmbreeError> {
+    pub(crate) fn commit(self) -> Result<CommittedScene, EmbreeError> {
         // SAFETY: the scene is valid; no other thread uses it, for `self` is owned.
         unsafe { sys::rtcCommitScene(self.scene.raw) };
         match last_error(self.scene.device.handle, "building the BVH") {

@@ -137,7 +137,6 @@ fn memory_is_counted_and_given_back() {
     let before = device.memory().bytes();
     let scene = straight_yarn(&device);
     assert!(device.memory().bytes() > before);
-    assert!(device.memory().peak_bytes() >= device.memory().bytes());
     drop(scene);
     assert!(device.memory().bytes() <= before, "{} > {before}", device.memory().bytes());
     assert!(device.version().starts_with("4."));

@@ -10,7 +10,7 @@ use crate::geometry::pattern::{StrandKind, tile::chain};
 
 /// How panels are sewn together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SeamKind {
+pub(crate) enum SeamKind {
     /// Their edges lie beside each other.
     None,
     /// The outermost stitches are turned in, and a yarn goes to and fro between them where it is not seen.

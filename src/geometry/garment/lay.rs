@@ -18,7 +18,7 @@ use crate::{
 
 /// A yarn as it lies, a B-spline.
 #[derive(Clone, Debug)]
-pub struct LaidYarn {
+pub(crate) struct LaidYarn {
     /// Control points, mm.
     pub points: Vec<DVec3>,
     /// Whether the last is followed by the first.
@@ -35,7 +35,7 @@ pub struct LaidYarn {
 
 /// How loops differ from stitch to stitch and from row to row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tension {
+pub(crate) struct Tension {
     /// Start of what is random.
     pub seed: u32,
     /// Standard deviation of the size of loops.

@@ -19,7 +19,7 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// Why a garment cannot be laid: for the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GarmentError {
+pub(crate) struct GarmentError {
     /// The mesh file, if it is at fault.
     pub path: Option<PathBuf>,
     /// Counted from 1; 0 where no line is at fault.
@@ -32,7 +32,7 @@ pub struct GarmentError {
 
 impl GarmentError {
     /// Something that is wrong with the scene's numbers, not with the file.
-    pub fn new(problem: impl Into<String>, hint: impl Into<String>) -> Self {
+    pub(crate) fn new(problem: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { path: None, line: 0, problem: problem.into(), hint: hint.into() }
     }
 
@@ -42,7 +42,7 @@ impl GarmentError {
 
     /// The same, of a file.
     #[must_use]
-    pub fn of(mut self, path: &Path) -> Self {
+    pub(crate) fn of(mut self, path: &Path) -> Self {
         self.path.get_or_insert_with(|| path.to_owned());
         self
     }
@@ -62,7 +62,7 @@ impl std::error::Error for GarmentError {}
 
 /// A triangle of a garment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
+pub(crate) struct Face {
     /// Indices of its corners' positions, counter-clockwise from outside.
     pub points: [u32; 3],
     /// Indices of its corners' texture coordinates.
@@ -75,7 +75,7 @@ pub struct Face {
 
 /// The names that a `[[fabric.panel]]` may choose a face by.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
+pub(crate) struct Part {
     /// OBJ group, or object where there is no group.
     pub group: String,
     /// OBJ material; empty without.
@@ -84,7 +84,7 @@ pub struct Part {
 
 /// A garment as it is in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct GarmentMesh {
+pub(crate) struct GarmentMesh {
     /// Positions, in the file's unit.
     pub points: Vec<DVec3>,
     /// Texture coordinates, in their own unit.
@@ -102,7 +102,7 @@ impl GarmentMesh {
     ///
     /// # Errors
     /// What is wrong with it, and in which line.
-    pub fn read(path: &Path) -> Result<Self, GarmentError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, GarmentError> {
         let fail =
             |problem: String| GarmentError::new(problem, "a mesh in OBJ format with texture coordinates").of(path);
         let meta = std::fs::metadata(path).map_err(|e| fail(in_words(&e)))?;
@@ -120,7 +120,7 @@ impl GarmentMesh {
     ///
     /// # Errors
     /// Faces without texture coordinates.
-    pub fn from_polygons(given: &PolygonMesh) -> Result<Self, GarmentError> {
+    pub(crate) fn from_polygons(given: &PolygonMesh) -> Result<Self, GarmentError> {
         if given.uv_corners.len() != given.corners.len() {
             let hint = "the texture coordinates (`st`) are the flat panels of the garment: export them with the mesh";
             return Err(GarmentError::at(0, "a mesh without texture coordinates", hint));
@@ -156,7 +156,7 @@ impl GarmentMesh {
     ///
     /// # Errors
     /// As [`Self::read`], without the file's name.
-    pub fn parse(text: &str) -> Result<Self, GarmentError> {
+    pub(crate) fn parse(text: &str) -> Result<Self, GarmentError> {
         let mut mesh = Self::default();
         let mut part = Part { group: String::new(), material: String::new() };
         let mut polygons = Counted::default();
@@ -242,7 +242,7 @@ impl GarmentMesh {
     ///
     /// # Errors
     /// What differs.
-    pub fn same_topology(&self, other: &Self) -> Result<(), String> {
+    pub(crate) fn same_topology(&self, other: &Self) -> Result<(), String> {
         if self.points.len() != other.points.len() {
             return Err(format!("{} points, where the first frame has {}", other.points.len(), self.points.len()));
         }

@@ -12,7 +12,7 @@ mod edges;
 mod fold;
 mod lattice;
 mod lay;
-pub mod mesh;
+pub(crate) mod mesh;
 mod panels;
 mod sewing;
 mod sheet;
@@ -33,7 +33,7 @@ use self::{
     strain::Shapes,
     surface::Surface,
 };
-pub use self::{
+pub(crate) use self::{
     edges::SeamKind,
     lay::{LaidYarn, Tension},
     mesh::{GarmentError, GarmentMesh},
@@ -45,11 +45,11 @@ use super::{
 };
 
 /// More stitches than these are not laid.
-pub const MOST_STITCHES: f64 = 2e7;
+pub(crate) const MOST_STITCHES: f64 = 2e7;
 
 /// The cloth of some panels.
 #[derive(Clone, Debug)]
-pub struct Cloth {
+pub(crate) struct Cloth {
     /// Group or material of the panels, with `*` and `?`; `None` for all that no other cloth takes.
     pub group: Option<String>,
     /// What repeats, mm, at the gauge that it is to have.
@@ -64,7 +64,7 @@ pub struct Cloth {
 
 /// What is laid on a garment.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub(crate) struct Options {
     /// Millimetres per unit of the mesh.
     pub unit_mm: f64,
     /// Millimetres per unit of its texture coordinates; found from lengths if absent.
@@ -83,7 +83,7 @@ pub struct Options {
 
 /// What is known of a garment before any yarn is laid.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub(crate) struct Report {
     /// Its panels.
     pub panels: Vec<Panel>,
     /// Stitches (or crossings) of each panel.
@@ -108,13 +108,13 @@ pub struct Report {
 
 impl Report {
     /// Stitches of all panels.
-    pub fn all_stitches(&self) -> u64 {
+    pub(crate) fn all_stitches(&self) -> u64 {
         self.stitches.iter().sum()
     }
 }
 
 /// A garment divided into stitches, ready to be laid in any frame.
-pub struct Garment {
+pub(crate) struct Garment {
     panels: Panels,
     surface: Surface,
     lattices: Vec<Lattice>,
@@ -126,14 +126,14 @@ pub struct Garment {
 }
 
 /// The yarns of one frame, for each cloth.
-pub type Laid = Vec<Vec<LaidYarn>>;
+pub(crate) type Laid = Vec<Vec<LaidYarn>>;
 
 impl Garment {
     /// Divides the panels of a mesh (the first frame of an animation) into stitches.
     ///
     /// # Errors
     /// What is wrong with the mesh, or with what is to be laid on it.
-    pub fn new(mesh: &GarmentMesh, options: Options) -> Result<Self, GarmentError> {
+    pub(crate) fn new(mesh: &GarmentMesh, options: Options) -> Result<Self, GarmentError> {
         let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm)?;
         let cloth = choose(&panels.panels, &options.cloths)?;
         panels.turn(&cloth.iter().map(|&c| -options.cloths[c].grain).collect::<Vec<_>>());
@@ -222,18 +222,18 @@ impl Garment {
     }
 
     /// What is known of it.
-    pub fn report(&self) -> &Report {
+    pub(crate) fn report(&self) -> &Report {
         &self.report
     }
 
     /// The most columns and rows of the panels of a cloth; `None` if none is of it.
-    pub fn counts(&self, cloth: usize) -> Option<[usize; 2]> {
+    pub(crate) fn counts(&self, cloth: usize) -> Option<[usize; 2]> {
         let own = self.lattices.iter().zip(&self.report.cloth).filter(|(l, c)| **c == cloth && l.stitches > 0);
         own.map(|(l, _)| l.counts).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }
 
     /// What the yarns of a cloth are.
-    pub fn kinds(&self, cloth: usize) -> Vec<StrandKind> {
+    pub(crate) fn kinds(&self, cloth: usize) -> Vec<StrandKind> {
         self.shapes[cloth].strands.iter().map(|s| s.kind).collect()
     }
 
@@ -242,7 +242,7 @@ impl Garment {
     ///
     /// # Errors
     /// A frame of another topology: its place among the frames, and what differs.
-    pub fn lay(
+    pub(crate) fn lay(
         &self,
         first: &GarmentMesh,
         frames: &[&GarmentMesh],

@@ -11,7 +11,7 @@ use super::{
 
 /// A connected piece of flat cloth.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// Its group's name.
     pub group: String,
     /// Its material's name; empty without.
@@ -28,7 +28,7 @@ pub struct Panel {
 
 /// 3-D length over length in texture coordinates, by area.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LengthRatio {
+pub(crate) struct LengthRatio {
     /// A twentieth of it is below.
     pub p5: f64,
     /// The median.

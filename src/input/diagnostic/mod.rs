@@ -11,12 +11,11 @@ mod tests;
 use std::{cell::RefCell, fmt::Write as _};
 
 pub(crate) use names::{listed, shortened};
-pub use names::{nearest, unknown_name};
-pub use show::escaped;
+pub(crate) use names::{nearest, unknown_name};
 use show::render_one;
 
 /// How many diagnostics [`Diagnostics::render`] shows before it says "and N more".
-pub const MAX_SHOWN: usize = 20;
+pub(crate) const MAX_SHOWN: usize = 20;
 
 /// Names one text in [`Sources`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -107,7 +106,7 @@ impl Sources {
 
 /// Whether the program can go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
+pub(crate) enum Severity {
     /// The scene cannot be used.
     Error,
     /// The scene can be used, but probably not as meant.
@@ -116,7 +115,7 @@ pub enum Severity {
 
 /// One thing the user should know.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Diagnostic {
+pub(crate) struct Diagnostic {
     /// Whether the program can go on.
     pub severity: Severity,
     /// One line, in lower case, without a full stop.
@@ -129,66 +128,61 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// An error without a place or a hint.
-    pub fn error(message: impl Into<String>) -> Diagnostic {
+    pub(crate) fn error(message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Error, message: message.into(), span: None, hint: None }
     }
 
     /// A warning without a place or a hint.
-    pub fn warning(message: impl Into<String>) -> Diagnostic {
+    pub(crate) fn warning(message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Warning, ..Diagnostic::error(message) }
     }
 
     /// The same at a place.
-    pub fn at(self, span: Span) -> Diagnostic {
+    pub(crate) fn at(self, span: Span) -> Diagnostic {
         Diagnostic { span: Some(span), ..self }
     }
 
     /// The same with a hint.
-    pub fn hint(self, hint: impl Into<String>) -> Diagnostic {
+    pub(crate) fn hint(self, hint: impl Into<String>) -> Diagnostic {
         Diagnostic { hint: Some(hint.into()), ..self }
     }
 }
 
 /// Collects diagnostics. Shared by reference: many readers report into one collector.
 #[derive(Default)]
-pub struct Diagnostics {
+pub(crate) struct Diagnostics {
     list: RefCell<Vec<Diagnostic>>,
 }
 
 impl Diagnostics {
     /// Nothing collected yet.
-    pub fn new() -> Diagnostics {
+    pub(crate) fn new() -> Diagnostics {
         Diagnostics::default()
     }
 
     /// Adds one.
-    pub fn push(&self, diagnostic: Diagnostic) {
+    pub(crate) fn push(&self, diagnostic: Diagnostic) {
         self.list.borrow_mut().push(diagnostic);
     }
 
-    /// How many errors and warnings there are.
-    pub fn len(&self) -> usize {
-        self.list.borrow().len()
-    }
-
     /// Whether there is nothing to tell.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.list.borrow().is_empty()
     }
 
     /// How many errors there are; warnings do not count.
-    pub fn error_count(&self) -> usize {
+    pub(crate) fn error_count(&self) -> usize {
         self.list.borrow().iter().filter(|diagnostic| diagnostic.severity == Severity::Error).count()
     }
 
     /// Whether there is at least one error.
-    pub fn has_errors(&self) -> bool {
+    pub(crate) fn has_errors(&self) -> bool {
         self.error_count() > 0
     }
 
     /// All of them in the order of their places: first by source, then from top to bottom;
     /// the same thing said twice is listed once, and what has no place comes last.
-    pub fn sorted(&self) -> Vec<Diagnostic> {
+    pub(crate) fn sorted(&self) -> Vec<Diagnostic> {
         let mut list = self.list.borrow().clone();
         list.sort_by_key(|diagnostic| {
             // A message about a whole file comes before those about its lines.
@@ -200,7 +194,7 @@ impl Diagnostics {
     }
 
     /// The text for the user: each diagnostic with its line and a caret, the first [`MAX_SHOWN`] of them.
-    pub fn render(&self, sources: &Sources) -> String {
+    pub(crate) fn render(&self, sources: &Sources) -> String {
         let list = self.sorted();
         let mut text = String::new();
         for diagnostic in list.iter().take(MAX_SHOWN) {

@@ -3,7 +3,7 @@
 /// The candidate that `name` was probably meant to be: at most two slips of the finger away
 /// (one for names of up to three letters; upper and lower case are the same), or else
 /// the one that goes on where `name` stops, or stops before it.
-pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64; // nobody types more by hand, and the distance costs the product of the lengths
     const SHORTEST_PREFIX: usize = 3;
     let wanted: Vec<char> = name.chars().take(LONGEST + 1).map(|character| character.to_ascii_lowercase()).collect();
@@ -57,7 +57,7 @@ pub(super) fn edit_distance(first: &[char], second: &[char]) -> usize {
 
 /// Message and hint for a name that is not among `candidates`:
 /// `unknown fiber "slk"` and `did you mean "silk"?`, or else a list of what there is.
-pub fn unknown_name<'a>(
+pub(crate) fn unknown_name<'a>(
     what: &str,
     name: &str,
     candidates: impl IntoIterator<Item = &'a str> + Clone,

@@ -170,7 +170,7 @@ fn cell(character: char) -> (String, usize) {
 }
 
 /// The text with everything escaped that would not show as itself.
-pub fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut output = String::with_capacity(text.len());
     text.chars().for_each(|character| push_escaped(&mut output, character));
     output

@@ -1,4 +1,4 @@
-use super::{names::edit_distance, *};
+use super::{names::edit_distance, show::escaped, *};
 
 fn render(text: &str, start: usize, end: usize, hint: &str) -> String {
     let mut sources = Sources::new();
@@ -88,7 +88,7 @@ fn without_a_line_the_hint_stands_below() {
     diagnostics.push(Diagnostic::warning("odd"));
     diagnostics.push(Diagnostic::error("too big").at(Span::whole(id)).hint("make it smaller"));
     assert_eq!(diagnostics.render(&sources), "a.toml: error: too big\n      = make it smaller\nwarning: odd\n");
-    assert_eq!((diagnostics.len(), diagnostics.error_count()), (2, 1));
+    assert_eq!((diagnostics.is_empty(), diagnostics.error_count()), (false, 1));
 }
 
 #[test]

@@ -15,17 +15,17 @@ use toml::de::{DeTable, DeValue};
 use super::diagnostic::{Diagnostic, Diagnostics, SourceId, Sources, Span};
 use convert::{Converter, report_syntax_errors, too_deep};
 use path::{Container, Step, parse_path, path_text, place_at};
-pub use tree::{Entry, Node, Table, Value};
+pub(crate) use tree::{Entry, Node, Table, Value};
 
 /// Files above this size are not scenes; the caller refuses them before reading.
-pub const MAX_FILE_BYTES: u64 = 64 << 20;
+pub(crate) const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Arrays and tables inside each other, at most; deeper trees would end on the stack.
-pub const MAX_DEPTH: usize = 64;
+pub(crate) const MAX_DEPTH: usize = 64;
 
 /// A scene as it was written: a file, libraries under it, options over it.
 #[derive(Clone, Debug)]
-pub struct Document {
+pub(crate) struct Document {
     /// The outermost table.
     pub root: Table,
 }
@@ -33,7 +33,7 @@ pub struct Document {
 impl Document {
     /// Reads the text of a file; `path` is what messages call it. `None` when something was wrong
     /// with it; all of that is in `diagnostics` then.
-    pub fn parse(path: &str, text: &str, sources: &mut Sources, diagnostics: &Diagnostics) -> Option<Document> {
+    pub(crate) fn parse(path: &str, text: &str, sources: &mut Sources, diagnostics: &Diagnostics) -> Option<Document> {
         let source = sources.add_file(path, text);
         let (tree, errors) = DeTable::parse_recoverable(text);
         report_syntax_errors(&errors, text, source, diagnostics);
@@ -45,13 +45,8 @@ impl Document {
         (!converter.failed.get()).then_some(Document { root })
     }
 
-    /// A document without keys, for a scene that is given by options alone; `label` is what messages call it.
-    pub fn empty(label: &str, sources: &mut Sources) -> Document {
-        Document { root: Table::new(Span::whole(sources.add_file(label, ""))) }
-    }
-
     /// Adds what only the library has; see [`Table::merge`].
-    pub fn merge(&mut self, library: Document, sources: &Sources) {
+    pub(crate) fn merge(&mut self, library: Document, sources: &Sources) {
         self.root.merge(library.root, sources);
     }
 
@@ -59,7 +54,7 @@ impl Document {
     ///
     /// The key is a path of names and, for arrays, indices counted from 0: `light.0.radiance=[1, 2, 3]`.
     /// Names with other than letters, digits, `_` and `-` may be quoted. The value is TOML, or else plain text.
-    pub fn apply_option(&mut self, assignment: &str, sources: &mut Sources, diagnostics: &Diagnostics) {
+    pub(crate) fn apply_option(&mut self, assignment: &str, sources: &mut Sources, diagnostics: &Diagnostics) {
         const OPTION: &str = "--set ";
         let source = sources.add_option(format!("{OPTION}{assignment}"));
         let steps = match parse_path(assignment) {
@@ -97,7 +92,7 @@ impl Document {
     ///
     /// `path` is as in [`Document::apply_option`]; messages show `label`, with the caret below what
     /// follows its first space or `=`.
-    pub fn set(
+    pub(crate) fn set(
         &mut self,
         path: &str,
         value: impl Into<Value>,

@@ -15,7 +15,7 @@ use std::ops::RangeInclusive;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Span, listed, nearest, shortened};
 use super::document::{Document, Entry, Node, Table, Value};
-pub use range::Range;
+pub(crate) use range::Range;
 use range::number_text;
 use title::Title;
 
@@ -23,7 +23,7 @@ use title::Title;
 ///
 /// The plain methods answer `None` when the key is absent; the `required_` ones report that as an error;
 /// those with `_or` answer a default. A wrong value is reported by all of them and counts as absent.
-pub struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     table: &'a Table,
     title: Title,
     diagnostics: &'a Diagnostics,
@@ -34,7 +34,7 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Reads the outermost table of a document.
-    pub fn new(document: &'a Document, diagnostics: &'a Diagnostics) -> Reader<'a> {
+    pub(crate) fn new(document: &'a Document, diagnostics: &'a Diagnostics) -> Reader<'a> {
         let title = Title { path: String::new(), text: String::new(), suffix: String::new() };
         Reader::with_title(&document.root, title, diagnostics)
     }
@@ -46,47 +46,42 @@ impl<'a> Reader<'a> {
     // Places and messages.
 
     /// The table's name for messages: `[yarn.silk1]`, `[[light]] 2`; empty for the outermost table.
-    pub fn title(&self) -> &str {
+    pub(crate) fn title(&self) -> &str {
         &self.title.text
     }
 
     /// Where the table is announced.
-    pub fn header(&self) -> Span {
+    pub(crate) fn header(&self) -> Span {
         self.table.header()
     }
 
     /// Where the value of a key was written. Does not count as asking for the key.
-    pub fn span(&self, key: &str) -> Option<Span> {
+    pub(crate) fn span(&self, key: &str) -> Option<Span> {
         self.table.get(key).map(|entry| entry.node.span)
     }
 
-    /// Where a key was written. Does not count as asking for the key.
-    pub fn key_span(&self, key: &str) -> Option<Span> {
-        self.table.get(key).map(|entry| entry.key_span)
-    }
-
     /// Whether the key is there, right or wrong. Counts as asking for it.
-    pub fn has(&self, key: &str) -> bool {
+    pub(crate) fn has(&self, key: &str) -> bool {
         self.entry(key).is_some()
     }
 
     /// The keys that are there, in the order they were written. Does not count as asking for them.
-    pub fn keys(&self) -> impl Iterator<Item = &'a str> {
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &'a str> {
         self.table.entries().map(|entry| entry.key.as_str())
     }
 
     /// Reports an error at the value of a key, or at the table's header when the key is absent.
-    pub fn error_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
+    pub(crate) fn error_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
         self.report(Diagnostic::error(message), self.span(key), hint);
     }
 
     /// Reports a warning at the value of a key, or at the table's header when the key is absent.
-    pub fn warning_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
+    pub(crate) fn warning_at(&self, key: &str, message: impl Into<String>, hint: Option<&str>) {
         self.report(Diagnostic::warning(message), self.span(key), hint);
     }
 
     /// Reports an error at the table's header.
-    pub fn error(&self, message: impl Into<String>, hint: Option<&str>) {
+    pub(crate) fn error(&self, message: impl Into<String>, hint: Option<&str>) {
         self.report(Diagnostic::error(message), None, hint);
     }
 
@@ -99,7 +94,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reports every key that is there but was never asked for, unless the table is of an unknown kind ([`Self::kind`]).
-    pub fn finish(self) {
+    pub(crate) fn finish(self) {
         if self.of_unknown_kind.get() {
             return;
         }
@@ -117,13 +112,8 @@ impl<'a> Reader<'a> {
 
     // Asking.
 
-    /// Lets a key be there without reading it.
-    pub fn ignore(&self, key: &str) {
-        self.entry(key);
-    }
-
     /// The value under a key as it is.
-    pub fn node(&self, key: &str) -> Option<&'a Node> {
+    pub(crate) fn node(&self, key: &str) -> Option<&'a Node> {
         self.entry(key).map(|entry| &entry.node)
     }
 
@@ -154,17 +144,17 @@ impl<'a> Reader<'a> {
     // Numbers.
 
     /// A number; integers are numbers too.
-    pub fn f64(&self, key: &str, range: Range) -> Option<f64> {
+    pub(crate) fn f64(&self, key: &str, range: Range) -> Option<f64> {
         self.number(key, self.node(key)?, range, "a number")
     }
 
     /// A number, or the default.
-    pub fn f64_or(&self, key: &str, default: f64, range: Range) -> f64 {
+    pub(crate) fn f64_or(&self, key: &str, default: f64, range: Range) -> f64 {
         self.f64(key, range).unwrap_or(default)
     }
 
     /// A number that must be there.
-    pub fn required_f64(&self, key: &str, range: Range) -> Option<f64> {
+    pub(crate) fn required_f64(&self, key: &str, range: Range) -> Option<f64> {
         if self.required(key) { self.f64(key, range) } else { None }
     }
 
@@ -186,7 +176,7 @@ impl<'a> Reader<'a> {
     }
 
     /// A whole number, written without point and exponent.
-    pub fn u64(&self, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
+    pub(crate) fn u64(&self, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
         let node = self.node(key)?;
         let value = match node.value {
             Value::Integer(value) => value,
@@ -221,37 +211,32 @@ impl<'a> Reader<'a> {
     }
 
     /// A whole number, or the default.
-    pub fn u64_or(&self, key: &str, default: u64, range: RangeInclusive<u64>) -> u64 {
+    pub(crate) fn u64_or(&self, key: &str, default: u64, range: RangeInclusive<u64>) -> u64 {
         self.u64(key, range).unwrap_or(default)
     }
 
-    /// A whole number that must be there.
-    pub fn required_u64(&self, key: &str, range: RangeInclusive<u64>) -> Option<u64> {
-        if self.required(key) { self.u64(key, range) } else { None }
-    }
-
     /// Three numbers in brackets, each in the range.
-    pub fn vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+    pub(crate) fn vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
         self.array(key, self.node(key)?, range, "an array of 3 numbers")
     }
 
     /// Three numbers in brackets, or the default.
-    pub fn vec3_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
+    pub(crate) fn vec3_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
         self.vec3(key, range).unwrap_or(default)
     }
 
     /// Three numbers in brackets that must be there.
-    pub fn required_vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+    pub(crate) fn required_vec3(&self, key: &str, range: Range) -> Option<[f64; 3]> {
         if self.required(key) { self.vec3(key, range) } else { None }
     }
 
     /// Two numbers in brackets, each in the range.
-    pub fn vec2(&self, key: &str, range: Range) -> Option<[f64; 2]> {
+    pub(crate) fn vec2(&self, key: &str, range: Range) -> Option<[f64; 2]> {
         self.array(key, self.node(key)?, range, "an array of 2 numbers")
     }
 
     /// Red, green and blue in brackets, or one number for all three.
-    pub fn rgb(&self, key: &str, range: Range) -> Option<[f64; 3]> {
+    pub(crate) fn rgb(&self, key: &str, range: Range) -> Option<[f64; 3]> {
         const EXPECTED: &str = "a number or an array of 3 numbers";
         let node = self.node(key)?;
         match node.value {
@@ -261,17 +246,12 @@ impl<'a> Reader<'a> {
     }
 
     /// A color, or the default.
-    pub fn rgb_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
+    pub(crate) fn rgb_or(&self, key: &str, default: [f64; 3], range: Range) -> [f64; 3] {
         self.rgb(key, range).unwrap_or(default)
     }
 
-    /// A color that must be there.
-    pub fn required_rgb(&self, key: &str, range: Range) -> Option<[f64; 3]> {
-        if self.required(key) { self.rgb(key, range) } else { None }
-    }
-
     /// Any count of numbers in brackets, or one number without.
-    pub fn numbers(&self, key: &str, range: Range) -> Option<Vec<f64>> {
+    pub(crate) fn numbers(&self, key: &str, range: Range) -> Option<Vec<f64>> {
         const EXPECTED: &str = "a number or an array of numbers";
         let node = self.node(key)?;
         let elements = match &node.value {
@@ -282,7 +262,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Pairs of numbers: an array of arrays of two.
-    pub fn pairs(&self, key: &str, range: Range) -> Option<Vec<[f64; 2]>> {
+    pub(crate) fn pairs(&self, key: &str, range: Range) -> Option<Vec<[f64; 2]>> {
         const EXPECTED: &str = "an array of pairs of numbers";
         let node = self.node(key)?;
         let Value::Array(elements) = &node.value else {
@@ -315,7 +295,7 @@ impl<'a> Reader<'a> {
     // Words.
 
     /// `true` or `false`.
-    pub fn bool(&self, key: &str) -> Option<bool> {
+    pub(crate) fn bool(&self, key: &str) -> Option<bool> {
         let node = self.node(key)?;
         match node.value {
             Value::Boolean(value) => Some(value),
@@ -327,12 +307,12 @@ impl<'a> Reader<'a> {
     }
 
     /// `true` or `false`, or the default.
-    pub fn bool_or(&self, key: &str, default: bool) -> bool {
+    pub(crate) fn bool_or(&self, key: &str, default: bool) -> bool {
         self.bool(key).unwrap_or(default)
     }
 
     /// Text in quotes.
-    pub fn string(&self, key: &str) -> Option<&'a str> {
+    pub(crate) fn string(&self, key: &str) -> Option<&'a str> {
         let node = self.node(key)?;
         match &node.value {
             Value::String(text) => Some(text),
@@ -344,17 +324,17 @@ impl<'a> Reader<'a> {
     }
 
     /// Text, or the default.
-    pub fn string_or(&self, key: &str, default: &'a str) -> &'a str {
+    pub(crate) fn string_or(&self, key: &str, default: &'a str) -> &'a str {
         self.string(key).unwrap_or(default)
     }
 
     /// Text that must be there.
-    pub fn required_string(&self, key: &str) -> Option<&'a str> {
+    pub(crate) fn required_string(&self, key: &str) -> Option<&'a str> {
         if self.required(key) { self.string(key) } else { None }
     }
 
     /// An array of texts, or one text; each with its place. Empty when the key is absent or wrong.
-    pub fn strings(&self, key: &str) -> Vec<(&'a str, Span)> {
+    pub(crate) fn strings(&self, key: &str) -> Vec<(&'a str, Span)> {
         let Some(node) = self.node(key) else { return Vec::new() };
         let elements = match &node.value {
             Value::Array(elements) => elements.as_slice(),
@@ -371,7 +351,7 @@ impl<'a> Reader<'a> {
     }
 
     /// One of the names, as what it stands for.
-    pub fn one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+    pub(crate) fn one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
         let text = self.string(key)?;
         if let Some((_, value)) = choices.iter().find(|(name, _)| *name == text) {
             return Some(value.clone());
@@ -385,13 +365,13 @@ impl<'a> Reader<'a> {
     }
 
     /// One of the names, or the default.
-    pub fn one_of_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> T {
+    pub(crate) fn one_of_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> T {
         self.one_of(key, choices).unwrap_or(default)
     }
 
     /// One of the names, for a key that decides which other keys a table has. Where its value is wrong, or the key is
     /// missing, [`Self::finish`] calls no key unknown: one mistake is told once.
-    pub fn kind<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+    pub(crate) fn kind<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
         let kind = self.required_one_of(key, choices);
         if kind.is_none() {
             self.of_unknown_kind();
@@ -400,34 +380,34 @@ impl<'a> Reader<'a> {
     }
 
     /// Says that nobody knows which keys the table has: [`Self::finish`] calls none unknown.
-    pub fn of_unknown_kind(&self) {
+    pub(crate) fn of_unknown_kind(&self) {
         self.of_unknown_kind.set(true);
     }
 
     /// As [`Self::kind`], with a default for a table that does not say.
-    pub fn kind_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> Option<T> {
+    pub(crate) fn kind_or<T: Clone>(&self, key: &str, default: T, choices: &[(&str, T)]) -> Option<T> {
         if self.has(key) { self.kind(key, choices) } else { Some(default) }
     }
 
     /// One of the names; the key must be there.
-    pub fn required_one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
+    pub(crate) fn required_one_of<T: Clone>(&self, key: &str, choices: &[(&str, T)]) -> Option<T> {
         if self.required(key) { self.one_of(key, choices) } else { None }
     }
 
     // Tables.
 
     /// A table.
-    pub fn table(&self, key: &str) -> Option<Reader<'a>> {
+    pub(crate) fn table(&self, key: &str) -> Option<Reader<'a>> {
         self.inner(key, self.node(key)?, self.title.table(key), "a table")
     }
 
     /// A table that must be there.
-    pub fn required_table(&self, key: &str) -> Option<Reader<'a>> {
+    pub(crate) fn required_table(&self, key: &str) -> Option<Reader<'a>> {
         if self.required(key) { self.table(key) } else { None }
     }
 
     /// An array of tables, or one table. Empty when the key is absent; what is no table is left out.
-    pub fn tables(&self, key: &str) -> Vec<Reader<'a>> {
+    pub(crate) fn tables(&self, key: &str) -> Vec<Reader<'a>> {
         const EXPECTED: &str = "a table or an array of tables";
         let Some(node) = self.node(key) else { return Vec::new() };
         let Value::Array(elements) = &node.value else {
@@ -441,7 +421,7 @@ impl<'a> Reader<'a> {
 
     /// The tables inside the table under a key, with their names: all `[yarn.NAME]` for `yarn`.
     /// Empty when the key is absent.
-    pub fn named_tables(&self, key: &str) -> Vec<(&'a str, Reader<'a>)> {
+    pub(crate) fn named_tables(&self, key: &str) -> Vec<(&'a str, Reader<'a>)> {
         let Some(outer) = self.table(key) else { return Vec::new() };
         let names: Vec<&str> = outer.keys().collect();
         names.into_iter().filter_map(|name| Some((name, outer.table(name)?))).collect()

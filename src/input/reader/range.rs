@@ -4,7 +4,7 @@ use std::fmt;
 
 /// Which numbers are allowed. Not-a-number and infinity never are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub(crate) struct Range {
     low: Limit,
     high: Limit,
 }
@@ -18,51 +18,39 @@ enum Limit {
 
 impl Range {
     /// Every number.
-    pub const FINITE: Range = Range { low: Limit::None, high: Limit::None };
+    pub(crate) const FINITE: Range = Range { low: Limit::None, high: Limit::None };
     /// Above 0.
-    pub const POSITIVE: Range = Range::above(0.0);
-    /// At least 0.
-    pub const NOT_NEGATIVE: Range = Range::at_least(0.0);
+    pub(crate) const POSITIVE: Range = Range::above(0.0);
     /// From 0 to 1, both included.
-    pub const UNIT: Range = Range::between(0.0, 1.0);
+    pub(crate) const UNIT: Range = Range::between(0.0, 1.0);
 
     /// `low` and larger numbers.
-    pub const fn at_least(low: f64) -> Range {
+    pub(crate) const fn at_least(low: f64) -> Range {
         Range { low: Limit::Including(low), high: Limit::None }
     }
 
     /// Numbers larger than `low`.
-    pub const fn above(low: f64) -> Range {
+    pub(crate) const fn above(low: f64) -> Range {
         Range { low: Limit::Excluding(low), high: Limit::None }
     }
 
-    /// `high` and smaller numbers.
-    pub const fn at_most(high: f64) -> Range {
-        Range { low: Limit::None, high: Limit::Including(high) }
-    }
-
-    /// Numbers smaller than `high`.
-    pub const fn below(high: f64) -> Range {
-        Range { low: Limit::None, high: Limit::Excluding(high) }
-    }
-
     /// From `low` to `high`, both included.
-    pub const fn between(low: f64, high: f64) -> Range {
+    pub(crate) const fn between(low: f64, high: f64) -> Range {
         Range { low: Limit::Including(low), high: Limit::Including(high) }
     }
 
     /// This range up to `high`, included.
-    pub const fn and_at_most(self, high: f64) -> Range {
+    pub(crate) const fn and_at_most(self, high: f64) -> Range {
         Range { low: self.low, high: Limit::Including(high) }
     }
 
     /// This range up to but without `high`.
-    pub const fn and_below(self, high: f64) -> Range {
+    pub(crate) const fn and_below(self, high: f64) -> Range {
         Range { low: self.low, high: Limit::Excluding(high) }
     }
 
     /// Whether the number is allowed.
-    pub fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         let above_low = match self.low {
             Limit::None => true,
             Limit::Including(low) => value >= low,

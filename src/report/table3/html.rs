@@ -13,7 +13,7 @@ use crate::{
 
 /// Pictures of one row.
 #[derive(Clone, Debug)]
-pub struct RowPictures {
+pub(crate) struct RowPictures {
     /// Explicit fibres.
     pub reference: Picture,
     /// What is compared with them.
@@ -26,7 +26,7 @@ pub struct RowPictures {
 
 /// A plot with words.
 #[derive(Clone, Debug)]
-pub struct Plot {
+pub(crate) struct Plot {
     /// What it shows.
     pub caption: String,
     /// SVG.
@@ -34,7 +34,7 @@ pub struct Plot {
 }
 
 /// The whole page. A row without pictures is shown by its figures alone.
-pub fn page(table: &Table, pictures: &[Option<RowPictures>], plots: &[Plot]) -> String {
+pub(crate) fn page(table: &Table, pictures: &[Option<RowPictures>], plots: &[Plot]) -> String {
     let body = html! {
         h1 { (table.title) }
         @for text in table.preface() { p { (text) } }

@@ -1,6 +1,6 @@
 //! Table 3: two ways to render the same cloth at equal quality, as Markdown, CSV and JSON; [`html`] has the page.
 
-pub mod html;
+pub(crate) mod html;
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use crate::image::metric::EPSILON;
 
 /// What one way took to reach the target, means over repeated runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Run {
+pub(crate) struct Run {
     /// Mode and model.
     pub method: String,
     /// Seconds of rendering.
@@ -43,7 +43,7 @@ pub struct Run {
 
 /// How far what a method converges to is from the reference, on the cloth: pixels that the reference covers at least half.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ModelError {
+pub(crate) struct ModelError {
     /// Mean over mean of the reference, each channel.
     pub mean_ratio: [f64; 3],
     /// relMSE without noise, full resolution.
@@ -56,7 +56,7 @@ pub struct ModelError {
 
 /// A third way, of which only the picture is compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Other {
+pub(crate) struct Other {
     /// What it is called.
     pub name: String,
     /// How far it is from the reference.
@@ -67,7 +67,7 @@ pub struct Other {
 
 /// Figures of the paper's table, reference and theirs: seconds, megabytes, bounces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Paper {
+pub(crate) struct Paper {
     /// Seconds at equal quality.
     pub seconds: [f64; 2],
     /// Memory in megabytes.
@@ -78,7 +78,7 @@ pub struct Paper {
 
 /// One row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// The cloth and its light.
     pub name: String,
     /// The scene file.
@@ -109,7 +109,7 @@ pub struct Row {
 
 /// A row that is not there, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Missing {
+pub(crate) struct Missing {
     /// The row's name.
     pub name: String,
     /// Why it is missing.
@@ -118,7 +118,7 @@ pub struct Missing {
 
 /// All of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Table {
+pub(crate) struct Table {
     /// What the suite calls itself.
     pub title: String,
     /// The suite file.
@@ -142,7 +142,7 @@ pub struct Table {
 }
 
 /// The metric in words.
-pub fn metric() -> String {
+pub(crate) fn metric() -> String {
     format!(
         "relMSE: mean over pixels and channels of (picture - converged)^2 / (converged^2 + {EPSILON}), \
          against a converged picture of the same mode and model from independent seeds, without the latter's noise"
@@ -221,7 +221,7 @@ impl Table {
     }
 
     /// The table as Markdown.
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         let mut out = format!("# {}\n\n{}\n\n", self.title, self.preface().join("\n\n"));
         let _ = writeln!(out, "| {} |", COLUMNS.map(|(name, _)| name).join(" | "));
         let _ = writeln!(out, "|{}", " --- |".repeat(COLUMNS.len()));
@@ -254,7 +254,7 @@ impl Table {
     }
 
     /// Every figure, a line for each row.
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let mut out = "row,scene,width,height".to_owned();
         let sides = ["reference", "aggregated"];
         let figures = [
@@ -316,7 +316,7 @@ impl Table {
     }
 
     /// The table as JSON.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
     }
 }
