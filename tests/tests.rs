@@ -13,6 +13,8 @@ mod compositing;
 mod colors;
 // The same picture to the bit: threads, repeated runs, crops; and another one for another seed.
 mod determinism;
+// Scenes against what they looked like, within their noise.
+mod golden;
 // Two pictures against each other: metrics, masks, thresholds, maps and pages.
 mod compare;
 // Curve files from one format to another; curves, meshes and cameras of stages in scenes; completions, manuals.
