@@ -74,111 +74,22 @@ impl Panels {
         }
         let mut notes = mesh.notes.clone();
         let (weld, welded) = weld(&mesh.points);
-        let name = |face: &Face| mesh.parts[face.part as usize].group.as_str();
-        let area = |f: &Face| {
-            let [a, b, c] = f.points.map(|i| mesh.points[i as usize] * unit_mm);
-            0.5 * (b - a).cross(c - a).length()
-        };
-        let signed = |f: &Face| {
-            let [a, b, c] = f.uvs.map(|i| mesh.uvs[i as usize]);
-            0.5 * (b - a).perp_dot(c - a)
-        };
-        // Triangles without area say nothing about the cloth.
-        let mut flat = Counted::default();
-        let total: f64 = mesh.faces.iter().map(area).sum();
-        let total_uv: f64 = mesh.faces.iter().map(|f| signed(f).abs()).sum();
-        let count = mesh.faces.len() as f64;
-        let sound = |f: &Face| {
-            let [a, b, c] = f.points.map(|i| weld[i as usize]);
-            area(f) > 1e-6 * total / count && signed(f).abs() > 1e-6 * total_uv / count && a != b && b != c && c != a
-        };
-        if total_uv <= 0.0 || !total_uv.is_finite() || total <= 0.0 {
-            let hint = "the texture coordinates are the flat panels of the garment";
-            return Err(GarmentError::at(0, "the texture coordinates have no area", hint));
-        }
-        let mut faces: Vec<Face> = Vec::with_capacity(mesh.faces.len());
-        for face in &mesh.faces {
-            if sound(face) {
-                faces.push(*face);
-            } else {
-                flat.add(name(face), face.line as usize);
-            }
-        }
-        flat.note("triangles without area were left out", &mut notes);
-
-        // Corners that share place, texture coordinates and part are one.
-        let grain = 1e-7 * (total_uv / count).sqrt();
-        let mut corners: HashMap<(u32, [i64; 2], u32), u32> = HashMap::new();
-        let mut uvs = Vec::new();
-        let mut cut: Vec<[u32; 3]> = faces
-            .iter()
-            .map(|f| {
-                [0, 1, 2].map(|k| {
-                    let uv = mesh.uvs[f.uvs[k] as usize];
-                    let key = (weld[f.points[k] as usize], (uv / grain).round().to_array().map(|v| v as i64), f.part);
-                    *corners.entry(key).or_insert_with(|| {
-                        uvs.push(uv);
-                        uvs.len() as u32 - 1
-                    })
-                })
-            })
-            .collect();
+        let areas = Areas { mesh, unit_mm };
+        let (faces, grain) = areas.sound_faces(&weld, &mut notes)?;
+        let (mut cut, mut uvs) = joined_corners(mesh, &faces, &weld, grain);
         let (of_face, order) = charts(&cut, uvs.len(), &faces, mesh)?;
         let faces: Vec<Face> = order.iter().map(|&i| faces[i]).collect();
         cut = order.iter().map(|&i| cut[i]).collect();
 
-        let ratios: Vec<(f64, f64)> = faces.iter().map(|f| ((area(f) / signed(f).abs()).sqrt(), area(f))).collect();
+        let ratios: Vec<(f64, f64)> =
+            faces.iter().map(|f| ((areas.of(f) / areas.in_uv(f).abs()).sqrt(), areas.of(f))).collect();
         let found = percentile(&ratios, 0.5);
         let uv_mm = unit_of(found, uv_mm, &mut notes)?;
         for uv in &mut uvs {
             *uv *= uv_mm;
         }
-
-        // Panels whose texture is seen from behind are turned round: an S twist stays S.
-        let number = of_face.last().map_or(0, |&p| p as usize + 1);
-        let mut turned = vec![0.0; number];
-        for (face, &panel) in faces.iter().zip(&of_face) {
-            turned[panel as usize] += signed(face);
-        }
-        let mut panels: Vec<Panel> = Vec::with_capacity(number);
-        let mut mirrored = Counted::default();
-        let mut flipped = Counted::default();
-        let mut done = vec![false; uvs.len()];
-        for (i, face) in faces.iter().enumerate() {
-            let panel = of_face[i] as usize;
-            let mirror = turned[panel] < 0.0;
-            if panel == panels.len() {
-                let part = &mesh.parts[face.part as usize];
-                if mirror {
-                    mirrored.add(&part.group, face.line as usize);
-                }
-                panels.push(Panel {
-                    group: part.group.clone(),
-                    material: part.material.clone(),
-                    mirrored: mirror,
-                    faces: 0,
-                    area: 0.0,
-                    line: face.line as usize,
-                });
-            }
-            panels[panel].faces += 1;
-            panels[panel].area += signed(face).abs() * uv_mm * uv_mm;
-            if (signed(face) < 0.0) != mirror {
-                flipped.add(name(face), face.line as usize);
-            }
-            for c in cut[i] {
-                if mirror && !std::mem::replace(&mut done[c as usize], true) {
-                    uvs[c as usize].x = -uvs[c as usize].x;
-                }
-            }
-        }
-        mirrored.note("panels are mirrored in their texture coordinates: they were turned round", &mut notes);
-        if flipped.count() * 20 > faces.len() {
-            let problem =
-                format!("{} of {} triangles lie upside down in the texture coordinates", flipped.count(), faces.len());
-            return Err(GarmentError::at(0, problem, "panels must lie flat, without folds over themselves"));
-        }
-        flipped.note("triangles lie upside down in the texture coordinates and hold no stitches", &mut notes);
+        let panels = areas.upright_panels(&faces, &of_face, &cut, &mut uvs, &mut notes)?;
+        let panels = panels.into_iter().map(|panel| Panel { area: panel.area * uv_mm * uv_mm, ..panel }).collect();
 
         let sewn: Vec<[u32; 3]> = faces.iter().map(|f| f.points.map(|i| weld[i as usize])).collect();
         non_manifold(&sewn, &faces, mesh, &mut notes);
@@ -232,6 +143,131 @@ impl Panels {
     pub(super) fn points(&self, mesh: &GarmentMesh, unit_mm: f64) -> Vec<DVec3> {
         self.welded.iter().map(|&i| mesh.points[i as usize] * unit_mm).collect()
     }
+}
+
+/// Areas of a mesh's faces.
+struct Areas<'a> {
+    mesh: &'a GarmentMesh,
+    unit_mm: f64,
+}
+
+impl Areas<'_> {
+    /// Of the surface, square millimetres.
+    fn of(&self, face: &Face) -> f64 {
+        let [a, b, c] = face.points.map(|i| self.mesh.points[i as usize] * self.unit_mm);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Of the texture coordinates, in their own unit; negative where they are seen from behind.
+    fn in_uv(&self, face: &Face) -> f64 {
+        let [a, b, c] = face.uvs.map(|i| self.mesh.uvs[i as usize]);
+        0.5 * (b - a).perp_dot(c - a)
+    }
+
+    fn group(&self, face: &Face) -> &str {
+        self.mesh.parts[face.part as usize].group.as_str()
+    }
+
+    /// The faces that say something of the cloth, and the distance within which texture coordinates are the same.
+    fn sound_faces(&self, weld: &[u32], notes: &mut Vec<String>) -> Result<(Vec<Face>, f64), GarmentError> {
+        let faces = &self.mesh.faces;
+        let total: f64 = faces.iter().map(|f| self.of(f)).sum();
+        let total_uv: f64 = faces.iter().map(|f| self.in_uv(f).abs()).sum();
+        let count = faces.len() as f64;
+        if total_uv <= 0.0 || !total_uv.is_finite() || total <= 0.0 {
+            let hint = "the texture coordinates are the flat panels of the garment";
+            return Err(GarmentError::at(0, "the texture coordinates have no area", hint));
+        }
+        let sound = |f: &Face| {
+            let [a, b, c] = f.points.map(|i| weld[i as usize]);
+            let wide = self.of(f) > 1e-6 * total / count && self.in_uv(f).abs() > 1e-6 * total_uv / count;
+            wide && a != b && b != c && c != a
+        };
+        let mut flat = Counted::default();
+        for face in faces.iter().filter(|f| !sound(f)) {
+            flat.add(self.group(face), face.line as usize);
+        }
+        flat.note("triangles without area were left out", notes);
+        Ok((faces.iter().copied().filter(sound).collect(), 1e-7 * (total_uv / count).sqrt()))
+    }
+
+    /// The panels, their areas in the unit of the file's texture coordinates. Those whose texture is seen from behind are
+    /// turned round: an S twist stays S.
+    fn upright_panels(
+        &self,
+        faces: &[Face],
+        of_face: &[u32],
+        cut: &[[u32; 3]],
+        uvs: &mut [DVec2],
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Panel>, GarmentError> {
+        let number = of_face.last().map_or(0, |&p| p as usize + 1);
+        let mut turned = vec![0.0; number];
+        for (face, &panel) in faces.iter().zip(of_face) {
+            turned[panel as usize] += self.in_uv(face);
+        }
+        let mut panels: Vec<Panel> = Vec::with_capacity(number);
+        let mut mirrored = Counted::default();
+        let mut flipped = Counted::default();
+        let mut done = vec![false; uvs.len()];
+        for (i, face) in faces.iter().enumerate() {
+            let panel = of_face[i] as usize;
+            let mirror = turned[panel] < 0.0;
+            if panel == panels.len() {
+                let part = &self.mesh.parts[face.part as usize];
+                if mirror {
+                    mirrored.add(&part.group, face.line as usize);
+                }
+                panels.push(Panel {
+                    group: part.group.clone(),
+                    material: part.material.clone(),
+                    mirrored: mirror,
+                    faces: 0,
+                    area: 0.0,
+                    line: face.line as usize,
+                });
+            }
+            panels[panel].faces += 1;
+            panels[panel].area += self.in_uv(face).abs();
+            if (self.in_uv(face) < 0.0) != mirror {
+                flipped.add(self.group(face), face.line as usize);
+            }
+            for c in cut[i] {
+                if mirror && !std::mem::replace(&mut done[c as usize], true) {
+                    uvs[c as usize].x = -uvs[c as usize].x;
+                }
+            }
+        }
+        mirrored.note("panels are mirrored in their texture coordinates: they were turned round", notes);
+        if flipped.count() * 20 > faces.len() {
+            let problem =
+                format!("{} of {} triangles lie upside down in the texture coordinates", flipped.count(), faces.len());
+            return Err(GarmentError::at(0, problem, "panels must lie flat, without folds over themselves"));
+        }
+        flipped.note("triangles lie upside down in the texture coordinates and hold no stitches", notes);
+        Ok(panels)
+    }
+}
+
+/// Corners that share place, texture coordinates (within `grain`) and part are one: the corners of each face, and the texture
+/// coordinates of all corners.
+fn joined_corners(mesh: &GarmentMesh, faces: &[Face], weld: &[u32], grain: f64) -> (Vec<[u32; 3]>, Vec<DVec2>) {
+    let mut corners: HashMap<(u32, [i64; 2], u32), u32> = HashMap::new();
+    let mut uvs = Vec::new();
+    let cut = faces
+        .iter()
+        .map(|f| {
+            [0, 1, 2].map(|k| {
+                let uv = mesh.uvs[f.uvs[k] as usize];
+                let key = (weld[f.points[k] as usize], (uv / grain).round().to_array().map(|v| v as i64), f.part);
+                *corners.entry(key).or_insert_with(|| {
+                    uvs.push(uv);
+                    uvs.len() as u32 - 1
+                })
+            })
+        })
+        .collect();
+    (cut, uvs)
 }
 
 /// The welded point of each point, and the first point of each welded one: what coincides is one.

@@ -23,7 +23,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         curve_file,
-        garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, SeamKind, Tension},
+        garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Report, SeamKind, Tension},
         mesh::Mesh,
         pattern::{
             chart::Chart,
@@ -80,7 +80,18 @@ struct Rule {
 const SEAMS: [(&str, SeamKind); 3] =
     [("none", SeamKind::None), ("mattress", SeamKind::Mattress), ("overlock", SeamKind::Overlock)];
 
+/// Grams of yarns of such lengths, mm, by their tex (grams in a kilometre); `None` where that of one is not known.
+fn weight(lengths: &[f64], tex: &[Option<f64>]) -> Option<f64> {
+    let all = lengths.iter().zip(tex).filter(|(length, _)| **length > 0.0);
+    all.map(|(length, tex)| Some(length * 1e-6 * (*tex)?)).sum()
+}
+
 impl Rule {
+    /// Tex of its yarn, or of the garment's `yarn` where it names none.
+    fn tex(&self, yarn: &str, library: &Library) -> Option<f64> {
+        library.yarns.get(self.yarn.as_deref().unwrap_or(yarn))?.tex
+    }
+
     /// What messages call it.
     fn origin(&self, mesh: &Path) -> String {
         let group = self.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
@@ -349,50 +360,9 @@ impl GarmentPlan {
         detail: &Detail,
         warnings: &mut Vec<String>,
     ) -> Option<(Vec<MadePanels>, GarmentFacts)> {
-        let radius_of =
-            |rule: &Rule| rule.yarn.as_ref().and_then(|name| library.yarns.get(name)).map_or(radius, |y| y.radius);
-        let tex_of = |rule: &Rule| {
-            let own = rule.yarn.as_deref().or(Some(yarn)).and_then(|name| library.yarns.get(name));
-            own.and_then(|yarn| yarn.tex)
-        };
-        let cloths: Option<Vec<Cloth>> = self
-            .rules
-            .iter()
-            .map(|rule| {
-                let tile = rule.cloth.tile(rule.stitch, radius_of(rule), context, warnings)?;
-                Some(Cloth {
-                    group: rule.group.clone(),
-                    tile,
-                    grain: rule.grain,
-                    points: rule.cloth.points,
-                    seam: rule.seam,
-                })
-            })
-            .collect();
-        let tell = |error: GarmentError| {
-            let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
-            let error = if error.line > 0 && error.path.is_none() {
-                GarmentError { path: Some(self.path.clone()), ..error }
-            } else {
-                error
-            };
-            context.error(self.span, error.to_string(), hint);
-        };
+        let cloths = self.cloths(radius, context, library, warnings);
         let frames = Frames::find(&self.path, detail);
-        let mut read: BTreeMap<Moment, GarmentMesh> = BTreeMap::new();
-        let mut own_unit = None;
-        for moment in frames.moments() {
-            match moment.garment(self.prims[0].as_ref(), self.z_up, context) {
-                Ok((mesh, unit)) => {
-                    own_unit = unit;
-                    read.insert(moment.clone(), mesh);
-                }
-                Err(error) => {
-                    tell(error);
-                    return None;
-                }
-            }
-        }
+        let (read, own_unit) = self.read(&frames, context)?;
         let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
         let rest = &read[&frames.rest];
         let cloths = cloths?;
@@ -407,48 +377,15 @@ impl GarmentPlan {
             coordinates: colored || self.rules.iter().any(|r| r.color.is_some()),
             near: self.near,
         };
-        let garment = match Garment::new(rest, options) {
-            Ok(garment) => garment,
-            Err(error) => {
-                tell(error);
-                return None;
-            }
-        };
+        let garment = Garment::new(rest, options).map_err(|error| self.tell(error, context)).ok()?;
         let mut notes = garment.report().notes.clone();
-        let report = garment.report();
-        let tex: Vec<Option<f64>> = self.rules.iter().map(tex_of).collect();
-        // Tex is grams in a kilometre. Nothing is said of yarns of which one is not known.
-        let weight = |lengths: &[f64]| -> Option<f64> {
-            let all = lengths.iter().zip(&tex).filter(|(length, _)| **length > 0.0);
-            all.map(|(length, tex)| Some(length * 1e-6 * (*tex)?)).sum()
-        };
+        let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
         let mut facts = GarmentFacts {
-            path: self.path.display().to_string(),
-            cloth: self.rules[0].cloth.name.clone(),
-            panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
-            stitches: report.all_stitches(),
-            yarn_length: report.yarn_length.iter().sum(),
-            weight: weight(&report.yarn_length),
+            weight: weight(&garment.report().yarn_length, &tex),
             overlap: overlap.map(|o| [o.share, o.deepest]),
-            control_points: report.control_points,
-            uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
-            stretched: report.stretched,
-            uv_mm: report.uv_mm,
-            bounds: report.bounds,
-            repairs: Vec::new(),
+            ..self.facts(garment.report())
         };
-        let mut meshes = Vec::new();
-        for pose in &frames.poses {
-            let (a, b) = (&read[&pose.before], &read[&pose.after]);
-            for (mesh, moment) in [(a, &pose.before), (b, &pose.after)] {
-                if let Err(problem) = rest.same_topology(mesh) {
-                    let message = format!("{}: {problem}", moment.path.display());
-                    context.error(self.span, message, Some("all frames have the same faces".to_owned()));
-                    return None;
-                }
-            }
-            meshes.push(between(a, b, pose.share));
-        }
+        let meshes = self.posed(&frames, &read, context)?;
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
         check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
@@ -483,9 +420,87 @@ impl GarmentPlan {
         let first = laid.pop()?;
         let lengths: Vec<f64> = first.iter().map(|yarns| length(yarns)).collect();
         facts.yarn_length = lengths.iter().sum();
-        facts.weight = weight(&lengths);
+        facts.weight = weight(&lengths, &tex);
         facts.repairs = notes;
         Some((self.made(first, [later, flow], at_rest, (&sizes, &names)), facts))
+    }
+
+    /// The relaxed tile of each rule, for yarns of `radius` where the rule names none.
+    fn cloths(
+        &self,
+        radius: f64,
+        context: &Context<'_>,
+        library: &Library,
+        warnings: &mut Vec<String>,
+    ) -> Option<Vec<Cloth>> {
+        let made = self.rules.iter().map(|rule| {
+            let yarn = rule.yarn.as_ref().and_then(|name| library.yarns.get(name));
+            let tile = rule.cloth.tile(rule.stitch, yarn.map_or(radius, |yarn| yarn.radius), context, warnings)?;
+            let (group, points) = (rule.group.clone(), rule.cloth.points);
+            Some(Cloth { group, tile, grain: rule.grain, points, seam: rule.seam })
+        });
+        made.collect()
+    }
+
+    /// The meshes of all moments, and the unit that their file has, mm.
+    fn read(&self, frames: &Frames, context: &Context<'_>) -> Option<(BTreeMap<Moment, GarmentMesh>, Option<f64>)> {
+        let mut read = BTreeMap::new();
+        let mut own_unit = None;
+        for moment in frames.moments() {
+            let found = moment.garment(self.prims[0].as_ref(), self.z_up, context);
+            let (mesh, unit) = found.map_err(|error| self.tell(error, context)).ok()?;
+            own_unit = unit;
+            read.insert(moment.clone(), mesh);
+        }
+        Some((read, own_unit))
+    }
+
+    fn tell(&self, error: GarmentError, context: &Context<'_>) {
+        let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
+        let unnamed = error.line > 0 && error.path.is_none();
+        let error = if unnamed { GarmentError { path: Some(self.path.clone()), ..error } } else { error };
+        context.error(self.span, error.to_string(), hint);
+    }
+
+    /// What is known before yarns are laid; of their weight and overlap nothing.
+    fn facts(&self, report: &Report) -> GarmentFacts {
+        GarmentFacts {
+            path: self.path.display().to_string(),
+            cloth: self.rules[0].cloth.name.clone(),
+            panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
+            stitches: report.all_stitches(),
+            yarn_length: report.yarn_length.iter().sum(),
+            weight: None,
+            overlap: None,
+            control_points: report.control_points,
+            uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
+            stretched: report.stretched,
+            uv_mm: report.uv_mm,
+            bounds: report.bounds,
+            repairs: Vec::new(),
+        }
+    }
+
+    /// The garment's mesh in every pose; all must have the faces of the one at rest.
+    fn posed(
+        &self,
+        frames: &Frames,
+        read: &BTreeMap<Moment, GarmentMesh>,
+        context: &Context<'_>,
+    ) -> Option<Vec<GarmentMesh>> {
+        let mut meshes = Vec::new();
+        for pose in &frames.poses {
+            let (a, b) = (&read[&pose.before], &read[&pose.after]);
+            for (mesh, moment) in [(a, &pose.before), (b, &pose.after)] {
+                if let Err(problem) = read[&frames.rest].same_topology(mesh) {
+                    let message = format!("{}: {problem}", moment.path.display());
+                    context.error(self.span, message, Some("all frames have the same faces".to_owned()));
+                    return None;
+                }
+            }
+            meshes.push(between(a, b, pose.share));
+        }
+        Some(meshes)
     }
 
     /// What a survey tells of each rule that has panels: all but its yarns, which are not laid.
