@@ -303,16 +303,10 @@ impl Chart {
 
     /// The next numbers of stitches to cast on, fewer and more, that `rows` rows fit; empty if none is near.
     fn counts_that_fit(&self, cast_on: u32, rows: u32) -> String {
-        let fits = |&count: &u32| {
-            let row = |found: Option<u32>, row: &Row| {
-                let (found, (takes, makes)) = (found?, row.takes_and_makes());
-                match found.checked_rem(takes)? {
-                    0 => (found / takes).checked_mul(makes),
-                    _ => row.is_plain().then_some(found),
-                }
-            };
-            self.rows.iter().cycle().take(rows as usize).fold(Some(count), row).is_some()
-        };
+        // Each row is counted once, for it may be long and be tried often.
+        let all: Vec<Fit> = self.rows.iter().map(Row::fit).collect();
+        let next = |found: u32, fit: &Fit| u32::try_from(fit.made_of(found)?).ok();
+        let fits = |&count: &u32| all.iter().cycle().take(rows as usize).try_fold(count, next).is_some();
         let fewer = (1..cast_on).rev().take(LARGEST_STEP_ASIDE).find(fits);
         let more = (cast_on + 1..).take(LARGEST_STEP_ASIDE).find(fits);
         [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
@@ -327,16 +321,14 @@ impl Chart {
         let (mut found, mut total) = (cast_on, 0_u64);
         for r in 0..rows {
             let row = &self.rows[r as usize % self.rows.len()];
-            let (takes, makes) = row.takes_and_makes();
-            let cut = takes == 0 || !found.is_multiple_of(takes);
-            if takes == 0 || (cut && !row.is_plain()) {
-                let problem = format!("row {} repeats over {takes} stitches, but finds {found}", r + 1);
+            let fit = row.fit();
+            let Some(made) = fit.made_of(found) else {
+                let problem = format!("row {} repeats over {} stitches, but finds {found}", r + 1, fit.takes);
                 let hint = "the number of stitches must be a multiple of what a row with shaping or cables takes";
                 let counts = self.counts_that_fit(cast_on, rows);
                 let hint = if counts.is_empty() { hint.to_owned() } else { format!("{hint}: cast on {counts}") };
                 return Err(ChartError::new(Some(row.line), problem, hint));
-            }
-            let made = if cut { u64::from(found) } else { u64::from(found / takes) * u64::from(makes) };
+            };
             total += made;
             if total > most {
                 let problem = format!("more than {most} stitches by row {}", r + 1);
@@ -354,7 +346,30 @@ fn common_divisor(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { common_divisor(b, a % b) }
 }
 
+/// What a row asks of the number of stitches that it finds.
+struct Fit {
+    takes: u32,
+    makes: u32,
+    /// Whether it may be cut anywhere.
+    plain: bool,
+}
+
+impl Fit {
+    /// How many stitches the row makes of those that it finds; `None` where it does not fit them.
+    fn made_of(&self, found: u32) -> Option<u64> {
+        match found.checked_rem(self.takes)? {
+            0 => Some(u64::from(found / self.takes) * u64::from(self.makes)),
+            _ => self.plain.then_some(found.into()),
+        }
+    }
+}
+
 impl Row {
+    fn fit(&self) -> Fit {
+        let (takes, makes) = self.takes_and_makes();
+        Fit { takes, makes, plain: self.is_plain() }
+    }
+
     fn takes_and_makes(&self) -> (u32, u32) {
         self.steps.iter().map(|s| s.takes_and_makes()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
     }
