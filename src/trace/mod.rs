@@ -212,25 +212,18 @@ impl World {
         if self.scene.occluded(&raw_ray(ray), &mut filter) { 0.0 } else { filter.passed() }
     }
 
-    /// Places where a yarn bends more tightly than its radius allows: the scene's fabric, then the place.
-    pub fn tight_bends(&self) -> impl Iterator<Item = (usize, &TightBend)> {
-        self.geometries.iter().flat_map(|geometry| {
-            let bends = match geometry {
-                CurveGeometry::Yarns(yarns) => yarns.strands.tight_bends(),
-                CurveGeometry::Fibers(_) => &[],
-            };
-            bends.iter().map(move |bend| (geometry.fabric(), bend))
-        })
-    }
-
-    /// Where in the scene's own space a bend of a fabric lies, millimetres.
-    pub fn place_of(&self, fabric: usize, bend: &TightBend) -> Option<DVec3> {
-        let yarns = self.geometries.iter().find_map(|geometry| match geometry {
-            CurveGeometry::Yarns(yarns) if geometry.fabric() == fabric => Some(yarns),
+    /// The tightest place of each yarn of a fabric that bends more tightly than its radius allows, and where it is in the
+    /// scene's own space, millimetres.
+    pub fn tight_bends(&self, fabric: usize) -> Vec<(&TightBend, DVec3)> {
+        let strands = self.geometries.iter().filter_map(|geometry| match geometry {
+            CurveGeometry::Yarns(yarns) if yarns.fabric == fabric => Some(&yarns.strands),
             _ => None,
-        })?;
-        let segment = yarns.strands.segments_of(bend.yarn).nth(bend.segment)?;
-        Some(yarns.strands.frame(segment, 0.5).centre.as_dvec3())
+        });
+        let place = |of: &Strands, bend: &TightBend| {
+            let segment = of.segments_of(bend.yarn).start + bend.segment as u32;
+            of.frame(segment, 0.5).centre.as_dvec3()
+        };
+        strands.flat_map(|of| of.tight_bends().iter().map(move |bend| (bend, place(of, bend)))).collect()
     }
 }
 

@@ -25,30 +25,32 @@ pub(super) fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usi
         tracing::warn!("{warning}");
     }
     for (i, fabric) in scene.fabrics.iter().enumerate() {
-        let bends = || world.tight_bends().filter(|(of, _)| *of == i).map(|(_, bend)| bend);
-        let Some(worst) = bends().max_by(|a, b| a.fold.total_cmp(&b.fold)) else { continue };
-        let places: usize = bends().map(|bend| bend.places).sum();
-        let at = world.place_of(i, worst).map(|at| at + scene.middle);
+        let bends = world.tight_bends(i);
+        let Some((worst, at)) = bends.iter().max_by(|(a, _), (b, _)| a.fold.total_cmp(&b.fold)) else { continue };
+        let places: usize = bends.iter().map(|(bend, _)| bend.places).sum();
+        let at = *at + scene.middle;
         tracing::warn!(
             "{}: {} of {} yarns bend so tightly at {places} place{} that they fold into themselves and their plies break; the \
-             worst is yarn {} at segment {}{}{}, whose inner side runs backwards by {:.1} of its radius{}",
+             worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
             fabric.origin,
-            bends().count(),
+            bends.len(),
             yarns[i],
             if places == 1 { "" } else { "s" },
             worst.yarn,
             worst.segment,
             fabric.panel_of(worst.yarn).map_or(String::new(), |name| format!(" of panel `{name}`")),
-            at.map_or(String::new(), |at| format!(" ([{:.1}, {:.1}, {:.1}] mm)", at.x, at.y, at.z)),
+            at.x,
+            at.y,
+            at.z,
             worst.fold,
-            match (fabric.from_file && 2 * bends().count() > yarns[i], args.log.verbose > 0) {
+            match (fabric.from_file && 2 * bends.len() > yarns[i], args.log.verbose > 0) {
                 (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
                 (false, false) => " (-v shows all)",
                 (false, true) => "",
             }
         );
-        for bend in bends() {
-            let at = world.place_of(i, bend).unwrap_or_default() + scene.middle;
+        for (bend, at) in bends {
+            let at = at + scene.middle;
             let (yarn, segment, fold) = (bend.yarn, bend.segment, bend.fold);
             tracing::debug!("yarn {yarn} folds at segment {segment} by {fold:.2} of its radius, at {at:.1} mm");
         }
