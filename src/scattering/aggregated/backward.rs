@@ -82,7 +82,7 @@ impl Lobe {
         let optics = &view.yarn.plies[node.spot.ply];
         let energy = node.amplitude * optics.albedo * optics.leaves_ply * (Rgb::ONE - node.drawn.value.clear);
         let mut lobe = Self::new(view, &node.crossing, energy, 1.0 - node.drawn.escape);
-        if view.yarn.shape().plies.len() > 1 && lobe.chance > 0.0 {
+        if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             let w = lobe.draw(stream);
             let (value, pdf) = lobe.value(view, node.spot.ply, w);
             if pdf > 0.0 {
@@ -99,7 +99,7 @@ impl Lobe {
     /// Lobe B of a ply, for a given energy and chance of sampling.
     #[inline]
     pub(super) fn new(view: &View<'_>, crossing: &PlyCrossing, energy: Rgb, chance: f32) -> Self {
-        let shape = view.yarn.shape();
+        let shape = view.yarn.occluder().shape();
         let optics = &view.yarn.plies[crossing.ply];
         let relative = if shape.plies.len() == 1 { crossing.offset / shape.plies[0].radius } else { view.section.h };
         let (lean_sin, lean_cos) = sin_cos(LEAN_SIDEWAYS * relative.clamp(-1.0, 1.0).asin());

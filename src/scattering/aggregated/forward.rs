@@ -155,9 +155,9 @@ impl Forward {
         let (yarn, spot) = (view.yarn, &self.spot);
         let tilt = spot.tilt(view.section, w);
         let mut depth = Rgb::ZERO;
-        view.section.plies_ahead(yarn.shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
+        view.section.plies_ahead(yarn.occluder().shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
-            let chord = yarn.shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
+            let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
             let mut fibers = tilt * chord.ahead(-ahead.foot);
             if ahead.ply == spot.ply {
                 fibers = (fibers - optics.gaps.density).max(0.0);

@@ -1,7 +1,7 @@
 //! The aggregated yarn: one answer for the hundreds of fibres behind a point of a yarn. docs/model.md derives it.
 //!
 //! Light on its way along the camera's chord through the plies
-//! * meets no fibre at all (the unscattered share T0, a delta, [`AggregatedYarn::transparency`]),
+//! * meets no fibre at all (the unscattered share T0, a delta, [`Occluder::transparency`]),
 //! * or meets a first fibre. From there it passes on forward as TT through that one and all it meets on its own way out
 //!   (lobe F, `forward`),
 //! * or ends its chain of TT at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
@@ -69,22 +69,10 @@ impl AggregatedYarn {
         Self { occluder: Occluder::new(shape, Transparency::Gaps(gaps)), plies, node_gain, plain: false }
     }
 
-    /// The yarn's cross-section.
-    #[inline]
-    pub fn shape(&self) -> &YarnShape {
-        self.occluder.shape()
-    }
-
     /// The yarn without its colours: what rays see that only ask whether they pass.
     #[inline]
     pub fn occluder(&self) -> &Occluder {
         &self.occluder
-    }
-
-    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
-    #[inline]
-    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
-        self.occluder.transparency(crossings)
     }
 }
 
@@ -127,8 +115,8 @@ impl<'a> View<'a> {
         } else {
             (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
         };
-        let inside = section.inside(yarn.shape(), section.point(depth), crossing.travel_at(depth));
-        let tangent = inside.fiber_tangent(yarn.shape(), section, crossing.ply);
+        let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
+        let tangent = inside.fiber_tangent(yarn.occluder().shape(), section, crossing.ply);
         let stretch = tangent.length();
         Spot { ply: crossing.ply, depth, inside, tangent: tangent / stretch, stretch }
     }
@@ -155,7 +143,7 @@ pub struct Vertex<'a> {
 
 impl<'a> Vertex<'a> {
     /// Draws the first fibre and the node. `throughput` is the path's weight so far; `unscattered` is
-    /// [`AggregatedYarn::transparency`] of `crossings`, which the caller has already decided against: all values here are
+    /// [`Occluder::transparency`] of `crossings`, which the caller has already decided against: all values here are
     /// over 1 - `unscattered`.
     #[inline]
     pub fn new(

@@ -193,7 +193,7 @@ impl Node {
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
         let (yarn, spot) = (view.yarn, &self.spot);
-        let shape = yarn.shape();
+        let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
         let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
         let shift = optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);

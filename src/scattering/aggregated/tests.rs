@@ -33,7 +33,7 @@ fn quadrature(
     directions: &[Vec3A],
 ) -> Vec<[Rgb; 2]> {
     let mut crossings = Crossings::new();
-    section.crossings(yarn.shape(), &mut crossings);
+    section.crossings(yarn.occluder().shape(), &mut crossings);
     let view = View::new(yarn, section);
     let mut out = vec![[Rgb::ZERO; 2]; directions.len()];
     let mut reaching = Rgb::ONE;
@@ -78,7 +78,7 @@ fn quadrature(
 /// is spread. The program has a better F; the chain's rate, the kernel and the wrapped normal are the same.
 fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
     let mut crossings = Crossings::new();
-    section.crossings(yarn.shape(), &mut crossings);
+    section.crossings(yarn.occluder().shape(), &mut crossings);
     let view = View::new(yarn, section);
     let sum = |of: &dyn Fn(&PlyOptics) -> Rgb| {
         crossings.iter().map(|c| of(&yarn.plies[c.ply]) * c.fibers).fold(Rgb::ZERO, |a, b| a + b)
@@ -89,7 +89,7 @@ fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec
     let optics = &yarn.plies[front.ply];
     let chain = sum(&|p| p.chain);
     let events = chain.select_below(1e-6, Rgb::ONE, chain / chain.one_minus_exp_neg().max(Rgb::splat(1e-30)));
-    let frame = LobeFrame::of_ply(yarn.shape(), section, front, view.camera);
+    let frame = LobeFrame::of_ply(yarn.occluder().shape(), section, front, view.camera);
     let value = |w: &Vec3A| {
         let (at, cos) = frame.latitudes(*w);
         let off = w.dot(frame.y).atan2(w.dot(frame.x)) - PI;
@@ -196,8 +196,8 @@ fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
         for (m, slack) in [(lossless(), 0.003), (white_by_different_ways(), 0.01)] {
             let (yarn, section) = build(case, &m);
             let mut crossings = Crossings::new();
-            section.crossings(yarn.shape(), &mut crossings);
-            let t0 = yarn.transparency(&crossings);
+            section.crossings(yarn.occluder().shape(), &mut crossings);
+            let t0 = yarn.occluder().transparency(&crossings);
             let mut stream = Stream::new(9);
             let (mut sum, mut square) = ([0f64; 3], [0f64; 3]);
             let n = 30_000;
@@ -227,8 +227,8 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
         for (white, m) in [(true, lossless()), (false, silk())] {
             let (yarn, section) = build(case, &m);
             let mut crossings = Crossings::new();
-            section.crossings(yarn.shape(), &mut crossings);
-            let t0 = yarn.transparency(&crossings);
+            section.crossings(yarn.occluder().shape(), &mut crossings);
+            let t0 = yarn.occluder().transparency(&crossings);
             let mut stream = Stream::new(100 + index as u32);
             let n = 20_000;
             let (mut sum, mut square, mut largest) = (0f64, 0f64, 0f32);
@@ -275,8 +275,8 @@ fn sample_densities_match_where_samples_fall() {
     // integrated over a cell, against the number of samples that fell there. Same node for all: fixed numbers.
     let (yarn, section) = build((1, 40, 0.2, 0.0, -0.33, 0.2, 0.5, 0.4), &material(SILK, [0.3, 0.25, 0.5]));
     let mut crossings = Crossings::new();
-    section.crossings(yarn.shape(), &mut crossings);
-    let t0 = yarn.transparency(&crossings);
+    section.crossings(yarn.occluder().shape(), &mut crossings);
+    let t0 = yarn.occluder().transparency(&crossings);
     let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, [0.3, 0.4, 0.6, 0.2], &mut Stream::new(5));
     let cell = |w: Vec3A| {
         let row = ((w.z * 0.5 + 0.5) * 8.0).clamp(0.0, 7.0) as usize;
@@ -360,8 +360,8 @@ fn black_empty_and_extreme_yarns_stay_finite_and_dark() {
                 for h in [0.0, 0.5, 1.0, -1.0, 0.999_999] {
                     let section = section(theta, h, 0.3);
                     let mut crossings = Crossings::new();
-                    section.crossings(yarn.shape(), &mut crossings);
-                    let t0 = yarn.transparency(&crossings);
+                    section.crossings(yarn.occluder().shape(), &mut crossings);
+                    let t0 = yarn.occluder().transparency(&crossings);
                     assert!((0.0..=1.0).contains(&t0));
                     for _ in 0..20 {
                         let u = [0; 4].map(|_| stream.next());

@@ -105,22 +105,10 @@ impl ChordYarn {
         Self { occluder: Occluder::new(shape, transparency), plies, model }
     }
 
-    /// The yarn's cross-section.
-    #[inline]
-    pub fn shape(&self) -> &YarnShape {
-        self.occluder.shape()
-    }
-
     /// The yarn without its colours: what rays see that only ask whether they pass.
     #[inline]
     pub fn occluder(&self) -> &Occluder {
         &self.occluder
-    }
-
-    /// T0: the share of light that passes all plies on the ray and meets no fibre; grey.
-    #[inline]
-    pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
-        self.occluder.transparency(crossings)
     }
 
     /// n_l of the model.
@@ -129,7 +117,7 @@ impl ChordYarn {
         if self.model != ChordModel::Printed {
             return f64::from(crossing.fibers);
         }
-        let h = f64::from(crossing.offset / self.shape().plies[crossing.ply].radius);
+        let h = f64::from(crossing.offset / self.occluder.shape().plies[crossing.ply].radius);
         self.plies[crossing.ply].printed_fibers * (1.0 - h * h).max(0.0).sqrt()
     }
 

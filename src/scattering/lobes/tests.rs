@@ -73,9 +73,9 @@ fn compare(model: ChordModel, counted_fibers: bool, plies: std::ops::RangeInclus
             };
             let section = section(number("theta_deg").to_radians() as f32, h, phase);
             let mut crossings = Crossings::new();
-            section.crossings(yarn.shape(), &mut crossings);
+            section.crossings(yarn.occluder().shape(), &mut crossings);
             let share = 1.0 / f64::from(rows * phases);
-            unscattered += f64::from(yarn.transparency(&crossings)) * share;
+            unscattered += f64::from(yarn.occluder().transparency(&crossings)) * share;
             if crossings.is_empty() {
                 continue;
             }
@@ -168,8 +168,8 @@ fn directions_are_as_far_from_counted_light_as_was_measured_for_each_model() {
                 let h = -1.0 + 2.0 * (i as f32 + 0.5) / lines as f32;
                 let section = section(number("theta_deg").to_radians() as f32, h, 0.0);
                 let mut crossings = Crossings::new();
-                section.crossings(yarn.shape(), &mut crossings);
-                let t0 = yarn.transparency(&crossings);
+                section.crossings(yarn.occluder().shape(), &mut crossings);
+                let t0 = yarn.occluder().transparency(&crossings);
                 let vertex = ChordVertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, [0.5; 4], &mut Stream::new(1));
                 for (index, (w, dw)) in grid.iter().enumerate() {
                     let value = vertex.values(*w).0.sum().to_array();
@@ -216,7 +216,7 @@ fn build(case: Case, materials: &[&FiberMaterial], model: ChordModel) -> (ChordY
     let yarn = ChordYarn::new(shape, &materials, model);
     let section = section(theta, h, phase);
     let mut crossings = Crossings::new();
-    section.crossings(yarn.shape(), &mut crossings);
+    section.crossings(yarn.occluder().shape(), &mut crossings);
     (yarn, section, crossings)
 }
 
@@ -233,7 +233,7 @@ fn values_integrate_to_the_energies_and_the_density_to_one() {
         for case in CASES {
             let (silk, white) = (silk(), lossless());
             let (yarn, section, crossings) = build(case, &[&silk, &white], model);
-            let t0 = yarn.transparency(&crossings);
+            let t0 = yarn.occluder().transparency(&crossings);
             let throughput = Rgb::new(1.0, 0.3, 2.0);
             let vertex = ChordVertex::new(&yarn, &section, &crossings, t0, throughput, [0.5; 4], &mut Stream::new(1));
             let (mut energy, mut density) = ([0.0; 5], 0.0);
@@ -263,7 +263,7 @@ fn samples_average_to_the_energies_and_light_sampling_joins_without_loss() {
         for (index, case) in CASES.into_iter().enumerate() {
             let (silk, white) = (silk(), lossless());
             let (yarn, section, crossings) = build(case, &[&silk, &white], model);
-            let t0 = yarn.transparency(&crossings);
+            let t0 = yarn.occluder().transparency(&crossings);
             let mut stream = Stream::new(40 + index as u32);
             let n = 20_000;
             let mut sums = [[0f64; 2]; 2];
@@ -320,7 +320,7 @@ fn samples_fall_where_the_density_says() {
     let (silk, white) = (material(SILK, [0.3, 0.25, 0.5]), lossless());
     for model in MODELS {
         let (yarn, section, crossings) = build((3, 20, 0.2, 0.23, -0.33, 0.2, 0.5, 0.4), &[&silk, &white], model);
-        let t0 = yarn.transparency(&crossings);
+        let t0 = yarn.occluder().transparency(&crossings);
         let vertex = ChordVertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, [0.5; 4], &mut Stream::new(1));
         let cell = |w: Vec3A| {
             let row = ((w.z * 0.5 + 0.5) * 12.0).clamp(0.0, 11.0) as usize;
@@ -422,8 +422,8 @@ fn black_empty_and_extreme_yarns_stay_finite() {
                     for h in [0.0, 0.5, 1.0, -1.0, 0.999_999] {
                         let section = section(theta, h, 0.3);
                         let mut crossings = Crossings::new();
-                        section.crossings(yarn.shape(), &mut crossings);
-                        let t0 = yarn.transparency(&crossings);
+                        section.crossings(yarn.occluder().shape(), &mut crossings);
+                        let t0 = yarn.occluder().transparency(&crossings);
                         assert!((0.0..=1.0).contains(&t0));
                         for _ in 0..20 {
                             let u = [0; 4].map(|_| stream.next());

@@ -40,7 +40,7 @@ pub struct ChordVertex<'a> {
 }
 
 impl<'a> ChordVertex<'a> {
-    /// `throughput` is the path's weight so far; `unscattered` is [`ChordYarn::transparency`] of `crossings`, which the
+    /// `throughput` is the path's weight so far; `unscattered` is [`Occluder::transparency`](crate::geometry::occluder::Occluder::transparency) of `crossings`, which the
     /// caller has already decided against: all values here are over 1 - `unscattered`. `u` and the stream are those of
     /// [`Vertex::new`](crate::scattering::aggregated::Vertex::new), of which these models need one number.
     #[inline]
@@ -85,8 +85,8 @@ impl<'a> ChordVertex<'a> {
         let first = -(f64::from(u[0]) * (-total).exp_m1()).ln_1p();
         Self {
             yarn,
-            fiber: LobeFrame::new(front.tangent_at_entry(yarn.shape(), section), camera),
-            ply: LobeFrame::of_ply(yarn.shape(), section, front, camera),
+            fiber: LobeFrame::new(front.tangent_at_entry(yarn.occluder().shape(), section), camera),
+            ply: LobeFrame::of_ply(yarn.occluder().shape(), section, front, camera),
             energy,
             chance: normalised([energy.r, energy.d, energy.f, energy.b].map(|e| e.weighted_mean(weight))),
             kappa_r: yarn.plies[front.ply].kappa_r,
