@@ -44,12 +44,9 @@ fn inside(edge: &BorderEdge, at: DVec2) -> f64 {
 }
 
 /// The edge nearest to a point; of two that meet there the one that it lies straight before.
-fn nearest(from: DVec2, edges: &[Edge]) -> Option<&Edge> {
-    edges.iter().min_by(|a, b| key(a, from).total_cmp(&key(b, from)))
-}
-
-fn key(edge: &Edge, from: DVec2) -> f64 {
-    on(&edge.border, from).0.distance_squared(from) - 1e-6 * inside(&edge.border, from).powi(2)
+fn nearest<'a>(from: DVec2, edges: impl IntoIterator<Item = &'a Edge>) -> Option<&'a Edge> {
+    let key = |edge: &Edge| on(&edge.border, from).0.distance_squared(from) - 1e-6 * inside(&edge.border, from).powi(2);
+    edges.into_iter().min_by(|a, b| key(a).total_cmp(&key(b)))
 }
 
 /// Whether an edge goes rather up or down than across.
@@ -117,8 +114,7 @@ pub(super) fn is_turned_in(at: DVec2, edges: &[Edge]) -> bool {
 
 /// Where a place lies against the nearest of the seams that are turned in, within a distance of it.
 pub(super) fn near_seam(at: DVec2, edges: &[Edge], within: f64, on_panel: bool) -> Option<NearSeam> {
-    let turned = edges.iter().filter(|e| e.margin < 0.0);
-    let edge = turned.min_by(|a, b| key(a, at).total_cmp(&key(b, at)))?;
+    let edge = nearest(at, edges.iter().filter(|e| e.margin < 0.0))?;
     let (to, share) = on(&edge.border, at);
     let distance = to.distance(at);
     let over = if on_panel { 0.0 } else { distance as f32 };

@@ -20,8 +20,10 @@ pub(crate) enum SeamKind {
 }
 
 impl SeamKind {
+    /// All of them, in the order of their numbers.
+    pub(super) const ALL: [Self; 3] = [Self::None, Self::Mattress, Self::Overlock];
     /// How many kinds there are.
-    pub(super) const COUNT: usize = 3;
+    pub(super) const COUNT: usize = Self::ALL.len();
 }
 
 /// A way along the edge of cloth: fine vertices of the sewn mesh one after the other, the cloth to the left.

@@ -13,7 +13,6 @@ use super::{
 };
 use crate::geometry::pattern::StrandKind;
 
-const KINDS: [SeamKind; SeamKind::COUNT] = [SeamKind::None, SeamKind::Mattress, SeamKind::Overlock];
 /// An overlock seam takes about so much of each panel, mm, in whole stitches, which are so many at most.
 const TAKEN: f64 = 3.0;
 const MOST_TAKEN: f64 = 6.0;
@@ -54,7 +53,7 @@ impl Trim {
             let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
             free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
         }
-        let folds = KINDS.map(|kind| Fold::new(kind, shapes.heights, d));
+        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d));
         // Edges that only meet: as far as yarns reach, and half a yarn.
         let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
         let meets = |beyond: DVec2| match knitted {
@@ -62,7 +61,7 @@ impl Trim {
             true => DVec2::new(0.56 * d, beyond.y * stitch.y + 0.51 * d),
             false => ends + 0.51 * d,
         };
-        let sewn = KINDS.map(|kind| match &folds[kind as usize] {
+        let sewn = SeamKind::ALL.map(|kind| match &folds[kind as usize] {
             None => shapes.beyond.map(meets),
             Some(fold) => [-turned_in(kind, fold, stitch, d); 2],
         });

@@ -138,9 +138,7 @@ impl<'a> Sheet<'a> {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (u, v) = (p.x - i, p.y - j);
         let (mut inward, mut distance, mut most) = (Vec3::ZERO, 0.0, (0.0, SeamKind::None));
-        for (dx, dy, share) in
-            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
-        {
+        for (dx, dy, share) in corner_shares(u, v) {
             let hem = self.hem(self.corner(i as isize + dx, j as isize + dy)?)?;
             inward += share * hem.inward;
             distance += share * hem.distance;
@@ -184,9 +182,7 @@ impl<'a> Sheet<'a> {
         }
         // Normals turn slowly: a linear mean will do.
         let (mut flat, mut normal, mut weight) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-        for (dx, dy, share) in
-            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
-        {
+        for (dx, dy, share) in corner_shares(u, v) {
             if let Some(k) = self.corner(i + dx, j + dy) {
                 flat += share * self.points[k];
                 normal += share * self.normals[k];
@@ -207,6 +203,12 @@ impl<'a> Sheet<'a> {
             .find_map(|(dx, dy)| self.corner(i + dx, j + dy))
             .map_or(Vec3::ZERO, |k| self.points[k])
     }
+}
+
+/// The corners around a place within a stitch, as steps from the lower left one, and their shares in it: bilinear.
+#[inline]
+fn corner_shares(u: f32, v: f32) -> [(isize, isize, f32); 4] {
+    [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
 }
 
 /// Weights of four values in a row, between the second and the third: Catmull-Rom.
