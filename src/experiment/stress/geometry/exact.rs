@@ -56,9 +56,11 @@ impl Straight {
         for i in 0..n {
             let h = 1.96 * (f64::from(i) + 0.5) / f64::from(n) - 0.98;
             let along = 20.0 * (f64::from(stream.next()) - 0.5);
-            let origin = *axis * along + axis.cross(*side) * h - direction * 10.0;
-            let ray = Ray::new(origin.as_vec3a(), direction.as_vec3a());
-            let (hit, passed, asked) = world.probe(&ray, &mut crossings);
+            let ray = |h: f64| {
+                let origin = *axis * along + axis.cross(*side) * h - direction * 10.0;
+                Ray::new(origin.as_vec3a(), direction.as_vec3a())
+            };
+            let (hit, passed, asked) = world.probe(&ray(h), &mut crossings);
             calls = [calls[0] + u64::from(asked[0]), calls[1] + u64::from(asked[1])];
             most = most.max(asked[0]).max(asked[1]);
             let at = || format!("across {name}, tilted by {tilt:e}, h {h:.3}");
@@ -69,8 +71,7 @@ impl Straight {
             // What the crossing itself says of the same ray, or of one a rounding error beside it: towards a ply's wall
             // the chord has a slope without bound.
             let mut own = |h: f64| {
-                let origin = *axis * along + axis.cross(*side) * h - direction * 10.0;
-                let hit = world.probe(&Ray::new(origin.as_vec3a(), direction.as_vec3a()), &mut crossings).0?;
+                let hit = world.intersect(&ray(h))?;
                 let (HitPlace::Yarn(section), CurveGeometry::Yarns(yarns)) = (&hit.place, &world.geometries()[0])
                 else {
                     return None;
