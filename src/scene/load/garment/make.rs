@@ -1,0 +1,347 @@
+//! From the keys of a garment to its yarns: meshes read, tiles relaxed, poses laid.
+
+use std::{collections::BTreeMap, path::Path};
+
+use glam::{DVec2, DVec3};
+
+use super::{
+    super::{
+        super::{FabricMotion, GarmentFacts},
+        Context,
+        cloth::Detail,
+        color::{ColorPlan, FabricCoordinates},
+        poses::{Frames, Moment, Pose, between},
+        sequence::check_moves,
+        yarns::Library,
+    },
+    GarmentPlan, Rule,
+};
+use crate::geometry::{
+    curve::{Basis, Curve},
+    garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Report, Tension},
+    mesh::Mesh,
+};
+
+/// What a rule has become: curves of one kind of yarn.
+pub(in crate::scene::load) struct MadePanels {
+    pub(in crate::scene::load) origin: String,
+    /// The yarn's name, if it is not the fabric's.
+    pub(in crate::scene::load) yarn: Option<String>,
+    pub(in crate::scene::load) color: Option<ColorPlan>,
+    pub(in crate::scene::load) curves: Vec<(Curve, Vec<f64>)>,
+    /// From which of the curves on they lie on the panel of a name.
+    pub(in crate::scene::load) panels: Vec<(usize, String)>,
+    pub(in crate::scene::load) coordinates: FabricCoordinates,
+    pub(in crate::scene::load) motion: FabricMotion,
+}
+
+impl Rule {
+    /// Tex of its yarn, or of the garment's `yarn` where it names none.
+    fn tex(&self, yarn: &str, library: &Library) -> Option<f64> {
+        library.yarns.get(self.yarn.as_deref().unwrap_or(yarn))?.tex
+    }
+
+    /// What messages call it.
+    fn origin(&self, mesh: &Path) -> String {
+        let group = self.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
+        format!("{}{group}, {}", mesh.display(), self.cloth.name)
+    }
+}
+
+impl GarmentPlan {
+    /// Reads the mesh and lays the yarns, unless only facts are wanted.
+    #[expect(clippy::too_many_arguments, reason = "each is needed once, by name")]
+    pub(in crate::scene::load) fn make(
+        self,
+        (yarn, radius): (&str, f64),
+        tension: Option<Tension>,
+        colored: bool,
+        context: &Context<'_>,
+        library: &Library,
+        detail: &Detail,
+        warnings: &mut Vec<String>,
+    ) -> Option<(Vec<MadePanels>, GarmentFacts)> {
+        let cloths = self.cloths(radius, context, library, warnings);
+        let frames = Frames::find(&self.path, detail);
+        let (read, own_unit) = self.read(&frames, context)?;
+        let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
+        let rest = &read[&frames.rest];
+        let cloths = cloths?;
+        let sizes: Vec<DVec2> = cloths.iter().map(|c| c.tile.stitch()).collect();
+        let overlap = cloths.iter().filter_map(|c| c.tile.overlap()).max_by(|a, b| a.share.total_cmp(&b.share));
+        let options = Options {
+            unit_mm: unit,
+            uv_mm: self.uv_unit,
+            cloths,
+            seam: self.seam,
+            tension,
+            coordinates: colored || self.rules.iter().any(|r| r.color.is_some()),
+            near: self.near,
+        };
+        let garment = Garment::new(rest, options).map_err(|error| self.tell(error, context)).ok()?;
+        let mut notes = garment.report().notes.clone();
+        let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
+        let mut facts = GarmentFacts {
+            weight: weight(&garment.report().yarn_length, &tex),
+            overlap: overlap.map(|o| [o.share, o.deepest]),
+            ..self.facts(garment.report())
+        };
+        let meshes = self.posed(&frames, &read, context)?;
+        let kept = kept(&meshes, frames.shown);
+        let shown = kept.iter().filter(|i| **i < frames.shown).count();
+        check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
+        if detail.survey {
+            facts.repairs.clone_from(&notes);
+            return Some((self.not_laid(&garment, &sizes, shown), facts));
+        }
+        let mut meshes: Vec<GarmentMesh> =
+            meshes.into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, mesh)| mesh).collect();
+        // Plies wind by lengths in the first frame, so that they keep their places from frame to frame.
+        let with_rest = frames.animated && (meshes.len() > 1 || meshes[0].points != rest.points);
+        let times = meshes.len();
+        if with_rest {
+            meshes.push(rest.clone());
+        }
+        let bodies = self.bodies(&kept, unit, with_rest, detail, context)?;
+        let all: Vec<&GarmentMesh> = meshes.iter().collect();
+        let body: Vec<&Mesh> = bodies.iter().collect();
+        let mut laid = match garment.lay(rest, &all, &body, &mut notes) {
+            Ok(laid) => laid,
+            Err((_, problem)) => {
+                context.error(self.span, problem, None);
+                return None;
+            }
+        };
+        let names: Vec<String> = garment.report().panels.iter().map(|p| p.group.clone()).collect();
+        drop(garment);
+        let at_rest = if with_rest { laid.pop() } else { None };
+        debug_assert_eq!(laid.len(), times);
+        let mut later = laid.split_off(1);
+        let flow = later.split_off(shown - 1);
+        let first = laid.pop()?;
+        let lengths: Vec<f64> = first.iter().map(|yarns| length(yarns)).collect();
+        facts.yarn_length = lengths.iter().sum();
+        facts.weight = weight(&lengths, &tex);
+        facts.repairs = notes;
+        Some((self.made(first, [later, flow], at_rest, (&sizes, &names)), facts))
+    }
+
+    /// The relaxed tile of each rule, for yarns of `radius` where the rule names none.
+    fn cloths(
+        &self,
+        radius: f64,
+        context: &Context<'_>,
+        library: &Library,
+        warnings: &mut Vec<String>,
+    ) -> Option<Vec<Cloth>> {
+        let made = self.rules.iter().map(|rule| {
+            let yarn = rule.yarn.as_ref().and_then(|name| library.yarns.get(name));
+            let tile = rule.cloth.tile(rule.stitch, yarn.map_or(radius, |yarn| yarn.radius), context, warnings)?;
+            let (group, points) = (rule.group.clone(), rule.cloth.points);
+            Some(Cloth { group, tile, grain: rule.grain, points, seam: rule.seam })
+        });
+        made.collect()
+    }
+
+    /// The meshes of all moments, and the unit that their file has, mm.
+    fn read(&self, frames: &Frames, context: &Context<'_>) -> Option<(BTreeMap<Moment, GarmentMesh>, Option<f64>)> {
+        let mut read = BTreeMap::new();
+        let mut own_unit = None;
+        for moment in frames.moments() {
+            let found = moment.garment(self.prims[0].as_ref(), self.z_up, context);
+            let (mesh, unit) = found.map_err(|error| self.tell(error, context)).ok()?;
+            own_unit = unit;
+            read.insert(moment.clone(), mesh);
+        }
+        Some((read, own_unit))
+    }
+
+    fn tell(&self, error: GarmentError, context: &Context<'_>) {
+        let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
+        let unnamed = error.line > 0 && error.path.is_none();
+        let error = if unnamed { GarmentError { path: Some(self.path.clone()), ..error } } else { error };
+        context.error(self.span, error.to_string(), hint);
+    }
+
+    /// What is known before yarns are laid; of their weight and overlap nothing.
+    fn facts(&self, report: &Report) -> GarmentFacts {
+        GarmentFacts {
+            path: self.path.display().to_string(),
+            cloth: self.rules[0].cloth.name.clone(),
+            panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
+            stitches: report.all_stitches(),
+            yarn_length: report.yarn_length.iter().sum(),
+            weight: None,
+            overlap: None,
+            control_points: report.control_points,
+            uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
+            stretched: report.stretched,
+            uv_mm: report.uv_mm,
+            bounds: report.bounds,
+            repairs: Vec::new(),
+        }
+    }
+
+    /// The garment's mesh in every pose; all must have the faces of the one at rest.
+    fn posed(
+        &self,
+        frames: &Frames,
+        read: &BTreeMap<Moment, GarmentMesh>,
+        context: &Context<'_>,
+    ) -> Option<Vec<GarmentMesh>> {
+        let mut meshes = Vec::new();
+        for pose in &frames.poses {
+            let (a, b) = (&read[&pose.before], &read[&pose.after]);
+            for (mesh, moment) in [(a, &pose.before), (b, &pose.after)] {
+                if let Err(problem) = read[&frames.rest].same_topology(mesh) {
+                    let message = format!("{}: {problem}", moment.path.display());
+                    context.error(self.span, message, Some("all frames have the same faces".to_owned()));
+                    return None;
+                }
+            }
+            meshes.push(between(a, b, pose.share));
+        }
+        Some(meshes)
+    }
+
+    /// What a survey tells of each rule that has panels: all but its yarns, which are not laid.
+    fn not_laid(self, garment: &Garment, sizes: &[DVec2], shown: usize) -> Vec<MadePanels> {
+        let mut out = Vec::new();
+        for (i, rule) in self.rules.into_iter().enumerate() {
+            let Some(counts) = garment.counts(i) else { continue };
+            // The place of the last stitch says how many there are.
+            let last = counts.map(|n| n as f32 - 0.5);
+            out.push(MadePanels {
+                origin: rule.origin(&self.path),
+                yarn: rule.yarn,
+                color: rule.color,
+                curves: Vec::new(),
+                panels: Vec::new(),
+                coordinates: FabricCoordinates::laid(vec![vec![last]], garment.kinds(i), sizes[i].as_vec2().to_array()),
+                motion: FabricMotion { later: vec![Vec::new(); shown - 1], ..FabricMotion::default() },
+            });
+        }
+        out
+    }
+
+    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm, and `names` of all panels.
+    fn made(
+        self,
+        first: Laid,
+        [mut later, mut flow]: [Vec<Laid>; 2],
+        mut rest: Option<Laid>,
+        (sizes, names): (&[DVec2], &[String]),
+    ) -> Vec<MadePanels> {
+        let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
+            std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
+        };
+        let mut out = Vec::new();
+        for (i, (yarns, rule)) in first.into_iter().zip(self.rules).enumerate() {
+            if yarns.is_empty() {
+                continue;
+            }
+            let motion = FabricMotion {
+                later: later.iter_mut().map(|laid| points(laid, i)).collect(),
+                rest: rest.as_mut().map(|laid| points(laid, i)),
+                flow: flow.iter_mut().map(|laid| points(laid, i)).collect(),
+            };
+            let mut panels: Vec<(usize, String)> = Vec::new();
+            for (k, yarn) in yarns.iter().enumerate() {
+                let name = &names[yarn.panel as usize];
+                if panels.last().is_none_or(|(_, before)| before != name) {
+                    panels.push((k, name.clone()));
+                }
+            }
+            let mut kinds = Vec::with_capacity(yarns.len());
+            let mut places = Vec::with_capacity(yarns.len());
+            let curves = yarns
+                .into_iter()
+                .map(|LaidYarn { points, closed, radius, kind, coordinates, .. }| {
+                    kinds.push(kind);
+                    places.push(coordinates);
+                    let radii = vec![radius; points.len()];
+                    (Curve { basis: Basis::BSpline, closed, points, radii: None, flattening: None }, radii)
+                })
+                .collect();
+            out.push(MadePanels {
+                origin: rule.origin(&self.path),
+                yarn: rule.yarn,
+                color: rule.color,
+                curves,
+                panels,
+                coordinates: FabricCoordinates::laid(places, kinds, sizes[i].as_vec2().to_array()),
+                motion,
+            });
+        }
+        out
+    }
+
+    /// The body in each pose that is kept.
+    fn bodies(
+        &self,
+        kept: &[usize],
+        unit: f64,
+        with_rest: bool,
+        detail: &Detail,
+        context: &Context<'_>,
+    ) -> Option<Vec<Mesh>> {
+        let Some((path, span)) = &self.body else { return Some(Vec::new()) };
+        let own = Frames::find(path, detail);
+        let mut read: BTreeMap<Moment, Mesh> = BTreeMap::new();
+        for moment in own.moments() {
+            match moment.body(self.prims[1].as_ref(), self.z_up, context) {
+                Ok((mut mesh, own_unit)) => {
+                    // A body without a unit of its own has the garment's.
+                    let scale = self.unit.or(own_unit).map_or(unit, |mm| mm * self.scale);
+                    mesh.transform(&glam::DAffine3::from_scale(DVec3::splat(scale)));
+                    read.insert(moment.clone(), mesh);
+                }
+                Err(problem) => {
+                    context.error(*span, problem, None);
+                    return None;
+                }
+            }
+        }
+        let posed = |pose: &Pose| {
+            let (a, b) = (&read[&pose.before], &read[&pose.after]);
+            let mut mesh = a.clone();
+            if a.points.len() == b.points.len() {
+                mesh.points = a.points.iter().zip(&b.points).map(|(a, b)| a.lerp(*b, pose.share)).collect();
+            }
+            mesh
+        };
+        let last = own.poses.len() - 1;
+        let mut out: Vec<Mesh> = kept.iter().map(|&i| posed(&own.poses[i.min(last)])).collect();
+        if with_rest {
+            out.push(read[&own.rest].clone());
+        }
+        Some(out)
+    }
+}
+
+/// Which poses are laid: one where nothing moves while the shutter is open, and those behind `shown` if anything moves
+/// from one of them to the next.
+fn kept(meshes: &[GarmentMesh], shown: usize) -> Vec<usize> {
+    let moves = |poses: &[GarmentMesh]| poses.windows(2).any(|pair| pair[0].points != pair[1].points);
+    let mut kept: Vec<usize> = if moves(&meshes[..shown]) { (0..shown).collect() } else { vec![0] };
+    if moves(&meshes[shown..]) {
+        kept.extend(shown..meshes.len());
+    }
+    kept
+}
+
+/// Length of yarns, mm: between the places where segments of their B-splines join.
+fn length(yarns: &[LaidYarn]) -> f64 {
+    let of = |yarn: &LaidYarn| {
+        let knot = |w: &[DVec3]| (w[0] + 4.0 * w[1] + w[2]) / 6.0;
+        yarn.points.windows(4).map(|w| knot(&w[..3]).distance(knot(&w[1..]))).sum::<f64>()
+    };
+    // Chords are a little shorter than what they span: by two percent for loops of twelve points.
+    yarns.iter().map(of).sum()
+}
+
+/// Grams of yarns of such lengths, mm, by their tex (grams in a kilometre); `None` where that of one is not known.
+fn weight(lengths: &[f64], tex: &[Option<f64>]) -> Option<f64> {
+    let all = lengths.iter().zip(tex).filter(|(length, _)| **length > 0.0);
+    all.map(|(length, tex)| Some(length * 1e-6 * (*tex)?)).sum()
+}
