@@ -114,8 +114,8 @@ pub const POINTS: u32 = 24;
 const LARGEST_CELL: u32 = 2048;
 /// Steps for edges, and for a piece that has no cell.
 const EDGE_STEPS: usize = 300;
-const PIECE_STEPS: usize = 60;
-const FINE_STEPS: usize = 16;
+const PIECE_STEPS: usize = 40;
+const FINE_STEPS: usize = 8;
 /// Points of a stitch while a piece without a cell is relaxed.
 const COARSE: u32 = 14;
 

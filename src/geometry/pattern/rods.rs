@@ -96,12 +96,25 @@ struct Push {
     to: DVec3,
 }
 
-/// Two segments that touch: the way between them, the push on the second one, and how far along both it acts.
-struct Touch {
-    segments: [u32; 2],
-    between: DVec3,
-    by: DVec3,
-    along: [f64; 2],
+impl Push {
+    /// A push at a share of the way along.
+    fn at(by: DVec3, along: f64) -> Self {
+        Self { from: by * (1.0 - along), to: by * along }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.from += other.from;
+        self.to += other.to;
+    }
+}
+
+/// What contact does beyond the chunk of segments in which it was found.
+#[derive(Default)]
+struct Outside {
+    /// Segments of other chunks, and what they are pushed by.
+    pushes: Vec<(u32, Push)>,
+    /// Derivative of the energy by the logarithms of the cell's width and height.
+    virial: DVec2,
 }
 
 /// Points, their speeds, the forces on them, and where they were before.
@@ -111,6 +124,7 @@ type Moving<'a> = (&'a mut [DVec3], &'a mut [DVec3], &'a [DVec3], &'a [DVec3]);
 #[derive(Default)]
 struct Work {
     edges: Vec<DVec3>,
+    bends: Vec<DVec3>,
     pulls: Vec<DVec3>,
     pushes: Vec<Push>,
     forces: Vec<DVec3>,
@@ -177,9 +191,8 @@ impl Rods {
     }
 
     fn edges(&self, edges: &mut Vec<DVec3>) {
-        edges.clear();
-        edges.extend(self.points.windows(2).map(|w| w[1] - w[0]));
-        edges.push(DVec3::ZERO);
+        let points = &self.points;
+        fill(edges, points.len(), |i| points.get(i + 1).map_or(DVec3::ZERO, |next| *next - points[i]));
         for s in &self.strands {
             let last = s.start + s.count - 1;
             edges[last] = s.jump.map_or(DVec3::ZERO, |jump| self.points[s.start] + jump - self.points[last]);
@@ -295,64 +308,68 @@ impl Rods {
 
     /// How far each segment has gone since points were at `before`; half of what its cell has been strained with it.
     fn gone(&self, before: &[DVec3], strained: f64, gone: &mut Vec<f32>) {
-        gone.clear();
-        let of = |(p, b): (&DVec3, &DVec3)| (p.distance(*b) + 0.5 * strained) as f32 + 1e-4;
-        gone.extend(self.points.iter().zip(before).map(of));
-        for s in &self.strands {
-            let first = gone[s.start];
-            for i in s.start..s.start + s.count {
-                let next = if i + 1 < s.start + s.count { gone[i + 1] } else { first };
-                gone[i] = gone[i].max(next);
-            }
+        let of = |i: usize| (self.points[i].distance(before[i]) + 0.5 * strained) as f32 + 1e-4;
+        fill(gone, before.len(), |i| if i + 1 < before.len() { of(i).max(of(i + 1)) } else { of(i) });
+        for s in self.strands.iter().filter(|s| s.jump.is_some()) {
+            let last = s.start + s.count - 1;
+            gone[last] = of(last).max(of(s.start));
         }
     }
 
     /// Pushes of segments that touch; gives the derivative of their energy by the logarithms of the cell's width and height.
     fn contact(&self, apart: f64, stiffness: f64, work: &mut Work) -> DVec2 {
-        let n = self.points.len();
-        let (edges, gone, starts, neighbours) = (&work.edges, &work.gone, &work.starts, &work.neighbours);
-        let period = self.period.unwrap_or_default();
-        let touches = |c: usize| -> Vec<Touch> {
-            let mut found = Vec::new();
-            for i in c * CHUNK..((c + 1) * CHUNK).min(n) {
-                let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
-                for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
-                    let j = other.segment as usize;
-                    if other.gap > gone[i] + gone[j] {
-                        continue;
-                    }
-                    let [x, y] = other.cells.map(f64::from);
-                    let q0 = self.points[j] + DVec3::new(x * period.x, y * period.y, 0.0);
-                    let near = nearest(p0, p1, q0, q0 + edges[j]);
-                    let square = near.between.length_squared();
-                    if square < apart * apart {
-                        let distance = square.sqrt().max(1e-6);
-                        // Firmer where they are deep in each other, so that they do not pass.
-                        let firm = (DEEP / distance).max(1.0).powi(2);
-                        let by = near.between * (stiffness * firm * (apart - distance) / distance);
-                        let segments = [i as u32, other.segment];
-                        found.push(Touch { segments, between: near.between, by, along: [near.s, near.t] });
-                    }
-                }
-            }
-            found
-        };
-        let pushes = &mut work.pushes;
+        let mut pushes = std::mem::take(&mut work.pushes);
         pushes.clear();
-        pushes.resize(n, Push::default());
-        let mut virial = DVec2::ZERO;
+        pushes.resize(self.points.len(), Push::default());
+        let touch = |(c, own): (usize, &mut [Push])| self.touch(c * CHUNK, own, [apart, stiffness], work);
+        let outside: Vec<Outside> = if pushes.len() <= CHUNK {
+            vec![touch((0, &mut pushes))]
+        } else {
+            pushes.par_chunks_mut(CHUNK).enumerate().map(touch).collect()
+        };
         // In their order, whatever the number of threads.
-        let chunks: Vec<Vec<Touch>> =
-            if n <= CHUNK { vec![touches(0)] } else { (0..n.div_ceil(CHUNK)).into_par_iter().map(touches).collect() };
-        for Touch { segments, between, by, along } in chunks.into_iter().flatten() {
-            let [i, j] = segments.map(|s| s as usize);
-            pushes[i].from -= by * (1.0 - along[0]);
-            pushes[i].to -= by * along[0];
-            pushes[j].from += by * (1.0 - along[1]);
-            pushes[j].to += by * along[1];
-            virial -= (by * between).truncate();
+        let mut virial = DVec2::ZERO;
+        for chunk in outside {
+            virial += chunk.virial;
+            chunk.pushes.iter().for_each(|(j, push)| pushes[*j as usize].add(push));
         }
+        work.pushes = pushes;
         virial
+    }
+
+    /// Pushes of the segments of one chunk, from `first` on, and what they push elsewhere.
+    fn touch(&self, first: usize, own: &mut [Push], [apart, stiffness]: [f64; 2], work: &Work) -> Outside {
+        let Work { edges, gone, starts, neighbours, .. } = work;
+        let period = self.period.unwrap_or_default();
+        let mut outside = Outside::default();
+        for i in first..first + own.len() {
+            let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
+            for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
+                let j = other.segment as usize;
+                if other.gap > gone[i] + gone[j] {
+                    continue;
+                }
+                let [x, y] = other.cells.map(f64::from);
+                let q0 = self.points[j] + DVec3::new(x * period.x, y * period.y, 0.0);
+                let near = nearest(p0, p1, q0, q0 + edges[j]);
+                let square = near.between.length_squared();
+                if square >= apart * apart {
+                    continue;
+                }
+                let distance = square.sqrt().max(1e-6);
+                // Firmer where they are deep in each other, so that they do not pass.
+                let firm = (DEEP / distance).max(1.0).powi(2);
+                let by = near.between * (stiffness * firm * (apart - distance) / distance);
+                own[i - first].add(&Push::at(-by, near.s));
+                let push = Push::at(by, near.t);
+                match own.get_mut(j.wrapping_sub(first)) {
+                    Some(beside) => beside.add(&push),
+                    None => outside.pushes.push((other.segment, push)),
+                }
+                outside.virial -= (by * near.between).truncate();
+            }
+        }
+        outside
     }
 
     /// Makes a periodic cell wider and higher.
@@ -367,60 +384,65 @@ impl Rods {
 
     /// Forces on points; gives the derivative of the energy by the logarithms of the cell's width and height.
     fn forces(&self, has: &[bool], apart: f64, contact: f64, work: &mut Work) -> DVec2 {
-        let n = self.points.len();
         self.edges(&mut work.edges);
-        let edges = &work.edges;
-        // The bend at each point: difference of the tangents, over the mean length of both segments.
-        let mut bends = std::mem::take(&mut work.forces);
-        bends.clear();
-        bends.resize(n, DVec3::ZERO);
+        self.bends(has, &work.edges, &mut work.bends);
+        let mut virial = self.pulls(has, work);
+        virial += self.contact(apart, contact, work);
+        // What pulls at a point: the segment after it, and the one before it the other way.
+        let Work { pulls, pushes, forces, .. } = work;
+        let force = |i: usize, before: Option<usize>| {
+            let (pull, push) = before.map_or((DVec3::ZERO, DVec3::ZERO), |k| (pulls[k], pushes[k].to));
+            pulls[i] - pull + pushes[i].from + push
+        };
+        fill(forces, self.points.len(), |i| force(i, i.checked_sub(1)));
+        for s in &self.strands {
+            forces[s.start] = force(s.start, s.jump.map(|_| s.start + s.count - 1));
+        }
+        virial
+    }
+
+    /// The bend at each point: difference of the tangents, over the mean length of both segments.
+    fn bends(&self, has: &[bool], edges: &[DVec3], bends: &mut Vec<DVec3>) {
         let bend = |a: usize, b: usize| {
             let (la, lb) = (self.rest[a], self.rest[b]);
             (edges[b] / lb - edges[a] / la) / (0.5 * (la + lb))
         };
+        fill(bends, self.points.len(), |i| match i {
+            i if i > 0 && has[i] && has[i - 1] => bend(i - 1, i),
+            _ => DVec3::ZERO,
+        });
         for s in &self.strands {
-            let inner = s.start + 1..s.start + s.count - usize::from(s.jump.is_none());
-            inner.for_each(|i| bends[i] = bend(i - 1, i));
-            if s.jump.is_some() {
-                bends[s.start] = bend(s.start + s.count - 1, s.start);
-            }
+            bends[s.start] = s.jump.map_or(DVec3::ZERO, |_| bend(s.start + s.count - 1, s.start));
         }
-        // The pull along each segment: the derivative of the energy by its vector.
-        let pulls = &mut work.pulls;
-        pulls.clear();
-        pulls.resize(n, DVec3::ZERO);
-        let mut virial = DVec2::ZERO;
-        for s in &self.strands {
-            let end = s.start + s.count;
-            for i in s.start..end {
-                if !has[i] {
-                    continue;
-                }
-                let next = if i + 1 == end { s.start } else { i + 1 };
-                let (e, rest) = (edges[i], self.rest[i]);
-                let length = e.length().max(1e-9);
-                let pull = e * (STRETCH * (1.0 / rest - 1.0 / length)) + (bends[i] - bends[next]) / rest;
-                pulls[i] = pull;
-                virial += (pull * e).truncate();
-            }
+    }
+
+    /// The pull along each segment: the derivative of the energy by its vector. Gives that by the cell's size.
+    fn pulls(&self, has: &[bool], work: &mut Work) -> DVec2 {
+        let Work { edges, bends, pulls, .. } = work;
+        let pull = |i: usize, next: usize| {
+            let (e, rest) = (edges[i], self.rest[i]);
+            let length = e.length().max(1e-9);
+            e * (STRETCH * (1.0 / rest - 1.0 / length)) + (bends[i] - bends[next]) / rest
+        };
+        fill(pulls, self.points.len(), |i| if has[i] { pull(i, (i + 1).min(has.len() - 1)) } else { DVec3::ZERO });
+        for s in self.strands.iter().filter(|s| s.jump.is_some()) {
+            let last = s.start + s.count - 1;
+            pulls[last] = pull(last, s.start);
         }
-        virial += self.contact(apart, contact, work);
-        let (pulls, pushes) = (&work.pulls, &work.pushes);
-        // What pulls at a point: the segment after it, and the one before it the other way.
-        let mut forces = bends;
-        for s in &self.strands {
-            let end = s.start + s.count;
-            let mut before = match s.jump {
-                Some(_) => (pulls[end - 1], pushes[end - 1].to),
-                None => (DVec3::ZERO, DVec3::ZERO),
-            };
-            for i in s.start..end {
-                forces[i] = pulls[i] - before.0 + pushes[i].from + before.1;
-                before = (pulls[i], pushes[i].to);
-            }
+        match self.period {
+            Some(_) => pulls.iter().zip(edges).map(|(pull, e)| (*pull * *e).truncate()).sum(),
+            None => DVec2::ZERO,
         }
-        work.forces = forces;
-        virial
+    }
+}
+
+/// Makes a list of what `of` gives for each number below `count`, on all threads if there are many.
+fn fill<T: Send + Copy>(out: &mut Vec<T>, count: usize, of: impl Fn(usize) -> T + Sync + Send) {
+    if count <= CHUNK {
+        out.clear();
+        out.extend((0..count).map(of));
+    } else {
+        (0..count).into_par_iter().with_min_len(CHUNK).map(of).collect_into_vec(out);
     }
 }
 

@@ -85,6 +85,11 @@ impl Rods {
         }
     }
 
+    /// Whether both ends of a segment stay where they are.
+    fn stays(&self, i: usize) -> bool {
+        self.fixed.get(i..i + 2).is_some_and(|ends| ends[0] && ends[1])
+    }
+
     /// Middles of segments, with those of images that are within `reach` of the cell.
     fn middles(&self, edges: &[DVec3], reach: f64) -> Middles {
         let n = self.points.len();
@@ -161,7 +166,8 @@ impl Search<'_> {
                 continue;
             }
             let widest = touch + half + halves[j];
-            if distance > widest * widest || !has[j] || self.same_piece(i, j, near.at - middle) {
+            let apart = distance > widest * widest || (self.rods.stays(i) && self.rods.stays(j));
+            if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
                 continue;
             }
             let half_j = 0.5 * edges[j];
