@@ -99,6 +99,25 @@ impl Sources {
         self.get(id).is_some_and(|source| source.is_option)
     }
 
+    /// The place of a line, from 0, of the text that a value of several lines at `span` holds; the whole value where it stands
+    /// on one line, or where `\\` makes other lines of it.
+    pub(crate) fn line_of_text(&self, span: Span, line: usize) -> Span {
+        let find = || {
+            let raw = self.text(span.source).get(span.start as usize..span.end as usize)?;
+            let text = ["\"\"\"", "'''"].iter().find_map(|quotes| raw.strip_prefix(quotes)?.strip_suffix(quotes))?;
+            if text.contains('\\') {
+                return None;
+            }
+            // A line that begins behind the quotes is none of the text.
+            let behind = text.strip_prefix('\n').or(text.strip_prefix("\r\n")).unwrap_or(text);
+            let found = behind.split_inclusive('\n').nth(line)?;
+            let start = found.as_ptr() as usize - raw.as_ptr() as usize + found.len() - found.trim_start().len();
+            let start = span.start as usize + start;
+            Some(Span::new(span.source, start, start + found.trim().len()))
+        };
+        find().unwrap_or(span)
+    }
+
     fn get(&self, id: SourceId) -> Option<&Source> {
         self.list.get(id.0 as usize)
     }

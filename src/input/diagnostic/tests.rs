@@ -21,6 +21,24 @@ fn caret_stands_below_the_text() {
 }
 
 #[test]
+fn lines_of_a_long_text_have_their_place() {
+    let line_of = |text: &str, line: usize| {
+        let mut sources = Sources::new();
+        let id = sources.add_file("scenes/x.toml", text);
+        let start = text.find('=').unwrap() + 2;
+        let value = Span::new(id, start, text.trim_end().len());
+        let found = sources.line_of_text(value, line);
+        text[found.start as usize..found.end as usize].to_owned()
+    };
+    let rows = "a = \"\"\"\nRow 1: k\n  Row 2: q  \n\"\"\"\n";
+    assert_eq!([line_of(rows, 0), line_of(rows, 1)], ["Row 1: k", "Row 2: q"]);
+    assert_eq!(line_of("a = '''Row 1: k\r\nRow 2: q'''", 1), "Row 2: q");
+    // Where lines of the value are not those of the file, it is shown whole.
+    assert_eq!(line_of("a = \"Row 1: k\"", 0), "\"Row 1: k\"");
+    assert_eq!(line_of("a = \"\"\"Row 1: \\\nk\"\"\"", 0), "\"\"\"Row 1: \\\nk\"\"\"");
+}
+
+#[test]
 fn columns_count_characters() {
     let text = "näme = \"größe\" + 1";
     let start = text.find('+').unwrap();

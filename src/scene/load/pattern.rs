@@ -162,7 +162,7 @@ impl KnitPlan {
 /// `pattern`, `chart` or `instructions`: its name, the chart, and where its rows were written.
 pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Chart>, Vec<Span>) {
     if let Some(text) = table.string("instructions") {
-        return ("knit".to_owned(), written(table, text), Vec::new());
+        return ("knit".to_owned(), written(table, text, context), Vec::new());
     }
     if let Some(Value::Table(_)) = table.node("chart").map(|node| &node.value)
         && let Some(picture) = table.table("chart")
@@ -227,7 +227,7 @@ fn drawn(table: &Reader<'_>, picture: Reader<'_>, context: &Context<'_>) -> Opti
 }
 
 /// Written instructions over so many `stitches`, as a chart.
-fn written(table: &Reader<'_>, text: &str) -> Option<Chart> {
+fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Option<Chart> {
     if let Some(other) = ["pattern", "chart"].into_iter().find(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
@@ -235,8 +235,11 @@ fn written(table: &Reader<'_>, text: &str) -> Option<Chart> {
     let rows = match knitspeak::chart_rows(text, stitches) {
         Ok(rows) => rows,
         Err(error) => {
-            let line = error.line.map_or(String::new(), |line| format!("line {}: ", line + 1));
-            table.error_at("instructions", format!("{line}{}", error.problem), Some(&error.hint));
+            let whole = table.span("instructions").unwrap_or(table.header());
+            let place = error.line.map_or(whole, |line| context.sources.line_of_text(whole, line));
+            let line =
+                error.line.filter(|_| place == whole).map_or(String::new(), |line| format!("line {}: ", line + 1));
+            context.error(place, format!("{line}{}", error.problem), Some(error.hint));
             return None;
         }
     };
