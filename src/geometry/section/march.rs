@@ -37,8 +37,10 @@ pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN
 pub(super) const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
 /// Light that leaves from inside: how far it still has to go is felt in all.
 pub(super) const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
-/// The shortest step from one station to the next, in yarn radii.
+/// The shortest step towards the surface, in yarn radii.
 const LEAST_STEP: f32 = 0.1;
+/// The shortest that a step is made by turns and bends, in yarn radii.
+const SHORTEST_STEP: f32 = 0.02;
 /// What may be left of a way without another station, in yarn radii.
 pub(super) const LEAST_LEFT: f32 = 1e-3;
 /// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
@@ -127,13 +129,14 @@ impl Section<'_> {
                 next.real += step * real_slope;
             } else {
                 let bows = station.advance.abs() * step * near.bowing;
-                step /= (turning * step / reach.turn).max(bows).ceil();
+                // Where a yarn has no room for its bend, way after way would be too far.
+                step = (step / (turning * step / reach.turn).max(bows).ceil()).max(SHORTEST_STEP.min(step));
                 // Inside of a bend it may turn out faster.
                 for _ in 0..4 {
                     let depth = station.depth + step;
                     next = self.step(near, start + depth * direction, direction, depth, reach);
                     let turned = rate * (next.station.travel - station.travel);
-                    if turned.abs() <= 1.3 * reach.turn {
+                    if turned.abs() <= 1.3 * reach.turn || step <= SHORTEST_STEP {
                         break;
                     }
                     step *= 0.5;

@@ -556,3 +556,28 @@ fn extreme_rays_stay_finite() {
         }
     }
 }
+
+/// At a cusp of a curve neither its bend nor the turn of its plies has a bound; ways through it must end all the same.
+#[test]
+fn ways_through_a_cusp_end() {
+    let shape = touching_yarn(2, 60, 0.4, 0.3, 0.2);
+    let mut stream = Stream::new(7);
+    for bend in [1e2_f32, 1e4, 6e5, 1e9] {
+        for _ in 0..50 {
+            let [phi, theta, h] = [stream.next(), stream.next(), stream.next()];
+            let cusp = YarnFrame {
+                curvature: Vec3A::new(bend, 0.05 * bend, 0.0),
+                turn: Some(1e-3 * bend),
+                flattening_turn: 1e-3,
+                ..place()
+            };
+            let section = section_of(&cusp, 2.8 * (theta - 0.5), TAU as f32 * phi, 1.98 * (h - 0.5));
+            let mut stations = 0;
+            section.march_ray(&shape, |_, _| {
+                stations += 1;
+                if stations < 100_000 { std::ops::ControlFlow::Continue(()) } else { std::ops::ControlFlow::Break(()) }
+            });
+            assert!(stations <= 2000, "bend {bend}: {stations} stations");
+        }
+    }
+}
