@@ -2,7 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
-use super::fiber::FiberMaterial;
+use super::{
+    escape::{self, Disc, RINGS},
+    fiber::FiberMaterial,
+};
 use crate::{
     geometry::{occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
@@ -14,8 +17,8 @@ mod calibrated {
     pub(super) const START_SHRINK: f64 = 0.4;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
-    /// Strength and half point of the lean of multiply scattered light towards the camera, and its fall with albedo.
-    pub(super) const LEAN: f64 = 3.2;
+    /// Share of multiply scattered light that leaves as from a matt cylinder: strength, half point, and its fall with albedo.
+    pub(super) const LEAN: f64 = 3.0;
     pub(super) const LEAN_HALF: f64 = 10.0;
     pub(super) const LEAN_ALBEDO: f64 = 0.14;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
@@ -64,6 +67,8 @@ pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
 pub(crate) struct PlyOptics {
     /// What passes between them.
     pub gaps: PlyGaps,
+    /// Share of TT that goes on forward in a chain.
+    pub chain_share: f32,
     /// Extinction per expected fibre of light that may pass fibres as TT; at least [`LEAST_RATE`].
     pub rho: Rgb,
     /// Weight that TT keeps on its way forward, at each fibre.
@@ -76,13 +81,17 @@ pub(crate) struct PlyOptics {
     pub single_tt: Rgb,
     /// Their sum: the albedo of an event that ends a chain.
     pub albedo: Rgb,
-    /// Of light scattered twice or more: the share that leaves this ply at last.
-    pub leaves_ply: Rgb,
-    /// The same for leaving the yarn, when its other plies are met at random.
+    /// Of light scattered twice or more, evenly in the ply: the share that leaves the yarn at last, when its other plies are
+    /// met at random.
     pub leaves_yarn: Rgb,
+    /// What leaves this ply at last of light that meets another fibre after one in each ring of equal area, from the axis on, or
+    /// at the rim.
+    pub leaves_from: [Rgb; RINGS + 1],
+    /// What leaves the yarn at last of light that meets a fibre of this ply on its way from another one.
+    pub leaves_again: Rgb,
     /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
     pub mirrored: Rgb,
-    /// How much that light leans towards where the camera looks from, 0 to 1.
+    /// Of that light: the share that leaves as a matt cylinder would send it off; the rest leaves evenly.
     pub lean: Rgb,
     /// Squares of the fibre's widths.
     pub beta_r_squared: f32,
@@ -125,10 +134,11 @@ impl PlyOptics {
         let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
         let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
         let radius_optical = |c: usize| sigma * rho(c) * round_core;
+        let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
         let escape = |c: usize| {
             let t = radius_optical(c);
             let e = escape_probability_of_disc(t);
-            let k = calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
+            let k = own_escape(c);
             e * (1.0 + k) / (1.0 + k * e)
         };
         let escape_past = |neighbours: f64, c: usize| {
@@ -137,13 +147,18 @@ impl PlyOptics {
         };
         let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
         let escape_yarn = |c: usize| escape_past(neighbours, c);
-        let escape_ply = |c: usize| escape_past(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c);
         let closure = |escape: f64, c: usize| {
             let gain = albedo(c) * escape;
             // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
             let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
             if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
         };
+        let disc = |neighbours: f64, c: usize| {
+            let t = radius_optical(c);
+            let taken_back = neighbours * (escape(c) * t * PI / 2.0).min(1.0);
+            Disc::new(t, own_escape(c), taken_back).shares(albedo(c))
+        };
+        let from = [0, 1, 2].map(|c| disc(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c).0);
         let mirrored = |c: usize| {
             let out = r(c) + d(c) + tt_out(c);
             if out <= 0.0 {
@@ -160,14 +175,16 @@ impl PlyOptics {
         };
         Self {
             gaps: PlyGaps::new(ply),
+            chain_share: f as f32,
             rho: per_channel(&|c| rho(c).max(LEAST_RATE)),
             chain: per_channel(&chain),
             single_r: per_channel(&|c| single(r(c), c)),
             single_d: per_channel(&|c| single(d(c), c)),
             single_tt: per_channel(&|c| single(tt_out(c), c)),
             albedo: per_channel(&albedo),
-            leaves_ply: per_channel(&|c| closure(escape_ply(c), c)),
             leaves_yarn: per_channel(&|c| closure(escape_yarn(c), c)),
+            leaves_from: std::array::from_fn(|ring| per_channel(&|c| from[c][ring])),
+            leaves_again: per_channel(&|c| disc(neighbours, c).1),
             mirrored: per_channel(&mirrored),
             lean: per_channel(&lean),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
@@ -177,6 +194,16 @@ impl PlyOptics {
             lead: (FRAC_PI_4 * fiber) as f32,
             fiber_chord: (2.0 * FRAC_PI_4 * fiber) as f32,
         }
+    }
+}
+
+impl PlyOptics {
+    /// [`Self::leaves_from`] at a square distance from the axis, as a share of that of the outermost fibres.
+    #[inline]
+    pub(crate) fn leaves_at(&self, r2: f32) -> Rgb {
+        let (ring, share) = escape::between(r2);
+        let [low, high] = [self.leaves_from[ring], self.leaves_from[ring + 1]];
+        low + (high - low) * share
     }
 }
 

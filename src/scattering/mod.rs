@@ -21,6 +21,7 @@
 
 pub mod aggregated;
 pub(crate) mod closed_forms;
+pub(crate) mod escape;
 pub mod fiber;
 pub(crate) mod kernel;
 pub(crate) mod lobe;

@@ -80,7 +80,7 @@ impl Backward {
 impl Lobe {
     fn of_node(view: &View<'_>, node: &Node, stream: &mut Stream) -> Self {
         let optics = &view.yarn.plies[node.spot.ply];
-        let energy = node.amplitude * optics.albedo * optics.leaves_ply * (Rgb::ONE - node.drawn.value.clear);
+        let energy = node.amplitude * optics.albedo * node.leaves * (Rgb::ONE - node.drawn.value.clear);
         let mut lobe = Self::new(view, &node.crossing, energy, 1.0 - node.drawn.escape);
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             let w = lobe.draw(stream);
@@ -88,7 +88,7 @@ impl Lobe {
             if pdf > 0.0 {
                 let open = (-node.optical_depth(view, w).1).exp();
                 let weight = value / pdf;
-                let energy = weight * (Rgb::ONE - open) * optics.leaves_yarn;
+                let energy = weight * (Rgb::ONE - open) * optics.leaves_again;
                 let chance = open_chance(view, node, open);
                 lobe.again = Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy });
             }
@@ -120,15 +120,22 @@ impl Lobe {
     pub(super) fn value(&self, view: &View<'_>, ply: usize, w: Vec3A) -> (Rgb, f32) {
         let optics = &view.yarn.plies[ply];
         let (at, cos) = self.frame.latitudes(w);
-        let across = (w.dot(self.frame.x), w.dot(self.frame.y));
-        let length = (across.0 * across.0 + across.1 * across.1).sqrt().max(1e-12);
-        let lean = (across.0 * self.lean_to.0 + across.1 * self.lean_to.1) / length;
+        let lean = self.leaning(w);
         let m = if self.mirrored > 0.0 { kernel_scalar(self.kappa, at) } else { 0.0 };
         let even = cos * (0.5 * FRAC_1_PI);
         let latitude = optics.mirrored * (m - DIFFUSE) + DIFFUSE;
-        let value = self.energy * latitude * (optics.lean * lean + 1.0) * even;
+        let matt = off_a_matt_cylinder(lean) - 1.0;
+        let value = self.energy * latitude * (optics.lean * matt + 1.0) * even;
         let pdf = (self.mirrored * (m - DIFFUSE) + DIFFUSE) * (self.lean * lean + 1.0) * even;
         (value, pdf)
+    }
+
+    /// Cosine of the azimuth of `w` from where the lobe leans to.
+    #[inline]
+    pub(super) fn leaning(&self, w: Vec3A) -> f32 {
+        let across = (w.dot(self.frame.x), w.dot(self.frame.y));
+        let length = (across.0 * across.0 + across.1 * across.1).sqrt().max(1e-12);
+        (across.0 * self.lean_to.0 + across.1 * self.lean_to.1) / length
     }
 
     /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
@@ -201,10 +208,18 @@ impl Lobe {
     }
 }
 
+/// What a matt cylinder sends off, against an even azimuth, by the cosine of the angle to the light, averaged over its width:
+/// (pi / 4) ((pi - angle) cos + sin).
+#[inline]
+pub(super) fn off_a_matt_cylinder(cos: f32) -> f32 {
+    let cos = cos.clamp(-1.0, 1.0);
+    (0.25 * PI * ((PI - cos.acos()) * cos + (1.0 - cos * cos).sqrt())).max(0.0)
+}
+
 /// The chance, given how open a direction is, that multiply scattered light goes on in it.
 #[inline]
 fn open_chance(view: &View<'_>, node: &Node, open: Rgb) -> f32 {
-    let leaves = view.yarn.plies[node.spot.ply].leaves_yarn;
+    let leaves = view.yarn.plies[node.spot.ply].leaves_again;
     let out = open.weighted_mean(node.weight);
     let stay = ((Rgb::ONE - open) * leaves).weighted_mean(node.weight);
     if out + stay > 0.0 { out / (out + stay) } else { 1.0 }

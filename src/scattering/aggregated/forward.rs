@@ -1,6 +1,6 @@
 //! Lobe F: light that passes the first fibre it meets as TT, and all others on its own way out (docs/model.md, section 5).
 
-use std::f32::consts::PI;
+use std::f32::consts::{PI, TAU};
 
 use glam::Vec3A;
 
@@ -19,6 +19,8 @@ use crate::{
 /// Density (1/steradian) of F's directions below which the lobe ends. What little it would have there ends its chain
 /// instead, and most light that comes from elsewhere pays nothing for F.
 const FORWARD_TAIL: f32 = 1e-4;
+/// How many fibres light goes on before further fibres turn it back.
+const GOES_ON: f32 = 0.8;
 
 /// Light that the first fibre on the camera's ray passes on, for one such fibre.
 #[derive(Clone, Debug)]
@@ -28,13 +30,19 @@ pub(super) struct Forward {
     frame: LobeFrame,
     /// What TT keeps at the fibre.
     chain: Rgb,
-    /// For each channel, and for the density of sampling: the share of light that meets no other fibre on its way out.
-    once: Rgb,
-    once_drawn: f32,
-    /// Kernels and azimuthal deviations of one TT event, and of more than one.
+    /// Shares of light that passes no other fibre on its way out, one, and more: for each channel, and for the density of
+    /// sampling.
+    shares: [Rgb; 3],
+    drawn_shares: [f32; 3],
+    /// Kernels and azimuthal deviations of so many TT events.
     kappa: Rgb,
     factor: Rgb,
-    sigma: [f32; 2],
+    sigma: [f32; 3],
+    /// Extinction per fibre in the first fibre's ply, and how many fibres deeper further ones are met.
+    rho: Rgb,
+    on: f32,
+    /// Share of TT that goes on; the rest goes all round and is no part of F.
+    chain_share: f32,
     /// What may leave from a node where F does not, and the path's weight: they decide between both.
     gain: Rgb,
     weight: Rgb,
@@ -84,25 +92,32 @@ impl Forward {
         }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
 
-        // Further TT events, as if light went on straight: on the mean a (1 - e^(-rho n)) / rho, taken as geometric. Two
-        // lobes stand for their number: none, and the mean of the others, which is as wide as variances add up to.
+        // Further TT events, as if light went on straight: on the mean a (1 - e^(-rho n)) / rho, taken as geometric. Three
+        // lobes stand for their number: none, one, and the mean of the others, which is as wide as variances add up to.
         let left = crossing.fibers - met + crossings[first + 1..].iter().map(|c| c.fibers).sum::<f32>();
         let depth = optics.rho * left;
         let more = optics.chain * depth.one_minus_exp_neg() / optics.rho;
-        let once = Rgb::ONE / (more + 1.0);
-        let shares = Rgb::from(normalised((optics.chain * (-depth).exp()).max(Rgb::splat(1e-20)).to_array())) * 3.0;
-        let events = 2.0 + more.weighted_mean(shares);
-        let kappa = kappa_of_variance(Rgb::new(1.0, events, events) * optics.beta_tt_squared);
+        let (once, again) = (Rgb::ONE / (more + 1.0), more / (more + 1.0));
+        let shares = [once, once * again, again * again];
+        let passed = Rgb::from(normalised((optics.chain * (-depth).exp()).max(Rgb::splat(1e-20)).to_array())) * 3.0;
+        let drawn_shares = shares.map(|share| share.weighted_mean(passed));
+        // Light of a channel that passes few fibres is not as wide as that of one which passes many.
+        let often = shares[2] * passed;
+        let events = 3.0 + more.weighted_mean(often) / often.mean().max(1e-20);
+        let kappa = kappa_of_variance(Rgb::new(1.0, 2.0, events) * optics.beta_tt_squared);
 
         let mut forward = Self {
             spot,
             frame: LobeFrame::new(spot.tangent, view.camera),
             chain: optics.chain,
-            once,
-            once_drawn: once.weighted_mean(shares),
+            shares,
+            drawn_shares,
             kappa,
             factor: normalisation(kappa),
-            sigma: [optics.beta_n, events.sqrt() * optics.beta_n],
+            sigma: [1.0, 2.0, events].map(|count| count.sqrt() * optics.beta_n),
+            rho: optics.rho,
+            on: GOES_ON.min(left),
+            chain_share: optics.chain_share,
             gain,
             weight,
             drawn: Drawn { direction: Vec3A::ZERO, share: Rgb::ZERO, pdf: 0.0, chance: 0.0 },
@@ -114,7 +129,8 @@ impl Forward {
     #[inline]
     pub(super) fn draw_direction(&self, view: &View<'_>, stream: &mut Stream) -> Drawn {
         let [u_lobe, u_azimuth] = [stream.next(), stream.next()];
-        let lobe = usize::from(u_lobe >= self.once_drawn);
+        let [first, second, _] = self.drawn_shares;
+        let lobe = usize::from(u_lobe >= first) + usize::from(u_lobe >= first + second);
         let kappa = self.kappa.to_array()[lobe];
         let u = [stream.next(), stream.next()];
         let sin = sample_sine(kappa, self.frame.sin, self.frame.cos, u, stream);
@@ -129,18 +145,24 @@ impl Forward {
     pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> Toward {
         let none = Toward { value: Rgb::ZERO, pdf: 0.0, chance: 0.0 };
         let (at, cos) = self.frame.latitudes(w);
-        let [m_once, m_more, _] = normalised_kernel(self.kappa, self.factor, at).to_array();
-        if m_once.max(m_more) * cos < FORWARD_TAIL * 1e-4 {
+        let along = normalised_kernel(self.kappa, self.factor, at);
+        if along.max_channel() * cos < FORWARD_TAIL * 1e-4 {
             return none;
         }
         let off = w.dot(self.frame.y).atan2(w.dot(self.frame.x)) - PI;
-        let once = m_once * cos * wrapped_normal(off, self.sigma[0]);
-        let more = m_more * cos * wrapped_normal(off, self.sigma[1]);
-        let pdf = more + self.once_drawn * (once - more);
+        let around = self.sigma.map(|sigma| wrapped_normal(off, sigma));
+        let all = along * Rgb::from(around) * cos;
+        let pdf = 3.0 * Rgb::from(self.drawn_shares).weighted_mean(all);
         if pdf < FORWARD_TAIL {
             return none;
         }
-        let lobe = self.once * (once - more) + more;
+        let [once, twice, often] = all.to_array();
+        let even = (1.0 - self.chain_share) / TAU;
+        let once = once * (1.0 - even / around[0]).max(0.0) / self.chain_share;
+        // Light that further fibres turned back was deeper in the ply than the way out from the first one.
+        let turned = 1.0 - off.cos();
+        let deeper = (self.rho * (-0.5 * self.on * turned * turned)).exp();
+        let lobe = self.shares[0] * once + (self.shares[1] * twice + self.shares[2] * often) * deeper;
         // What is drawn for all channels together holds the lobe of each but for rare directions.
         let value = (self.chain * (-self.depth(view, w)).exp() * lobe).min(Rgb::splat(pdf));
         let share = value / pdf;

@@ -186,7 +186,7 @@ impl<'a> Vertex<'a> {
         if let Some(node) = &self.node {
             let at_node = 1.0 - self.forward_chance();
             let value = node.toward(&self.view, w);
-            let weight = mis_weight(light_pdf, at_node * node.escape_chance(&self.view, value.clear) * value.pdf);
+            let weight = mis_weight(light_pdf, at_node * node.escape_chance(value.clear) * value.pdf);
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;

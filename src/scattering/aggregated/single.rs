@@ -42,6 +42,8 @@ pub(super) struct Node {
     chance: [f32; 3],
     /// Throughput times amplitude and albedo: what decides between escape and B.
     pub(super) weight: Rgb,
+    /// Of light that meets another fibre after this one: the share that leaves the ply at last.
+    pub(super) leaves: Rgb,
     /// A direction drawn from the lobes.
     pub(super) drawn: Drawn,
 }
@@ -109,7 +111,7 @@ impl Node {
         let frame = LobeFrame::new(node.spot.tangent, view.camera);
         let direction = frame.direction(sin, TAU * u_azimuth);
         let value = node.toward(view, direction);
-        node.drawn = Drawn { direction, value, escape: node.escape_chance(view, value.clear) };
+        node.drawn = Drawn { direction, value, escape: node.escape_chance(value.clear) };
         Some(node)
     }
 
@@ -123,6 +125,9 @@ impl Node {
         let widened = optics.chain.max_channel() * (before + SAMPLING_WIDENING);
         let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
         let weight = throughput * amplitude;
+        let core = view.yarn.occluder().shape().plies[spot.ply].core_radius;
+        let along = (crossing.foot - spot.depth) * view.section.cos;
+        let leaves = optics.leaves_at((crossing.offset * crossing.offset + along * along) / (core * core));
         let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
         Self {
             spot,
@@ -135,6 +140,7 @@ impl Node {
             kappa_tt: kappa((1.0 + widened) * optics.beta_tt_squared),
             chance: normalised(lobes),
             weight: weight * optics.albedo,
+            leaves,
             drawn: Drawn { direction: Vec3A::ZERO, value: NodeValue::NOTHING, escape: 0.0 },
         }
     }
@@ -178,10 +184,9 @@ impl Node {
 
     /// The chance, given the clearness of a direction, that light sent there counts as escaped and not as B.
     #[inline]
-    pub(super) fn escape_chance(&self, view: &View<'_>, clear: Rgb) -> f32 {
-        let leaves = view.yarn.plies[self.spot.ply].leaves_yarn;
+    pub(super) fn escape_chance(&self, clear: Rgb) -> f32 {
         let out = clear.weighted_mean(self.weight);
-        let stay = ((Rgb::ONE - clear) * leaves).weighted_mean(self.weight);
+        let stay = ((Rgb::ONE - clear) * self.leaves).weighted_mean(self.weight);
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 

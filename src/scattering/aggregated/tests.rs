@@ -5,7 +5,10 @@ use std::{
     f64::consts::TAU as TAU64,
 };
 
-use super::{backward::Lobe, *};
+use super::{
+    backward::{Lobe, off_a_matt_cylinder},
+    *,
+};
 use crate::geometry::yarn::{PlyParameters, touching_plies};
 use crate::{
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
@@ -67,11 +70,20 @@ fn quadrature(
         let energy = reaching * ended * optics.albedo * optics.leaves_yarn * (Rgb::ONE - clear_share);
         let backward = Lobe::new(&view, c, energy, 1.0);
         for (w, out) in directions.iter().zip(&mut out) {
-            out[1] += backward.value(&view, c.ply, *w).0;
+            out[1] += plain_backward(&view, &backward, c.ply, *w);
         }
         reaching *= (-depth).exp();
     }
     out
+}
+
+/// B of the plain form: it leans as (1 + b cos phi) / 2 pi. Only the share of light that leans, and how it does, have changed.
+fn plain_backward(view: &View<'_>, lobe: &Lobe, ply: usize, w: Vec3A) -> Rgb {
+    const STRENGTHS: f32 = 3.2 / 3.0;
+    let share = view.yarn.plies[ply].lean;
+    let leaning = lobe.leaning(w);
+    let plain = (share * STRENGTHS).min(Rgb::ONE) * leaning + 1.0;
+    lobe.value(view, ply, w).0 * plain / (share * (off_a_matt_cylinder(leaning) - 1.0) + 1.0)
 }
 
 /// F of the plain form, and T0: the camera's chord alone says how much passes, and the mean number of TT events how far it
