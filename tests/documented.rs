@@ -10,6 +10,8 @@ use std::{
     sync::LazyLock,
 };
 
+use yarnray::geometry::pattern::{chart::PATTERNS, draft::NAMES};
+
 use crate::support::{SWATCH, directory, program, project, write, yarnray};
 
 /// Options whose value is written, not read.
@@ -268,4 +270,24 @@ fn commands_are_found_in_documents() {
         examples_of_document(text),
         ["yarnray info a.toml", "yarnray merge 1.film -o a.exr", "yarnray info b.toml"]
     );
+}
+
+/// docs/structures.md shows every pattern and every draft with a name, and each of its pictures is there.
+#[test]
+fn every_structure_is_shown() {
+    let page = std::fs::read_to_string(project("docs/structures.md")).expect("a document");
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| ![")).collect();
+    let names: BTreeSet<&str> = rows.iter().filter_map(|row| row.split('`').nth(1)).collect();
+    let missing: Vec<&str> = PATTERNS.iter().map(|(name, _)| *name).filter(|name| !names.contains(name)).collect();
+    assert!(missing.is_empty(), "not shown: {missing:?}");
+    // Drafts are families, `twill 2/1` one of `twill M/N`.
+    let family = |name: &str| name.split(' ').next().map(str::to_owned);
+    let families: BTreeSet<String> = names.iter().filter_map(|name| family(name)).collect();
+    let missing: Vec<&&str> =
+        NAMES.iter().filter(|name| !family(name).is_some_and(|f| families.contains(&f))).collect();
+    assert!(missing.is_empty(), "not shown: {missing:?}");
+    for row in rows {
+        let file = row.split(['(', ')']).nth(1).expect("a picture");
+        assert!(project("docs").join(file).exists(), "{file} is not there");
+    }
 }
