@@ -216,6 +216,7 @@ fn garment_json(facts: &GarmentFacts) -> Value {
     let [p5, p50, p95] = facts.uv_ratio;
     json!({
         "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
+        "near": facts.near.map(|(at, radius)| json!({"at_mm": at.to_array(), "radius_mm": radius})),
         "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
         "overlap": facts.overlap.map(|[share, deepest]| json!({"share": share, "deepest": deepest})),
         "control_points": facts.control_points,
@@ -237,6 +238,9 @@ fn garment_lines(facts: &GarmentFacts) -> String {
         facts.control_points,
         100.0 * facts.stretched
     );
+    if let Some((at, radius)) = facts.near {
+        text += &format!("  near      only what lies within {radius:.3} mm of {at:.3} mm\n");
+    }
     if let Some(weight) = facts.weight {
         text += &format!("  weight    {weight:.1} g of yarn\n");
     }

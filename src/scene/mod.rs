@@ -357,6 +357,8 @@ pub struct GarmentFacts {
     pub panels: Vec<(String, u64)>,
     /// Stitches of all panels; crossings of a weave.
     pub stitches: u64,
+    /// Place and radius of the part that is laid, millimetres, where that is not all: stitches, yarns and points are of it.
+    pub near: Option<(DVec3, f64)>,
     /// Length of all yarns, millimetres; without seams and finished edges where it was not laid.
     pub yarn_length: f64,
     /// Weight of all yarns, grams, where every yarn's `tex` is known.

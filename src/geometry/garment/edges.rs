@@ -181,6 +181,7 @@ pub(super) fn finish(poses: &[Pose], edgings: &[&Edging]) -> Vec<Vec<LaidYarn>> 
                     radius,
                     kind: StrandKind::Course,
                     panel: edging.way.panel,
+                    color: 0,
                     coordinates: Vec::new(),
                 }
             };

@@ -49,6 +49,8 @@ pub(super) struct Lattice {
     /// Whether the last column is beside the first.
     pub(super) ring: bool,
     kept: Vec<bool>,
+    /// The same of the whole panel, where only a part is laid.
+    whole: Vec<bool>,
     anchors: Vec<Anchor>,
     /// Which corners are moved onto a free border.
     free: Vec<bool>,
@@ -119,6 +121,7 @@ impl Lattice {
             stitch,
             ring,
             kept: Vec::new(),
+            whole: Vec::new(),
             anchors: Vec::new(),
             free: Vec::new(),
             stitches: 0,
@@ -130,21 +133,31 @@ impl Lattice {
             let (x, y) = (i % counts[0], i / counts[0]);
             low + stitch * DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
         };
-        let layers: Vec<usize> = (0..counts[0] * counts[1])
+        let layers: Vec<(usize, bool)> = (0..counts[0] * counts[1])
             .into_par_iter()
             .with_min_len(256)
-            .map(|i| {
-                let found = finder.find(middle(i));
-                if found.is_some() && lays(found) { finder.layers(middle(i)).max(1) } else { 0 }
+            .map(|i| match finder.find(middle(i)) {
+                found if found.is_some() && lays(found) => (finder.layers(middle(i)).max(1), true),
+                found if found.is_some() => (1, false),
+                _ => (0, true),
             })
             .collect();
-        lattice.doubled = layers.iter().filter(|&&n| n > 1).count();
-        lattice.kept = layers.iter().map(|&n| n > 0).collect();
-        lattice.turn_in(&middle, &edges);
-        lattice.drop_lonely();
+        lattice.doubled = layers.iter().filter(|(n, laid)| *laid && *n > 1).count();
+        lattice.keep(layers.iter().map(|(n, _)| *n > 0).collect(), &middle, &edges);
+        if layers.iter().any(|(_, laid)| !laid) {
+            lattice.whole = std::mem::take(&mut lattice.kept);
+            lattice.keep(layers.iter().map(|(n, laid)| *laid && *n > 0).collect(), &middle, &edges);
+        }
         lattice.stitches = lattice.kept.iter().filter(|k| **k).count() as u64;
         lattice.place(&finder, &edges, low, division.bent);
         lattice
+    }
+
+    /// Keeps some stitches, and those beyond seams beside them.
+    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &[Edge]) {
+        self.kept = kept;
+        self.turn_in(middle, edges);
+        self.drop_lonely();
     }
 
     /// Adds the stitches beyond seams that are turned in.
@@ -203,6 +216,15 @@ impl Lattice {
             }
         }
         out
+    }
+
+    /// The run of a row that holds a stitch, as it is where all of the panel is laid.
+    pub(super) fn whole_run(&self, line: usize, stitch: usize) -> [usize; 2] {
+        let kept = if self.whole.is_empty() { &self.kept } else { &self.whole };
+        let row = &kept[line * self.counts[0]..(line + 1) * self.counts[0]];
+        let first = row[..stitch].iter().rposition(|k| !k).map_or(0, |i| i + 1);
+        let last = row[stitch..].iter().position(|k| !k).map_or(row.len(), |i| stitch + i);
+        [first, last.max(stitch + 1)]
     }
 
     pub(super) fn width(&self) -> usize {

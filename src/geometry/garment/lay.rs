@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
+    floats::{FLOATING, Lanes, Strand, Stranded, Way, led},
     lattice::Lattice,
     sheet::Sheet,
     strain::{Shape, Shapes, Strain, UNSTRAINED},
@@ -29,6 +30,8 @@ pub(crate) struct LaidYarn {
     pub kind: StrandKind,
     /// On which panel it lies; a seam's is one of both.
     pub panel: u32,
+    /// Its colour, where each colour is a yarn of its own; else 0.
+    pub color: u16,
     /// At each control point its stitch and row from the panel's lower left corner; empty where it was not asked for.
     pub coordinates: Vec<[f32; 2]>,
 }
@@ -44,13 +47,13 @@ pub(crate) struct Tension {
 
 /// A run of stitches of a line, walked forwards or backwards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Run {
-    line: usize,
-    first: usize,
-    last: usize,
-    backwards: bool,
+pub(super) struct Run {
+    pub(super) line: usize,
+    pub(super) first: usize,
+    pub(super) last: usize,
+    pub(super) backwards: bool,
     /// It goes round and meets itself.
-    ring: bool,
+    pub(super) ring: bool,
 }
 
 impl Run {
@@ -71,46 +74,61 @@ pub(super) const CUT_END: f64 = 0.65;
 /// A row's end and the next row's are joined if they are no further apart, in stitches.
 const FURTHEST: usize = 3;
 
+/// What a panel's yarns are, beside their shapes.
+#[derive(Clone, Copy)]
+pub(super) struct Laying<'a> {
+    pub(super) tension: Option<Tension>,
+    /// The colours, where each is a yarn of its own.
+    pub(super) stranded: Option<&'a Stranded>,
+    /// Whether yarns know their stitches.
+    pub(super) coordinates: bool,
+}
+
 /// Lays the yarns of a panel in several frames at once: for each frame the same yarns.
-pub(super) fn lay(
-    sheets: &[Sheet<'_>],
-    shapes: &Shapes,
-    tension: Option<Tension>,
-    coordinates: bool,
-) -> Vec<Vec<LaidYarn>> {
+pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> Vec<Vec<LaidYarn>> {
     let lattice = sheets[0].lattice;
-    let chains: Vec<(usize, Vec<Run>)> = (0..2)
+    let of_axis = |axis: usize| {
+        let chains = chains(lattice, axis, shapes.is_woven()).into_iter();
+        chains.flat_map(|chain| match laying.stranded {
+            Some(stranded) => Way::of_colors(lattice, &chain, stranded),
+            None => vec![Way::plain(chain)],
+        })
+    };
+    let ways: Vec<(usize, Way)> = (0..2)
         .filter(|&axis| shapes.has_axis(axis))
-        .flat_map(|axis| chains(lattice, axis, shapes.is_woven()).into_iter().map(move |chain| (axis, chain)))
+        .flat_map(|axis| of_axis(axis).map(move |way| (axis, way)))
         .collect();
     // What repeats is centred on the panel, but where it goes round.
     let shift = [0, 1].map(|axis| {
         let (n, repeat) = (lattice.counts[axis], shapes.counts[axis]);
         if axis == 0 && !lattice.ring { (repeat - (n % repeat) / 2) % repeat } else { 0 }
     });
+    let lanes = Lanes::new(shapes, lattice);
     let frames = sheets.iter().map(|sheet| {
-        let one = |(axis, chain): &(usize, Vec<Run>)| {
+        let one = |(axis, way): &(usize, Way)| {
             let mut layer = Layer {
                 sheet,
                 shapes,
                 shift,
-                tension,
+                lanes,
+                tension: laying.tension,
                 axis: *axis,
                 out: Vec::new(),
-                places: coordinates.then(Vec::new),
+                places: laying.coordinates.then(Vec::new),
             };
-            let (closed, shape) = (chain[0].ring, layer.shape(chain[0].line));
-            layer.chain(chain);
+            let (closed, shape) = (way.runs[0].ring, layer.shape(way.runs[0].line));
+            layer.way(way);
             LaidYarn {
                 points: layer.out,
                 closed,
                 radius: shape.radius,
                 kind: shape.kind,
                 panel: lattice.panel,
+                color: way.color,
                 coordinates: layer.places.unwrap_or_default(),
             }
         };
-        chains.par_iter().map(one).collect()
+        ways.par_iter().map(one).collect()
     });
     frames.collect()
 }
@@ -153,6 +171,7 @@ struct Layer<'a> {
     sheet: &'a Sheet<'a>,
     shapes: &'a Shapes,
     shift: [usize; 2],
+    lanes: Lanes,
     tension: Option<Tension>,
     axis: usize,
     out: Vec<DVec3>,
@@ -183,24 +202,25 @@ impl<'a> Layer<'a> {
         }
     }
 
-    fn chain(&mut self, runs: &[Run]) {
+    fn way(&mut self, way: &Way) {
+        let runs = &way.runs;
         if !runs[0].ring {
-            self.tail(&runs[0], true);
+            self.tail(&runs[0], way.strand(0), true);
         }
         for (i, run) in runs.iter().enumerate() {
-            self.stitches(run);
+            self.stitches(run, way.strand(i));
             if let Some(next) = runs.get(i + 1) {
-                self.turn(run, next);
+                self.turn([(run, way.strand(i)), (next, way.strand(i + 1))]);
             }
         }
-        let last = runs[runs.len() - 1];
-        if !last.ring {
-            self.tail(&last, false);
+        let last = runs.len() - 1;
+        if !runs[last].ring {
+            self.tail(&runs[last], way.strand(last), false);
         }
     }
 
     /// All control points of a run's stitches.
-    fn stitches(&mut self, run: &Run) {
+    fn stitches(&mut self, run: &Run, strand: Option<Strand<'_>>) {
         let (sheet, axis) = (self.sheet, self.axis);
         let strain = |s: usize| {
             let (x, y) = if axis == 0 { (s, run.line) } else { (run.line, s) };
@@ -212,7 +232,7 @@ impl<'a> Layer<'a> {
         let (mut before, mut here) = (strain(order(0)), strain(order(0)));
         // The end of a run's last stitch is the start of one that is not there.
         let far_end = |layer: &mut Self, strain| {
-            let place = layer.place(run.line, run.last, 0, strain);
+            let place = layer.corner(run.line, run.last, strand, strain);
             layer.push(place, run);
         };
         if run.backwards {
@@ -221,13 +241,19 @@ impl<'a> Layer<'a> {
         for i in 0..count {
             let s = order(i);
             let next = strain(order((i + 1).min(count - 1)));
-            for k in 0..per_stitch {
+            let floats = strand.filter(|strand| !strand.row.knits(strand.color, s));
+            for k in 0..if floats.is_some() { FLOATING.len() } else { per_stitch } {
+                if let Some(strand) = floats {
+                    let place = self.float(run, s, k, strand);
+                    self.push(place, run);
+                    continue;
+                }
                 // Strain changes evenly from the middle of a stitch to that of the next.
                 let t = (k as f32 + 0.5) / per_stitch as f32 - 0.5;
                 let (other, share) = if t < 0.0 { (before, -t) } else { (next, t) };
                 let mixed = [0, 1, 2].map(|a| here[a] + share * (other[a] - here[a]));
                 let k = if run.backwards { per_stitch - 1 - k } else { k };
-                let place = self.place(run.line, s, k, mixed);
+                let place = self.place(run.line, s, k, mixed) + self.led(run.line, s, k, strand);
                 self.push(place, run);
             }
             (before, here) = (here, next);
@@ -235,6 +261,32 @@ impl<'a> Layer<'a> {
         if !run.ring && !run.backwards {
             far_end(self, here);
         }
+    }
+
+    /// Where a yarn is at the start of a stitch; also of one after the last.
+    fn corner(&self, line: usize, s: usize, strand: Option<Strand<'_>>, strain: Strain) -> Vec3 {
+        let base = self.place(line, s, 0, strain);
+        strand.and_then(|strand| self.lanes.joint(strand, line, s)).unwrap_or(base)
+    }
+
+    /// Control point k of the way behind a stitch, in the order of the run.
+    fn float(&self, run: &Run, s: usize, k: usize, strand: Strand<'_>) -> Vec3 {
+        let k = if run.backwards { FLOATING.len() - 1 - k } else { k };
+        match k {
+            0 => self.corner(run.line, s, Some(strand), UNSTRAINED),
+            _ => self.lanes.float(strand, run.line, s as f32 + FLOATING[k]),
+        }
+    }
+
+    /// By how much control point k of a stitch is led to what its yarn does before and after.
+    fn led(&self, line: usize, s: usize, k: usize, strand: Option<Strand<'_>>) -> Vec3 {
+        let along = k as f32 / self.shape(line).per_stitch as f32;
+        let to = |(joint, share): (usize, f32)| {
+            let strand = strand.filter(|_| led(share) > 0.0)?;
+            let place = self.lanes.joint(strand, line, joint)?;
+            Some((place - self.place(line, joint, 0, UNSTRAINED)) * led(share))
+        };
+        [(s, along), (s + 1, 1.0 - along)].into_iter().filter_map(to).sum()
     }
 
     /// Control point k of stitch s of a line.
@@ -264,17 +316,24 @@ impl<'a> Layer<'a> {
         (turn(across, self.shapes.diameter) / along) as f32
     }
 
-    /// From the end of a run round to the start of the next.
-    fn turn(&mut self, run: &Run, next: &Run) {
+    /// From the end of a run round to the start of the next that the yarn knits.
+    fn turn(&mut self, [(run, strand), (next, beside)]: [(&Run, Option<Strand<'_>>); 2]) {
         let outward = if run.backwards { -1.0 } else { 1.0 };
         let corner = if self.axis == 0 { [run.end(), run.line + 1] } else { [run.line + 1, run.end()] };
         // Where panels lie beside each other the selvedge goes to the wrong side.
         let sewn = !self.sheet.lattice.is_free(corner[0], corner[1]) && !self.sheet.is_turned_in(corner[0], corner[1]);
         let bulge = self.bulge() * outward * if sewn { 0.3 } else { 1.0 };
-        let deep = if sewn { 1.5 * self.shapes.diameter as f32 } else { 0.0 };
-        let from = self.place(run.line, run.end(), 0, UNSTRAINED);
-        let to = self.place(next.line, next.start(), 0, UNSTRAINED);
-        for (share, out) in [(0.12_f32, 0.62), (0.5, 1.0), (0.88, 0.62)] {
+        let d = self.shapes.diameter as f32;
+        // Colours lie behind each other there, and behind all what is carried over rows.
+        let rows = next.line - run.line;
+        let layer = strand.map_or(0, |strand| strand.rank()) + usize::from(rows > 1);
+        let deep = if sewn { 1.5 * d } else { 0.0 } + d * layer as f32;
+        let from = self.corner(run.line, run.end(), strand, UNSTRAINED);
+        let to = self.corner(next.line, next.start(), beside, UNSTRAINED);
+        let ends = [0.12 / rows as f32, 1.0 - 0.12 / rows as f32];
+        let between = (1..2 * rows).map(|i| i as f32 / (2 * rows) as f32);
+        for share in std::iter::once(ends[0]).chain(between).chain([ends[1]]) {
+            let out = if ends.contains(&share) { 0.62 } else { 1.0 };
             let mut p = from.lerp(to, share);
             p[self.axis] += bulge * out;
             p.z -= deep * out;
@@ -283,10 +342,10 @@ impl<'a> Layer<'a> {
     }
 
     /// The end of a yarn: over the border to the wrong side, and back behind the stitches.
-    fn tail(&mut self, run: &Run, first: bool) {
+    fn tail(&mut self, run: &Run, strand: Option<Strand<'_>>, first: bool) {
         let corner = if first { run.start() } else { run.end() };
         let outward = if (corner == run.last) == (run.last > run.first) { 1.0_f32 } else { -1.0 };
-        let from = self.place(run.line, corner, 0, UNSTRAINED);
+        let from = self.corner(run.line, corner, strand, UNSTRAINED);
         let bulge = self.bulge();
         let d = self.shapes.diameter as f32;
         // Not round the bend of what is turned in.
@@ -294,12 +353,14 @@ impl<'a> Layer<'a> {
         let furthest = if self.sheet.is_turned_in(at[0], at[1]) { 1 } else { 3 };
         let inward = (run.last - run.first).min(furthest) as f32;
         // Out, up or down, behind, and in; threads of a weave are cut at the edge.
+        // Between the lanes of this row and of the next.
+        let up = if strand.is_some() { 0.5 } else { 0.3 };
         let darned = [
             (0.62 * bulge, 0.05, 0.0),
-            (0.7 * bulge, 0.25, -0.9 * d),
-            (-0.3, 0.3, -1.6 * d),
-            (-0.6 * inward, 0.3, -1.6 * d),
-            (-inward, 0.3, -1.5 * d),
+            (0.7 * bulge, up - 0.05, -0.9 * d),
+            (-0.3, up, -1.6 * d),
+            (-0.6 * inward, up, -1.6 * d),
+            (-inward, up, -1.5 * d),
         ];
         let cut = [(0.3 * bulge, 0.0, 0.0), (CUT_END as f32 * bulge, 0.0, 0.0), (bulge, 0.0, 0.0)];
         let way: &[(f32, f32, f32)] = if self.shapes.is_woven() { &cut } else { &darned };

@@ -2,13 +2,14 @@
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
 //! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `lay`
-//! lays its yarns from row to row over the `sheet` of a frame, `sewing` says what is at the borders, of which `fold` turns
+//! lays its yarns from row to row over the `sheet` of a frame, each colour with its `floats`, `sewing` says what is at the borders, of which `fold` turns
 //! in what is sewn and `edges` makes the yarns, and `body` keeps them outside of who wears them. All lengths are
 //! millimetres.
 
 mod body;
 mod border;
 mod edges;
+mod floats;
 mod fold;
 mod lattice;
 mod lay;
@@ -26,8 +27,9 @@ use rayon::prelude::*;
 use self::{
     body::Body,
     edges::{Edging, finish},
+    floats::Lanes,
     lattice::Lattice,
-    lay::lay,
+    lay::{Laying, lay},
     panels::Panels,
     sewing::Sewing,
     strain::Shapes,
@@ -35,6 +37,7 @@ use self::{
 };
 pub(crate) use self::{
     edges::SeamKind,
+    floats::{Floats, Stranded},
     lay::{LaidYarn, Tension},
     mesh::{GarmentError, GarmentMesh},
     panels::{LengthRatio, Panel},
@@ -226,10 +229,28 @@ impl Garment {
         &self.report
     }
 
-    /// The most columns and rows of the panels of a cloth; `None` if none is of it.
+    /// The panels of a cloth on which anything is laid.
+    fn of_cloth(&self, cloth: usize) -> impl Iterator<Item = &Lattice> {
+        let all = self.lattices.iter().zip(&self.report.cloth);
+        all.filter(move |(l, c)| **c == cloth && l.stitches > 0).map(|(l, _)| l)
+    }
+
+    /// The most columns and rows of the panels of a cloth, from their flat corners on; `None` if none is of it.
     pub(crate) fn counts(&self, cloth: usize) -> Option<[usize; 2]> {
-        let own = self.lattices.iter().zip(&self.report.cloth).filter(|(l, c)| **c == cloth && l.stitches > 0);
-        own.map(|(l, _)| l.counts).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+        let own = self.of_cloth(cloth).map(|l| [0, 1].map(|k| l.counts[k] - l.turned_in[k].min(l.counts[k] - 1)));
+        own.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+    }
+
+    /// What the floats of a cloth come to, and about their length, mm, and control points.
+    pub(crate) fn floats(&self, cloth: usize, stranded: &Stranded) -> (Floats, f64, u64) {
+        let mut all = Floats::default();
+        let mut length = 0.0;
+        for lattice in self.of_cloth(cloth) {
+            let own = floats::count(lattice, stranded);
+            length += own.stitches as f64 * lattice.stitch.x;
+            all = Floats { stitches: all.stitches + own.stitches, most: all.most.max(own.most) };
+        }
+        (all, length, all.stitches * floats::FLOATING.len() as u64)
     }
 
     /// What the yarns of a cloth are.
@@ -238,7 +259,8 @@ impl Garment {
     }
 
     /// Lays the yarns in some frames, which have the first one's topology: the same yarns with the same points in each.
-    /// Bodies are as many as frames, or none. Notes tell what had to be moved.
+    /// Bodies are as many as frames, or none. `stranded` says for each cloth whose colours are yarns of their own which
+    /// those are; of what is beyond its end none are. Notes tell what had to be moved.
     ///
     /// # Errors
     /// A frame of another topology: its place among the frames, and what differs.
@@ -247,6 +269,7 @@ impl Garment {
         first: &GarmentMesh,
         frames: &[&GarmentMesh],
         bodies: &[&Mesh],
+        stranded: &[Option<Stranded>],
         notes: &mut Vec<String>,
     ) -> Result<Vec<Laid>, (usize, String)> {
         let mut poses = Vec::with_capacity(frames.len());
@@ -254,7 +277,12 @@ impl Garment {
             first.same_topology(frame).map_err(|problem| (i, problem))?;
             poses.push(self.surface.pose(&self.panels.points(frame, self.options.unit_mm)));
         }
-        let clearance = self.shapes.iter().map(|s| 2.2 * s.diameter).fold(0.0, f64::max);
+        let stranded = |cloth: usize| stranded.get(cloth).and_then(Option::as_ref);
+        let behind = |(cloth, shapes): (usize, &Shapes)| {
+            let floats = stranded(cloth).map_or(0.0, |_| Lanes::reach(shapes));
+            floats.max(2.2 * shapes.diameter)
+        };
+        let clearance = self.shapes.iter().enumerate().map(behind).fold(0.0, f64::max);
         let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, 4.0 * clearance)).collect();
         let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
         for (i, pose) in poses.iter_mut().enumerate() {
@@ -269,7 +297,12 @@ impl Garment {
             }
             let sheets: Vec<_> =
                 poses.iter().map(|p| lattice.sheet(&self.surface, p, self.sewing.folds(cloth))).collect();
-            let yarns = lay(&sheets, &self.shapes[cloth], self.options.tension, self.options.coordinates);
+            let laying = Laying {
+                tension: self.options.tension,
+                stranded: stranded(cloth),
+                coordinates: self.options.coordinates,
+            };
+            let yarns = lay(&sheets, &self.shapes[cloth], laying);
             for (frame, yarns) in laid.iter_mut().zip(yarns) {
                 frame[cloth].extend(yarns);
             }

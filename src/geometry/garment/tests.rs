@@ -1,3 +1,6 @@
+mod floats;
+mod seams;
+
 use std::fmt::Write;
 
 use glam::DVec2;
@@ -6,8 +9,11 @@ use super::*;
 use crate::{
     geometry::{
         curve::{Basis, Curve},
-        pattern::{draft::Draft, overlap::overlap, weave::Weave},
-        spline::evaluate,
+        pattern::{
+            draft::Draft,
+            overlap::{Overlap, overlap},
+            weave::Weave,
+        },
     },
     testing::stockinette,
 };
@@ -59,11 +65,17 @@ fn square() -> GarmentMesh {
 
 fn laid(mesh: &GarmentMesh, options: Options) -> (Report, Vec<LaidYarn>) {
     let garment = Garment::new(mesh, options).unwrap();
-    let yarns = garment.lay(mesh, &[mesh], &[], &mut Vec::new()).unwrap();
+    let yarns = garment.lay(mesh, &[mesh], &[], &[], &mut Vec::new()).unwrap();
     (garment.report().clone(), yarns.into_iter().flatten().flatten().collect())
 }
 
 fn overlapping(yarns: &[LaidYarn]) -> f64 {
+    let found = run_into_each_other(yarns);
+    eprintln!("{found:?}");
+    found.share
+}
+
+fn run_into_each_other(yarns: &[LaidYarn]) -> Overlap {
     let curves: Vec<(Curve, Vec<f64>)> = yarns
         .iter()
         .map(|y| {
@@ -72,9 +84,17 @@ fn overlapping(yarns: &[LaidYarn]) -> f64 {
             (Curve { basis: Basis::BSpline, closed: y.closed, points, radii: None, flattening: None }, radii)
         })
         .collect();
-    let found = overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap();
-    eprintln!("{found:?}");
-    found.share
+    overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap()
+}
+
+/// The parts of yarns whose control points lie within, as yarns of their own.
+fn within(yarns: &[LaidYarn], inside: &dyn Fn(DVec3) -> bool) -> Vec<LaidYarn> {
+    let parts = |yarn: &LaidYarn| -> Vec<LaidYarn> {
+        let runs = yarn.points.chunk_by(|a, b| inside(*a) == inside(*b));
+        let part = |points: &[DVec3]| LaidYarn { points: points.to_vec(), closed: false, ..yarn.clone() };
+        runs.filter(|run| run.len() > 3 && inside(run[0])).map(part).collect()
+    };
+    yarns.iter().flat_map(parts).collect()
 }
 
 #[test]
@@ -118,7 +138,7 @@ fn warps_are_threads_of_their_own_and_wefts_turn_at_selvedges() {
         assert!(across < 2.0 && up > 95.0, "{across} {up}");
     }
     // Where they were cut to be sewn, wefts end as well.
-    let [first, ..] = sewn(&woven(), 0, SeamKind::Overlock);
+    let [first, ..] = seams::sewn(&woven(), 0, SeamKind::Overlock);
     assert!(first.iter().filter(|y| y.kind == StrandKind::Weft).count() > 10);
 }
 
@@ -174,91 +194,6 @@ fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
     assert!(overlapping(&yarns) < 0.12);
 }
 
-/// Two panels that meet at 80 mm along an axis, sewn: the yarns of each panel, and those of the seam.
-fn sewn(tile: &Tile, axis: usize, seam: SeamKind) -> [Vec<LaidYarn>; 3] {
-    let mut text = String::new();
-    sheet(&mut text, "first", 8, 8, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
-    sheet(&mut text, "second", 8, 8, 10.0, 200.0, &|u, v| DVec3::new(u, v, 0.0) + 80.0 * DVec3::AXES[axis]);
-    let mesh = GarmentMesh::parse(&text).unwrap();
-    let (_, yarns) = laid(&mesh, Options { seam, ..options(tile.clone()) });
-    let mut out = [const { Vec::new() }; 3];
-    for yarn in yarns {
-        let middle = yarn.points.iter().sum::<DVec3>() / yarn.points.len() as f64;
-        let of_cloth = (2.0 * yarn.radius - tile.diameter()).abs() < 1e-9;
-        // What finishes free edges goes round both.
-        match yarn.closed {
-            true => {}
-            false => out[if of_cloth { usize::from(middle[axis] > 80.0) } else { 2 }].push(yarn),
-        }
-    }
-    out
-}
-
-/// Places along yarns, close to each other.
-fn along(yarns: &[LaidYarn]) -> Vec<DVec3> {
-    let segment = |w: &[DVec3]| {
-        let points = [w[0], w[1], w[2], w[3]].map(|p| p.extend(0.0));
-        (0..6).map(move |k| evaluate(Basis::BSpline, points, f64::from(k) / 6.0).at.truncate())
-    };
-    yarns.iter().flat_map(|yarn| yarn.points.windows(4).flat_map(segment)).collect()
-}
-
-/// The distance of both panels' middle lines, the least in each stitch along the seam, in diameters.
-fn distances(panels: [&[DVec3]; 2], tile: &Tile, axis: usize) -> Vec<f64> {
-    let near = |p: &&DVec3| (p[axis] - 80.0).abs() < 6.0;
-    let [first, second] = panels.map(|panel| panel.iter().filter(near).collect::<Vec<&DVec3>>());
-    let step = tile.stitch()[1 - axis];
-    let windows = (15.0 / step) as usize..(65.0 / step) as usize;
-    let least = |window: usize| {
-        let inside = |p: &&&DVec3| (p[1 - axis] / step).floor() as usize == window;
-        let of = |p: &&DVec3| second.iter().map(|q| p.distance(**q)).fold(f64::MAX, f64::min);
-        first.iter().filter(inside).map(of).fold(f64::MAX, f64::min) / tile.diameter()
-    };
-    windows.map(least).collect()
-}
-
-#[test]
-fn panels_meet_at_seams_without_overlap() {
-    let mut wrong = Vec::new();
-    for kind in [SeamKind::None, SeamKind::Mattress, SeamKind::Overlock] {
-        for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0), (woven(), 1)] {
-            let [first, second, _] = sewn(&tile, axis, kind).map(|yarns| along(&yarns));
-            let distances = distances([&first, &second], &tile, axis);
-            let (least, most) = distances.iter().fold((f64::MAX, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
-            eprintln!("{kind:?} {axis}: {least:.3} to {most:.3}");
-            // Not into each other, and with less than a yarn between them.
-            if least < 0.95 || most > 2.0 {
-                wrong.push(format!("{kind:?} {axis}, woven {}: {distances:.2?}", tile.strands.len() > 1));
-            }
-        }
-    }
-    assert!(wrong.is_empty(), "{wrong:#?}");
-}
-
-#[test]
-fn seams_are_turned_in_and_sewn_where_nobody_looks() {
-    for (tile, axis) in [(stockinette(), 0), (stockinette(), 1), (woven(), 0)] {
-        let d = tile.diameter();
-        let deepest = |places: &[DVec3]| places.iter().map(|p| p.z).fold(f64::MAX, f64::min);
-        for kind in [SeamKind::None, SeamKind::Mattress, SeamKind::Overlock] {
-            let [first, second, threads] = sewn(&tile, axis, kind).map(|yarns| along(&yarns));
-            if kind == SeamKind::None {
-                assert!(threads.is_empty() && deepest(&first) > -3.0 * d && deepest(&second) > -3.0 * d);
-                continue;
-            }
-            // Both edges go in, as deep as each other, and the thread stays below what is seen.
-            assert!(deepest(&first) < -3.0 * d && (deepest(&first) - deepest(&second)).abs() < d);
-            assert!(threads.iter().all(|p| p.z < -0.8 * d && (p[axis] - 80.0).abs() < 5.0 * d), "{kind:?} {axis}");
-            let crossings = threads.windows(2).filter(|w| (w[0][axis] < 80.0) != (w[1][axis] < 80.0)).count();
-            let step = if kind == SeamKind::Mattress { 2.0 * tile.stitch().y } else { 4.0 };
-            assert!(crossings as f64 > 0.8 * 2.0 * 80.0 / step, "{kind:?} {axis}: {crossings}");
-            // An overlock goes round both edges, below the deepest loop; a mattress seam stays between them.
-            let under = deepest(&threads) < deepest(&first);
-            assert_eq!(under, kind == SeamKind::Overlock, "{axis}: {} {}", deepest(&threads), deepest(&first));
-        }
-    }
-}
-
 #[test]
 fn frames_keep_their_yarns_and_errors_name_what_differs() {
     let still = square();
@@ -267,7 +202,7 @@ fn frames_keep_their_yarns_and_errors_name_what_differs() {
         *p = DVec3::new(p.x, p.y, p.z + 0.002 * p.x * p.x);
     }
     let garment = Garment::new(&still, options(stockinette())).unwrap();
-    let frames = garment.lay(&still, &[&still, &moved], &[], &mut Vec::new()).unwrap();
+    let frames = garment.lay(&still, &[&still, &moved], &[], &[], &mut Vec::new()).unwrap();
     for (a, b) in frames[0].iter().flatten().zip(frames[1].iter().flatten()) {
         assert_eq!((a.points.len(), a.closed), (b.points.len(), b.closed));
         for (p, q) in a.points.iter().zip(&b.points) {
@@ -277,7 +212,7 @@ fn frames_keep_their_yarns_and_errors_name_what_differs() {
     }
     let mut other = still.clone();
     other.faces.pop();
-    let (frame, problem) = garment.lay(&still, &[&still, &other], &[], &mut Vec::new()).unwrap_err();
+    let (frame, problem) = garment.lay(&still, &[&still, &other], &[], &[], &mut Vec::new()).unwrap_err();
     assert!(frame == 1 && problem.contains("triangles"), "{problem}");
 }
 
@@ -309,7 +244,7 @@ fn a_body_keeps_yarns_out() {
     let mesh = GarmentMesh::parse(&text).unwrap();
     let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(stockinette()) }).unwrap();
     let mut notes = Vec::new();
-    let yarns = garment.lay(&mesh, &[&mesh], &[&body], &mut notes).unwrap();
+    let yarns = garment.lay(&mesh, &[&mesh], &[&body], &[], &mut notes).unwrap();
     assert!(notes.iter().any(|n| n.contains("out of the body")), "{notes:?}");
     for yarn in yarns.iter().flatten().flatten() {
         for p in &yarn.points {

@@ -18,9 +18,9 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+pub(crate) use self::colors::{Way, caught, in_use};
 use self::{
     cell::Cell,
-    colors::Way,
     loops::{Border, Loops},
     piece::{Laying, Surface, Thread, settle},
 };

@@ -31,6 +31,9 @@ use crate::{
 /// The colour of each stitch by rows, from 0, and the yarn in the library that each colour is.
 pub(super) type StitchColors = (Vec<Vec<u16>>, Vec<usize>);
 
+/// The colour of a stitch by its column and row, from 0, and the yarn in the library that each colour is.
+pub(super) type LaidColors = (Box<dyn Fn(usize, usize) -> u16 + Send + Sync>, Vec<usize>);
+
 /// Which yarn is where.
 #[derive(Default)]
 struct Layout {
@@ -158,6 +161,30 @@ impl ColorPlan {
         let order: Vec<usize> = counts.into_iter().map(|c| c.1).collect();
         let color = |yarn: &usize| order.iter().position(|y| y == yarn).unwrap_or(0) as u16;
         Some((yarns.iter().map(|row| row.iter().map(color).collect()).collect(), order))
+    }
+
+    /// Which colour each stitch of a knit on a garment has, by columns and rows from a panel's corner, and the yarns in the
+    /// library that the colours are: the fabric's own is the first.
+    pub(super) fn laid(
+        &self,
+        extent: [f32; 2],
+        stitch: [f32; 2],
+        base: usize,
+        context: &Context<'_>,
+        library: &Library,
+    ) -> Option<LaidColors> {
+        let mut map = self.cells(extent, Some(stitch), false, base, context, library)?.into_rows();
+        let mut yarns = vec![base];
+        for cell in &mut map.cells {
+            let color = yarns.iter().position(|y| y == cell).unwrap_or_else(|| {
+                yarns.push(*cell);
+                yarns.len() - 1
+            });
+            *cell = color;
+        }
+        map.ground = 0;
+        let color = move |column: usize, row: usize| map.at(column as f32 + 0.5, row as f32 + 0.5) as u16;
+        Some((Box::new(color), yarns))
     }
 
     /// Gives a fabric its variants and what varies. `coordinates` are asked for only if something depends on them; `dyes`

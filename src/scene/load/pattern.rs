@@ -126,11 +126,8 @@ impl KnitPlan {
         }
         let colors = Colors { rows, work, catch, carry };
         let (most, row) = colors.most_in_a_row();
-        if most > MOST_STRANDED && work == Work::Stranded {
-            warnings.push(format!(
-                "row {} is knitted of {most} yarns, and each floats behind the stitches of the others;                  with `color_work = \"intarsia\"` none does",
-                row + 1
-            ));
+        if work == Work::Stranded {
+            warnings.extend(too_many_strands(&format!("row {}", row + 1), most, "intarsia"));
         }
         Some((Some(colors), yarns))
     }
@@ -287,6 +284,36 @@ pub(super) fn stockinette(table: &Reader<'_>, fabric: &Reader<'_>, context: &Con
     counted(table, Chart::named("stockinette"), form, "stockinette", 20, Vec::new(), sizes)
 }
 
+/// Over how many stitches a float goes before it is caught, if it is, and over how many rows a yarn is carried.
+#[derive(Clone, Copy)]
+pub(super) struct Stranding {
+    pub(super) catch: Option<u32>,
+    pub(super) carry: u32,
+}
+
+fn stranding(table: &Reader<'_>) -> Stranding {
+    let catch = table.u64_or("catch_floats", CATCH_FLOATS, 0..=1_000_000) as u32;
+    let carry = table.u64_or("carry_rows", CARRY_ROWS, 0..=1_000_000) as u32;
+    Stranding { catch: (catch > 0).then_some(catch), carry }
+}
+
+/// How the colours of a knit on a garment are worked; `None` where one yarn changes its colour.
+pub(super) fn work_of_tile(table: &Reader<'_>) -> Option<Stranding> {
+    let stranded = table.one_of_or("color_work", true, &[("stranded", true), ("printed", false)]);
+    let stranding = stranding(table);
+    stranded.then_some(stranding)
+}
+
+/// What is told of a row of so many yarns, if that is more than anyone strands.
+pub(super) fn too_many_strands(row: &str, yarns: usize, instead: &str) -> Option<String> {
+    let told = || {
+        format!(
+            "{row} is knitted of {yarns} yarns, and each floats behind the stitches of the others; with `color_work = \"{instead}\"` none does"
+        )
+    };
+    (yarns > MOST_STRANDED).then(told)
+}
+
 fn counted(
     table: &Reader<'_>,
     chart: Option<Chart>,
@@ -315,11 +342,10 @@ fn counted(
         let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
         table.error_at("color_work", "intarsia is knitted flat", Some(hint));
     }
-    let catch = table.u64_or("catch_floats", CATCH_FLOATS, 0..=1_000_000) as u32;
-    let carry = table.u64_or("carry_rows", CARRY_ROWS, 0..=1_000_000) as u32;
+    let Stranding { catch, carry } = stranding(table);
     // A tile is of one yarn for each row.
     let work = match work.filter(|_| !tile) {
-        Some(work) => ColorWork::Yarns { work, catch: (catch > 0).then_some(catch), carry },
+        Some(work) => ColorWork::Yarns { work, catch, carry },
         None => ColorWork::Printed,
     };
     let (chart, form) = (chart?, form?);

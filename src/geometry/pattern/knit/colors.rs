@@ -126,7 +126,7 @@ impl Colors {
 
     /// The ways of all yarns through a piece of so many rows, each a list of rows and whether it goes from right to left there.
     /// They begin where a colour begins or was cut.
-    pub(super) fn ways(&self, finished: bool, round: bool) -> Vec<Way> {
+    pub(crate) fn ways(&self, finished: bool, round: bool) -> Vec<Way> {
         if self.work == Work::Intarsia {
             return self.ways_of_fields(finished);
         }
@@ -166,23 +166,23 @@ impl Colors {
 
 /// The way of one yarn.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Way {
-    pub(super) color: u16,
-    pub(super) rows: Vec<Stretch>,
+pub(crate) struct Way {
+    pub(crate) color: u16,
+    pub(crate) rows: Vec<Stretch>,
 }
 
 /// A row or a part of it that a yarn goes through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stretch {
-    pub(super) row: i32,
+pub(crate) struct Stretch {
+    pub(crate) row: i32,
     /// Whether it goes from right to left.
-    pub(super) backwards: bool,
+    pub(crate) backwards: bool,
     /// The column where it begins on the left.
-    pub(super) first: u32,
+    pub(crate) first: u32,
 }
 
 /// The colours in a row, each once, in their order.
-fn in_use(row: impl Iterator<Item = u16>) -> Vec<u16> {
+pub(crate) fn in_use(row: impl Iterator<Item = u16>) -> Vec<u16> {
     let mut used: Vec<u16> = row.collect();
     used.sort_unstable();
     used.dedup();
@@ -206,8 +206,10 @@ impl Loops {
                 self.courses.extend(fields(&course, &of));
                 continue;
             }
-            let used = in_use((0..n).map(of));
-            let holds = caught(&course, &of, &used, colors.catch, self.border.round.is_some());
+            let stitches: Vec<u16> = (0..n).map(of).collect();
+            let used = in_use(stitches.iter().copied());
+            let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
+            let holds = caught(&stitches, &is_loop, &used, colors.catch, self.border.round.is_some());
             for (rank, &color) in used.iter().enumerate() {
                 let own = |k: usize| {
                     let (column, visit) = course.visits[k];
@@ -264,23 +266,23 @@ pub(in super::super) enum Hold {
     Catches,
 }
 
-/// After which visits a float is caught: its colour and that of the working yarn.
-fn caught(
-    course: &Course,
-    of: &dyn Fn(usize) -> u16,
+/// After which stitches of a row of some colours a float is caught between two loops of one colour: its colour and that of
+/// the working yarn.
+pub(crate) fn caught(
+    colors: &[u16],
+    is_loop: &dyn Fn(usize) -> bool,
     used: &[u16],
     catch: Option<u32>,
     round: bool,
 ) -> Vec<Option<(u16, u16)>> {
-    let n = course.visits.len();
+    let n = colors.len();
     let mut holds = vec![None; n];
     let Some(longest) = catch.map(|c| c.max(1) as usize) else { return holds };
     if used.len() < 2 {
         return holds;
     }
-    let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
     for &color in used {
-        let own: Vec<usize> = (0..n).filter(|&k| of(k) == color).collect();
+        let own: Vec<usize> = (0..n).filter(|&k| colors[k] == color).collect();
         let mut spans: Vec<(usize, usize)> = own.windows(2).map(|w| (w[0] + 1, w[1])).collect();
         if let (Some(&first), Some(&last)) = (own.first(), own.last()) {
             if round {
@@ -296,11 +298,11 @@ fn caught(
                 // Between two loops of one colour, where nothing else is held.
                 let fits = |k: &usize| {
                     let (a, b) = ((k - 1) % n, k % n);
-                    of(a) == of(b) && is_loop(a) && is_loop(b) && holds[a].is_none()
+                    colors[a] == colors[b] && is_loop(a) && is_loop(b) && holds[a].is_none()
                 };
                 let near = (from + 1..to).filter(fits).min_by_key(|k| (k.abs_diff(ideal), *k));
                 if let Some(k) = near {
-                    holds[(k - 1) % n] = Some((color, of(k % n)));
+                    holds[(k - 1) % n] = Some((color, colors[k % n]));
                 }
             }
         }

@@ -87,10 +87,8 @@ impl FabricPlan {
         let base = Base::new(&keys, context, library)?;
         let made = match source {
             Source::Garment(plan) => {
-                let tension = keys.color.tension();
-                let places = keys.color.needs_places() || detail.uv;
                 let yarn = (keys.kind.name(), base.radius);
-                let (panels, facts) = plan.make(yarn, tension, places, context, library, detail, warnings)?;
+                let (panels, facts) = plan.make(yarn, &keys.color, context, library, detail, warnings)?;
                 garments.push(facts);
                 panels
                     .into_iter()

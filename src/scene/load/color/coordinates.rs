@@ -44,10 +44,14 @@ impl FabricCoordinates {
         (curves.collect(), grid)
     }
 
-    /// That of yarns laid on a garment, by stitches and rows from the corner of each panel; a stitch is so wide and high, mm.
-    pub(in crate::scene::load) fn laid(points: Vec<Vec<[f32; 2]>>, kinds: Vec<StrandKind>, stitch: [f32; 2]) -> Self {
-        let most = |k: usize| points.iter().flatten().map(|c| c[k]).fold(1.0, f32::max).ceil();
-        let extent = [most(0), most(1)];
+    /// That of yarns laid on a garment, by stitches and rows from the corner of each panel, of which the largest has so many;
+    /// a stitch is so wide and high, mm.
+    pub(in crate::scene::load) fn laid(
+        points: Vec<Vec<[f32; 2]>>,
+        kinds: Vec<StrandKind>,
+        extent: [f32; 2],
+        stitch: [f32; 2],
+    ) -> Self {
         Self { points, kinds, extent, stitch: Some(stitch), own: Vec::new() }
     }
 

@@ -43,6 +43,15 @@ impl LaidCells {
         }
     }
 
+    /// The same, when nothing else is wanted.
+    pub(super) fn into_rows(self) -> CellMap {
+        match self.motif {
+            Some(motif) => motif,
+            None if self.by_columns => self.by_column,
+            None => self.by_row,
+        }
+    }
+
     /// The cells that a curve of the fabric runs through.
     pub(super) fn of(&self, curve: usize, coordinates: &FabricCoordinates) -> &CellMap {
         match (&self.motif, coordinates.kinds.get(curve)) {

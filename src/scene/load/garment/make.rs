@@ -10,17 +10,21 @@ use super::{
         Context,
         cloth::Detail,
         color::{ColorPlan, FabricCoordinates},
+        pattern,
         poses::{Frames, Moment, Pose, between},
         sequence::check_moves,
         yarns::Library,
     },
-    GarmentPlan, Rule,
+    GarmentPlan, Pattern, Rule,
 };
 use crate::geometry::{
     curve::{Basis, Curve},
-    garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Report, Tension},
+    garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
     mesh::Mesh,
 };
+
+/// For each rule its colours where each is a yarn of its own, and the yarns in the library that they are.
+type StrandedRules = (Vec<Option<Stranded>>, Vec<Vec<usize>>);
 
 /// What a rule has become: curves of one kind of yarn.
 pub(in crate::scene::load) struct MadePanels {
@@ -50,12 +54,10 @@ impl Rule {
 
 impl GarmentPlan {
     /// Reads the mesh and lays the yarns, unless only facts are wanted.
-    #[expect(clippy::too_many_arguments, reason = "each is needed once, by name")]
     pub(in crate::scene::load) fn make(
         self,
         (yarn, radius): (&str, f64),
-        tension: Option<Tension>,
-        colored: bool,
+        color: &ColorPlan,
         context: &Context<'_>,
         library: &Library,
         detail: &Detail,
@@ -74,18 +76,16 @@ impl GarmentPlan {
             uv_mm: self.uv_unit,
             cloths,
             seam: self.seam,
-            tension,
-            coordinates: colored || self.rules.iter().any(|r| r.color.is_some()),
+            tension: color.tension(),
+            coordinates: color.needs_places() || detail.uv || self.rules.iter().any(|r| r.color.is_some()),
             near: self.near,
         };
         let garment = Garment::new(rest, options).map_err(|error| self.tell(error, context)).ok()?;
         let mut notes = garment.report().notes.clone();
         let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
-        let mut facts = GarmentFacts {
-            weight: weight(&garment.report().yarn_length, &tex),
-            overlap: overlap.map(|o| [o.share, o.deepest]),
-            ..self.facts(garment.report())
-        };
+        let (stranded, own) = self.stranded((yarn, color), (&garment, &sizes), context, library, warnings)?;
+        let mut facts =
+            GarmentFacts { overlap: overlap.map(|o| [o.share, o.deepest]), ..self.facts(&garment, &stranded, &tex) };
         let meshes = self.posed(&frames, &read, context)?;
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
@@ -105,7 +105,7 @@ impl GarmentPlan {
         let bodies = self.bodies(&kept, unit, with_rest, detail, context)?;
         let all: Vec<&GarmentMesh> = meshes.iter().collect();
         let body: Vec<&Mesh> = bodies.iter().collect();
-        let mut laid = match garment.lay(rest, &all, &body, &mut notes) {
+        let mut laid = match garment.lay(rest, &all, &body, &stranded, &mut notes) {
             Ok(laid) => laid,
             Err((_, problem)) => {
                 context.error(self.span, problem, None);
@@ -113,6 +113,7 @@ impl GarmentPlan {
             }
         };
         let names: Vec<String> = garment.report().panels.iter().map(|p| p.group.clone()).collect();
+        let extents: Vec<[f32; 2]> = (0..self.rules.len()).map(|i| extent(&garment, i)).collect();
         drop(garment);
         let at_rest = if with_rest { laid.pop() } else { None };
         debug_assert_eq!(laid.len(), times);
@@ -123,7 +124,7 @@ impl GarmentPlan {
         facts.yarn_length = lengths.iter().sum();
         facts.weight = weight(&lengths, &tex);
         facts.repairs = notes;
-        Some((self.made(first, [later, flow], at_rest, (&sizes, &names)), facts))
+        Some((self.made(first, [later, flow], at_rest, (&sizes, &extents, &names), own), facts))
     }
 
     /// The relaxed tile of each rule, for yarns of `radius` where the rule names none.
@@ -163,17 +164,62 @@ impl GarmentPlan {
         context.error(self.span, error.to_string(), hint);
     }
 
-    /// What is known before yarns are laid; of their weight and overlap nothing.
-    fn facts(&self, report: &Report) -> GarmentFacts {
+    /// For each rule whose colours are yarns of their own where they are, and the yarns in the library; `None` and nothing
+    /// for others. The garment's own `yarn` and colours are those of rules that say none.
+    fn stranded(
+        &self,
+        (yarn, color): (&str, &ColorPlan),
+        (garment, sizes): (&Garment, &[DVec2]),
+        context: &Context<'_>,
+        library: &Library,
+        warnings: &mut Vec<String>,
+    ) -> Option<StrandedRules> {
+        let mut all = Vec::new();
+        let mut own = Vec::new();
+        for (i, rule) in self.rules.iter().enumerate() {
+            let plan = rule.color.as_ref().unwrap_or(color);
+            let name = rule.yarn.as_deref().unwrap_or(yarn);
+            let base = library.yarns.keys().position(|n| n == name);
+            let (Pattern::Knit { stranding: Some(work), .. }, Some(base), false) =
+                (&rule.cloth.pattern, base, plan.is_plain())
+            else {
+                all.push(None);
+                own.push(Vec::new());
+                continue;
+            };
+            let stitch = sizes[i].as_vec2().to_array();
+            let (color, yarns) = plan.laid(extent(garment, i), stitch, base, context, library)?;
+            let stranded = Stranded { color, catch: work.catch, carry: work.carry };
+            let most = garment.floats(i, &stranded).0.most;
+            let row = format!("{}: a row", rule.origin(&self.path));
+            warnings.extend(pattern::too_many_strands(&row, most, "printed"));
+            all.push(Some(stranded));
+            own.push(yarns);
+        }
+        Some((all, own))
+    }
+
+    /// What is known before yarns are laid; of their overlap nothing.
+    fn facts(&self, garment: &Garment, stranded: &[Option<Stranded>], tex: &[Option<f64>]) -> GarmentFacts {
+        let report = garment.report();
+        let mut lengths = report.yarn_length.clone();
+        let mut control_points = report.control_points;
+        for (i, stranded) in stranded.iter().enumerate() {
+            let Some(stranded) = stranded else { continue };
+            let (_, length, points) = garment.floats(i, stranded);
+            lengths[i] += length;
+            control_points += points;
+        }
         GarmentFacts {
             path: self.path.display().to_string(),
             cloth: self.rules[0].cloth.name.clone(),
             panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
             stitches: report.all_stitches(),
-            yarn_length: report.yarn_length.iter().sum(),
-            weight: None,
+            near: self.near,
+            yarn_length: lengths.iter().sum(),
+            weight: weight(&lengths, tex),
             overlap: None,
-            control_points: report.control_points,
+            control_points,
             uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
             stretched: report.stretched,
             uv_mm: report.uv_mm,
@@ -208,35 +254,38 @@ impl GarmentPlan {
     fn not_laid(self, garment: &Garment, sizes: &[DVec2], shown: usize) -> Vec<MadePanels> {
         let mut out = Vec::new();
         for (i, rule) in self.rules.into_iter().enumerate() {
-            let Some(counts) = garment.counts(i) else { continue };
-            // The place of the last stitch says how many there are.
-            let last = counts.map(|n| n as f32 - 0.5);
+            if garment.counts(i).is_none() {
+                continue;
+            }
+            let (extent, stitch) = (extent(garment, i), sizes[i].as_vec2().to_array());
             out.push(MadePanels {
                 origin: rule.origin(&self.path),
                 yarn: rule.yarn,
                 color: rule.color,
                 curves: Vec::new(),
                 panels: Vec::new(),
-                coordinates: FabricCoordinates::laid(vec![vec![last]], garment.kinds(i), sizes[i].as_vec2().to_array()),
+                coordinates: FabricCoordinates::laid(Vec::new(), garment.kinds(i), extent, stitch),
                 motion: FabricMotion { later: vec![Vec::new(); shown - 1], ..FabricMotion::default() },
             });
         }
         out
     }
 
-    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm, and `names` of all panels.
+    /// Yarns as curves, for each rule that has any; `sizes` are those of its stitches, mm, `extents` its columns and rows,
+    /// `own` the yarns of its colours where each is one, and `names` those of all panels.
     fn made(
         self,
         first: Laid,
         [mut later, mut flow]: [Vec<Laid>; 2],
         mut rest: Option<Laid>,
-        (sizes, names): (&[DVec2], &[String]),
+        (sizes, extents, names): (&[DVec2], &[[f32; 2]], &[String]),
+        own: Vec<Vec<usize>>,
     ) -> Vec<MadePanels> {
         let points = |laid: &mut Laid, rule: usize| -> Vec<Vec<DVec3>> {
             std::mem::take(&mut laid[rule]).into_iter().map(|yarn| yarn.points).collect()
         };
         let mut out = Vec::new();
-        for (i, (yarns, rule)) in first.into_iter().zip(self.rules).enumerate() {
+        for (i, ((yarns, rule), own)) in first.into_iter().zip(self.rules).zip(own).enumerate() {
             if yarns.is_empty() {
                 continue;
             }
@@ -254,6 +303,8 @@ impl GarmentPlan {
             }
             let mut kinds = Vec::with_capacity(yarns.len());
             let mut places = Vec::with_capacity(yarns.len());
+            let own: Vec<usize> =
+                if own.is_empty() { own } else { yarns.iter().map(|y| own[usize::from(y.color)]).collect() };
             let curves = yarns
                 .into_iter()
                 .map(|LaidYarn { points, closed, radius, kind, coordinates, .. }| {
@@ -269,7 +320,8 @@ impl GarmentPlan {
                 color: rule.color,
                 curves,
                 panels,
-                coordinates: FabricCoordinates::laid(places, kinds, sizes[i].as_vec2().to_array()),
+                coordinates: FabricCoordinates::laid(places, kinds, extents[i], sizes[i].as_vec2().to_array())
+                    .with_yarns(own),
                 motion,
             });
         }
@@ -317,6 +369,11 @@ impl GarmentPlan {
         }
         Some(out)
     }
+}
+
+/// Columns and rows of the largest panel of a rule.
+fn extent(garment: &Garment, rule: usize) -> [f32; 2] {
+    garment.counts(rule).unwrap_or([1, 1]).map(|n| n as f32)
 }
 
 /// Which poses are laid: one where nothing moves while the shutter is open, and those behind `shown` if anything moves

@@ -11,7 +11,8 @@ use super::{
     cloth::Yarns,
     color::{self, ColorPlan},
     mesh::prim_pattern,
-    pattern, weave,
+    pattern::{self, Stranding},
+    weave,
 };
 use crate::{
     geometry::{
@@ -41,7 +42,7 @@ const LOOSEST: f64 = 30.0;
 /// What repeats, as it is written.
 #[derive(Clone)]
 enum Pattern {
-    Knit { chart: Chart, yarn_per_stitch: Option<f64> },
+    Knit { chart: Chart, yarn_per_stitch: Option<f64>, stranding: Option<Stranding> },
     Weave { draft: Draft, crimp: f64 },
     File(PathBuf),
 }
@@ -199,8 +200,9 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
     let made = match kind {
         Some(0) => {
             let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+            let stranding = pattern::work_of_tile(&table);
             let (name, chart, _) = pattern::chart(&table, context);
-            chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch }))
+            chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, stranding }))
         }
         Some(1) => {
             let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
@@ -214,8 +216,11 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
                 (path.display().to_string(), Pattern::File(path))
             })
         }
-        Some(_) => Chart::named("stockinette")
-            .map(|chart| ("stockinette".to_owned(), Pattern::Knit { chart, yarn_per_stitch: None })),
+        Some(_) => {
+            let stranding = pattern::work_of_tile(&table);
+            let knit = |chart| Pattern::Knit { chart, yarn_per_stitch: None, stranding };
+            Chart::named("stockinette").map(|chart| ("stockinette".to_owned(), knit(chart)))
+        }
         None => None,
     };
     table.finish();
@@ -238,7 +243,7 @@ impl ClothPlan {
             None
         };
         match &self.pattern {
-            Pattern::Knit { chart, yarn_per_stitch } => {
+            Pattern::Knit { chart, yarn_per_stitch, .. } => {
                 let length = yarn_per_stitch
                     .or(stitch.map(|s| (MUNDEN * s.element_product()).sqrt() / d))
                     .unwrap_or(knit::YARN_PER_STITCH);

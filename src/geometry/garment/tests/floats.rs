@@ -1,0 +1,147 @@
+//! Stranded colours: which yarn is where, and what floats behind.
+
+use super::*;
+
+/// Colours of a cloth by column and row, with floats of at most `catch` stitches.
+fn stranded(color: fn(usize, usize) -> u16, catch: Option<u32>) -> Stranded {
+    Stranded { color: Box::new(color), catch, carry: 2 }
+}
+
+fn laid_stranded(mesh: &GarmentMesh, options: Options, stranded: Stranded) -> Vec<LaidYarn> {
+    let garment = Garment::new(mesh, options).unwrap();
+    let yarns = garment.lay(mesh, &[mesh], &[], &[Some(stranded)], &mut Vec::new()).unwrap();
+    yarns.into_iter().flatten().flatten().filter(|y| !(y.closed && y.color == 0)).collect()
+}
+
+/// Three stitches of the one colour and two of the other, a stitch further in each row.
+fn slanting(x: usize, y: usize) -> u16 {
+    u16::from((x + y) % 5 > 2)
+}
+
+/// Fields of twelve stitches.
+fn wide(x: usize, y: usize) -> u16 {
+    u16::from((x / 12 + y / 6) % 2 == 1)
+}
+
+fn three(x: usize, y: usize) -> u16 {
+    ((x / 2 + y) % 3) as u16
+}
+
+fn one(_: usize, _: usize) -> u16 {
+    0
+}
+
+fn middle(p: DVec3) -> bool {
+    (p.truncate() - DVec2::splat(50.0)).abs().max_element() < 36.0
+}
+
+#[test]
+fn each_colour_is_a_yarn_that_knits_its_stitches_and_floats_behind_the_others() {
+    let tile = stockinette();
+    let d = tile.diameter();
+    let yarns = laid_stranded(&square(), options(tile), stranded(slanting, None));
+    assert_eq!(yarns.iter().map(|y| y.color).collect::<Vec<_>>(), [0, 1]);
+    let mut loops = 0;
+    for yarn in &yarns {
+        for (p, [x, y]) in yarn.points.iter().zip(&yarn.coordinates).filter(|(p, _)| middle(**p)) {
+            let share = x.fract();
+            let own = slanting(*x as usize, *y as usize) == yarn.color;
+            // Legs of loops are in front; what passes in the middle of a stitch of another colour is behind all loops.
+            match own {
+                true if p.z > 0.3 * d => loops += 1,
+                false if (0.3..0.7).contains(&share) => assert!(p.z < -1.3 * d, "{p} {x} {y}"),
+                false => assert!(p.z < 0.3 * d, "{p} {x} {y}"),
+                true => {}
+            }
+        }
+    }
+    assert!(loops > 1000, "{loops}");
+}
+
+#[test]
+fn floats_lie_behind_the_cloth_and_cross_where_colours_change() {
+    let plain = within(&laid_stranded(&square(), options(stockinette()), stranded(one, None)), &middle);
+    let rest = run_into_each_other(&plain);
+    eprintln!("plain {rest:?}");
+    let mut wrong = Vec::new();
+    // Measured: 0.11 (0.26), 0.016 (0.26), 0.13 (0.95), 0.16 (0.71) of the yarn, and the deepest in diameters. Each change of
+    // colour is a crossing; where a float is caught the yarns go through each other.
+    for (name, color, catch, most) in [
+        ("two colours", slanting as fn(usize, usize) -> u16, None, [0.12, 0.3]),
+        ("wide fields", wide, None, [0.02, 0.3]),
+        ("caught", wide, Some(5), [0.15, 1.0]),
+        ("three colours", three, None, [0.19, 0.8]),
+    ] {
+        let yarns = within(&laid_stranded(&square(), options(stockinette()), stranded(color, catch)), &middle);
+        let found = run_into_each_other(&yarns);
+        eprintln!("{name}: {found:?}");
+        if found.share > most[0] || found.deepest > most[1] {
+            wrong.push(format!("{name}: {found:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn long_floats_are_caught_by_the_yarn_that_knits() {
+    let tile = stockinette();
+    let d = tile.diameter();
+    let free = laid_stranded(&square(), options(tile.clone()), stranded(wide, None));
+    let caught = laid_stranded(&square(), options(tile), stranded(wide, Some(5)));
+    // The yarn that knits goes behind the float, which lies behind the cloth.
+    let hooks = |yarns: &[LaidYarn]| {
+        let places = yarns.iter().flat_map(|y| y.points.iter().zip(&y.coordinates).map(|(p, at)| (y.color, *p, *at)));
+        let behind = |(color, p, [x, y]): &(u16, DVec3, [f32; 2])| {
+            middle(*p) && wide(*x as usize, *y as usize) == *color && p.z < -2.3 * d
+        };
+        places.filter(behind).count()
+    };
+    assert_eq!(hooks(&free), 0);
+    // Twelve stitches are caught twice, in some 24 rows of 18 stitches.
+    let found = hooks(&caught);
+    assert!((40..300).contains(&found), "{found}");
+}
+
+#[test]
+fn a_colour_is_carried_over_a_few_rows_and_cut_over_more() {
+    fn every(n: usize) -> fn(usize, usize) -> u16 {
+        match n {
+            3 => |x, y| u16::from(y % 3 == 0 && x % 4 == 0),
+            _ => |x, y| u16::from(y % 6 == 0 && x % 4 == 0),
+        }
+    }
+    let count = |n: usize| {
+        let yarns = laid_stranded(&square(), options(stockinette()), stranded(every(n), Some(7)));
+        [0, 1].map(|color| yarns.iter().filter(|y| y.color == color).count())
+    };
+    assert_eq!(count(3), [1, 1]);
+    let [ground, cut] = count(6);
+    assert!(ground == 1 && cut > 4, "{ground} {cut}");
+}
+
+#[test]
+fn a_part_has_the_floats_of_the_whole() {
+    let whole = laid_stranded(&square(), options(stockinette()), stranded(wide, Some(5)));
+    let near = Some((DVec3::new(50.0, 50.0, 0.0), 24.0));
+    let part = laid_stranded(&square(), Options { near, ..options(stockinette()) }, stranded(wide, Some(5)));
+    let middle = |yarns: &[LaidYarn]| -> Vec<DVec3> {
+        let points = yarns.iter().flat_map(|y| y.points.clone());
+        points.filter(|p| p.truncate().distance(DVec2::splat(50.0)) < 14.0).collect()
+    };
+    let (one, other) = (middle(&whole), middle(&part));
+    assert!(one.len() == other.len() && one.len() > 500, "{} {}", one.len(), other.len());
+    assert!(other.iter().all(|p| one.contains(p)));
+}
+
+#[test]
+fn floats_are_counted_before_they_are_laid() {
+    let garment = Garment::new(&square(), options(stockinette())).unwrap();
+    let (floats, length, points) = garment.floats(0, &stranded(three, None));
+    let count = |yarns: &[LaidYarn]| yarns.iter().map(|y| y.points.len()).sum::<usize>();
+    let [plain, colored] = [one as fn(usize, usize) -> u16, three]
+        .map(|color| count(&laid_stranded(&square(), options(stockinette()), stranded(color, None))));
+    // Each stitch has two floats; turns and ends of their own are few.
+    assert!(floats.most == 3 && floats.stitches == 2 * garment.report().all_stitches());
+    assert!((points as f64 / (colored - plain) as f64 - 1.0).abs() < 0.05, "{points} {colored} {plain}");
+    assert!((length / (floats.stitches as f64 * 4.0) - 1.0).abs() < 0.05);
+}
