@@ -15,6 +15,8 @@ pub(super) struct Edge {
     pub(super) margin: f64,
     /// How it is sewn, if it is.
     pub(super) seam: SeamKind,
+    /// Whether it is the first of two that are sewn together.
+    pub(super) first: bool,
 }
 
 /// A place of the panel near a seam that is turned in, or beyond it.
@@ -28,6 +30,8 @@ pub(super) struct NearSeam {
     pub(super) over: f32,
     /// How it is sewn.
     pub(super) kind: SeamKind,
+    /// Whether its edge is the first of the two.
+    pub(super) first: bool,
 }
 
 /// The nearest place of an edge, and how far along it is, from 0 to 1.
@@ -118,6 +122,7 @@ pub(super) fn near_seam(at: DVec2, edges: &[Edge], within: f64, on_panel: bool) 
     let (to, share) = on(&edge.border, at);
     let distance = to.distance(at);
     let over = if on_panel { 0.0 } else { distance as f32 };
-    let found = NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam };
+    let found =
+        NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam, first: edge.first };
     (distance < within).then_some(found)
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{lay::LaidYarn, surface::Pose};
+use super::{fold::Fold, lay::LaidYarn, surface::Pose};
 use crate::geometry::pattern::{StrandKind, tile::chain};
 
 /// How panels are sewn together.
@@ -125,10 +125,10 @@ pub(super) enum Finish {
     /// To and fro between edges that are turned in, a turn each `step`. Places are mm from the seam's plane and out, on the
     /// left side and on the right.
     Mattress { step: f64, radius: f64, hooks: [[f64; 2]; 2] },
-    /// Through both edges that lie against each other, a stitch each `step`.
-    Needle { step: f64, radius: f64, line: [[f64; 2]; 2] },
+    /// Through both edges that lie against each other, a stitch each `step`; places are those of `fold` as it stands upright.
+    Needle { step: f64, radius: f64, line: [[f64; 2]; 2], fold: Fold },
     /// From the needle's line over the edge and back, on the left side or on the right.
-    Looper { step: f64, radius: f64, line: [f64; 2], edge: [f64; 2], side: f64 },
+    Looper { step: f64, radius: f64, line: [f64; 2], edge: [f64; 2], side: f64, fold: Fold },
 }
 
 /// Length of a link as it relaxes, in diameters.
@@ -228,7 +228,7 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
             }
             radius
         }
-        Finish::Needle { radius, line: [left, right], .. } => {
+        Finish::Needle { radius, line: [left, right], fold, .. } => {
             for i in 0..count {
                 // Along the one side, and through to the loopers of the other.
                 for (along, [side, out_of], sign) in [
@@ -239,12 +239,13 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
                     (0.9, left, 1.0),
                     (0.97, left, 0.2),
                 ] {
-                    out.push(rail.place(share(i as f64 + along), sign * side, out_of));
+                    let [aside, out_of] = fold.lay_over([sign * side, out_of], 1.0);
+                    out.push(rail.place(share(i as f64 + along), aside, out_of));
                 }
             }
             radius
         }
-        Finish::Looper { radius, line, edge, side, .. } => {
+        Finish::Looper { radius, line, edge, side, fold, .. } => {
             let middle = [0.5 * (line[0] + edge[0]), 0.5 * (line[1] + edge[1])];
             let (over, back) = ([-0.5 * edge[0], edge[1] - 2.0 * radius], [0.6 * edge[0], edge[1] - 2.0 * radius]);
             // Loops of both sides meet at the edge, one a little before the other.
@@ -260,7 +261,8 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
                     (0.6, edge),
                     (0.78, middle),
                 ] {
-                    out.push(rail.place(share(i as f64 + along + shift), side * off, out_of));
+                    let [aside, out_of] = fold.lay_over([side * off, out_of], 1.0);
+                    out.push(rail.place(share(i as f64 + along + shift), aside, out_of));
                 }
             }
             radius

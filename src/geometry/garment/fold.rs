@@ -3,6 +3,9 @@
 //! Across a seam, s is the distance from it on the cloth (negative for what was left beyond the line, to be turned in),
 //! z the height over the cloth. Both panels do the same on either side of the plane through the line, so that yarns that
 //! stay on their side by their radius do not meet.
+//!
+//! Over a body seams are pressed flat: edges that are joined below are laid to one side, others apart, each under its own
+//! panel.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -27,6 +30,8 @@ pub(super) struct Fold {
     least: f64,
     /// How far the cloth's wrong side and its right side are from its middle, mm.
     sides: [f64; 2],
+    /// Whether what is turned in is laid to one side.
+    laid_over: bool,
 }
 
 /// A place on the way: the angle by which the cloth is turned there, how far the bend has moved down, and what is straight
@@ -39,18 +44,20 @@ struct Turned {
 
 impl Fold {
     /// Of cloth whose yarns' middles lie between two heights, of yarn of a diameter; `None` where cloth stays flat.
-    pub(super) fn new(kind: SeamKind, [low, high]: [f64; 2], diameter: f64) -> Option<Self> {
+    pub(super) fn new(kind: SeamKind, [low, high]: [f64; 2], diameter: f64, pressed: bool) -> Option<Self> {
         let (wall, flare) = match kind {
             SeamKind::None => return None,
+            SeamKind::Mattress if pressed => (0.0, FRAC_PI_2),
             // Where the edges part the sewing yarn has room between them. Before, somewhere on the wall, loops of both sides
             // touch.
             SeamKind::Mattress => (1.8 * diameter, 50_f64.to_radians()),
             SeamKind::Overlock => (f64::INFINITY, 0.0),
         };
+        let laid_over = pressed && kind == SeamKind::Overlock;
         let radius = 0.9 * diameter - low;
         let sides = [0.5 * diameter - low, 0.5 * diameter + high];
         let half = high + 0.51 * diameter;
-        Some(Self { radius, half, wall, flare, neutral: radius + 0.5 * low, least: 0.3 * diameter, sides })
+        Some(Self { radius, half, wall, flare, neutral: radius + 0.5 * low, least: 0.3 * diameter, sides, laid_over })
     }
 
     /// The distance from the seam at which the bend begins, mm.
@@ -73,12 +80,40 @@ impl Fold {
         Turned { angle: FRAC_PI_2 + turned, down: after.min(self.wall), straight: parted - turned * self.neutral }
     }
 
-    /// Where a place of the cloth comes to lie: distance from the seam's plane and height, mm.
-    pub(super) fn bend(&self, s: f64, z: f64) -> [f64; 2] {
+    /// Where a place of the cloth comes to lie: distance from the seam's plane and height, mm. `side` is 1 on the side to
+    /// which edges are laid and -1 on the other.
+    pub(super) fn bend(&self, s: f64, z: f64, side: f64) -> [f64; 2] {
         if s >= self.begin() {
             return [s, z];
         }
-        self.off(s, z.max(self.least - self.radius))
+        let at = self.off(s, z.max(self.least - self.radius));
+        if s < self.upright() { self.lay_over(at, side) } else { at }
+    }
+
+    /// Where a place below the bends comes to lie if edges are laid to one side: all of it turns about an axis under the
+    /// first bend of that side.
+    pub(super) fn lay_over(&self, [aside, out]: [f64; 2], side: f64) -> [f64; 2] {
+        let deep = -self.radius - out;
+        if !self.laid_over || deep <= 0.0 {
+            return [aside, out];
+        }
+        // Layers keep their distances; the seam's plane keeps its length.
+        let middle = self.begin();
+        let from_axis = middle - aside * side;
+        let angle = (deep / middle).min(FRAC_PI_2);
+        let straight = (deep - middle * FRAC_PI_2).max(0.0);
+        let (sin, cos) = angle.sin_cos();
+        [side * (middle - from_axis * cos + straight), -self.radius - from_axis * sin]
+    }
+
+    /// How far below the cloth's middle all of it reaches where so much is turned in, mm.
+    pub(super) fn depth(&self, over: f64) -> f64 {
+        let upright = self.off(-over, self.sides[1])[1].min(self.off(-over, -self.sides[0])[1]);
+        let lowest = match self.laid_over {
+            true => self.lay_over([-self.half - self.sides[0], upright], 1.0)[1],
+            false => (0..32).map(|i| self.off(-over * f64::from(i) / 31.0, self.sides[1])[1]).fold(upright, f64::min),
+        };
+        -lowest
     }
 
     /// What lies so far before the right side of what is turned in, at a distance on the cloth.
@@ -106,23 +141,52 @@ mod tests {
     #[test]
     fn cloth_goes_on_evenly_and_stays_on_its_side() {
         for kind in [SeamKind::Mattress, SeamKind::Overlock] {
-            let fold = Fold::new(kind, [-0.8, 0.7], 1.0).unwrap();
-            assert_eq!(fold.bend(fold.begin(), 0.3), [fold.begin(), 0.3]);
-            let [s, z] = fold.bend(fold.upright(), 0.0);
+            let fold = Fold::new(kind, [-0.8, 0.7], 1.0, false).unwrap();
+            assert_eq!(fold.bend(fold.begin(), 0.3, 1.0), [fold.begin(), 0.3]);
+            let [s, z] = fold.bend(fold.upright(), 0.0, 1.0);
             assert!((s - fold.half).abs() < 1e-9 && (z + fold.radius).abs() < 1e-9);
-            let mut before = fold.bend(6.0, 0.0);
+            let mut before = fold.bend(6.0, 0.0, 1.0);
             for i in 1..900 {
-                let here = fold.bend(6.0 - 0.01 * f64::from(i), 0.0);
+                let here = fold.bend(6.0 - 0.01 * f64::from(i), 0.0, 1.0);
                 let step = (here[0] - before[0]).hypot(here[1] - before[1]);
                 // Outside of the neutral line cloth is drawn out.
                 assert!((0.0099..0.0135).contains(&step), "{i}: {step}");
                 before = here;
             }
             // Right sides face each other and do not meet, and what is turned in lies under the cloth.
-            let across = |s: f64| fold.bend(s, 0.7)[0] - 0.5;
+            let across = |s: f64| fold.bend(s, 0.7, 1.0)[0] - 0.5;
             assert!((0..600).map(|i| across(3.0 - 0.01 * f64::from(i))).all(|gap| gap > 0.0));
-            assert!(fold.bend(-2.0, 0.0)[1] < -2.0);
+            assert!(fold.bend(-2.0, 0.0, 1.0)[1] < -2.0);
         }
-        assert_eq!(Fold::new(SeamKind::None, [-0.8, 0.7], 1.0), None);
+        assert_eq!(Fold::new(SeamKind::None, [-0.8, 0.7], 1.0, false), None);
+    }
+
+    #[test]
+    fn what_is_pressed_lies_flat_and_keeps_its_layers_apart() {
+        for kind in [SeamKind::Mattress, SeamKind::Overlock] {
+            let fold = Fold::new(kind, [-0.8, 0.7], 1.0, true).unwrap();
+            let upright = Fold::new(kind, [-0.8, 0.7], 1.0, false).unwrap();
+            // However much is turned in, it goes no deeper.
+            assert!(fold.depth(30.0) < 8.0 && (fold.depth(30.0) - fold.depth(60.0)).abs() < 1e-9, "{kind:?}");
+            assert!(upright.depth(30.0) > 20.0);
+            let places = |side: f64| (0..1500).map(move |i| (side, 3.0 - 0.01 * f64::from(i)));
+            let at = |side: f64, s: f64, z: f64| {
+                let [aside, out] = fold.bend(s, z, side);
+                [side * aside, out]
+            };
+            let mut nearest = f64::MAX;
+            for (_, s) in places(1.0).filter(|(_, s)| *s < 0.0) {
+                for (_, t) in places(-1.0).filter(|(_, t)| *t < 0.0) {
+                    let ([a, b], [c, d]) = (at(1.0, s, 0.0), at(-1.0, t, 0.0));
+                    nearest = nearest.min((a - c).hypot(b - d));
+                }
+            }
+            // Middles of both stay apart by two half thicknesses of their right sides, and under the cloth.
+            assert!(nearest > 2.0 * 0.7 + 1.0, "{kind:?}: {nearest}");
+            let lowest = places(1.0).map(|(side, s)| at(side, s, -0.8)[1]).fold(f64::MAX, f64::min);
+            assert!(lowest > -fold.depth(12.0) - 1e-9, "{kind:?}: {lowest}");
+            let [aside, out] = at(1.0, -9.0, -0.8);
+            assert!(aside > 4.0 && out < -0.8 - 1.0, "{kind:?}: {aside} {out}");
+        }
     }
 }

@@ -34,6 +34,8 @@ pub(super) struct Division<'a> {
     pub(super) sewn: [[DVec2; 2]; SeamKind::COUNT],
     /// The seam at each edge of the border.
     pub(super) seams: &'a [SeamKind],
+    /// Whether a panel that is sewn to itself goes round without a seam: knits do, of a weave no loom makes such a panel.
+    pub(super) round: bool,
     /// Within this distance of a seam cloth is bent, mm.
     pub(super) bent: f64,
 }
@@ -73,16 +75,21 @@ impl Lattice {
         lays: &(impl Fn(Anchor) -> bool + Sync),
     ) -> Self {
         let finder = Finder::new(surface, panel);
-        let around = closing(panel, border);
-        let edge = |(border, seam): (&BorderEdge, &SeamKind)| {
+        let around = closing(panel, border).filter(|_| division.round);
+        let edge = |(i, (border, seam)): (usize, (&BorderEdge, &SeamKind))| {
             let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
             let sides = if border.sewn_to.is_none() { [division.free; 2] } else { division.sewn[*seam as usize] };
             // The cloth is to the left of its edges.
             let [x, y] = [sides[usize::from(d.y > 0.0)].x, sides[usize::from(d.x < 0.0)].y];
-            Edge { border: *border, margin: d.y.abs() * x + d.x.abs() * y, seam: *seam }
+            Edge {
+                border: *border,
+                margin: d.y.abs() * x + d.x.abs() * y,
+                seam: *seam,
+                first: border.is_first(panel, i),
+            }
         };
         // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
-        let all = border.iter().zip(division.seams).map(edge);
+        let all = border.iter().zip(division.seams).enumerate().map(edge);
         let edges: Vec<Edge> = all.filter(|e| around.is_none() || !is_side(&e.border)).collect();
         let mut low = border.iter().flat_map(|e| e.ends).fold(DVec2::INFINITY, DVec2::min);
         let mut high = border.iter().flat_map(|e| e.ends).fold(DVec2::NEG_INFINITY, DVec2::max);

@@ -80,6 +80,8 @@ pub(crate) struct Options {
     pub tension: Option<Tension>,
     /// Whether yarns know their stitches.
     pub coordinates: bool,
+    /// Whether seams are pressed flat, as over a body.
+    pub pressed: bool,
     /// Only stitches so near to a place of the first frame are laid, mm; all if absent.
     pub near: Option<(DVec3, f64)>,
 }
@@ -124,6 +126,8 @@ pub(crate) struct Garment {
     shapes: Vec<Shapes>,
     sewing: Sewing,
     edgings: Vec<Edging>,
+    /// How far the fine points of the surface are kept from a body, mm, if not all by the same.
+    clearances: Vec<f32>,
     options: Options,
     report: Report,
 }
@@ -221,7 +225,9 @@ impl Garment {
             notes,
             bounds: (low, high),
         };
-        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, options, report })
+        let clearances =
+            if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
+        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, clearances, options, report })
     }
 
     /// What is known of it.
@@ -278,15 +284,17 @@ impl Garment {
             poses.push(self.surface.pose(&self.panels.points(frame, self.options.unit_mm)));
         }
         let stranded = |cloth: usize| stranded.get(cloth).and_then(Option::as_ref);
-        let behind = |(cloth, shapes): (usize, &Shapes)| {
-            let floats = stranded(cloth).map_or(0.0, |_| Lanes::reach(shapes));
-            floats.max(2.2 * shapes.diameter)
-        };
-        let clearance = self.shapes.iter().enumerate().map(behind).fold(0.0, f64::max);
-        let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, 4.0 * clearance)).collect();
+        let behind = |(cloth, shapes): (usize, &Shapes)| stranded(cloth).map_or(0.0, |_| Lanes::reach(shapes));
+        let least = self.shapes.iter().enumerate().map(behind).fold(clearance(&self.shapes), f64::max);
+        let of_point = |i: usize| self.clearances.get(i).map_or(least, |c| least.max(f64::from(*c)));
+        let most = self.clearances.iter().map(|c| f64::from(*c)).fold(4.0 * least, f64::max);
+        let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, most)).collect();
         let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
         for (i, pose) in poses.iter_mut().enumerate() {
-            let pushed = bodies.get(i).map_or(0, |body| pose.push_out(body, clearance));
+            let pushed = bodies.get(i).map_or(0, |body| pose.push_out(body, &of_point));
+            if pushed > 0 {
+                self.surface.turn_normals(pose);
+            }
             if pushed > 0 && i == 0 {
                 notes.push(format!("{pushed} points of the cloth were moved out of the body or off its skin"));
             }
@@ -320,6 +328,11 @@ impl Garment {
         }
         Ok(laid)
     }
+}
+
+/// How far cloth is kept from a body, mm.
+fn clearance(shapes: &[Shapes]) -> f64 {
+    shapes.iter().map(|s| 2.2 * s.diameter).fold(0.0, f64::max)
 }
 
 /// The cloth of each panel.

@@ -1,6 +1,9 @@
 //! What is at the borders of panels: how much cloth is left out or turned in, and which yarns run along.
 
-use glam::DVec2;
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3, IVec3};
+use rayon::prelude::*;
 
 use super::{
     Options,
@@ -20,6 +23,8 @@ const MOST_TAKEN: f64 = 6.0;
 const THREAD: f64 = 0.1;
 /// Length of its stitches, mm.
 const STEP: f64 = 2.5;
+/// Over a body cloth comes down from a seam within so many times its height.
+const SLOPE: f64 = 3.0;
 
 /// One cloth at borders.
 struct Trim {
@@ -43,7 +48,7 @@ pub(super) struct Sewing {
 }
 
 impl Trim {
-    fn new(stitch: DVec2, repeat: [u32; 2], knitted: bool, shapes: &Shapes) -> Self {
+    fn new(stitch: DVec2, repeat: [u32; 2], knitted: bool, shapes: &Shapes, pressed: bool) -> Self {
         let d = shapes.diameter;
         let mut free = DVec2::ZERO;
         for axis in 0..2 {
@@ -53,7 +58,7 @@ impl Trim {
             let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
             free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
         }
-        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d));
+        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, pressed));
         // Edges that only meet: as far as yarns reach, and half a yarn.
         let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
         let meets = |beyond: DVec2| match knitted {
@@ -84,7 +89,7 @@ impl Sewing {
     pub(super) fn new(options: &Options, shapes: &[Shapes], borders: &[Vec<BorderEdge>], cloth: &[usize]) -> Self {
         let trim = |(cloth, shapes): (&super::Cloth, &Shapes)| {
             let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
-            Trim::new(cloth.tile.stitch(), cloth.tile.counts, knitted, shapes)
+            Trim::new(cloth.tile.stitch(), cloth.tile.counts, knitted, shapes, options.pressed)
         };
         let kind = |panel: usize, edge: &BorderEdge| {
             let other = edge.sewn_to.map_or(cloth[panel], |(other, _)| cloth[other as usize]);
@@ -104,6 +109,41 @@ impl Sewing {
         &self.trims[cloth].folds
     }
 
+    /// How far each fine point of the sewn mesh is kept from a body's skin, mm: no less than `least`, and by seams as much as
+    /// what is turned in takes. Empty where that is nowhere more.
+    pub(super) fn clearances(&self, pose: &Pose, borders: &[Vec<BorderEdge>], least: f64) -> Vec<f32> {
+        let mut seams: Vec<(DVec3, f64, f64)> = Vec::new();
+        for (panel, (border, kinds)) in borders.iter().zip(&self.seams).enumerate() {
+            let trim = &self.trims[self.cloth[panel]];
+            for (edge, kind) in border.iter().zip(kinds) {
+                let Some(fold) = trim.folds[*kind as usize].filter(|_| edge.sewn_to.is_some()) else { continue };
+                let over = -trim.sewn[*kind as usize][0].min_element();
+                let depth = fold.depth(over) + 1.4 * trim.diameter;
+                seams.extend(edge.vertices.map(|v| (pose.vertex(v).0, depth, over + fold.begin())));
+            }
+        }
+        let widest = seams.iter().map(|s| s.2 + SLOPE * s.1).fold(0.0, f64::max);
+        if widest <= 0.0 {
+            return Vec::new();
+        }
+        let cell = |p: DVec3| (p / widest).floor().as_ivec3();
+        let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
+        for (i, seam) in seams.iter().enumerate() {
+            cells.entry(cell(seam.0).to_array()).or_default().push(i);
+        }
+        let of = |p: &DVec3| {
+            let around = (0..27).map(|k| cell(*p) + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
+            let near = around.filter_map(|c| cells.get(&c.to_array())).flatten();
+            let wanted = near.map(|&i| {
+                let (at, depth, wide) = seams[i];
+                let t = ((p.distance(at) - wide) / (SLOPE * depth)).clamp(0.0, 1.0);
+                depth + (least - depth) * (t * t * (3.0 - 2.0 * t))
+            });
+            wanted.fold(least, f64::max) as f32
+        };
+        pose.points().par_iter().with_min_len(1024).map(of).collect()
+    }
+
     /// How a panel is divided for its cloth.
     pub(super) fn division(&self, panel: usize) -> Division<'_> {
         let trim = &self.trims[self.cloth[panel]];
@@ -114,6 +154,7 @@ impl Sewing {
             free: trim.free,
             sewn: trim.sewn,
             seams: &self.seams[panel],
+            round: trim.knitted,
             bent: begin + 2.0 * trim.stitch.max_element()
                 - trim.sewn.iter().map(|s| s[0].min_element()).fold(0.0, f64::min),
         }
@@ -128,10 +169,12 @@ impl Sewing {
                 match edge.sewn_to {
                     None => free.push((edge.vertices, panel as u32, None)),
                     // Each seam once; what is knitted in the round has none.
-                    Some((other, mate)) => {
-                        let first = (panel as u32, i as u32) < (other, mate);
+                    Some((other, _)) => {
                         let kind = self.seams[panel][i];
-                        if first && kind != SeamKind::None && !(other == panel as u32 && lattices[panel].ring) {
+                        if edge.is_first(panel as u32, i)
+                            && kind != SeamKind::None
+                            && !(other == panel as u32 && lattices[panel].ring)
+                        {
                             sewn.push((edge.vertices, panel as u32, Some(other)));
                         }
                     }
@@ -193,6 +236,7 @@ impl Sewing {
                 out.push(Edging::new(way, finish, cloth, first));
             }
             SeamKind::Overlock => {
+                let Some(own_fold) = fold(own) else { return };
                 let radius = THREAD.clamp(0.15 * d, 0.35 * d);
                 let step = STEP.max(12.0 * radius);
                 let line = |(trim, over): (&Trim, f64)| {
@@ -205,9 +249,10 @@ impl Sewing {
                 let (line, edge) = (sides.map(line), sides.map(edge));
                 // Both edges are as deep as the deeper one.
                 let depth = edge[0][1].min(edge[1][1]);
-                out.push(Edging::new(way.clone(), Finish::Needle { step, radius, line }, cloth, first));
+                out.push(Edging::new(way.clone(), Finish::Needle { step, radius, line, fold: own_fold }, cloth, first));
                 for (k, side) in [(0, 1.0), (1, -1.0)] {
-                    let finish = Finish::Looper { step, radius, line: line[k], edge: [edge[k][0], depth], side };
+                    let finish =
+                        Finish::Looper { step, radius, line: line[k], edge: [edge[k][0], depth], side, fold: own_fold };
                     out.push(Edging::new(way.clone(), finish, cloth, first));
                 }
             }

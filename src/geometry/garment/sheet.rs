@@ -15,11 +15,20 @@ use super::{
 /// What a corner near a seam knows of it.
 #[derive(Clone, Copy, Debug)]
 struct Hem {
+    /// The place of the seam that is nearest, mm.
+    on: Vec3,
     /// Unit vector on the cloth from the seam.
     inward: Vec3,
-    /// Distance from the seam, negative beyond it, mm.
-    distance: f32,
     kind: SeamKind,
+    /// Whether what is laid to one side comes to lie under this one.
+    first: bool,
+}
+
+impl Hem {
+    /// Distance of a place from the seam, negative beyond it, mm.
+    fn distance(&self, at: Vec3) -> f32 {
+        (at - self.on).dot(self.inward)
+    }
 }
 
 /// The corners of a panel's stitches in one frame.
@@ -66,11 +75,10 @@ impl<'a> Sheet<'a> {
         let [a, b]: [DVec3; 2] = near.vertices.map(|v| pose.vertex(v).0);
         let (on, along) = (single(a.lerp(b, f64::from(near.share))), single(b - a));
         let inward = self.normals[i].cross(along).normalize_or(Vec3::X);
-        let distance = if near.over > 0.0 { -near.over } else { (self.points[i] - on).dot(inward) };
         if near.over > 0.0 {
             self.points[i] = on - inward * near.over;
         }
-        self.hems[i] = Some(Hem { inward, distance, kind: near.kind });
+        self.hems[i] = Some(Hem { on, inward, kind: near.kind, first: near.first });
     }
 
     /// Goes on straight by one more corner on all sides.
@@ -97,9 +105,7 @@ impl<'a> Sheet<'a> {
                     };
                     best = (best.0 + weight, best.1 + weight * at, best.2 + weight * self.normals[a]);
                     if let Some(own) = self.hem(a).filter(|_| hem.is_none_or(|(most, _)| weight > most)) {
-                        let before =
-                            known(2 * dx, 2 * dy).and_then(|b| self.hem(b)).map_or(own.distance, |h| h.distance);
-                        hem = Some((weight, Hem { distance: 2.0 * own.distance - before, ..own }));
+                        hem = Some((weight, own));
                     }
                 }
                 (best.0 > 0.0).then(|| (i, best.1 / best.0, best.2.normalize_or(Vec3::Y), hem.map(|h| h.1)))
@@ -119,8 +125,8 @@ impl<'a> Sheet<'a> {
 
     /// Whether a corner is by a seam that is turned in.
     pub(super) fn is_turned_in(&self, x: usize, y: usize) -> bool {
-        let found = self.corner(x as isize, y as isize).and_then(|i| self.hem(i));
-        found.is_some_and(|hem| hem.distance < 0.0)
+        let found = self.corner(x as isize, y as isize).and_then(|i| Some((self.points[i], self.hem(i)?)));
+        found.is_some_and(|(at, hem)| hem.distance(at) < 0.0)
     }
 
     /// The place in stitches across, rows up and mm out: where cloth is turned in it goes round with it.
@@ -130,22 +136,23 @@ impl<'a> Sheet<'a> {
         if self.hems.is_empty() {
             return at + normal * p.z;
         }
-        self.folded(p).map_or(at + normal * p.z, |(inward, [aside, out])| at + inward * aside + normal * out)
+        self.folded(p, at).map_or(at + normal * p.z, |(inward, [aside, out])| at + inward * aside + normal * out)
     }
 
-    /// By how much a place is moved from the seam and lies over the flat cloth, if it is near a seam.
-    fn folded(&self, p: Vec3) -> Option<(Vec3, [f32; 2])> {
+    /// By how much a place, which is at `at` on the flat cloth, is moved from the seam and lies over it, if it is near a seam.
+    fn folded(&self, p: Vec3, at: Vec3) -> Option<(Vec3, [f32; 2])> {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (u, v) = (p.x - i, p.y - j);
-        let (mut inward, mut distance, mut most) = (Vec3::ZERO, 0.0, (0.0, SeamKind::None));
+        let (mut inward, mut distance, mut most) = (Vec3::ZERO, 0.0, (0.0, SeamKind::None, false));
         for (dx, dy, share) in corner_shares(u, v) {
             let hem = self.hem(self.corner(i as isize + dx, j as isize + dy)?)?;
             inward += share * hem.inward;
-            distance += share * hem.distance;
-            most = if share > most.0 { (share, hem.kind) } else { most };
+            distance += share * hem.distance(at);
+            most = if share > most.0 { (share, hem.kind, hem.first) } else { most };
         }
         let fold = self.folds[most.1 as usize].as_ref()?;
-        let [s, out] = fold.bend(f64::from(distance), f64::from(p.z));
+        let side = if most.2 { 1.0 } else { -1.0 };
+        let [s, out] = fold.bend(f64::from(distance), f64::from(p.z), side);
         Some((inward, [s as f32 - distance, out as f32]))
     }
 

@@ -48,16 +48,21 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// Moves points out of a body, so far from its skin; gives their number.
-    pub(super) fn push_out(&mut self, body: &Body, clearance: f64) -> usize {
-        let push = |p: &mut DVec3| match body.push_out(*p, clearance) {
+    /// Moves points out of a body, each so far from its skin; gives their number.
+    pub(super) fn push_out(&mut self, body: &Body, clearance: &(impl Fn(usize) -> f64 + Sync)) -> usize {
+        let push = |(i, p): (usize, &mut DVec3)| match body.push_out(*p, clearance(i)) {
             Some(out) => {
                 *p = out;
                 1
             }
             None => 0,
         };
-        self.points.par_iter_mut().with_min_len(1024).map(push).sum()
+        self.points.par_iter_mut().enumerate().with_min_len(1024).map(push).sum()
+    }
+
+    /// All fine points of the sewn mesh.
+    pub(super) fn points(&self) -> &[DVec3] {
+        &self.points
     }
 
     /// Position and normal of a fine point of the sewn mesh.
@@ -75,6 +80,13 @@ pub(super) struct BorderEdge {
     pub(super) vertices: [u32; 2],
     /// The panel that is sewn to it, and that panel's edge; itself where it is free.
     pub(super) sewn_to: Option<(u32, u32)>,
+}
+
+impl BorderEdge {
+    /// Whether it, which is edge `i` of a panel, is the first of two that are sewn together.
+    pub(super) fn is_first(&self, panel: u32, i: usize) -> bool {
+        self.sewn_to.is_some_and(|mate| (panel, i as u32) < mate)
+    }
 }
 
 /// A border that turns by more than 35 degrees has a corner there.
@@ -114,6 +126,11 @@ impl Surface {
         let points = finest.limit(&values);
         let normals = normals(&finest.faces, &points);
         Pose { points, normals }
+    }
+
+    /// Turns the normals of a pose after its points.
+    pub(super) fn turn_normals(&self, pose: &mut Pose) {
+        pose.normals = normals(&self.sewn[self.sewn.len() - 1].faces, &pose.points);
     }
 
     /// The fine faces of a panel.

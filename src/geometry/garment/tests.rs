@@ -33,6 +33,7 @@ fn options(tile: Tile) -> Options {
         seam: SeamKind::Mattress,
         tension: None,
         coordinates: true,
+        pressed: false,
         near: None,
     }
 }
@@ -170,28 +171,47 @@ fn rows_are_few_yarns_and_long() {
     assert!(longest as u64 >= 12 * report.all_stitches());
 }
 
-#[test]
-fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
+/// A tube of 240 mm around.
+fn tube() -> GarmentMesh {
     let mut text = String::new();
-    let radius = 240.0 / std::f64::consts::TAU;
     let at = |u: f64, v: f64| {
-        let (sin, cos) = (u.rem_euclid(240.0) / radius).sin_cos();
-        DVec3::new(radius * sin, v, radius * cos)
+        let (sin, cos) = (u.rem_euclid(240.0) / TUBE).sin_cos();
+        DVec3::new(TUBE * sin, v, TUBE * cos)
     };
     sheet(&mut text, "tube", 24, 6, 10.0, 0.0, &at);
-    let mesh = GarmentMesh::parse(&text).unwrap();
-    let (report, yarns) = laid(&mesh, options(stockinette()));
+    GarmentMesh::parse(&text).unwrap()
+}
+
+const TUBE: f64 = 240.0 / std::f64::consts::TAU;
+
+#[test]
+fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
+    let (report, yarns) = laid(&tube(), options(stockinette()));
     let rounds: Vec<&LaidYarn> = yarns.iter().filter(|y| y.closed).collect();
     assert!(rounds.len() > 15, "{} of {}", rounds.len(), yarns.len());
     assert_eq!(report.all_stitches() % 60, 0, "{}", report.all_stitches());
     // On the round surface, not on its chords.
     for yarn in &rounds {
         for p in &yarn.points {
-            let off = (p.x.hypot(p.z) - radius).abs();
+            let off = (p.x.hypot(p.z) - TUBE).abs();
             assert!(off < 2.2, "{p}: {off}");
         }
     }
     assert!(overlapping(&yarns) < 0.12);
+}
+
+#[test]
+fn a_woven_tube_is_sewn() {
+    let sewn = Options { seam: SeamKind::Overlock, ..options(woven()) };
+    let (_, yarns) = laid(&tube(), sewn);
+    let wefts: Vec<&LaidYarn> = yarns.iter().filter(|y| y.kind == StrandKind::Weft).collect();
+    // Each pick is a thread of its own, cut where it is turned in.
+    assert!(wefts.len() > 18 && wefts.iter().all(|y| !y.closed), "{}", wefts.len());
+    let inwards = |y: &&&LaidYarn| y.points.iter().any(|p| p.x.hypot(p.z) < TUBE - 2.0);
+    assert_eq!(wefts.iter().filter(inwards).count(), wefts.len());
+    // A needle's thread and two loopers', from edge to edge.
+    let threads = yarns.iter().filter(|y| y.radius < 0.2 && !y.closed).collect::<Vec<_>>();
+    assert_eq!(threads.len(), 3);
 }
 
 #[test]

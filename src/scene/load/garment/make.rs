@@ -78,6 +78,7 @@ impl GarmentPlan {
             seam: self.seam,
             tension: color.tension(),
             coordinates: color.needs_places() || detail.uv || self.rules.iter().any(|r| r.color.is_some()),
+            pressed: self.body.is_some(),
             near: self.near,
         };
         let garment = Garment::new(rest, options).map_err(|error| self.tell(error, context)).ok()?;
