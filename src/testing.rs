@@ -4,7 +4,7 @@ use std::{io::Write as _, path::PathBuf};
 
 use crate::geometry::pattern::{
     chart::Chart,
-    knit::{Edges, Form, Knit},
+    knit::{Edges, Form, Knit, Rims},
     tile::Tile,
 };
 
@@ -19,6 +19,7 @@ pub(crate) fn stockinette() -> Tile {
         row_height: Some(3.0 / 1.2),
         yarn_per_stitch: Some(13.9),
         edges: Edges::Live,
+        rims: Rims::default(),
         points: 24,
         colors: None,
     };

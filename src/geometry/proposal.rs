@@ -131,6 +131,7 @@ mod tests {
             stitch_width: None,
             row_height: None,
             edges: knit::Edges::Live,
+            rims: knit::Rims::default(),
             yarn_per_stitch: None,
             points: knit::POINTS,
             colors: None,

@@ -9,7 +9,7 @@ use crate::{
     geometry::pattern::{
         MAX_POINTS,
         chart::{Chart, PATTERNS},
-        knit::{self, Edges, Form, Knit, Knitted, Misfit, Sizes},
+        knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes},
     },
 };
 
@@ -50,8 +50,14 @@ pub(super) struct KnitArgs {
     /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
     #[arg(long, default_value = "finished", value_parser = ["finished", "slipped", "live"])]
     edges: String,
+    /// How a finished piece is cast on: with twisted loops, or as a rope.
+    #[arg(long, default_value = "long-tail", value_parser = ["long-tail", "cable"])]
+    cast_on: String,
+    /// How its top is closed; `drawn` together, the yarn through all loops, is for what is knitted round.
+    #[arg(long, default_value = "bound-off", value_parser = ["bound-off", "drawn"])]
+    top: String,
     /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
-    #[arg(long, conflicts_with_all = ["edges", "form", "profile"])]
+    #[arg(long, conflicts_with_all = ["edges", "form", "profile", "cast_on", "top"])]
     tile: bool,
     /// Control points of a stitch.
     #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
@@ -123,10 +129,17 @@ impl KnitArgs {
                 "slipped" => Edges::Slipped,
                 _ => Edges::Finished,
             },
+            rims: Rims {
+                cast_on: if self.cast_on == "cable" { CastOn::Cable } else { CastOn::LongTail },
+                top: if self.top == "drawn" { Closing::Drawn } else { Closing::BoundOff },
+            },
             yarn_per_stitch: self.yarn_per_stitch,
             points: self.points,
             colors: None,
         };
+        if piece.edges == Edges::Live && piece.rims != Rims::default() {
+            return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
+        }
         let piece = self.sized(&piece, 2.0 * radius)?;
         if piece.form != Form::Flat && piece.stitches < 3 {
             return Err(wrong(&"knitting in the round takes at least 3 stitches"));

@@ -16,6 +16,8 @@
 //! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
 //! | `t3f`, `t3b` | the same with purl stitches behind |
 //! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
+//! | `-`, `-4` | stitches that stay on the needle: a short row turns beside them, and the next row begins there |
+//! | `ds` | a double stitch: slipped with the yarn pulled over the needle; the first plain stitch after such a turn is one by itself |
 //! | `mb`, `bobble` | five loops out of one stitch (`k yo k yo k`), turn, five purled, turn, all of them knitted together |
 //!
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
@@ -81,13 +83,15 @@ pub enum Step {
     },
     /// Five loops out of one stitch, five more on the way back, and one through all of them.
     Bobble,
+    /// A stitch that stays on the needle: the yarn turns before it comes to it.
+    Unworked,
 }
 
 impl Step {
     /// Stitches of the row below that it takes, and stitches that it makes.
     pub fn takes_and_makes(self) -> (u32, u32) {
         match self {
-            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble => (1, 1),
+            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble | Self::Unworked => (1, 1),
             Self::Together { take, .. } => (take.into(), 1),
             Self::FrontBack => (1, 2),
             Self::YarnOver | Self::MakeOne { .. } => (0, 1),
@@ -117,6 +121,10 @@ pub enum Act {
     },
     /// A bobble grows out of the stitch below; one loop is left of it.
     Bobble,
+    /// The stitch below stays as it is, and no yarn comes there.
+    Unworked,
+    /// The stitch below stays, and the yarn that has turned there is pulled over the needle: a double stitch.
+    Double,
 }
 
 /// A stitch: what it is made of in the row below, and how.
@@ -208,7 +216,7 @@ const WIDEST_CABLE: u8 = 24;
 /// How far from what is asked a number of stitches is looked for that a chart fits.
 const LARGEST_STEP_ASIDE: usize = 200;
 const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
-                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, with spaces between them";
+                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, -, ds, with spaces between them";
 
 impl Chart {
     /// A pattern by its name.
@@ -276,7 +284,7 @@ impl Chart {
         let mut width = 1_u32;
         for row in &self.rows {
             let (takes, makes) = row.takes_and_makes();
-            if takes != makes {
+            if takes != makes || row.is_short() {
                 return None;
             }
             width = width.checked_mul(takes / common_divisor(width, takes))?;
@@ -285,6 +293,11 @@ impl Chart {
             }
         }
         Some(width)
+    }
+
+    /// The line of the description that a row of the knit, from 0, came from.
+    pub(super) fn line_of(&self, row: usize) -> usize {
+        self.rows[row % self.rows.len()].line
     }
 
     /// Whether rows may be cut anywhere: each stitch is made of one.
@@ -323,8 +336,14 @@ impl Chart {
             let row = &self.rows[r as usize % self.rows.len()];
             let fit = row.fit();
             let Some(made) = fit.made_of(found) else {
-                let problem = format!("row {} repeats over {} stitches, but finds {found}", r + 1, fit.takes);
-                let hint = "the number of stitches must be a multiple of what a row with shaping or cables takes";
+                let (does, hint) = match fit.short {
+                    true => ("is written for", "a short row says what becomes of every stitch"),
+                    false => (
+                        "repeats over",
+                        "the number of stitches must be a multiple of what a row with shaping or cables takes",
+                    ),
+                };
+                let problem = format!("row {} {does} {} stitches, but finds {found}", r + 1, fit.takes);
                 let counts = self.counts_that_fit(cast_on, rows);
                 let hint = if counts.is_empty() { hint.to_owned() } else { format!("{hint}: cast on {counts}") };
                 return Err(ChartError::new(Some(row.line), problem, hint));
@@ -352,12 +371,15 @@ struct Fit {
     makes: u32,
     /// Whether it may be cut anywhere.
     plain: bool,
+    /// Whether some stitches stay unworked: it is written once over the whole width.
+    short: bool,
 }
 
 impl Fit {
     /// How many stitches the row makes of those that it finds; `None` where it does not fit them.
     fn made_of(&self, found: u32) -> Option<u64> {
         match found.checked_rem(self.takes)? {
+            _ if self.short => (found == self.takes).then_some(self.makes.into()),
             0 => Some(u64::from(found / self.takes) * u64::from(self.makes)),
             _ => self.plain.then_some(found.into()),
         }
@@ -367,7 +389,7 @@ impl Fit {
 impl Row {
     fn fit(&self) -> Fit {
         let (takes, makes) = self.takes_and_makes();
-        Fit { takes, makes, plain: self.is_plain() }
+        Fit { takes, makes, plain: self.is_plain(), short: self.is_short() }
     }
 
     fn takes_and_makes(&self) -> (u32, u32) {
@@ -376,7 +398,12 @@ impl Row {
 
     /// Each stitch on its own: may be cut anywhere.
     fn is_plain(&self) -> bool {
-        self.steps.iter().all(|s| s.takes_and_makes() == (1, 1))
+        self.steps.iter().all(|s| s.takes_and_makes() == (1, 1)) && !self.is_short()
+    }
+
+    /// Whether some of its stitches stay unworked.
+    fn is_short(&self) -> bool {
+        self.steps.contains(&Step::Unworked)
     }
 
     fn work(&self, found: u32, made: usize) -> Vec<Stitch> {
@@ -405,6 +432,7 @@ impl Row {
                 Step::Slip { front } => out.push(Stitch { act: Act::Pass { front }, ..plain }),
                 Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
                 Step::Bobble => out.push(Stitch { act: Act::Bobble, ..plain }),
+                Step::Unworked => out.push(Stitch { act: Act::Unworked, ..plain }),
                 Step::Cable { front, back, left, purl } => {
                     let (front, back) = (u32::from(front), u32::from(back));
                     let ahead = |i| Stitch { first_parent: at + if left { back } else { 0 } + i, layer: 1, ..plain };
@@ -475,7 +503,8 @@ fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usi
         "ptbl" => plain(true, true),
         "sl" | "slwyib" | "miss" => Step::Slip { front: false },
         "slwyif" => Step::Slip { front: true },
-        "tuck" | "sl1yo" => Step::Tuck,
+        "tuck" | "sl1yo" | "ds" => Step::Tuck,
+        "-" => Step::Unworked,
         _ => return None,
     };
     let digits = &token[word.len()..];
@@ -508,88 +537,4 @@ fn parse_cable(token: &str) -> Option<Step> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn worked(rows: &[&str], cast_on: u32, count: u32) -> Vec<Vec<Stitch>> {
-        Chart::parse(rows).unwrap().work(cast_on, count, 1000).unwrap()
-    }
-
-    #[test]
-    fn named_patterns_are_sound_and_even() {
-        for (name, _) in PATTERNS {
-            let chart = Chart::named(name).unwrap();
-            let width = chart.even_width(100).unwrap();
-            let rows = chart.work(3 * width, 2 * chart.rows(), 10_000).unwrap();
-            assert!(rows.iter().all(|r| r.len() == 3 * width as usize), "{name}");
-        }
-        assert!(Chart::named("stockinet").is_none());
-    }
-
-    #[test]
-    fn decreases_take_two_and_increases_make_two() {
-        let rows = worked(&["k", "k3 k2tog", "k ssk kfb"], 15, 3);
-        assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [15, 12, 12]);
-    }
-
-    #[test]
-    fn a_hat_ends_with_few_stitches() {
-        let rows = worked(&["3: k", "k3 k2tog", "k", "k2 k2tog", "k1 k2tog", "k2tog"], 20, 8);
-        assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [20, 20, 20, 16, 16, 12, 8, 4]);
-        assert_eq!((rows[3][3].first_parent, rows[3][3].parents), (3, 2));
-        assert_eq!((rows[3][4].first_parent, rows[3][4].parents), (5, 1));
-        // Every loop is held by exactly one stitch.
-        for pair in rows.windows(2) {
-            let mut held = vec![0; pair[0].len()];
-            for s in &pair[1] {
-                for p in s.first_parent..s.first_parent + u32::from(s.parents) {
-                    held[p as usize] += 1;
-                }
-            }
-            assert!(held.iter().all(|&h| h == 1));
-        }
-    }
-
-    #[test]
-    fn cables_cross_halves() {
-        let row = &worked(&["k4", "c4f"], 4, 2)[1];
-        assert_eq!(
-            row.iter().map(|s| (s.first_parent, s.layer)).collect::<Vec<_>>(),
-            [(2, 1), (3, 1), (0, -1), (1, -1)]
-        );
-        assert_eq!(worked(&["k4", "c4b"], 4, 2)[1][0].layer, -1);
-    }
-
-    #[test]
-    fn plain_rows_may_be_cut_and_others_not() {
-        assert_eq!(worked(&["k2 p2"], 7, 1)[0].iter().filter(|s| s.purl).count(), 3);
-        let error = Chart::parse(&["k", "k3 k2tog"]).unwrap().work(9, 2, 1000).unwrap_err();
-        assert_eq!((error.line, error.problem.as_str()), (Some(1), "row 2 repeats over 5 stitches, but finds 9"));
-        assert!(error.hint.ends_with("takes: cast on 5 or 10"), "{}", error.hint);
-        // Four stitches of each five of the second row, by sevens in the third.
-        let error = Chart::parse(&["k", "k3 k2tog", "k5 k2tog"]).unwrap().work(10, 3, 1000).unwrap_err();
-        assert!(error.hint.ends_with("takes: cast on 35"), "{}", error.hint);
-    }
-
-    #[test]
-    fn mistakes_are_explained() {
-        for (rows, problem) in [
-            (&["k2 q"][..], "unknown step \"q\""),
-            (&["c1f"], "unknown step \"c1f\""),
-            (&["c26f"], "unknown step \"c26f\""),
-            (&["2/0lc"], "unknown step \"2/0lc\""),
-            (&["k0"], "unknown step \"k0\""),
-            (&["k99999999999999999999"], "unknown step \"k9999999999999999999\""),
-            (&["yo"], "a row that takes no stitch of the row below"),
-            (&[""], "a row that takes no stitch of the row below"),
-            (&["x: k"], "expected a number of rows before the colon, found \"x\""),
-            (&["20000: k", "k"], "more than 20000 rows"),
-            (&["k20000 p"], "more than 20000 steps in a row"),
-            (&[], "a chart without rows"),
-        ] {
-            assert_eq!(Chart::parse(rows).unwrap_err().problem, problem);
-        }
-        let grows = Chart::parse(&["kfb"]).unwrap().work(4, 60, 5000).unwrap_err();
-        assert_eq!(grows.problem, "more than 5000 stitches by row 10");
-    }
-}
+mod tests;

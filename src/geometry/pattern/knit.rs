@@ -10,7 +10,9 @@ mod cell;
 mod colors;
 mod loops;
 mod piece;
+mod rims;
 mod shape;
+mod short_rows;
 mod size;
 
 use std::f64::consts::TAU;
@@ -22,10 +24,11 @@ pub(crate) use self::colors::{Way, caught, in_use};
 use self::{
     cell::Cell,
     loops::{Border, Loops},
-    piece::{Laying, Surface, Thread, settle},
+    piece::{Laying, Surface, Thread, settle, sheet::Sheet},
 };
 pub use self::{
     colors::{Colors, Work},
+    rims::{CastOn, Closing, Rims},
     size::{Misfit, Sizes},
 };
 use super::{
@@ -76,6 +79,8 @@ pub struct Knit {
     pub form: Form,
     /// How it begins and ends.
     pub edges: Edges,
+    /// How a finished piece is cast on and closed at its top.
+    pub rims: Rims,
     /// Width of a stitch in yarn diameters; what the pattern draws itself to if absent.
     pub stitch_width: Option<f64>,
     /// Distance between rows in yarn diameters, likewise.
@@ -158,7 +163,11 @@ impl Knit {
         }
         match self.repeat() {
             Some(wide) => self.cell(wide, self.size(), self.points).gauge(),
-            None => self.rows_of_a_kind(&self.worked().unwrap_or_default(), self.size()).gauge(self.size()),
+            None => {
+                let rows = self.worked().unwrap_or_default();
+                let points = if short_rows::any(&rows) { self.points } else { COARSE };
+                self.rows_of_a_kind(&rows, self.size(), points).gauge(self.size())
+            }
         }
     }
 
@@ -175,7 +184,11 @@ impl Knit {
         const SMALLEST: f64 = 9.0;
         let Some(wide) = self.repeat() else {
             let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
-            return Err(ChartError::new(None, "a chart with shaping has no repeat that could be laid", hint));
+            return Err(ChartError::new(
+                None,
+                "a chart with shaping or short rows has no repeat that could be laid",
+                hint,
+            ));
         };
         let cell = self.cell(wide, self.size(), self.points);
         let [across, up] = (SMALLEST / cell.period).ceil().max(DVec2::ONE).to_array();
@@ -198,18 +211,22 @@ impl Knit {
         Ok(self.worked()?.iter().map(|row| row.len() as u32).collect())
     }
 
-    /// The ways of its yarns.
-    fn ways(&self) -> Vec<Way> {
+    /// The ways of its yarns through its rows.
+    fn ways(&self, rows: &[Vec<Stitch>]) -> Vec<Way> {
         let (finished, round) = (self.is_finished(), self.form != Form::Flat);
         let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
-        self.colors.as_ref().unwrap_or(&one()).ways(finished, round)
+        let mut ways = self.colors.as_ref().unwrap_or(&one()).ways(finished, round);
+        if short_rows::any(rows) {
+            short_rows::lead(&mut ways, rows, finished);
+        }
+        ways
     }
 
     /// A patch that repeats, of one colour, centred.
     fn patch(&self, diameter: f64) -> Result<Knitted, ChartError> {
         let Some(wide) = self.repeat() else {
             let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
-            return Err(ChartError::new(None, "a chart with shaping has no repeat for a tile", hint));
+            return Err(ChartError::new(None, "a chart with shaping or short rows has no repeat for a tile", hint));
         };
         let high = self.chart.rows();
         if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
@@ -237,12 +254,27 @@ impl Knit {
         Ok(Knitted { colors: vec![0; strands.len()], strands, gauge: [width * diameter, height * diameter] })
     }
 
+    /// The profile that it is knitted to, in yarn diameters, if it has one.
+    fn profile(&self, diameter: f64, rows: &[Vec<Stitch>]) -> Result<Option<Revolution>, ChartError> {
+        let scaled = match &self.form {
+            Form::Revolution(profile) => Some(profile.iter().map(|p| *p / diameter).collect()),
+            _ => None,
+        };
+        let profile = match self.rims.top {
+            Closing::BoundOff => scaled,
+            Closing::Drawn => Some(rims::drawn(self, scaled, rows)?),
+        };
+        Ok(profile.map(|points: Vec<DVec2>| Revolution::new(&points)))
+    }
+
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
         let mut rows = self.chart.work(self.stitches, self.rows, MAX_POINTS / u64::from(self.points).max(1))?;
+        short_rows::turned(&mut rows, self)?;
         if self.has_slipped_sides() {
+            let right = short_rows::from_right(&rows, self.is_finished());
             // Rows begin on the left and on the right by turns. The first one holds the cast-on edge.
             for (r, row) in rows.iter_mut().enumerate().skip(1).filter(|(_, row)| row.len() > 2) {
-                let first = if r % 2 == 0 { 0 } else { row.len() - 1 };
+                let first = if (r % 2 == 1) == right { 0 } else { row.len() - 1 };
                 if row[first].act == Act::Draw && row[first].parents == 1 && row[first].layer == 0 {
                     row[first].act = Act::Pass { front: false };
                 }
@@ -285,31 +317,28 @@ impl Knit {
         let rows = self.worked()?;
         let finished = self.is_finished();
         let round = self.form != Form::Flat;
-        let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished };
-        let ways = self.ways();
+        let rims = self.rims;
+        let mirrored = short_rows::from_right(&rows, finished);
+        let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished, rims, mirrored };
+        let ways = self.ways(&rows);
         let backwards = ways.iter().flat_map(|w| &w.rows).any(|s| s.row == rows.len() as i32 && s.backwards);
         let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
         if let Some(colors) = &self.colors {
             loops.dye(colors);
         }
-        let profile = match &self.form {
-            Form::Revolution(profile) => {
-                let scaled: Vec<DVec2> = profile.iter().map(|p| *p / diameter).collect();
-                Some(Revolution::new(&scaled))
-            }
-            _ => None,
-        };
+        let profile = self.profile(diameter, &rows)?;
         let size = profile.as_ref().map_or(self.size(), |p| self.size_on(p, &rows).map(Some));
         let cell =
             self.repeat().map(|wide| self.cell(wide, size, if profile.is_some() { COARSE } else { self.points }));
         let even = cell.is_some() && profile.is_none();
-        let points = if even { self.points } else { COARSE };
-        let kinds = if cell.is_none() { self.rows_of_a_kind(&rows, size) } else { Kinds::default() };
+        let points = if even || short_rows::any(&rows) { self.points } else { COARSE };
+        let kinds = if cell.is_none() { self.rows_of_a_kind(&rows, size, points) } else { Kinds::default() };
         let [width, height] = cell.as_ref().map_or_else(|| kinds.gauge(size), Cell::gauge);
         let count = f64::from(self.rows);
         let surface = match (&self.form, profile) {
             (_, Some(revolution)) => Surface::Round { revolution, height },
             (Form::Tube, _) => Surface::Round { revolution: piece::tube(self.stitches, width, count, height), height },
+            _ if !loops.levels().is_empty() => Surface::Bent(Sheet::relaxed(loops.levels(), &rows, [width, height])),
             _ => Surface::Plane { width, height },
         };
         let cell_of = |row: usize| match &cell {
@@ -345,7 +374,7 @@ impl Knit {
         }
         let shift = match &surface {
             Surface::Plane { height, .. } => DVec3::new(0.0, -0.5 * height * count, 0.0),
-            Surface::Round { .. } => DVec3::ZERO,
+            Surface::Round { .. } | Surface::Bent(_) => DVec3::ZERO,
         };
         let strand = |(index, thread): (usize, Thread)| PatternStrand {
             curve: Curve {
@@ -365,7 +394,7 @@ impl Knit {
     }
 
     /// Cells for rows of knit and purl columns that are above and below their like: what a shaped piece begins with.
-    fn rows_of_a_kind(&self, rows: &[Vec<Stitch>], size: [Option<f64>; 2]) -> Kinds {
+    fn rows_of_a_kind(&self, rows: &[Vec<Stitch>], size: [Option<f64>; 2], points: u32) -> Kinds {
         const MOST_KINDS: usize = 6;
         let kinds: Vec<Option<Vec<bool>>> = rows.iter().map(|r| column_signs(r)).collect();
         let mut known: Vec<Vec<bool>> = Vec::new();
@@ -390,7 +419,7 @@ impl Knit {
         let cell = |kind: &Vec<bool>| {
             let row: Vec<&str> = kind.iter().map(|purl| if *purl { "p" } else { "k" }).collect();
             let chart = Chart::parse(&[row.join(" ")]).ok()?;
-            Some(Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), COARSE, size))
+            Some(Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size))
         };
         Kinds { cells: known.par_iter().filter_map(cell).collect(), of_row }
     }

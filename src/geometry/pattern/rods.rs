@@ -136,19 +136,23 @@ struct Work {
 }
 
 /// How FIRE goes on: its step in time, and how much speeds turn towards forces.
-struct Fire {
+pub(super) struct Fire {
     /// The longest step.
     longest: f64,
-    dt: f64,
+    pub(super) dt: f64,
     alpha: f64,
     /// Steps in a row in which energy fell.
     downhill: u32,
 }
 
 impl Fire {
+    pub(super) fn new(longest: f64) -> Self {
+        Self { longest, dt: 0.5 * longest, alpha: 0.1, downhill: 0 }
+    }
+
     /// Goes faster while energy falls by the `power` of forces, and starts anew where it rises; gives the share of speeds
     /// to keep, and what to add to them of forces.
-    fn adapt(&mut self, power: f64, force: f64, speed: f64) -> (f64, f64) {
+    pub(super) fn adapt(&mut self, power: f64, force: f64, speed: f64) -> (f64, f64) {
         if power > 0.0 {
             self.downhill += 1;
             if self.downhill > 5 {
@@ -212,7 +216,7 @@ impl Rods {
         let weight = (n as f64).sqrt();
         let mut cell_speed = DVec2::ZERO;
         let time = TIME / run.firm.max(1.0).sqrt();
-        let mut fire = Fire { longest: time, dt: 0.5 * time, alpha: 0.1, downhill: 0 };
+        let mut fire = Fire::new(time);
         // Where points were when neighbours were looked for, and how many have gone far since then.
         let mut before: Vec<DVec3> = Vec::new();
         let (mut gone, mut since) = (n, 0);

@@ -425,7 +425,7 @@ mod tests {
     use crate::geometry::pattern::{
         chart::Chart,
         draft::Draft,
-        knit::{Edges, Form, POINTS, ROW_HEIGHT, STITCH_WIDTH, YARN_PER_STITCH},
+        knit::{Edges, Form, POINTS, ROW_HEIGHT, Rims, STITCH_WIDTH, YARN_PER_STITCH},
     };
 
     fn stockinette() -> Tile {
@@ -438,6 +438,7 @@ mod tests {
             row_height: Some(ROW_HEIGHT),
             yarn_per_stitch: Some(YARN_PER_STITCH),
             edges: Edges::Live,
+            rims: Rims::default(),
             points: POINTS,
             colors: None,
         };

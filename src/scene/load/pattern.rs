@@ -14,7 +14,7 @@ use crate::{
         pattern::{
             MAX_POINTS,
             chart::{Chart, ChartError, PATTERNS},
-            knit::{self, Colors, Edges, Form, Knit, Knitted, Work},
+            knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Work},
             knitspeak,
             overlap::overlap,
         },
@@ -335,6 +335,7 @@ fn counted(
         table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));
     }
     let edges = if tile { Edges::Tile } else { edges };
+    let rims = rims(table, edges, form.as_ref());
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
     let works = [("stranded", Some(Work::Stranded)), ("intarsia", Some(Work::Intarsia)), ("printed", None)];
     let work = table.one_of_or("color_work", Some(Work::Stranded), &works);
@@ -349,8 +350,19 @@ fn counted(
         None => ColorWork::Printed,
     };
     let (chart, form) = (chart?, form?);
-    let knit =
-        Knit { chart, stitches, rows, form, edges, stitch_width, row_height, yarn_per_stitch, points, colors: None };
+    let knit = Knit {
+        chart,
+        stitches,
+        rows,
+        form,
+        edges,
+        rims,
+        stitch_width,
+        row_height,
+        yarn_per_stitch,
+        points,
+        colors: None,
+    };
     if knit.control_points() > MAX_POINTS {
         table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
     }
@@ -359,6 +371,25 @@ fn counted(
         return None;
     }
     Some(KnitPlan { knit, name: name.to_owned(), lines, header: table.header(), work, sizes })
+}
+
+/// `cast_on` and `top` of a finished piece.
+fn rims(table: &Reader<'_>, edges: Edges, form: Option<&Form>) -> Rims {
+    let cast_on = [("long-tail", CastOn::LongTail), ("cable", CastOn::Cable)];
+    let top = [("bound-off", Closing::BoundOff), ("drawn", Closing::Drawn)];
+    let rims = Rims {
+        cast_on: table.one_of_or("cast_on", CastOn::LongTail, &cast_on),
+        top: table.one_of_or("top", Closing::BoundOff, &top),
+    };
+    for key in ["cast_on", "top"] {
+        if table.has(key) && matches!(edges, Edges::Live | Edges::Tile) {
+            table.error_at(key, format!("open loops have no `{key}`"), Some("edges = \"finished\""));
+        }
+    }
+    if rims.top == Closing::Drawn && form == Some(&Form::Flat) {
+        table.error_at("top", "a flat piece is not drawn together", Some("form = \"tube\" or \"revolution\""));
+    }
+    rims
 }
 
 /// The profile in millimetres, if it is one.

@@ -216,7 +216,7 @@ impl Loops {
                     let at = match visit {
                         _ if of(k) == color => return (column, visit),
                         Visit::Loop(i) => self.loops[i as usize].foot,
-                        Visit::Pass { at, .. } | Visit::Float { at } => at,
+                        Visit::Pass { at, .. } | Visit::Float { at } | Visit::Through { at } => at,
                     };
                     (column, Visit::Float { at })
                 };

@@ -3,7 +3,12 @@
 mod maker;
 
 use self::maker::{LIFTED, Maker};
-use super::{super::chart::Stitch, colors::Hold, shape::REACH};
+use super::{
+    super::chart::Stitch,
+    colors::Hold,
+    rims::{Closing, Rims},
+    shape::REACH,
+};
 
 /// A loop of yarn that a needle has held.
 #[derive(Clone, Debug)]
@@ -76,6 +81,11 @@ pub(in super::super) enum Visit {
         /// Where.
         at: f64,
     },
+    /// It goes through a loop of the last row, to be drawn tight.
+    Through {
+        /// Where.
+        at: f64,
+    },
 }
 
 /// A yarn's way along a row, from left to right.
@@ -124,6 +134,8 @@ pub(in super::super) struct Loops {
     /// How far up each row begins, in rows: those whose stitches change places have more room below them.
     heights: Vec<f64>,
     room: f64,
+    /// Where rows are short, how far up each stitch of each row begins, and behind them the tops of all; else nothing.
+    levels: Vec<Vec<f64>>,
     /// Whether any stitch is a bobble.
     bobbles: bool,
 }
@@ -137,8 +149,12 @@ pub(in super::super) struct Border {
     pub(in super::super) stacked: bool,
     /// Flat or round: whether `at` counts turns.
     pub(in super::super) turns: bool,
-    /// The first row is cast on and the last one bound off.
+    /// The first row is cast on and the last one bound off or drawn together.
     pub(in super::super) finished: bool,
+    /// How.
+    pub(in super::super) rims: Rims,
+    /// Whether it is cast on from left to right.
+    pub(in super::super) mirrored: bool,
 }
 
 impl Border {
@@ -160,8 +176,10 @@ impl Loops {
         let mut maker = Maker::new(rows, cast_on, border);
         maker.positions();
         maker.draw();
-        if border.finished {
-            maker.bind_off(backwards);
+        match border.rims.top {
+            _ if !border.finished => {}
+            Closing::BoundOff => maker.bind_off(backwards),
+            Closing::Drawn => maker.draw_together(),
         }
         maker.finish()
     }
@@ -172,6 +190,26 @@ impl Loops {
             within if self.border.stacked || within == row => f64::from(row - within) + self.heights[within as usize],
             _ => f64::from(row),
         }
+    }
+
+    /// The same at a place of a row of a flat piece: short rows make some columns higher than others.
+    pub(in super::super) fn up_at(&self, row: i32, at: f64) -> f64 {
+        let Some(levels) = usize::try_from(row).ok().and_then(|r| self.levels.get(r)) else { return self.up(row) };
+        let last = levels.len() - 1;
+        let x = (at + 0.5 * last as f64).clamp(0.0, last as f64);
+        let k = (x as usize).min(last.saturating_sub(1));
+        levels[k] + (levels[(k + 1).min(last)] - levels[k]) * (x - k as f64)
+    }
+
+    /// So many shares of a row's height above the beginning of a row, at a place of it.
+    pub(in super::super) fn within(&self, row: i32, at: f64, share: f64) -> f64 {
+        let base = self.up_at(row, at);
+        if self.levels.is_empty() { base + share } else { base + share * (self.up_at(row + 1, at) - base) }
+    }
+
+    /// How far up the stitches of each row begin where rows are short, and behind them the tops of all.
+    pub(in super::super) fn levels(&self) -> &[Vec<f64>] {
+        &self.levels
     }
 
     /// How much higher rows are with the room that some have below them.

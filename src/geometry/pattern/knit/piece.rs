@@ -1,17 +1,19 @@
 //! A whole piece: loops are laid out as their cell has them or in their closed form, yarns led from row to row, and what
 //! is not at rest yet relaxed.
 
+mod drawn;
 pub(super) mod follow;
+pub(super) mod sheet;
+mod thread;
 
-use std::{collections::HashSet, f64::consts::TAU};
+use std::f64::consts::TAU;
 
-use glam::{DVec2, DVec3, IVec3};
+use glam::{DVec2, DVec3};
 
+pub(super) use self::thread::{Thread, settle};
+use self::{drawn::drawn_points, sheet::Sheet, thread::State};
 use super::{
-    super::{
-        revolution::Revolution,
-        rods::{Rods, Run, Strand},
-    },
+    super::revolution::Revolution,
     cell::Cell,
     colors::{Hold, Stretch, Way},
     loops::{Course, Loop, Loops, Visit},
@@ -24,6 +26,8 @@ pub(super) enum Surface {
     Plane { width: f64, height: f64 },
     /// About the y axis; rows are turns of one spiral.
     Round { revolution: Revolution, height: f64 },
+    /// Flat cloth that short rows bend.
+    Bent(Sheet),
 }
 
 impl Surface {
@@ -31,38 +35,27 @@ impl Surface {
     fn across(&self, p: &Place) -> f64 {
         match self {
             Self::Plane { width, .. } => *width,
+            Self::Bent(sheet) => sheet.width(),
             Self::Round { revolution, height } => TAU * revolution.radius((p.up + p.at - 0.5) * height),
         }
     }
 
-    fn place(&self, p: &Place) -> DVec3 {
+    /// Where a place of a row is.
+    fn place(&self, row: i32, p: &Place) -> DVec3 {
         match self {
             Self::Plane { width, height } => DVec3::new(p.at * width, p.up * height, p.out),
             Self::Round { revolution, height } => revolution.place(p.at, (p.up + p.at - 0.5) * height, p.out),
+            Self::Bent(sheet) => sheet.place(row, p),
         }
     }
-}
 
-/// A yarn on its way through the cloth.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Thread {
-    pub(super) points: Vec<DVec3>,
-    /// Length at rest of the segment that begins at each point.
-    pub(super) rest: Vec<f64>,
-    pub(super) grid: Vec<[f32; 2]>,
-    /// What each point may do.
-    pub(super) state: Vec<State>,
-}
-
-/// What a point may do while a piece relaxes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
-    /// It is at rest, as its cell has it.
-    Rest,
-    /// It moves.
-    Move,
-    /// Nothing holds it yet: it stays.
-    Held,
+    /// The directions across and up at a place of a row of a flat piece.
+    fn directions(&self, row: i32, p: &Place) -> [DVec3; 2] {
+        match self {
+            Self::Bent(sheet) => sheet.directions(row, p),
+            Self::Plane { .. } | Self::Round { .. } => [DVec3::X, DVec3::Y],
+        }
+    }
 }
 
 /// How a piece is laid out.
@@ -84,8 +77,6 @@ pub(super) struct Laying<'a> {
 
 /// Stitches and rows at the edges that find their place anew.
 const EDGE: usize = 2;
-/// The longest segment, in diameters.
-const LONGEST: f64 = 1.0;
 /// Length of yarn beyond the first and the last stitch, in diameters.
 const TAIL: f64 = 6.0;
 
@@ -119,7 +110,7 @@ impl Laying<'_> {
                 Some((_, place)) if self.is_inside(row, c, backwards) => {
                     self.link(&mut all, place, from, own, backwards)
                 }
-                _ => all.join(own, self.side(backwards)),
+                _ => all.join(own, self.turn(row, &from, backwards)),
             }
             here = Some((row, to));
         }
@@ -128,13 +119,16 @@ impl Laying<'_> {
         }
         let is_in = |row: i32| way.rows.iter().any(|r| r.row == row);
         match here {
-            _ if is_in(self.loops.rows) => all.tail(TAIL, DVec3::Y, false),
-            Some((_, place)) => all.go_on(&self.hidden(place)),
+            Some((_, place)) if is_in(self.loops.rows) && self.is_drawn() => all.go_on(&self.drawn_in(place)),
+            Some((row, place)) if is_in(self.loops.rows) => {
+                all.tail(TAIL, self.surface.directions(row, &place)[1], false);
+            }
+            Some((row, place)) => all.go_on(&self.hidden(row, place)),
             None => {}
         }
         match start {
-            _ if is_in(-1) => all.tail(TAIL, DVec3::NEG_Y, true),
-            Some(place) => all.come_from(&self.hidden(place)),
+            Some(place) if is_in(-1) => all.tail(TAIL, -self.surface.directions(-1, &place)[1], true),
+            Some(place) => all.come_from(&self.hidden(way.rows[0].row, place)),
             None => {}
         }
         all
@@ -147,6 +141,15 @@ impl Laying<'_> {
             (false, true) => 1.0,
             (false, false) => -1.0,
         }
+    }
+
+    /// How far a yarn bulges where it turns before it goes through a row: beside a stitch that stays on the needle hardly.
+    fn turn(&self, row: i32, from: &Place, backwards: bool) -> DVec3 {
+        const BULGE: f64 = 0.8;
+        const BESIDE: f64 = 0.35;
+        let inside = 0.5 * self.loops.wide as f64 - from.at.abs() > 0.75;
+        let bulge = if inside && matches!(self.surface, Surface::Bent(_)) { BESIDE } else { BULGE };
+        self.surface.directions(row, from)[0] * self.side(backwards) * bulge
     }
 
     /// Whether a field of a row begins beside another one, for a yarn that comes from the row below.
@@ -172,7 +175,7 @@ impl Laying<'_> {
             Place { at: to.at, up: to.up + UP, out: -1.2 },
             to,
         ]
-        .map(|p| self.surface.place(&p));
+        .map(|p| self.surface.place(0, &p));
         let at = |k: usize| knots[k.min(knots.len() - 1)];
         let line = (0..=8 * (knots.len() - 1)).map(|k| {
             let (i, t) = (k / 8, (k % 8) as f64 / 8.0);
@@ -181,7 +184,7 @@ impl Laying<'_> {
         });
         all.go_on(&line.collect::<Vec<_>>());
         all.pop();
-        all.join(own, 0.0);
+        all.join(own, DVec3::ZERO);
     }
 
     /// A yarn goes on some rows higher: up the side of a flat piece, inside of a tube.
@@ -196,16 +199,16 @@ impl Laying<'_> {
             let mix = |a: f64, b: f64| a + (b - a) * t;
             let out = mix(from.out, to.out) - deep;
             let place = Place { at: mix(from.at, to.at) + side * deep, up: mix(from.up, to.up), out };
-            self.surface.place(&place)
+            self.surface.place(0, &place)
         });
         all.go_on(&line.collect::<Vec<_>>());
         // The row begins with the last of these.
         all.pop();
-        all.join(own, 0.0);
+        all.join(own, DVec3::ZERO);
     }
 
     /// The end of a yarn that neither casts on nor binds off: from the edge of the row back behind it.
-    fn hidden(&self, end: Place) -> Vec<DVec3> {
+    fn hidden(&self, row: i32, end: Place) -> Vec<DVec3> {
         const DEEP: f64 = 2.9;
         let middle = if self.loops.border.turns { 0.5 } else { 0.0 };
         let inward = (middle - end.at).signum() / self.surface.across(&end);
@@ -213,11 +216,8 @@ impl Laying<'_> {
             let along = TAIL * f64::from(k) / 64.0;
             let down = (along / 2.5).min(1.0);
             let at = end.at + inward * (along - 1.2).max(0.0);
-            self.surface.place(&Place {
-                at,
-                up: end.up,
-                out: end.out - (end.out + DEEP) * down * down * (3.0 - 2.0 * down),
-            })
+            let out = end.out - (end.out + DEEP) * down * down * (3.0 - 2.0 * down);
+            self.surface.place(row, &Place { at, up: end.up, out })
         });
         line.collect()
     }
@@ -245,7 +245,7 @@ impl Laying<'_> {
         if let (Some(piece), Some(end)) = (pieces.last(), pieces.last().and_then(|p| p.places.last())) {
             // The end of a row, where it is not the beginning of the next.
             if !round {
-                own.push(self.surface.place(end), 0.0, piece.grid[piece.grid.len() - 1], State::Move);
+                own.push(self.surface.place(course.row, end), 0.0, piece.grid[piece.grid.len() - 1], State::Move);
             }
         }
         own
@@ -277,25 +277,29 @@ impl Laying<'_> {
                 self.lead(course, k, piece, first, out);
                 return;
             }
-            // Bent round.
-            (Some((cell, r)), Surface::Round { .. }) => {
+            // Bent round, or by short rows.
+            (Some((cell, r)), Surface::Round { .. } | Surface::Bent(_)) => {
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
                     let place = self.place_of(course, k, (cell, r), p, f64::from(g[1] - r as f32));
                     let grid = [g[0], g[1] - r as f32 + row as f32];
-                    out.push(self.surface.place(&place), rest, grid, state(grid, self.even && !edge));
+                    out.push(self.surface.place(row, &place), rest, grid, state(grid, self.even && !edge));
                 }
                 self.lead(course, k, piece, first, out);
                 return;
             }
             _ => {}
         }
-        let line: Vec<DVec3> = piece.places.iter().map(|p| self.surface.place(p)).collect();
-        let count = points_of(piece.yarn, self.points);
+        let line: Vec<DVec3> = piece.places.iter().map(|p| self.surface.place(row, p)).collect();
+        let (count, length) = match course.visits[k].1 {
+            // It is pulled tight.
+            Visit::Through { .. } => drawn_points(&line, self.points),
+            _ => (points_of(piece.yarn, self.points), piece.yarn * self.yarn),
+        };
         for (point, i, share) in spaced(&line, count) {
             let (a, b) = (piece.grid[i], piece.grid[i + 1]);
             let grid = [0, 1].map(|c| a[c] + share as f32 * (b[c] - a[c]));
-            out.push(point, piece.yarn * self.yarn / count as f64, grid, state(grid, false));
+            out.push(point, length / count as f64, grid, state(grid, false));
         }
     }
 
@@ -310,7 +314,7 @@ impl Laying<'_> {
         let sides = [(begin, first, k + n - 1, k + n - 1), (end, first + count - 1, k, k + 1)];
         let by = sides.map(|(place, point, joint, beside)| {
             let mixed = float(beside) || course.hold(joint % n) != Hold::None;
-            if mixed { self.surface.place(place) - out.points[point] } else { DVec3::ZERO }
+            if mixed { self.surface.place(course.row, place) - out.points[point] } else { DVec3::ZERO }
         });
         for i in 0..count {
             let along = (i as f64 + 0.5) / count as f64;
@@ -327,6 +331,7 @@ impl Laying<'_> {
             let above = |c: &u32| self.loops.loops[*c as usize].parents.len() == 1;
             let next = l.held.is_none_or(|row| row == l.row + 1);
             let usual = self.own_cells || (l.sign != 0.0 && l.twist == 0.0 && !l.bobble && next);
+            let usual = usual && !self.loops.is_drawn(l);
             usual && l.parents.len() <= 1 && l.layer == 0.0 && l.children.iter().all(above)
         })
     }
@@ -334,165 +339,6 @@ impl Laying<'_> {
     fn head(&self, own: &Loop) -> f64 {
         let border = self.loops.border;
         own.children.first().map_or(own.at, |&c| own.at + border.short(self.loops.loops[c as usize].foot - own.at))
-    }
-}
-
-impl Thread {
-    fn push(&mut self, point: DVec3, rest: f64, grid: [f32; 2], state: State) {
-        self.points.push(point);
-        self.rest.push(rest);
-        self.grid.push(grid);
-        self.state.push(state);
-    }
-
-    fn reverse(&mut self) {
-        self.points.reverse();
-        self.grid.reverse();
-        self.state.reverse();
-        // The rest of a segment is kept at its first point.
-        self.rest.pop();
-        self.rest.reverse();
-        self.rest.push(0.0);
-    }
-
-    /// Goes on with another row; at the edge of a flat piece in a turn to that side.
-    fn join(&mut self, mut next: Self, side: f64) {
-        if let (Some(&from), Some(&to)) = (self.points.last(), next.points.first()) {
-            if side != 0.0 {
-                const BULGE: f64 = 0.8;
-                let (a, b) = (from + DVec3::X * side * BULGE, to + DVec3::X * side * BULGE);
-                let at = |k: u32| {
-                    let t = f64::from(k) / 32.0;
-                    let u = 1.0 - t;
-                    from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t)
-                };
-                self.go_on(&(0..=32).map(at).collect::<Vec<_>>());
-                // The row begins with the last of these.
-                self.pop();
-            } else if let Some(last) = self.rest.last_mut()
-                && *last == 0.0
-            {
-                *last = from.distance(to).max(0.1);
-                if *last > LONGEST {
-                    // Along a long segment its neighbours would count as other strands.
-                    self.go_on(&[from, to]);
-                    self.pop();
-                }
-            }
-        }
-        self.points.append(&mut next.points);
-        self.rest.append(&mut next.rest);
-        self.grid.append(&mut next.grid);
-        self.state.append(&mut next.state);
-    }
-
-    /// Goes on along a line that begins where it ends.
-    fn go_on(&mut self, line: &[DVec3]) {
-        const STEP: f64 = 0.7;
-        let (Some(&grid), Some(last)) = (self.grid.last(), self.rest.last_mut()) else { return };
-        let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
-        let count = (length / STEP).ceil().clamp(2.0, 64.0) as usize;
-        let rest = length / count as f64;
-        *last = rest;
-        for (point, ..) in spaced(line, count).into_iter().skip(1) {
-            self.push(point, rest, grid, State::Move);
-        }
-        self.push(line[line.len() - 1], rest, grid, State::Move);
-    }
-
-    /// Begins with the same line, from its far end.
-    fn come_from(&mut self, line: &[DVec3]) {
-        let Some(&grid) = self.grid.first() else { return };
-        let mut own = Self::default();
-        own.push(line[0], 0.0, grid, State::Move);
-        own.go_on(line);
-        own.reverse();
-        own.pop();
-        own.join(std::mem::take(self), 0.0);
-        *self = own;
-    }
-
-    fn pop(&mut self) {
-        self.points.pop();
-        self.rest.pop();
-        self.grid.pop();
-        self.state.pop();
-    }
-
-    /// Goes on straight for a while at its end or its start.
-    fn tail(&mut self, length: f64, way: DVec3, at_start: bool) {
-        let end = if at_start { self.points.first() } else { self.points.last() };
-        let Some(&from) = end else { return };
-        let line = [from, from + way * length];
-        if at_start { self.come_from(&line) } else { self.go_on(&line) }
-    }
-}
-
-impl Thread {
-    /// More points on the same curve: so many times as many, about.
-    pub(super) fn refine(&mut self, times: f64) {
-        let old = std::mem::take(self);
-        let n = old.points.len();
-        let count = ((n - 1) as f64 * times).round() as usize;
-        let at = |i: usize| old.points[i.min(n - 1)];
-        for k in 0..=count {
-            let along = k as f64 * (n - 1) as f64 / count as f64;
-            let (i, t) = ((along as usize).min(n - 2), along - (along as usize).min(n - 2) as f64);
-            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-            let point = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
-            let (g, h) = (old.grid[i], old.grid[i + 1]);
-            // Where a round begins anew, places jump.
-            let h = if (0..2).any(|k| (h[k] - g[k]).abs() > 2.0) { g } else { h };
-            self.push(point, old.rest[i] / times, [0, 1].map(|k| g[k] + t as f32 * (h[k] - g[k])), old.state[i]);
-        }
-    }
-}
-
-/// Relaxes what moves in some yarns, among what is at rest within reach of it.
-pub(super) fn settle(threads: &mut [Thread], run: &Run) {
-    // What is at rest takes part if it is in such a cube beside one in which something moves.
-    const CUBE: f64 = 2.0;
-    if threads.iter().all(|t| t.state.iter().all(|s| *s != State::Move)) {
-        return;
-    }
-    let mut rods = Rods::default();
-    // Where each point of the rods is from.
-    let mut from: Vec<(usize, usize)> = Vec::new();
-    let whole = threads.iter().all(|t| t.state.iter().all(|s| *s != State::Rest));
-    let cube = |p: DVec3| (p / CUBE).floor().as_ivec3();
-    let mut near: HashSet<IVec3> = HashSet::new();
-    if !whole {
-        for t in threads.iter() {
-            for (p, _) in t.points.iter().zip(&t.state).filter(|(_, s)| **s == State::Move) {
-                let own = cube(*p);
-                let beside = |k: i32| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-                near.extend((0..27).map(|k| own + beside(k)));
-            }
-        }
-    }
-    for (k, t) in threads.iter().enumerate() {
-        let n = t.points.len();
-        let taken: Vec<bool> = t.points.iter().map(|p| whole || near.contains(&cube(*p))).collect();
-        let mut i = 0;
-        while i < n {
-            if !taken[i] {
-                i += 1;
-                continue;
-            }
-            let start = rods.points.len();
-            while i < n && taken[i] {
-                rods.points.push(t.points[i]);
-                rods.rest.push(t.rest[i].max(1e-3));
-                rods.fixed.push(t.state[i] != State::Move);
-                from.push((k, i));
-                i += 1;
-            }
-            rods.strands.push(Strand { start, count: rods.points.len() - start, jump: None });
-        }
-    }
-    rods.relax(run);
-    for (p, (k, i)) in rods.points.iter().zip(from) {
-        threads[k].points[i] = *p;
     }
 }
 

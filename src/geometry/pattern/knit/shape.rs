@@ -6,6 +6,7 @@
 //! its children at its head; where several loops lie over each other, each has a depth of its own.
 
 pub(super) mod bobble;
+mod rims;
 
 use std::f64::consts::TAU;
 
@@ -15,6 +16,7 @@ use self::bobble::PILED;
 use super::{
     colors::Hold,
     loops::{Border, Course, Loop, Loops, Visit},
+    rims::Rims,
 };
 
 /// How far across, up and out a point is: stitches or turns, rows, yarn diameters.
@@ -89,7 +91,7 @@ impl Loops {
 
     /// Where the feet of a visit are: its middle, and how far up and out.
     fn foot(&self, course: &Course, visit: &Visit) -> Foot {
-        let (row, reach) = (self.up(course.row), self.reach());
+        let reach = self.reach();
         match visit {
             Visit::Loop(i) => {
                 let l = &self.loops[*i as usize];
@@ -103,13 +105,17 @@ impl Loops {
                     sign => (reach + 0.12 * stack, -sign * self.foot_depth(l)),
                 };
                 let behind = if l.is_lifted() { -l.layer } else { l.sign };
-                Foot { at: l.foot, up: row - below, out, behind }
+                Foot { at: l.foot, up: self.up_at(course.row, l.foot) - below, out, behind }
             }
             Visit::Pass { at, front } => {
                 let out = if *front { FLOAT } else { -FLOAT };
-                Foot { at: *at, up: row - 0.5 * reach, out, behind: 0.0 }
+                Foot { at: *at, up: self.up_at(course.row, *at) - 0.5 * reach, out, behind: 0.0 }
             }
-            Visit::Float { at } => Foot { at: *at, up: row - 0.5 * reach + course.lift, out: -FLOAT, behind: 0.0 },
+            // Where it lies is told where it is laid.
+            Visit::Through { at } => Foot { at: *at, up: f64::from(self.rows), out: 0.0, behind: 0.0 },
+            Visit::Float { at } => {
+                Foot { at: *at, up: self.up(course.row) - 0.5 * reach + course.lift, out: -FLOAT, behind: 0.0 }
+            }
         }
     }
 
@@ -159,9 +165,13 @@ impl Loops {
                         match visit {
                             Visit::Loop(i) => match &self.loops[*i as usize] {
                                 l if l.bobble => self.bobble(l, *column, own, ends, step),
+                                l if self.is_roped(l) => {
+                                    self.roped_piece(l, *column, own, ends, step, [k == 0, k + 1 == n])
+                                }
                                 l => self.loop_piece(l, *column, own, ends, step),
                             },
                             Visit::Pass { .. } | Visit::Float { .. } => pass_piece(*column, course.row, own, ends),
+                            Visit::Through { at } => self.through_piece(*column, *at, step, [k == 0, k + 1 == n]),
                         }
                     })
                     .collect()
@@ -174,7 +184,7 @@ impl Loops {
         match visit {
             // Lifted strands lie between stitches.
             Visit::Loop(i) => !self.loops[*i as usize].is_lifted(),
-            Visit::Pass { .. } | Visit::Float { .. } => true,
+            Visit::Pass { .. } | Visit::Float { .. } | Visit::Through { .. } => true,
         }
     }
 
@@ -188,11 +198,23 @@ impl Loops {
         let head_at =
             if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
         let bound = own.held == Some(own.row);
-        let head_up = self.up(own.held.unwrap_or(own.row + 1)) + self.reach() + if bound { 0.5 } else { 0.0 };
-        let swap = self.swap(own, head_up - foot.up, head_at - foot.at);
+        let held = own.held.unwrap_or(own.row + 1);
+        let drawn = self.is_drawn(own);
+        let head_up = |at: f64| match drawn {
+            true => self.ring(at) + rims::BEYOND,
+            false => self.up_at(held, at) + self.reach() + if bound { 0.5 } else { 0.0 },
+        };
+        // Where rows are short a row may climb along a stitch.
+        let level = self.up_at(own.row, foot.at);
+        let foot_up = |at: f64| foot.up + (self.up_at(own.row, at) - level);
+        let swap = self.swap(own, head_up(head_at) - foot.up, head_at - foot.at);
         let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
         let foot_depth = self.foot_depth(own);
-        let spread = if children().any(|c| c.bobble) { HOLDS_BOBBLE } else { 1.0 + 0.8 * (count - 1.0) };
+        let spread = match children().any(|c| c.bobble) {
+            true => HOLDS_BOBBLE,
+            false if drawn => rims::PINCHED,
+            false => 1.0 + 0.8 * (count - 1.0),
+        };
         let crossing = match over {
             true if own.is_lifted() => 0.46,
             true => 0.35,
@@ -221,7 +243,8 @@ impl Loops {
                 + (head_at - foot.at) * moved
                 + step * across
                 + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step));
-            let up = foot.up + (head_up - foot.up) * head + (1.0 - inside) * (end.up - foot.up);
+            let low = foot_up(at);
+            let up = low + (head_up(at) - low) * head + (1.0 - inside) * (end.up - foot_up(end.at));
             let mut out = if over {
                 laid_over(own, child, [foot.out, head_depth], head)
             } else {
@@ -229,6 +252,9 @@ impl Loops {
                 mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
             };
             out += swap.map_or(0.0, |s| s.raised(head));
+            if drawn {
+                out += (Self::around(t / TAU) - out) * upper;
+            }
             if own.bobble {
                 // The last one of those that it is drawn through lies in the cloth.
                 out += PILED * (1.0 - smooth((head - 0.42) / 0.16));
@@ -335,6 +361,21 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
 /// Yarn that passes a stitch, in shares of a stitch's: a little more than its width.
 const PASSED: f64 = 0.26;
 
+/// A smooth line through places in so many steps, without the last one.
+fn through(knots: &[Place], steps: usize) -> impl Iterator<Item = Place> + '_ {
+    let at = |k: usize| {
+        let p = knots[k.min(knots.len() - 1)];
+        DVec3::new(p.at, p.up, p.out)
+    };
+    (0..steps).map(move |k| {
+        let along = k as f64 * (knots.len() - 1) as f64 / steps as f64;
+        let (i, t) = (along as usize, along.fract());
+        let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
+        let p = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+        Place { at: p.x, up: p.y, out: p.z }
+    })
+}
+
 /// Cuts a curve into so many pieces of equal length: the first point of each, with its place along `line` (whole steps and
 /// a share).
 pub(in super::super) fn spaced(line: &[DVec3], count: usize) -> Vec<(DVec3, usize, f64)> {
@@ -366,6 +407,7 @@ pub(in super::super) fn points_of(yarn: f64, per_stitch: u32) -> usize {
 impl Border {
     /// The borders of a periodic cell so many stitches wide.
     pub(in super::super) fn cell(wide: usize) -> Self {
-        Self { round: Some(wide as f64), stacked: true, turns: false, finished: false }
+        let round = Some(wide as f64);
+        Self { round, stacked: true, turns: false, finished: false, rims: Rims::default(), mirrored: false }
     }
 }

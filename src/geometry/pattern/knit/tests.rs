@@ -1,3 +1,5 @@
+mod rims;
+mod short_rows;
 mod topology;
 
 use std::collections::BTreeSet;
@@ -17,6 +19,7 @@ fn knit(pattern: &str, stitches: u32, rows: u32) -> Knit {
         rows,
         form: Form::Flat,
         edges: Edges::Finished,
+        rims: Rims::default(),
         stitch_width: None,
         row_height: None,
         yarn_per_stitch: None,

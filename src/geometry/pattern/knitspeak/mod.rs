@@ -3,7 +3,7 @@
 //! `Row 1 (RS): k2, *p2, k2; rep from * to end.` is what patterns in books and on Stitch-Maps say. Rows on the wrong side
 //! are worked from the other end and show the other face of each stitch; rounds are worked on the right side. Repeats to
 //! the end depend on the stitches on the needle, so rows are counted from the cast-on on, and each becomes a row of a
-//! chart over the whole width.
+//! chart over the whole width. A row that turns leaves the rest of the stitches for later, and the next one begins there.
 
 mod rows;
 #[cfg(test)]
@@ -48,7 +48,7 @@ const MOST_STITCHES: u32 = 20_000;
 const MOST_NESTED: usize = 16;
 
 const KNOWN: &str = "k, p, ktbl, ptbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, m1l, m1r, sl1, \
-                     sl1 wyif, tuck, mb and cables such as c4f and 2/1 LC are known; write repeats as *...; rep from * to end, \
+                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f and 2/1 LC are known; write repeats as *...; rep from * to end, \
                      [...] 3 times";
 
 /// The rows of a chart, from the cast-on edge up, each from left to right as seen from the right side.
@@ -58,10 +58,13 @@ const KNOWN: &str = "k, p, ktbl, ptbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, s
 pub fn chart_rows(text: &str, cast_on: u32) -> Result<Vec<String>> {
     let rows = written_rows(text)?;
     let mut found = cast_on;
+    // Stitches that the row before has left when it turned.
+    let mut behind = 0;
     rows.iter()
         .enumerate()
         .map(|(i, row)| {
-            let worked = row.body.work(found, row.line, i + 1)?;
+            let (worked, ahead) = row.body.work(found, behind, row.line, i + 1)?;
+            behind = ahead;
             found = worked.iter().map(|s| s.makes * s.count).sum();
             if found == 0 || found > MOST_STITCHES {
                 return error(row.line, format!("row {} makes {found} stitches", i + 1), "1 to 20000 fit on a needle");
@@ -104,28 +107,34 @@ enum Item {
     Times(Sequence, u32),
     /// A sequence until so many stitches are left.
     Repeat(Sequence, u32),
+    /// The row ends here.
+    Turn,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Sequence(Vec<Item>);
 
 impl Sequence {
-    fn work(&self, found: u32, line: usize, row: usize) -> Result<Vec<Steps>> {
+    /// The steps of a row that finds so many stitches and begins where `behind` of them were left; and how many it leaves itself.
+    fn work(&self, found: u32, behind: u32, line: usize, row: usize) -> Result<(Vec<Steps>, u32)> {
+        let unworked = |count| Steps { name: "-".to_owned(), takes: 1, makes: 1, count };
         let mut out: Vec<Steps> = Vec::new();
-        let mut left = found;
+        push(&mut out, unworked(behind));
+        let mut left = found - behind;
         self.follow(&mut left, &mut out, line, row)?;
-        if left > 0 {
-            let problem = format!("row {row} leaves {left} of {found} stitches unworked");
-            return error(line, problem, "rep from * to end, or another number of `stitches`");
+        if left > 0 && !matches!(self.0.last(), Some(Item::Turn)) {
+            let problem = format!("row {row} leaves {left} of {} stitches unworked", found - behind);
+            return error(line, problem, "rep from * to end, `turn` for a short row, or another number of `stitches`");
         }
-        Ok(out)
+        push(&mut out, unworked(left));
+        Ok((out, left))
     }
 
     fn takes(&self) -> u32 {
         let of = |item: &Item| match item {
             Item::Steps(steps) => steps.takes.saturating_mul(steps.count),
             Item::Times(sequence, times) => sequence.takes().saturating_mul(*times),
-            Item::Until(..) | Item::Repeat(..) => 0,
+            Item::Until(..) | Item::Repeat(..) | Item::Turn => 0,
         };
         self.0.iter().map(of).fold(0, u32::saturating_add)
     }
@@ -150,6 +159,7 @@ impl Sequence {
                     push(out, Steps { count: room / steps.takes, ..steps.clone() });
                     *left -= room;
                 }
+                Item::Turn => {}
                 Item::Times(sequence, times) => {
                     for _ in 0..*times {
                         sequence.follow(left, out, line, row)?;
@@ -202,7 +212,7 @@ impl Side {
         }
         let words = worked.iter().map(|s| match (s.name.as_str(), s.count) {
             (name, 1) => name.to_owned(),
-            ("k" | "p", n) => format!("{}{n}", s.name),
+            ("k" | "p" | "-", n) => format!("{}{n}", s.name),
             (name, n) => vec![name; n as usize].join(" "),
         });
         Ok(words.collect::<Vec<String>>().join(" "))
@@ -211,7 +221,7 @@ impl Side {
 
 /// What a step on the wrong side looks like from the right side.
 fn other_face(name: &str) -> Option<&'static str> {
-    const FACES: [(&str, &str); 9] = [
+    const FACES: [(&str, &str); 11] = [
         ("k", "p"),
         ("ktbl", "ptbl"),
         ("k2tog", "p2tog"),
@@ -221,6 +231,8 @@ fn other_face(name: &str) -> Option<&'static str> {
         // The yarn in front of the knitter is behind the cloth.
         ("sl", "slwyif"),
         ("tuck", "tuck"),
+        ("ds", "ds"),
+        ("-", "-"),
         ("miss", "miss"),
     ];
     FACES.iter().find_map(|&(a, b)| {

@@ -162,6 +162,9 @@ impl Parser<'_> {
     }
 
     fn step(&mut self) -> Result<Item> {
+        if let Some(turn) = self.turn()? {
+            return Ok(turn);
+        }
         let word = self.peek(0).unwrap_or_default().to_owned();
         self.at += 1;
         let Some(mut steps) = step(&word) else {
@@ -204,6 +207,37 @@ impl Parser<'_> {
         })
     }
 
+    /// "turn", "w&t", "wrap and turn", "turn, leaving rem sts unworked".
+    fn turn(&mut self) -> Result<Option<Item>> {
+        const WORDS: [&[&str]; 8] = [
+            &["turn", "work"],
+            &["turn"],
+            &["w&t"],
+            &["wt"],
+            &["wrap", "and", "turn"],
+            &["wrap", "&", "turn"],
+            &["wrap", "next", "st", "and", "turn"],
+            &["wrap", "next", "st", ",", "turn"],
+        ];
+        if !WORDS.iter().any(|words| self.take(words)) {
+            return Ok(None);
+        }
+        self.separators();
+        if self.take(&["leaving"]) || self.take(&["leave"]) {
+            let _ = self.take(&["rem"]) || self.take(&["remaining"]);
+            let _ = self.take(&["sts"]) || self.take(&["stitches"]);
+            self.take(&["unworked"]);
+        }
+        match self.peek(0) {
+            None => Ok(Some(Item::Turn)),
+            Some(after) => error(
+                self.line,
+                format!("\"{}\" comes after the turn", short(after)),
+                "a row ends where it turns: go on with the next one, as in Row 2: p10",
+            ),
+        }
+    }
+
     /// "2/1 LC", "2/2 rpc".
     fn cable(&mut self, word: &str) -> Result<Item> {
         let kind = self.peek(0).unwrap_or_default().to_owned();
@@ -239,6 +273,7 @@ fn step(word: &str) -> Option<Steps> {
         "m1" | "m1l" => return one("m1l", 0, 1),
         "m1r" => return one("m1r", 0, 1),
         "tuck" => return one("tuck", 1, 1),
+        "ds" => return one("ds", 1, 1),
         "miss" => return one("miss", 1, 1),
         "slwyif" => return one("slwyif", 1, 1),
         "mb" | "bobble" => return one("mb", 1, 1),

@@ -272,6 +272,7 @@ impl ClothPlan {
                     row_height: stitch.map(|s| s.y / d),
                     yarn_per_stitch: Some(length.clamp(6.0, 60.0)),
                     edges: Edges::Live,
+                    rims: knit::Rims::default(),
                     points: knit::POINTS,
                     colors: None,
                 };

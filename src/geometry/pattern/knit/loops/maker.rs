@@ -1,6 +1,7 @@
 //! Makes the loops of a chart's stitches: where they are, what they are drawn through, and the edges.
 
 use super::{
+    super::rims::CastOn,
     super::{
         super::chart::{Act, Stitch, Top},
         shape::bobble::{BELLY, BOBBLE},
@@ -12,10 +13,19 @@ use super::{
 const OVER: f64 = 0.8;
 const TUCKED: f64 = 0.75;
 pub(super) const LIFTED: f64 = 0.6;
+const DOUBLED: f64 = 0.48;
 const CAST_ON: f64 = 0.82;
+const CABLE_CAST_ON: f64 = 1.15;
 
 /// The loop of each stitch, before there are any.
 const NONE: u32 = u32::MAX;
+
+/// How far up rows begin, in mean rows: all of them, the room that they have, and each stitch where rows are short.
+struct Heights {
+    heights: Vec<f64>,
+    room: f64,
+    levels: Vec<Vec<f64>>,
+}
 
 pub(super) struct Maker<'a> {
     rows: &'a [Vec<Stitch>],
@@ -117,8 +127,8 @@ impl<'a> Maker<'a> {
         for _ in 0..=2 * self.rows.len() {
             let stitch = &self.rows[r][j];
             match stitch.act {
-                Act::Pass { .. } | Act::Tuck => {
-                    if stitch.act == Act::Tuck {
+                Act::Pass { .. } | Act::Tuck | Act::Unworked | Act::Double => {
+                    if matches!(stitch.act, Act::Tuck | Act::Double) {
                         later.push((self.made[r][j], down));
                     }
                     j = stitch.first_parent as usize;
@@ -143,8 +153,11 @@ impl<'a> Maker<'a> {
         if self.border.finished {
             let first = &self.middles[0];
             let at: Vec<f64> = if first.len() == self.cast_on { first.clone() } else { self.even(self.cast_on) };
-            self.cast =
-                at.iter().map(|&at| self.push(Loop { twist: 1.0, yarn: CAST_ON, ..Loop::laid(-1, at) })).collect();
+            let (twist, yarn) = match self.border.rims.cast_on {
+                CastOn::LongTail => (1.0, CAST_ON),
+                CastOn::Cable => (0.0, CABLE_CAST_ON),
+            };
+            self.cast = at.iter().map(|&at| self.push(Loop { twist, yarn, ..Loop::laid(-1, at) })).collect();
             let visits = self.cast.iter().enumerate().map(|(j, &c)| (j as u32, Visit::Loop(c))).collect();
             self.below = Some(Course::new(-1, visits));
         }
@@ -160,6 +173,8 @@ impl<'a> Maker<'a> {
                     Act::Bobble => Some(Loop { sign: 1.0, bobble: true, yarn: BOBBLE, ..base }),
                     Act::Over => Some(Loop { yarn: OVER, ..base }),
                     Act::Tuck => Some(Loop { yarn: TUCKED, ..base }),
+                    Act::Double => Some(Loop { yarn: DOUBLED, ..base }),
+                    Act::Unworked => None,
                     Act::Pass { front } => {
                         visits.push((j as u32, Visit::Pass { at, front }));
                         None
@@ -173,7 +188,8 @@ impl<'a> Maker<'a> {
                 }));
             }
             self.made.push(made);
-            self.courses.push(Course::new(r as i32, visits));
+            let first = row.iter().position(|s| s.act != Act::Unworked).unwrap_or(0);
+            self.courses.push(Course { first, ..Course::new(r as i32, visits) });
         }
         let mut content = Vec::new();
         for r in 0..self.rows.len() {
@@ -284,9 +300,23 @@ impl<'a> Maker<'a> {
         self.above = Some(Course::new(row, visits));
     }
 
+    /// The yarn goes through every loop of the last row.
+    pub(super) fn draw_together(&mut self) {
+        let last = self.rows.len() - 1;
+        let row = self.rows.len() as i32;
+        let mut visits = Vec::with_capacity(self.rows[last].len());
+        for j in 0..self.rows[last].len() {
+            let mut content = Vec::new();
+            self.content(last, j, 0, &mut content);
+            content.into_iter().for_each(|(p, _)| self.loops[p as usize].held = Some(row));
+            visits.push((j as u32, Visit::Through { at: self.middles[last][j] }));
+        }
+        self.above = Some(Course::new(row, visits));
+    }
+
     /// How far up each row begins, in mean rows, and how much higher rows are than without room to change places: three
     /// stitches that become one take it, cables, and stitches that lean far; and, above them, bobbles.
-    fn heights(&self) -> (Vec<f64>, f64) {
+    fn heights(&self) -> Heights {
         const TRIPLE: f64 = 0.8;
         const CROSSING: f64 = 0.5;
         let belly = |r: usize| if self.rows[r].iter().any(|s| s.act == Act::Bobble) { BELLY } else { 0.0 };
@@ -303,10 +333,11 @@ impl<'a> Maker<'a> {
             };
             self.rows[r].iter().zip(&self.middles[r]).map(of).fold(belly(below), f64::max)
         };
+        let rooms: Vec<f64> = (0..self.rows.len()).map(room).collect();
         let mut up = 0.0;
         let mut heights: Vec<f64> = Vec::with_capacity(self.rows.len());
-        for r in 0..self.rows.len() {
-            up += room(r);
+        for room in &rooms {
+            up += room;
             heights.push(up);
             up += 1.0;
         }
@@ -315,11 +346,40 @@ impl<'a> Maker<'a> {
         }
         let room = up / self.rows.len() as f64;
         heights.iter_mut().for_each(|h| *h /= room);
-        (heights, room)
+        Heights { levels: self.levels(&rooms, room), heights, room }
+    }
+
+    /// How far up each stitch of each row begins where rows are short: above as many rows as have been worked there. A double
+    /// stitch is drawn up by half of one.
+    fn levels(&self, rooms: &[f64], room: f64) -> Vec<Vec<f64>> {
+        const DOUBLE: f64 = 0.5;
+        if !self.rows.iter().flatten().any(|s| s.act == Act::Unworked) {
+            return Vec::new();
+        }
+        let mut below = vec![0.0; self.cast_on];
+        let mut levels = Vec::with_capacity(self.rows.len() + 1);
+        for (row, room) in self.rows.iter().zip(rooms) {
+            let at = |s: &Stitch| {
+                let parents = s.first_parent..s.first_parent + u32::from(s.parents.max(1));
+                let top = parents.filter_map(|p| below.get(p as usize)).copied().fold(0.0, f64::max);
+                top + if s.act == Act::Unworked { 0.0 } else { *room }
+            };
+            let own: Vec<f64> = row.iter().map(at).collect();
+            let high = |s: &Stitch| match s.act {
+                Act::Unworked => 0.0,
+                Act::Double => DOUBLE,
+                _ => 1.0,
+            };
+            below = row.iter().zip(&own).map(|(s, at)| at + high(s)).collect();
+            levels.push(own);
+        }
+        levels.push(below);
+        levels.iter_mut().flatten().for_each(|up| *up /= room);
+        levels
     }
 
     pub(super) fn finish(mut self) -> Loops {
-        let (heights, room) = self.heights();
+        let Heights { heights, room, levels } = self.heights();
         let mut courses = Vec::new();
         courses.extend(self.below.take());
         courses.append(&mut self.courses);
@@ -332,6 +392,7 @@ impl<'a> Maker<'a> {
             wide: self.rows[0].len(),
             heights,
             room,
+            levels,
             bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
         }
     }

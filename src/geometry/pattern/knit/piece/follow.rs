@@ -76,12 +76,12 @@ impl<'a> Laying<'a> {
         let own = match course.visits[k].1 {
             Visit::Loop(i) => Some(&self.loops.loops[i as usize]),
             Visit::Pass { .. } => None,
-            Visit::Float { .. } => return None,
+            Visit::Float { .. } | Visit::Through { .. } => return None,
         };
         let cell = (self.cells)(usize::try_from(course.row).ok()?)?;
         match self.surface {
             Surface::Plane { .. } => self.even.then_some(cell),
-            Surface::Round { .. } => self.plain(own).then_some(cell),
+            Surface::Round { .. } | Surface::Bent(_) => self.plain(own).then_some(cell),
         }
     }
 
@@ -90,14 +90,15 @@ impl<'a> Laying<'a> {
         let [width, height] = cell.gauge();
         let row = f64::from(course.row);
         match (self.surface, course.visits[k].1) {
-            (Surface::Round { .. }, Visit::Loop(i)) => {
+            (Surface::Round { .. } | Surface::Bent(_), Visit::Loop(i)) => {
                 let own = &self.loops.loops[i as usize];
                 let lean = own.foot - own.at + (self.head(own) - own.foot) * head;
-                let count = course.visits.len() as f64;
-                let at = own.at + lean + (p.x / width - (k as f64 + 0.5)) / count;
+                let count = if self.loops.border.turns { course.visits.len() as f64 } else { 1.0 };
+                let at = own.at + lean + (p.x / width - ((course.first + k) as f64 + 0.5)) / count;
+                let share = p.y / height - r as f64;
                 // A cell of several rows has its own room for what passes.
-                let base = if cell.high > 1 { row } else { self.loops.up(course.row) };
-                Place { at, up: base + p.y / height - r as f64, out: p.z }
+                let up = if cell.high > 1 { row + share } else { self.loops.within(course.row, at, share) };
+                Place { at, up, out: p.z }
             }
             _ => Place { at: p.x / width - 0.5 * self.loops.wide as f64, up: row + p.y / height - r as f64, out: p.z },
         }
@@ -108,7 +109,7 @@ impl<'a> Laying<'a> {
         let (cell, r) = self.cell_of(course, k)?;
         let mut points: Vec<DVec3> = cell.visit(r, course.first + k).map(|(p, _)| p).collect();
         points.extend(cell.visit(r, course.first + k + 1).next().map(|(p, _)| p));
-        let line: Vec<DVec3> = piece.places.iter().map(|p| self.surface.place(p)).collect();
+        let line: Vec<DVec3> = piece.places.iter().map(|p| self.surface.place(course.row, p)).collect();
         let length = |line: &[DVec3]| line.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
         let whole = length(&line);
         let by = |share: f64, head: f64| {
@@ -201,7 +202,7 @@ impl<'a> Laying<'a> {
                 continue;
             }
             let [heads, feet, legs] = self.around(course, &known, followed);
-            let (line, reach) = (self.loops.up(course.row + 1), self.loops.reach());
+            let reach = self.loops.reach();
             let mut own = pieces[c].clone();
             for ((_, visit), piece) in course.visits.iter().zip(&mut own) {
                 if !is_closed(visit) {
@@ -209,6 +210,7 @@ impl<'a> Laying<'a> {
                 }
                 for (place, grid) in piece.places.iter_mut().zip(&piece.grid) {
                     let below = heads.at(place.at);
+                    let line = self.loops.up_at(course.row + 1, place.at);
                     let share = (0.5 + 0.5 * (place.up - line) / reach).clamp(0.0, 1.0);
                     let above = feet.at(place.at).zip(legs.at(place.at)).map(|(foot, leg)| foot.lerp(leg, share));
                     // The edges hang on what they hold.
@@ -231,7 +233,7 @@ impl<'a> Laying<'a> {
             let (cell, r) = self.cell_of(above, k)?;
             let visit = cell.visit(r, above.first + k);
             let place = |(p, g): (DVec3, [f32; 2])| self.place_of(above, k, (cell, r), p, f64::from(g[1] - r as f32));
-            Some(visit.map(|p| self.surface.place(&place(p))).collect::<Vec<_>>())
+            Some(visit.map(|p| self.surface.place(above.row, &place(p))).collect::<Vec<_>>())
         };
         let is_held = |k: usize| {
             let (_, Visit::Loop(child)) = above.visits[k] else { return false };
@@ -241,7 +243,7 @@ impl<'a> Laying<'a> {
             let (Some(before), Some(mut way)) = (points(k - 1), points(k)) else { return false };
             way.truncate(way.len() / 2 + 1);
             way.splice(..0, before[before.len() / 2..].iter().copied());
-            let ring: Vec<DVec3> = pieces[parent].places.iter().map(|p| self.surface.place(p)).collect();
+            let ring: Vec<DVec3> = pieces[parent].places.iter().map(|p| self.surface.place(own.row, p)).collect();
             threaded(&ring, &way) != 0
         };
         (1..above.visits.len()).filter(|&k| is_held(k)).count()

@@ -7,11 +7,9 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
-
 use super::{
     super::loops::{Loop, Loops},
-    CLOSING, DEPTH, Foot, LEAN, Piece, Place, REACH, smooth,
+    CLOSING, DEPTH, Foot, LEAN, Piece, Place, REACH, smooth, through,
 };
 
 /// Its yarn, in shares of a stitch's.
@@ -98,25 +96,10 @@ fn bulge(v: f64) -> f64 {
     OUT * smooth((v - 0.5) / 0.9) * (1.0 - smooth((v - 1.9) / 0.8))
 }
 
-/// A smooth line through places, without the last one.
-fn through(knots: &[Place]) -> impl Iterator<Item = Place> + '_ {
-    let at = |k: usize| {
-        let p = knots[k.min(knots.len() - 1)];
-        DVec3::new(p.at, p.up, p.out)
-    };
-    (0..TURN).map(move |k| {
-        let along = k as f64 * (knots.len() - 1) as f64 / TURN as f64;
-        let (i, t) = (along as usize, along.fract());
-        let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-        let p = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
-        Place { at: p.x, up: p.y, out: p.z }
-    })
-}
-
 impl Loops {
     /// A bobble whose first foot is at `foot`, between the ends of its neighbours.
     pub(super) fn bobble(&self, own: &Loop, column: u32, foot: Foot, ends: [Foot; 2], step: f64) -> Piece {
-        let up = self.up(own.row);
+        let up = self.up_at(own.row, own.at);
         let pouch = Pouch { at: foot.at, up, step, third: BELLY / (3.0 * self.room()) };
         // The loop that closes it.
         let closing = Foot { up: up + 3.0 * pouch.third - self.reach(), ..foot };
@@ -128,27 +111,33 @@ impl Loops {
 
         let mut places: Vec<Place> = numbers().enumerate().flat_map(|(i, x)| pouch.there(x, i % 2 == 1)).collect();
         places[0] = end(ends[0]);
-        places.extend(through(&[
-            pouch.place(2.0, 0.5, -LOW, -1.1),
-            pouch.place(2.0, 0.68, 0.1, -0.9),
-            pouch.place(2.0, 0.72, 0.7, -0.5),
-            pouch.place(2.0, 0.72, 1.05, -0.4),
-            pouch.place(2.0, 0.5, 1.5 - BELLY_REACH, -DEPTH),
-        ]));
+        places.extend(through(
+            &[
+                pouch.place(2.0, 0.5, -LOW, -1.1),
+                pouch.place(2.0, 0.68, 0.1, -0.9),
+                pouch.place(2.0, 0.72, 0.7, -0.5),
+                pouch.place(2.0, 0.72, 1.05, -0.4),
+                pouch.place(2.0, 0.5, 1.5 - BELLY_REACH, -DEPTH),
+            ],
+            TURN,
+        ));
         numbers().rev().for_each(|x| places.extend(pouch.back(x)));
-        places.extend(through(&[
-            pouch.place(-2.0, -0.5, 1.5 - BELLY_REACH, -DEPTH),
-            pouch.place(-2.0, -0.75, 1.45, -0.6),
-            pouch.place(-2.0, -0.7, 1.9, -0.3),
-            pouch.place(-2.0, -0.62, 2.22, 0.3),
-            pouch.place(-2.0, -0.55, 2.36, 0.4),
-            pouch.flat(-0.45, 2.42, 0.2),
-            open,
-        ]));
+        places.extend(through(
+            &[
+                pouch.place(-2.0, -0.5, 1.5 - BELLY_REACH, -DEPTH),
+                pouch.place(-2.0, -0.75, 1.45, -0.6),
+                pouch.place(-2.0, -0.7, 1.9, -0.3),
+                pouch.place(-2.0, -0.62, 2.22, 0.3),
+                pouch.place(-2.0, -0.55, 2.36, 0.4),
+                pouch.flat(-0.45, 2.42, 0.2),
+                open,
+            ],
+            TURN,
+        ));
         let before = places.len();
         places.extend(&last.places[..last.places.len() - 1]);
         // Down behind it, to the next stitch.
-        places.extend(through(&[shut, pouch.flat(0.48, 1.6, -1.4), pouch.flat(0.5, 0.2, -1.4), end(ends[1])]));
+        places.extend(through(&[shut, pouch.flat(0.48, 1.6, -1.4), pouch.flat(0.5, 0.2, -1.4), end(ends[1])], TURN));
         places.push(end(ends[1]));
         let count = places.len() as f32;
         let grid = |k: usize| {

@@ -11,7 +11,7 @@ use super::{
 /// How a way is linked with a ring: how often it passes the ring towards the front less towards the back. The ring is closed far
 /// below, the way far above, and crossings are counted as seen from the front (Gauss' linking number as a sum of signs where
 /// the way is in front).
-fn linked(ring: &[DVec3], way: &[DVec3]) -> i32 {
+pub(super) fn linked(ring: &[DVec3], way: &[DVec3]) -> i32 {
     const FAR: f64 = 1e3;
     let closed = |line: &[DVec3], by: f64| -> Vec<DVec3> {
         let (first, last) = (line[0], line[line.len() - 1]);
@@ -296,8 +296,8 @@ fn yarns_do_not_pass_each_other_in_pieces() {
 }
 
 /// The yarn of each stitch of a piece of one yarn from left to right, by its row from the cast-on edge and its column. Round
-/// pieces are unrolled.
-fn yarn_of_stitches(piece: &Knit) -> BTreeMap<(i32, i32), Vec<DVec3>> {
+/// pieces are unrolled. `turns` says whether what leads from row to row is of the stitch before it.
+pub(super) fn yarn_of_stitches(piece: &Knit, turns: bool) -> BTreeMap<(i32, i32), Vec<DVec3>> {
     let made = piece.knitted(1.0).unwrap();
     let n = f64::from(piece.stitches);
     let radius = made.gauge[0] * n / TAU;
@@ -310,7 +310,11 @@ fn yarn_of_stitches(piece: &Knit) -> BTreeMap<(i32, i32), Vec<DVec3>> {
         }
     };
     let mut stitches: BTreeMap<(i32, i32), Vec<DVec3>> = BTreeMap::new();
+    let mut last = [f32::NAN; 2];
     for (p, [wale, course]) in made.strands[0].curve.points.iter().zip(&made.strands[0].coordinates) {
+        if std::mem::replace(&mut last, [*wale, *course]) == [*wale, *course] && !turns {
+            continue;
+        }
         stitches.entry((course.floor() as i32, wale.floor() as i32)).or_default().push(unrolled(*p, *wale));
     }
     for own in stitches.values_mut().filter(|own| own[0].x > own[own.len() - 1].x) {
@@ -321,7 +325,7 @@ fn yarn_of_stitches(piece: &Knit) -> BTreeMap<(i32, i32), Vec<DVec3>> {
 
 /// Stitches that are not drawn through what the chart says, away from the sides.
 fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
-    let (rows, stitches) = (piece.worked().unwrap(), yarn_of_stitches(piece));
+    let (rows, stitches) = (piece.worked().unwrap(), yarn_of_stitches(piece, true));
     let is_drawn = |r: i32, k: i32| {
         let [before, own, after] = [k - 1, k, k + 1].map(|k| stitches[&(r, k)].as_slice());
         let ring = [&stitches[&(r - 1, k)][..], &stitches[&(r - 1, k + 1)][..1]].concat();
@@ -359,7 +363,7 @@ fn slipped_sides_are_chains() {
     let piece = Knit { edges: Edges::Slipped, ..knit("stockinette", 10, 9) };
     assert_eq!(passed(|| drop(piece.strands(1.0).unwrap())), 0);
     assert_eq!(undrawn(&piece), []);
-    let stitches = yarn_of_stitches(&piece);
+    let stitches = yarn_of_stitches(&piece, true);
     // Rows that begin on the left slip their first stitch, and the next one is drawn through that of the row before.
     for r in [1, 3, 5] {
         let ring = [&stitches[&(r, 0)][..], &stitches[&(r, 1)][..1]].concat();

@@ -1,0 +1,80 @@
+use super::*;
+
+fn worked(rows: &[&str], cast_on: u32, count: u32) -> Vec<Vec<Stitch>> {
+    Chart::parse(rows).unwrap().work(cast_on, count, 1000).unwrap()
+}
+
+#[test]
+fn named_patterns_are_sound_and_even() {
+    for (name, _) in PATTERNS {
+        let chart = Chart::named(name).unwrap();
+        let width = chart.even_width(100).unwrap();
+        let rows = chart.work(3 * width, 2 * chart.rows(), 10_000).unwrap();
+        assert!(rows.iter().all(|r| r.len() == 3 * width as usize), "{name}");
+    }
+    assert!(Chart::named("stockinet").is_none());
+}
+
+#[test]
+fn decreases_take_two_and_increases_make_two() {
+    let rows = worked(&["k", "k3 k2tog", "k ssk kfb"], 15, 3);
+    assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [15, 12, 12]);
+}
+
+#[test]
+fn a_hat_ends_with_few_stitches() {
+    let rows = worked(&["3: k", "k3 k2tog", "k", "k2 k2tog", "k1 k2tog", "k2tog"], 20, 8);
+    assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [20, 20, 20, 16, 16, 12, 8, 4]);
+    assert_eq!((rows[3][3].first_parent, rows[3][3].parents), (3, 2));
+    assert_eq!((rows[3][4].first_parent, rows[3][4].parents), (5, 1));
+    // Every loop is held by exactly one stitch.
+    for pair in rows.windows(2) {
+        let mut held = vec![0; pair[0].len()];
+        for s in &pair[1] {
+            for p in s.first_parent..s.first_parent + u32::from(s.parents) {
+                held[p as usize] += 1;
+            }
+        }
+        assert!(held.iter().all(|&h| h == 1));
+    }
+}
+
+#[test]
+fn cables_cross_halves() {
+    let row = &worked(&["k4", "c4f"], 4, 2)[1];
+    assert_eq!(row.iter().map(|s| (s.first_parent, s.layer)).collect::<Vec<_>>(), [(2, 1), (3, 1), (0, -1), (1, -1)]);
+    assert_eq!(worked(&["k4", "c4b"], 4, 2)[1][0].layer, -1);
+}
+
+#[test]
+fn plain_rows_may_be_cut_and_others_not() {
+    assert_eq!(worked(&["k2 p2"], 7, 1)[0].iter().filter(|s| s.purl).count(), 3);
+    let error = Chart::parse(&["k", "k3 k2tog"]).unwrap().work(9, 2, 1000).unwrap_err();
+    assert_eq!((error.line, error.problem.as_str()), (Some(1), "row 2 repeats over 5 stitches, but finds 9"));
+    assert!(error.hint.ends_with("takes: cast on 5 or 10"), "{}", error.hint);
+    // Four stitches of each five of the second row, by sevens in the third.
+    let error = Chart::parse(&["k", "k3 k2tog", "k5 k2tog"]).unwrap().work(10, 3, 1000).unwrap_err();
+    assert!(error.hint.ends_with("takes: cast on 35"), "{}", error.hint);
+}
+
+#[test]
+fn mistakes_are_explained() {
+    for (rows, problem) in [
+        (&["k2 q"][..], "unknown step \"q\""),
+        (&["c1f"], "unknown step \"c1f\""),
+        (&["c26f"], "unknown step \"c26f\""),
+        (&["2/0lc"], "unknown step \"2/0lc\""),
+        (&["k0"], "unknown step \"k0\""),
+        (&["k99999999999999999999"], "unknown step \"k9999999999999999999\""),
+        (&["yo"], "a row that takes no stitch of the row below"),
+        (&[""], "a row that takes no stitch of the row below"),
+        (&["x: k"], "expected a number of rows before the colon, found \"x\""),
+        (&["20000: k", "k"], "more than 20000 rows"),
+        (&["k20000 p"], "more than 20000 steps in a row"),
+        (&[], "a chart without rows"),
+    ] {
+        assert_eq!(Chart::parse(rows).unwrap_err().problem, problem);
+    }
+    let grows = Chart::parse(&["kfb"]).unwrap().work(4, 60, 5000).unwrap_err();
+    assert_eq!(grows.problem, "more than 5000 stitches by row 10");
+}

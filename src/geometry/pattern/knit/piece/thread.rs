@@ -1,0 +1,193 @@
+//! A yarn as points on its way through a piece, and how those of them that may move relax.
+
+use std::collections::HashSet;
+
+use glam::{DVec3, IVec3};
+
+use super::super::{
+    super::rods::{Rods, Run, Strand},
+    shape::spaced,
+};
+
+/// The longest segment, in diameters.
+const LONGEST: f64 = 1.0;
+
+/// A yarn on its way through the cloth.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Thread {
+    pub(in super::super) points: Vec<DVec3>,
+    /// Length at rest of the segment that begins at each point.
+    pub(in super::super) rest: Vec<f64>,
+    pub(in super::super) grid: Vec<[f32; 2]>,
+    /// What each point may do.
+    pub(super) state: Vec<State>,
+}
+
+/// What a point may do while a piece relaxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// It is at rest, as its cell has it.
+    Rest,
+    /// It moves.
+    Move,
+    /// Nothing holds it yet: it stays.
+    Held,
+}
+
+impl Thread {
+    pub(super) fn push(&mut self, point: DVec3, rest: f64, grid: [f32; 2], state: State) {
+        self.points.push(point);
+        self.rest.push(rest);
+        self.grid.push(grid);
+        self.state.push(state);
+    }
+
+    pub(super) fn reverse(&mut self) {
+        self.points.reverse();
+        self.grid.reverse();
+        self.state.reverse();
+        // The rest of a segment is kept at its first point.
+        self.rest.pop();
+        self.rest.reverse();
+        self.rest.push(0.0);
+    }
+
+    /// Goes on with another row; where it turns, it bulges so far.
+    pub(super) fn join(&mut self, mut next: Self, turn: DVec3) {
+        if let (Some(&from), Some(&to)) = (self.points.last(), next.points.first()) {
+            if turn != DVec3::ZERO {
+                let (a, b) = (from + turn, to + turn);
+                let at = |k: u32| {
+                    let t = f64::from(k) / 32.0;
+                    let u = 1.0 - t;
+                    from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t)
+                };
+                self.go_on(&(0..=32).map(at).collect::<Vec<_>>());
+                // The row begins with the last of these.
+                self.pop();
+            } else if let Some(last) = self.rest.last_mut()
+                && *last == 0.0
+            {
+                *last = from.distance(to).max(0.1);
+                if *last > LONGEST {
+                    // Along a long segment its neighbours would count as other strands.
+                    self.go_on(&[from, to]);
+                    self.pop();
+                }
+            }
+        }
+        self.points.append(&mut next.points);
+        self.rest.append(&mut next.rest);
+        self.grid.append(&mut next.grid);
+        self.state.append(&mut next.state);
+    }
+
+    /// Goes on along a line that begins where it ends.
+    pub(super) fn go_on(&mut self, line: &[DVec3]) {
+        const STEP: f64 = 0.7;
+        let (Some(&grid), Some(last)) = (self.grid.last(), self.rest.last_mut()) else { return };
+        let length: f64 = line.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let count = (length / STEP).ceil().clamp(2.0, 64.0) as usize;
+        let rest = length / count as f64;
+        *last = rest;
+        for (point, ..) in spaced(line, count).into_iter().skip(1) {
+            self.push(point, rest, grid, State::Move);
+        }
+        self.push(line[line.len() - 1], rest, grid, State::Move);
+    }
+
+    /// Begins with the same line, from its far end.
+    pub(super) fn come_from(&mut self, line: &[DVec3]) {
+        let Some(&grid) = self.grid.first() else { return };
+        let mut own = Self::default();
+        own.push(line[0], 0.0, grid, State::Move);
+        own.go_on(line);
+        own.reverse();
+        own.pop();
+        own.join(std::mem::take(self), DVec3::ZERO);
+        *self = own;
+    }
+
+    pub(super) fn pop(&mut self) {
+        self.points.pop();
+        self.rest.pop();
+        self.grid.pop();
+        self.state.pop();
+    }
+
+    /// Goes on straight for a while at its end or its start.
+    pub(super) fn tail(&mut self, length: f64, way: DVec3, at_start: bool) {
+        let end = if at_start { self.points.first() } else { self.points.last() };
+        let Some(&from) = end else { return };
+        let line = [from, from + way * length];
+        if at_start { self.come_from(&line) } else { self.go_on(&line) }
+    }
+}
+
+impl Thread {
+    /// More points on the same curve: so many times as many, about.
+    pub(in super::super) fn refine(&mut self, times: f64) {
+        let old = std::mem::take(self);
+        let n = old.points.len();
+        let count = ((n - 1) as f64 * times).round() as usize;
+        let at = |i: usize| old.points[i.min(n - 1)];
+        for k in 0..=count {
+            let along = k as f64 * (n - 1) as f64 / count as f64;
+            let (i, t) = ((along as usize).min(n - 2), along - (along as usize).min(n - 2) as f64);
+            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
+            let point = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+            let (g, h) = (old.grid[i], old.grid[i + 1]);
+            // Where a round begins anew, places jump.
+            let h = if (0..2).any(|k| (h[k] - g[k]).abs() > 2.0) { g } else { h };
+            self.push(point, old.rest[i] / times, [0, 1].map(|k| g[k] + t as f32 * (h[k] - g[k])), old.state[i]);
+        }
+    }
+}
+
+/// Relaxes what moves in some yarns, among what is at rest within reach of it.
+pub(in super::super) fn settle(threads: &mut [Thread], run: &Run) {
+    // What is at rest takes part if it is in such a cube beside one in which something moves.
+    const CUBE: f64 = 2.0;
+    if threads.iter().all(|t| t.state.iter().all(|s| *s != State::Move)) {
+        return;
+    }
+    let mut rods = Rods::default();
+    // Where each point of the rods is from.
+    let mut from: Vec<(usize, usize)> = Vec::new();
+    let whole = threads.iter().all(|t| t.state.iter().all(|s| *s != State::Rest));
+    let cube = |p: DVec3| (p / CUBE).floor().as_ivec3();
+    let mut near: HashSet<IVec3> = HashSet::new();
+    if !whole {
+        for t in threads.iter() {
+            for (p, _) in t.points.iter().zip(&t.state).filter(|(_, s)| **s == State::Move) {
+                let own = cube(*p);
+                let beside = |k: i32| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+                near.extend((0..27).map(|k| own + beside(k)));
+            }
+        }
+    }
+    for (k, t) in threads.iter().enumerate() {
+        let n = t.points.len();
+        let taken: Vec<bool> = t.points.iter().map(|p| whole || near.contains(&cube(*p))).collect();
+        let mut i = 0;
+        while i < n {
+            if !taken[i] {
+                i += 1;
+                continue;
+            }
+            let start = rods.points.len();
+            while i < n && taken[i] {
+                rods.points.push(t.points[i]);
+                rods.rest.push(t.rest[i].max(1e-3));
+                rods.fixed.push(t.state[i] != State::Move);
+                from.push((k, i));
+                i += 1;
+            }
+            rods.strands.push(Strand { start, count: rods.points.len() - start, jump: None });
+        }
+    }
+    rods.relax(run);
+    for (p, (k, i)) in rods.points.iter().zip(from) {
+        threads[k].points[i] = *p;
+    }
+}
