@@ -35,10 +35,6 @@ struct Followed {
 /// Loops that a cell has folded far come through elsewhere than in their closed form. What suits most stitches is taken.
 const FOLLOWED: [Followed; 2] = [Followed { foot: 0.12, leg: 0.12 }, Followed { foot: 0.0, leg: 0.2 }];
 
-fn vector(p: &Place) -> DVec3 {
-    DVec3::new(p.at, p.up, p.out)
-}
-
 /// How far what lies along a row is moved, by where it is across the cloth.
 #[derive(Default)]
 struct Field {
@@ -104,6 +100,11 @@ impl<'a> Laying<'a> {
         }
     }
 
+    /// How far up a row is at a place of it where it climbs over short rows, in rows; else 0.
+    fn climbed(&self, row: i32, at: f64) -> f64 {
+        if self.loops.levels().is_empty() { 0.0 } else { self.loops.up_at(row, at) }
+    }
+
     /// How far a cell has moved a visit from its closed form.
     fn moved(&self, course: &Course, k: usize, piece: &Piece, followed: Followed) -> Option<Moved> {
         let (cell, r) = self.cell_of(course, k)?;
@@ -118,6 +119,7 @@ impl<'a> Laying<'a> {
             let (j, t) =
                 ((along as usize).min(points.len() - 2), along - (along as usize).min(points.len() - 2) as f64);
             let point = points[j].lerp(points[j + 1], t);
+            let vector = |p: &Place| DVec3::new(p.at, p.up - self.climbed(course.row, p.at), p.out);
             vector(&self.place_of(course, k, (cell, r), point, head)) - vector(&piece.places[i])
         };
         let is_bobble = matches!(course.visits[k].1, Visit::Loop(i) if self.loops.loops[i as usize].bobble);
@@ -217,7 +219,8 @@ impl<'a> Laying<'a> {
                     let foot = below.or(above).unwrap_or_default();
                     let rise = f64::from(grid[1] - course.row as f32).clamp(0.0, 1.0);
                     let by = foot.lerp(above.unwrap_or(foot), rise);
-                    *place = Place { at: place.at + by.x, up: place.up + by.y, out: place.out + by.z };
+                    let climb = self.climbed(course.row, place.at + by.x) - self.climbed(course.row, place.at);
+                    *place = Place { at: place.at + by.x, up: place.up + by.y + climb, out: place.out + by.z };
                 }
             }
             moved.push((c, own));
