@@ -207,7 +207,7 @@ impl Loops {
         // Where rows are short a row may climb along a stitch.
         let level = self.up_at(own.row, foot.at);
         let foot_up = |at: f64| foot.up + (self.up_at(own.row, at) - level);
-        let swap = self.swap(own, head_up(head_at) - foot.up, head_at - foot.at);
+        let swap = self.swap(own, head_up(head_at) - foot_up(head_at), head_at - foot.at);
         let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
         let foot_depth = self.foot_depth(own);
         let spread = match children().any(|c| c.bobble) {

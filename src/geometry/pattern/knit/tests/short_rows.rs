@@ -14,6 +14,9 @@ const WEDGE: [&str; 12] = ["k", "k", "k", "-4 k12", "-4 k12", "-8 k8", "-8 k8", 
 const DART: [&str; 14] =
     ["k", "k", "k13 -3", "-3 k10 -3", "-3 k8 -5", "-5 k6 -5", "-5 k4 -7", "k9 -7", "k", "k", "k", "k", "k", "k"];
 
+/// Four times as many rows on the right, bound off right above the last of them.
+const BAND: [&str; 5] = ["k", "2: -1 k15", "2: -6 k10", "2: -11 k5", "k"];
+
 fn shaped(rows: &[&str]) -> Knit {
     let chart = Chart::parse(rows).unwrap();
     Knit { rows: chart.rows(), chart, ..knit("stockinette", 16, 1) }
@@ -74,7 +77,7 @@ fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
 
 #[test]
 fn a_yarn_turns_and_all_of_it_is_drawn_through() {
-    for (name, rows) in [("wedge", &WEDGE[..]), ("dart", &DART[..])] {
+    for (name, rows) in [("wedge", &WEDGE[..]), ("dart", &DART), ("band", &BAND)] {
         let piece = shaped(rows);
         let mut made = Vec::new();
         let passes = passed(|| made = piece.strands(1.0).unwrap());
