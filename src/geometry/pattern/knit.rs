@@ -127,7 +127,8 @@ const COARSE: u32 = 14;
 impl Knit {
     /// How many control points the cloth would have at most if it kept its width.
     pub fn control_points(&self) -> u64 {
-        u64::from(self.stitches) * u64::from(self.rows) * u64::from(self.points) + u64::from(self.rows)
+        self.layers()
+            * (u64::from(self.stitches) * u64::from(self.rows) * u64::from(self.points) + u64::from(self.rows))
     }
 
     fn size(&self) -> [Option<f64>; 2] {
@@ -268,7 +269,8 @@ impl Knit {
     }
 
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
-        let mut rows = self.chart.work(self.stitches, self.rows, MAX_POINTS / u64::from(self.points).max(1))?;
+        let mut rows =
+            self.chart.work(self.stitches, self.rows, MAX_POINTS / (self.layers() * u64::from(self.points)).max(1))?;
         short_rows::turned(&mut rows, self)?;
         if self.has_slipped_sides() {
             let right = short_rows::from_right(&rows, self.is_finished());
@@ -291,6 +293,46 @@ impl Knit {
         self.edges == Edges::Slipped && self.form == Form::Flat
     }
 
+    fn is_double(&self) -> bool {
+        self.colors.as_ref().is_some_and(|c| c.work == Work::DoubleKnit)
+    }
+
+    fn layers(&self) -> u64 {
+        if self.is_double() { 2 } else { 1 }
+    }
+
+    /// What cannot be knitted together.
+    fn check(&self) -> Result<(), ChartError> {
+        let slipped = self.edges == Edges::Slipped;
+        let plain = Chart::named("stockinette").is_some_and(|plain| plain == self.chart);
+        let wrong = match &self.colors {
+            _ if slipped && self.form != Form::Flat => {
+                ("what is knitted round has no sides to slip", "edges = \"finished\"")
+            }
+            Some(_) if slipped => (
+                "slipped sides are knitted of one yarn",
+                "edges = \"finished\" where several yarns come and go at the sides",
+            ),
+            Some(colors) if colors.work == Work::DoubleKnit => match self.form {
+                _ if colors.rows.iter().flatten().any(|c| *c > 1) => {
+                    ("double knitting takes two colours, one for each layer", "a third is knitted with \"stranded\"")
+                }
+                _ if self.edges == Edges::Tile => {
+                    ("a tile is of one yarn in each row, and double knitting of two", "leave out `tile`")
+                }
+                _ if !plain => {
+                    ("both sides of double knitting are stockinette", "leave out `pattern`, `chart` and `instructions`")
+                }
+                Form::Revolution(_) => {
+                    ("both layers of double knitting have the same rows and stitches", "form = \"flat\" or \"tube\"")
+                }
+                _ => return Ok(()),
+            },
+            _ => return Ok(()),
+        };
+        Err(ChartError::new(None, wrong.0, wrong.1))
+    }
+
     /// The yarns of the piece, in the unit of `diameter`.
     ///
     /// # Errors
@@ -304,15 +346,9 @@ impl Knit {
     /// # Errors
     /// The chart does not fit the stitches, or asks for more than [`MAX_POINTS`] control points.
     pub fn knitted(&self, diameter: f64) -> Result<Knitted, ChartError> {
+        self.check()?;
         if self.edges == Edges::Tile {
             return self.patch(diameter);
-        }
-        if self.edges == Edges::Slipped && self.form != Form::Flat {
-            return Err(ChartError::new(None, "what is knitted round has no sides to slip", "edges = \"finished\""));
-        }
-        if self.edges == Edges::Slipped && self.colors.is_some() {
-            let hint = "edges = \"finished\" where several yarns come and go at the sides";
-            return Err(ChartError::new(None, "slipped sides are knitted of one yarn", hint));
         }
         let rows = self.worked()?;
         let finished = self.is_finished();
@@ -322,14 +358,20 @@ impl Knit {
         let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished, rims, mirrored };
         let ways = self.ways(&rows);
         let backwards = ways.iter().flat_map(|w| &w.rows).any(|s| s.row == rows.len() as i32 && s.backwards);
-        let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
-        if let Some(colors) = &self.colors {
-            loops.dye(colors);
-        }
+        let mut loops = match &self.colors {
+            Some(colors) if colors.work == Work::DoubleKnit => Loops::double(&rows, border, backwards, colors),
+            colors => {
+                let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
+                colors.iter().for_each(|colors| loops.dye(colors));
+                loops
+            }
+        };
         let profile = self.profile(diameter, &rows)?;
         let size = profile.as_ref().map_or(self.size(), |p| self.size_on(p, &rows).map(Some));
         let cell =
             self.repeat().map(|wide| self.cell(wide, size, if profile.is_some() { COARSE } else { self.points }));
+        let back = cell.as_ref().filter(|_| self.is_double()).map(Cell::turned);
+        loops.apart = if self.is_double() { cell.as_ref().map_or(0.0, Cell::touching) } else { 0.0 };
         let even = cell.is_some() && profile.is_none();
         let points = if even || short_rows::any(&rows) { self.points } else { COARSE };
         let kinds = if cell.is_none() { self.rows_of_a_kind(&rows, size, points) } else { Kinds::default() };
@@ -350,6 +392,7 @@ impl Knit {
             loops: &loops,
             surface: &surface,
             cells: &cell_of,
+            back: back.as_ref(),
             even,
             own_cells: cell.is_some(),
             slipped: self.has_slipped_sides(),

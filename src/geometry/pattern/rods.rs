@@ -64,7 +64,7 @@ const CONTACT: f64 = 90.0;
 const DEEP: f64 = 0.4;
 /// Yarns are kept this far apart: a little more than they need, for what a spline does between points and what forces
 /// press together.
-const APART: f64 = 1.02;
+pub(super) const APART: f64 = 1.02;
 /// Contacts are looked for this much beyond touching.
 const MARGIN: f64 = 0.8;
 /// If one in so many points has gone half of that, and if any has after so many steps, they are looked for again.

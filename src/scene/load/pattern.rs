@@ -139,6 +139,13 @@ impl KnitPlan {
         (colors, yarns): (Option<Colors>, Vec<usize>),
         context: &Context<'_>,
     ) -> Option<(Vec<Curve>, FabricCoordinates, String)> {
+        if matches!(self.work, ColorWork::Yarns { work: Work::DoubleKnit, .. }) && yarns.len() != 2 {
+            let problem =
+                format!("double knitting takes two yarns, one for each layer, but found {}", yarns.len().max(1));
+            let hint = "a `motif` or `rows` of the fabric of two yarns; more of them are knitted with \"stranded\"";
+            context.error(self.header, problem, Some(hint.to_owned()));
+            return None;
+        }
         let knit = Knit { colors, ..self.knit.clone() };
         let made = self.told(knit.knitted(diameter), context)?;
         let origin = self.origin(&made);
@@ -337,7 +344,12 @@ fn counted(
     let edges = if tile { Edges::Tile } else { edges };
     let rims = rims(table, edges, form.as_ref());
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
-    let works = [("stranded", Some(Work::Stranded)), ("intarsia", Some(Work::Intarsia)), ("printed", None)];
+    let works = [
+        ("stranded", Some(Work::Stranded)),
+        ("intarsia", Some(Work::Intarsia)),
+        ("double-knit", Some(Work::DoubleKnit)),
+        ("printed", None),
+    ];
     let work = table.one_of_or("color_work", Some(Work::Stranded), &works);
     if work == Some(Work::Intarsia) && form.as_ref().is_some_and(|f| *f != Form::Flat) {
         let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
@@ -345,7 +357,7 @@ fn counted(
     }
     let Stranding { catch, carry } = stranding(table);
     // A tile is of one yarn for each row.
-    let work = match work.filter(|_| !tile) {
+    let work = match work.filter(|work| !tile || *work == Work::DoubleKnit) {
         Some(work) => ColorWork::Yarns { work, catch, carry },
         None => ColorWork::Printed,
     };

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::{
     super::{
         chart::{Chart, Stitch},
-        rods::{Rods, Run, Strand},
+        rods::{APART, Rods, Run, Strand},
     },
     loops::{Border, Loops, Visit},
     shape::{Piece, Place, bobble::CLOSED, points_of, spaced},
@@ -226,6 +226,18 @@ impl Cell {
             self.rods.strands.push(Strand { start: first, count: strand.count, jump: strand.jump });
             self.visits.push(marks);
         }
+    }
+
+    /// The same cloth seen from its other side: its knit stitches are purl.
+    pub(super) fn turned(&self) -> Self {
+        let mut turned = self.clone();
+        turned.rods.points.iter_mut().for_each(|p| p.z = -p.z);
+        turned
+    }
+
+    /// How far its plane is from that of the same cloth turned, where both touch.
+    pub(super) fn touching(&self) -> f64 {
+        0.5 * APART - self.rods.points.iter().map(|p| p.z).fold(f64::MAX, f64::min)
     }
 
     /// Width of a stitch and distance of rows.

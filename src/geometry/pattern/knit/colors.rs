@@ -3,7 +3,8 @@
 //! Each colour is a yarn of its own. In stranded work, in a row of several colours each one makes its own loops and floats behind those of the
 //! others, from edge to edge; one that a few rows do not need is carried up the side, or inside of a tube. Floats keep
 //! their order, the first colour's below, so that no two yarns wind around each other. In intarsia each field of a colour has
-//! a yarn, which turns where the field ends and is linked there with its neighbour's.
+//! a yarn, which turns where the field ends and is linked there with its neighbour's. In double knitting two colours knit a
+//! layer each, and change layers where the picture changes its colour.
 
 use std::ops::Range;
 
@@ -16,6 +17,8 @@ pub enum Work {
     Stranded,
     /// Each field of a colour has a yarn of its own; of flat pieces only.
     Intarsia,
+    /// Two layers of plain knit back to back, of two colours that are exchanged on the other side.
+    DoubleKnit,
 }
 
 /// The colours of a piece, and how they are worked.
@@ -49,7 +52,7 @@ impl Colors {
         let last = self.rows.len() as i32 - 1;
         let own = &self.rows[row.clamp(0, last) as usize];
         match self.work {
-            Work::Stranded => most(own),
+            Work::Stranded | Work::DoubleKnit => most(own),
             Work::Intarsia if row > last && row.rem_euclid(2) == 1 => own.last().copied().unwrap_or(0),
             Work::Intarsia => own.first().copied().unwrap_or(0),
         }
@@ -136,7 +139,11 @@ impl Colors {
         let (first, after) = if finished { (-1, rows + 1) } else { (0, rows) };
         for row in first..after {
             let own = &self.rows[row.clamp(0, rows - 1) as usize];
-            let used = if (0..rows).contains(&row) { in_use(own.iter().copied()) } else { vec![self.of_edge(row)] };
+            let used = match (0..rows).contains(&row) {
+                true if self.work == Work::DoubleKnit => vec![0, 1],
+                true => in_use(own.iter().copied()),
+                false => vec![self.of_edge(row)],
+            };
             for color in used {
                 if open.len() <= usize::from(color) {
                     open.resize(usize::from(color) + 1, None);
@@ -264,6 +271,8 @@ pub(in super::super) enum Hold {
     Caught,
     /// The working yarn goes behind the float.
     Catches,
+    /// The yarn goes over to the other layer.
+    Crosses,
 }
 
 /// After which stitches of a row of some colours a float is caught between two loops of one colour: its colour and that of

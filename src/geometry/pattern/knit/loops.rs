@@ -1,5 +1,6 @@
 //! Which loop passes through which: a chart's stitches become loops, and the way of the yarn through each row.
 
+mod double;
 mod maker;
 
 use self::maker::{LIFTED, Maker};
@@ -37,6 +38,8 @@ pub(in super::super) struct Loop {
     pub(in super::super) foot: f64,
     /// Whether it closes a bobble, which is drawn through what it is.
     pub(in super::super) bobble: bool,
+    /// 1 in the front layer of a cloth of two, -1 in the back one; 0 where there is one layer.
+    pub(in super::super) side: f64,
 }
 
 impl Loop {
@@ -55,6 +58,7 @@ impl Loop {
             yarn: 1.0,
             foot: at,
             bobble: false,
+            side: 0.0,
         }
     }
 
@@ -138,6 +142,8 @@ pub(in super::super) struct Loops {
     levels: Vec<Vec<f64>>,
     /// Whether any stitch is a bobble.
     bobbles: bool,
+    /// How far each layer of a cloth of two is from the middle between them, in yarn diameters; 0 where there is one.
+    pub(in super::super) apart: f64,
 }
 
 /// What is beside the last stitch of a row, above the last row and below the first one.
@@ -178,7 +184,7 @@ impl Loops {
         maker.draw();
         match border.rims.top {
             _ if !border.finished => {}
-            Closing::BoundOff => maker.bind_off(backwards),
+            Closing::BoundOff => maker.bind_off(backwards, 1),
             Closing::Drawn => maker.draw_together(),
         }
         maker.finish()
@@ -215,6 +221,19 @@ impl Loops {
     /// How much higher rows are with the room that some have below them.
     pub(in super::super) fn room(&self) -> f64 {
         self.room
+    }
+
+    /// Whether the cloth has two layers.
+    pub(in super::super) fn is_double(&self) -> bool {
+        self.apart > 0.0
+    }
+
+    /// How far out the layer is of what a yarn does.
+    pub(in super::super) fn layer_of(&self, visit: &Visit) -> f64 {
+        match visit {
+            Visit::Loop(i) => self.apart * self.loops[*i as usize].side,
+            Visit::Pass { .. } | Visit::Float { .. } | Visit::Through { .. } => 0.0,
+        }
     }
 
     pub(in super::super) fn has_bobbles(&self) -> bool {

@@ -6,7 +6,7 @@ pub(super) mod follow;
 pub(super) mod sheet;
 mod thread;
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
@@ -64,6 +64,8 @@ pub(super) struct Laying<'a> {
     pub(super) surface: &'a Surface,
     /// The cell of each row of the chart, and the row in it; none where rows have no repeat.
     pub(super) cells: &'a dyn Fn(usize) -> Option<(&'a Cell, usize)>,
+    /// The cell of the back layer, of a cloth of two.
+    pub(super) back: Option<&'a Cell>,
     /// Whether all of the piece repeats as its cell does.
     pub(super) even: bool,
     /// Whether cells are of the chart's own rows; else of knit and purl stitches that stand where others may.
@@ -107,6 +109,10 @@ impl Laying<'_> {
             start.get_or_insert(from);
             match here {
                 Some((before, place)) if row - before > 1 => self.carry(&mut all, place, from, own),
+                Some((before, place)) if self.is_closed(before, row) => {
+                    let front = [row - 1, row].map(|r| self.is_front(r, way.color, backwards));
+                    self.wind(&mut all, row, [place, from], own, self.side(backwards), front);
+                }
                 Some((_, place)) if self.is_inside(row, c, backwards) => {
                     self.link(&mut all, place, from, own, backwards)
                 }
@@ -158,6 +164,43 @@ impl Laying<'_> {
         if backwards { c + 1 < all.end } else { c > all.start }
     }
 
+    /// Whether the yarns of both layers go around each other before a row.
+    fn is_closed(&self, before: i32, row: i32) -> bool {
+        let is_row = |r: i32| (0..self.loops.rows).contains(&r);
+        self.loops.is_double() && !self.loops.border.turns && is_row(before) && is_row(row)
+    }
+
+    /// Whether the stitch of a colour at a side is of the front layer, at the right one or at the left one.
+    fn is_front(&self, row: i32, color: u16, right: bool) -> bool {
+        let course = self.courses_of(row).map(|c| &self.loops.courses[c]).find(|c| c.color == color);
+        let edge = course.and_then(|c| if right { c.visits.last() } else { c.visits.first() });
+        edge.is_some_and(|(_, visit)| self.loops.layer_of(visit) > 0.0)
+    }
+
+    /// At a side the yarns of two layers turn and go around each other, once or until they have changed layers: it is closed.
+    /// `front` says whether a row ends and the next one begins in the front layer.
+    fn wind(&self, all: &mut Thread, row: i32, [from, to]: [Place; 2], own: Thread, side: f64, front: [bool; 2]) {
+        // In stitches, and in diameters from what they go around.
+        const BULGE: f64 = 0.45;
+        const AROUND: f64 = 0.56;
+        let begin = if front[0] { 0.0 } else { PI };
+        let turn = if front[0] == front[1] { TAU } else { PI };
+        let line = (0..=64).map(|k| {
+            let t = f64::from(k) / 64.0;
+            let (sin, cos) = (PI * t).sin_cos();
+            let up = from.up + (to.up - from.up) * 0.5 * (1.0 - cos);
+            let middle = self.surface.place(row, &Place { at: from.at + side * BULGE * sin, up, out: 0.0 });
+            let angle = begin + turn * t * t * (3.0 - 2.0 * t);
+            let end = from.out.abs() + (to.out.abs() - from.out.abs()) * t;
+            let radius = end + (AROUND - end) * sin * sin;
+            let away = DVec3::new(side * sin, -cos, 0.0);
+            middle + radius * (DVec3::Z * angle.cos() + away * angle.sin())
+        });
+        all.go_on(&line.collect::<Vec<_>>());
+        all.pop();
+        all.join(own, DVec3::ZERO);
+    }
+
     /// A yarn turns where its field ends: behind the cloth, around the neighbour's yarn, which turns half way up and half
     /// way down from it.
     fn link(&self, all: &mut Thread, from: Place, to: Place, own: Thread, backwards: bool) {
@@ -207,17 +250,20 @@ impl Laying<'_> {
         all.join(own, DVec3::ZERO);
     }
 
-    /// The end of a yarn that neither casts on nor binds off: from the edge of the row back behind it.
+    /// The end of a yarn that neither casts on nor binds off: from the edge of the row back behind it, or between two layers.
     fn hidden(&self, row: i32, end: Place) -> Vec<DVec3> {
-        const DEEP: f64 = 2.9;
+        const DEEP: f64 = -2.9;
+        // Between layers there is room half way up.
+        let (deep, rise) = if self.loops.is_double() { (0.0, 0.5 + self.loops.reach()) } else { (DEEP, 0.0) };
         let middle = if self.loops.border.turns { 0.5 } else { 0.0 };
         let inward = (middle - end.at).signum() / self.surface.across(&end);
         let line = (0..=64).map(|k| {
             let along = TAIL * f64::from(k) / 64.0;
             let down = (along / 2.5).min(1.0);
             let at = end.at + inward * (along - 1.2).max(0.0);
-            let out = end.out - (end.out + DEEP) * down * down * (3.0 - 2.0 * down);
-            self.surface.place(row, &Place { at, up: end.up, out })
+            let share = down * down * (3.0 - 2.0 * down);
+            let out = end.out + (deep - end.out) * share;
+            self.surface.place(row, &Place { at, up: end.up + rise * share, out })
         });
         line.collect()
     }
@@ -268,7 +314,8 @@ impl Laying<'_> {
             // As the cell has it.
             (Some((cell, r)), Surface::Plane { width, height }) => {
                 let n = self.loops.wide as f64;
-                let left = DVec3::new(-0.5 * n * width, f64::from(row) * height - r as f64 * height, 0.0);
+                let layer = self.loops.layer_of(&course.visits[k].1);
+                let left = DVec3::new(-0.5 * n * width, f64::from(row) * height - r as f64 * height, layer);
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
                     let grid = [g[0], g[1] - r as f32 + row as f32];

@@ -49,6 +49,8 @@ const CABLE: f64 = 2.6;
 const NARROW: f64 = 0.9;
 /// How wide a stitch is out of which a bobble grows.
 const HOLDS_BOBBLE: f64 = 1.35;
+/// How much of the way between two layers they come together where they are bound off.
+const CLOSED_BY: f64 = 0.5;
 /// How wide the foot is of what closes a bobble.
 const CLOSING: f64 = 0.6;
 /// How far yarn lies off the cloth where it passes stitches.
@@ -72,9 +74,28 @@ struct Foot {
 }
 
 impl Loops {
-    /// Width of a stitch in units of `at`, in a row of so many.
-    fn step(&self, count: usize) -> f64 {
-        if self.border.turns { 1.0 / count as f64 } else { 1.0 }
+    /// Width of a stitch in units of `at`, in a course.
+    fn step(&self, course: &Course) -> f64 {
+        let count = course.visits.iter().filter(|(_, v)| self.is_stitch(v)).count().max(1);
+        match self.border.turns {
+            true => 1.0 / count as f64,
+            // Loops of both layers beside each other.
+            false if self.is_double() && course.row < 0 => 0.5,
+            false => 1.0,
+        }
+    }
+
+    /// How far a loop is out of the middle of a cloth of two layers, at a share of its height.
+    fn layer(&self, own: &Loop, head: f64) -> f64 {
+        let is_bound = || own.held == Some(self.rows);
+        let share = match own.side {
+            0.0 => return 0.0,
+            // What is cast on leaves the middle below the feet of the first row.
+            _ if own.sign == 0.0 => smooth(head / 0.45),
+            _ if is_bound() => 1.0 - CLOSED_BY * smooth(head),
+            _ => 1.0,
+        };
+        own.side * self.apart * share
     }
 
     fn child_sign(&self, own: &Loop) -> f64 {
@@ -84,9 +105,13 @@ impl Loops {
 
     /// How deep the feet of a loop dive: behind all that it is drawn through.
     fn foot_depth(&self, own: &Loop) -> f64 {
-        let over = own.parents.iter().any(|&p| self.loops[p as usize].sign == 0.0);
+        // Feet of two layers must not pass each other.
+        let over = own.side == 0.0 && own.parents.iter().any(|&p| self.loops[p as usize].sign == 0.0);
         let others = LAYER * own.parents.len().saturating_sub(1) as f64;
-        DEPTH + if own.bobble { PILED } else { others } + if over { 0.5 } else { 0.0 }
+        // What binds off both layers is behind them.
+        let closes = own.side == 0.0 && own.parents.iter().any(|&p| self.loops[p as usize].side != 0.0);
+        let layers = if closes { (1.0 - CLOSED_BY) * self.apart } else { 0.0 };
+        DEPTH + layers + if own.bobble { PILED } else { others } + if over { 0.5 } else { 0.0 }
     }
 
     /// Where the feet of a visit are: its middle, and how far up and out.
@@ -102,7 +127,7 @@ impl Loops {
                     0.0 => (0.0, 0.0),
                     // A bobble begins as any other loop.
                     sign if l.bobble => (reach, -sign * DEPTH),
-                    sign => (reach + 0.12 * stack, -sign * self.foot_depth(l)),
+                    sign => (reach + 0.12 * stack, self.layer(l, 0.0) - sign * self.foot_depth(l)),
                 };
                 let behind = if l.is_lifted() { -l.layer } else { l.sign };
                 Foot { at: l.foot, up: self.up_at(course.row, l.foot) - below, out, behind }
@@ -124,8 +149,7 @@ impl Loops {
         self.courses
             .iter()
             .map(|course| {
-                let count = course.visits.iter().filter(|(_, v)| self.is_stitch(v)).count().max(1);
-                let step = self.step(count);
+                let step = self.step(course);
                 let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course, v)).collect();
                 let n = feet.len();
                 // The joint between a visit and the next, as the first one has it.
@@ -147,6 +171,7 @@ impl Loops {
                         // The float dips below the feet of the stitches that hold it, in front of the yarn between them.
                         Hold::Caught => (self.up(course.row) - 0.5, -1.0),
                         Hold::Catches => (self.up(course.row) - 0.8, -3.0),
+                        Hold::Crosses => (0.5 * (a.up + b.up) + course.lift, out),
                     };
                     Some(Foot { at: 0.5 * (a.at + b.at + round), up, out, behind: 0.0 })
                 };
@@ -154,14 +179,22 @@ impl Loops {
                 (0..n)
                     .map(|k| {
                         let own = feet[k];
-                        let end = |side: f64| Foot { at: own.at + side * 0.5 * step, ..own };
+                        let (column, visit) = &course.visits[k];
+                        let out = match visit {
+                            // At a side the yarns of two layers stay apart.
+                            Visit::Loop(i) if self.is_double() && self.loops[*i as usize].side != 0.0 => {
+                                let l = &self.loops[*i as usize];
+                                self.layer(l, 0.0) - l.sign * DEPTH
+                            }
+                            _ => own.out,
+                        };
+                        let end = |side: f64| Foot { at: own.at + side * 0.5 * step, out, ..own };
                         let left = match (k, self.border.round) {
                             (0, None) => None,
                             (0, Some(round)) => joints[n - 1].map(|j| Foot { at: j.at - round, ..j }),
                             _ => joints[k - 1],
                         };
                         let ends = [left.unwrap_or(end(-1.0)), joints[k].unwrap_or(end(1.0))];
-                        let (column, visit) = &course.visits[k];
                         match visit {
                             Visit::Loop(i) => match &self.loops[*i as usize] {
                                 l if l.bobble => self.bobble(l, *column, own, ends, step),
@@ -210,8 +243,10 @@ impl Loops {
         let swap = self.swap(own, head_up(head_at) - foot_up(head_at), head_at - foot.at);
         let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
         let foot_depth = self.foot_depth(own);
-        let spread = match children().any(|c| c.bobble) {
-            true => HOLDS_BOBBLE,
+        let spread = match over && own.side != 0.0 {
+            // Cast on for both layers, it is as wide as others where its layer is alone.
+            true => 2.0,
+            false if children().any(|c| c.bobble) => HOLDS_BOBBLE,
             false if drawn => rims::PINCHED,
             false => 1.0 + 0.8 * (count - 1.0),
         };
@@ -251,7 +286,7 @@ impl Loops {
                 let deep = |depth: f64| if cos2 > 0.0 { depth } else { DEPTH };
                 mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
             };
-            out += swap.map_or(0.0, |s| s.raised(head));
+            out += swap.map_or(0.0, |s| s.raised(head)) + self.layer(own, head);
             if drawn {
                 out += (Self::around(t / TAU) - out) * upper;
             }

@@ -1,3 +1,4 @@
+mod double;
 mod rims;
 mod short_rows;
 mod topology;

@@ -276,19 +276,20 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// Each stitch of the last row is drawn through it and through the one before it.
-    pub(super) fn bind_off(&mut self, backwards: bool) {
+    /// Each stitch of the last row, or so many `together`, is drawn through and the one before it laid over what comes out.
+    pub(super) fn bind_off(&mut self, backwards: bool, together: usize) {
         let last = self.rows.len() - 1;
         let row = self.rows.len() as i32;
-        let n = self.rows[last].len();
+        let n = self.rows[last].len() / together;
         let mut visits = Vec::with_capacity(n);
         let mut before: Option<u32> = None;
         for k in 0..n {
             let j = if backwards { n - 1 - k } else { k };
-            let at = self.middles[last][j];
+            let bound = j * together..(j + 1) * together;
+            let at = self.middles[last][bound.clone()].iter().sum::<f64>() / together as f64;
             let own = self.push(Loop { sign: 1.0, ..Loop::laid(row, at) });
             let mut content: Vec<(u32, i32)> = before.map(|b| (b, 0)).into_iter().collect();
-            self.content(last, j, 0, &mut content);
+            bound.for_each(|j| self.content(last, j, 0, &mut content));
             self.link(own, &content, row, false);
             self.loops[own as usize].foot = at;
             visits.push((j as u32, Visit::Loop(own)));
@@ -394,6 +395,7 @@ impl<'a> Maker<'a> {
             room,
             levels,
             bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
+            apart: 0.0,
         }
     }
 }

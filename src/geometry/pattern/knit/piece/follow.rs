@@ -74,9 +74,12 @@ impl<'a> Laying<'a> {
             Visit::Pass { .. } => None,
             Visit::Float { .. } | Visit::Through { .. } => return None,
         };
-        let cell = (self.cells)(usize::try_from(course.row).ok()?)?;
+        let (cell, r) = (self.cells)(usize::try_from(course.row).ok()?)?;
+        let side = own.map_or(0.0, |l| l.side);
+        let cell = (if side < 0.0 { self.back? } else { cell }, r);
         match self.surface {
-            Surface::Plane { .. } => self.even.then_some(cell),
+            // Layers that are bound off together lean to each other.
+            Surface::Plane { .. } => (self.even && (side == 0.0 || self.plain(own))).then_some(cell),
             Surface::Round { .. } | Surface::Bent(_) => self.plain(own).then_some(cell),
         }
     }
@@ -85,6 +88,7 @@ impl<'a> Laying<'a> {
     pub(super) fn place_of(&self, course: &Course, k: usize, (cell, r): (&Cell, usize), p: DVec3, head: f64) -> Place {
         let [width, height] = cell.gauge();
         let row = f64::from(course.row);
+        let out = p.z + self.loops.layer_of(&course.visits[k].1);
         match (self.surface, course.visits[k].1) {
             (Surface::Round { .. } | Surface::Bent(_), Visit::Loop(i)) => {
                 let own = &self.loops.loops[i as usize];
@@ -94,9 +98,9 @@ impl<'a> Laying<'a> {
                 let share = p.y / height - r as f64;
                 // A cell of several rows has its own room for what passes.
                 let up = if cell.high > 1 { row + share } else { self.loops.within(course.row, at, share) };
-                Place { at, up, out: p.z }
+                Place { at, up, out }
             }
-            _ => Place { at: p.x / width - 0.5 * self.loops.wide as f64, up: row + p.y / height - r as f64, out: p.z },
+            _ => Place { at: p.x / width - 0.5 * self.loops.wide as f64, up: row + p.y / height - r as f64, out },
         }
     }
 
@@ -157,8 +161,8 @@ impl<'a> Laying<'a> {
         (0..at.len()).map(|i| moved(i).or(at[i].map(|_| Moved::default()))).collect()
     }
 
-    /// How far the heads below a row, and the feet and the legs above it are moved.
-    fn around(&self, course: &Course, known: &[Option<Moved>], followed: Followed) -> [Field; 3] {
+    /// How far the heads below a row, and the feet and the legs above it are moved, in a layer.
+    fn around(&self, course: &Course, known: &[Option<Moved>], followed: Followed, layer: f64) -> [Field; 3] {
         // So far from the middle feet and legs are, in stitches.
         let side = |share: f64| 0.5 - share - LEAN * (2.0 * TAU * share).sin();
         let sides = [side(followed.foot), side(followed.leg).max(0.25)];
@@ -169,6 +173,9 @@ impl<'a> Laying<'a> {
         for (_, visit) in &course.visits {
             let Visit::Loop(i) = visit else { continue };
             let own = &loops[*i as usize];
+            if own.side != layer {
+                continue;
+            }
             let below = own.parents.iter().filter(|p| loops[**p as usize].row < own.row);
             heads.extend(below.map(|p| (own.foot, known[*p as usize].unwrap_or_default().head)));
             for child in own.children.iter().filter(|c| loops[**c as usize].row > own.row) {
@@ -203,13 +210,15 @@ impl<'a> Laying<'a> {
             if !course.visits.iter().any(|(_, visit)| is_closed(visit)) {
                 continue;
             }
-            let [heads, feet, legs] = self.around(course, &known, followed);
+            let layers: &[f64] = if self.loops.is_double() { &[1.0, 0.0, -1.0] } else { &[0.0] };
+            let fields: Vec<_> = layers.iter().map(|l| (*l, self.around(course, &known, followed, *l))).collect();
             let reach = self.loops.reach();
             let mut own = pieces[c].clone();
             for ((_, visit), piece) in course.visits.iter().zip(&mut own) {
-                if !is_closed(visit) {
-                    continue;
-                }
+                let Visit::Loop(i) = visit else { continue };
+                let own_side = self.loops.loops[*i as usize].side;
+                let field = fields.iter().find(|(layer, _)| *layer == own_side);
+                let (true, Some((_, [heads, feet, legs]))) = (is_closed(visit), field) else { continue };
                 for (place, grid) in piece.places.iter_mut().zip(&piece.grid) {
                     let below = heads.at(place.at);
                     let line = self.loops.up_at(course.row + 1, place.at);

@@ -295,10 +295,16 @@ fn yarns_do_not_pass_each_other_in_pieces() {
     }
 }
 
-/// The yarn of each stitch of a piece of one yarn from left to right, by its row from the cast-on edge and its column. Round
-/// pieces are unrolled. `turns` says whether what leads from row to row is of the stitch before it.
-pub(super) fn yarn_of_stitches(piece: &Knit, turns: bool) -> BTreeMap<(i32, i32), Vec<DVec3>> {
-    let made = piece.knitted(1.0).unwrap();
+/// Stitches of a yarn by row, from the cast-on edge, and column.
+pub(super) type Stitches = BTreeMap<(i32, i32), Vec<DVec3>>;
+
+/// The yarn of each stitch of a piece of one yarn. `turns` says whether what leads from row to row is of the stitch before it.
+pub(super) fn yarn_of_stitches(piece: &Knit, turns: bool) -> Stitches {
+    stitches_of(piece, &piece.knitted(1.0).unwrap(), 0, turns)
+}
+
+/// What is of each stitch in a yarn of a piece, from left to right. Round pieces are unrolled.
+pub(super) fn stitches_of(piece: &Knit, made: &Knitted, yarn: usize, turns: bool) -> Stitches {
     let n = f64::from(piece.stitches);
     let radius = made.gauge[0] * n / TAU;
     let unrolled = |p: DVec3, wale: f32| match piece.form {
@@ -309,9 +315,9 @@ pub(super) fn yarn_of_stitches(piece: &Knit, turns: bool) -> BTreeMap<(i32, i32)
             DVec3::new((turn + (own - turn).round()) * TAU * radius, p.y, p.x.hypot(p.z) - radius)
         }
     };
-    let mut stitches: BTreeMap<(i32, i32), Vec<DVec3>> = BTreeMap::new();
+    let mut stitches = Stitches::new();
     let mut last = [f32::NAN; 2];
-    for (p, [wale, course]) in made.strands[0].curve.points.iter().zip(&made.strands[0].coordinates) {
+    for (p, [wale, course]) in made.strands[yarn].curve.points.iter().zip(&made.strands[yarn].coordinates) {
         if std::mem::replace(&mut last, [*wale, *course]) == [*wale, *course] && !turns {
             continue;
         }
