@@ -22,6 +22,7 @@ pub(crate) fn stockinette() -> Tile {
         rims: Rims::default(),
         points: 24,
         colors: None,
+        flat: true,
     };
     Tile::of_knit(&knit, 1.2).unwrap()
 }

@@ -135,6 +135,7 @@ mod tests {
             yarn_per_stitch: None,
             points: knit::POINTS,
             colors: None,
+            flat: true,
         };
         let mut curves: Vec<Curve> = piece.strands(1.0).unwrap().into_iter().map(|s| s.curve).collect();
         for curve in &mut curves {

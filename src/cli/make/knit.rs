@@ -59,6 +59,9 @@ pub(super) struct KnitArgs {
     /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
     #[arg(long, conflicts_with_all = ["edges", "form", "profile", "cast_on", "top"])]
     tile: bool,
+    /// A flat piece that is not blocked: its edges roll as they do by themselves.
+    #[arg(long, conflicts_with_all = ["tile", "profile"])]
+    curl: bool,
     /// Control points of a stitch.
     #[arg(long, default_value_t = knit::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(12..=200))]
     points: u32,
@@ -136,6 +139,7 @@ impl KnitArgs {
             yarn_per_stitch: self.yarn_per_stitch,
             points: self.points,
             colors: None,
+            flat: !self.curl,
         };
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));

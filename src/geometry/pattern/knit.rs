@@ -8,6 +8,7 @@
 
 mod cell;
 mod colors;
+mod curl;
 mod loops;
 mod piece;
 mod rims;
@@ -23,8 +24,9 @@ use rayon::prelude::*;
 pub(crate) use self::colors::{Way, caught, in_use};
 use self::{
     cell::Cell,
+    curl::Curl,
     loops::{Border, Loops},
-    piece::{Laying, Surface, Thread, settle, sheet::Sheet},
+    piece::{Laying, State, Surface, Thread, settle, sheet::Sheet},
 };
 pub use self::{
     colors::{Colors, Work},
@@ -91,6 +93,8 @@ pub struct Knit {
     pub points: u32,
     /// Colour work, if there is any: a yarn for each colour.
     pub colors: Option<Colors>,
+    /// Whether a flat piece is blocked; else its edges roll as they would by themselves.
+    pub flat: bool,
 }
 
 /// A piece as it came out.
@@ -328,6 +332,13 @@ impl Knit {
                 }
                 _ => return Ok(()),
             },
+            _ if self.flat => return Ok(()),
+            _ if self.form != Form::Flat || self.edges == Edges::Tile => {
+                ("only flat pieces with edges are blocked or curl", "leave out `flat`")
+            }
+            _ if self.repeat().is_none() => {
+                ("how a chart with shaping curls is not known: it has no repeat", "leave out `flat`")
+            }
             _ => return Ok(()),
         };
         Err(ChartError::new(None, wrong.0, wrong.1))
@@ -419,6 +430,10 @@ impl Knit {
             Surface::Plane { height, .. } => DVec3::new(0.0, -0.5 * height * count, 0.0),
             Surface::Round { .. } | Surface::Bent(_) => DVec3::ZERO,
         };
+        if let (false, Some(cell)) = (self.flat || self.is_double(), &cell) {
+            let curl = Curl::of(cell, DVec2::new(width * f64::from(self.stitches), height * count));
+            roll_up(&mut threads, &curl, shift, &run);
+        }
         let strand = |(index, thread): (usize, Thread)| PatternStrand {
             curve: Curve {
                 basis: Basis::CatmullRom,
@@ -466,6 +481,18 @@ impl Knit {
         };
         Kinds { cells: known.par_iter().filter_map(cell).collect(), of_row }
     }
+}
+
+/// Lays a piece as it curls; then its yarns find room.
+fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3, run: &Run) {
+    if curl.is_flat() {
+        return;
+    }
+    for thread in threads.iter_mut() {
+        thread.points.iter_mut().for_each(|p| *p = curl.place(*p + to_middle) - to_middle);
+        thread.state.fill(State::Move);
+    }
+    settle(threads, &Run { steps: PIECE_STEPS, growing: 0, thin: 1.0, ..*run });
 }
 
 /// Cells of rows that are alike, and which row takes which.

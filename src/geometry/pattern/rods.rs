@@ -6,6 +6,7 @@
 //! another. The unit of length is the yarn's diameter, that of force its bending stiffness over the diameter's square.
 //! Sums are taken in a fixed order: the result is the same for any number of threads.
 
+mod energy;
 #[cfg(test)]
 pub(super) mod passing;
 mod search;

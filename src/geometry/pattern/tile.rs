@@ -441,6 +441,7 @@ mod tests {
             rims: Rims::default(),
             points: POINTS,
             colors: None,
+            flat: true,
         };
         Tile::of_knit(&knit, 0.5).unwrap()
     }

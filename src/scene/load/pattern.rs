@@ -343,6 +343,7 @@ fn counted(
     }
     let edges = if tile { Edges::Tile } else { edges };
     let rims = rims(table, edges, form.as_ref());
+    let flat = table.bool_or("flat", true);
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
     let works = [
         ("stranded", Some(Work::Stranded)),
@@ -374,6 +375,7 @@ fn counted(
         yarn_per_stitch,
         points,
         colors: None,
+        flat,
     };
     if knit.control_points() > MAX_POINTS {
         table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));

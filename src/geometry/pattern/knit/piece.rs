@@ -10,8 +10,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-pub(super) use self::thread::{Thread, settle};
-use self::{drawn::drawn_points, sheet::Sheet, thread::State};
+pub(super) use self::thread::{State, Thread, settle};
+use self::{drawn::drawn_points, sheet::Sheet};
 use super::{
     super::revolution::Revolution,
     cell::Cell,

@@ -26,6 +26,7 @@ fn knit(pattern: &str, stitches: u32, rows: u32) -> Knit {
         yarn_per_stitch: None,
         points: POINTS,
         colors: None,
+        flat: true,
     }
 }
 
@@ -272,4 +273,29 @@ fn fields_of_intarsia_are_linked_where_they_meet() {
         points.filter(|(_, c)| inner(c)).map(|(p, _)| p.x * side).fold(f64::MIN, f64::max)
     };
     assert!(reach(0, 1.0) > 0.2 && reach(1, -1.0) > 0.2, "{} {}", reach(0, 1.0), reach(1, -1.0));
+}
+
+#[test]
+fn a_piece_that_is_not_blocked_rolls_to_its_sides() {
+    let blocked = knit("stockinette", 24, 30);
+    let free = Knit { flat: false, ..blocked.clone() };
+    let [a, b] = [&blocked, &free].map(|piece| piece.strands(1.0).unwrap());
+    // Depth of what is near the middle of an edge, against that of the same points where it is blocked.
+    let depth = |strands: &[PatternStrand], near: &dyn Fn(&[f32; 2]) -> bool| {
+        let points = strands[0].curve.points.iter().zip(&strands[0].coordinates);
+        let z: Vec<f64> = points.filter(|(_, c)| near(c)).map(|(p, _)| p.z).collect();
+        z.iter().sum::<f64>() / z.len() as f64
+    };
+    let side = |c: &[f32; 2]| (2.0..3.0).contains(&c[0]) && (13.0..17.0).contains(&c[1]);
+    let top = |c: &[f32; 2]| (27.0..28.0).contains(&c[1]) && (10.0..14.0).contains(&c[0]);
+    let [side, top] = [&side as &dyn Fn(&[f32; 2]) -> bool, &top].map(|near| depth(&b, near) - depth(&a, near));
+    eprintln!("side {side:.2}, top {top:.2}");
+    assert!(side < -2.0 && top > 2.0, "{side} {top}");
+    let found = measured(&b);
+    eprintln!("{found:?}");
+    assert!(found.share <= 0.03, "{found:?}");
+    let told = |knit: Knit| knit.knitted(1.0).unwrap_err().problem;
+    assert!(told(Knit { form: Form::Tube, ..free.clone() }).contains("curl"));
+    let shaped = Chart::parse(&["k", "k2tog k"]).unwrap();
+    assert!(told(Knit { chart: shaped, ..free }).contains("curls"));
 }

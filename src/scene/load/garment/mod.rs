@@ -275,6 +275,7 @@ impl ClothPlan {
                     rims: knit::Rims::default(),
                     points: knit::POINTS,
                     colors: None,
+                    flat: true,
                 };
                 match Tile::of_knit(&knit, d) {
                     Ok(tile) => Some(tile),

@@ -20,12 +20,12 @@ pub(in super::super) struct Thread {
     pub(in super::super) rest: Vec<f64>,
     pub(in super::super) grid: Vec<[f32; 2]>,
     /// What each point may do.
-    pub(super) state: Vec<State>,
+    pub(in super::super) state: Vec<State>,
 }
 
 /// What a point may do while a piece relaxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
+pub(in super::super) enum State {
     /// It is at rest, as its cell has it.
     Rest,
     /// It moves.
