@@ -197,7 +197,9 @@ fn motifs_are_placed_by_lengths() {
     write(d, "g.obj", mesh(&flat));
     // Two stitches of 4 x 3 mm, 40 mm from the left and 30 from below.
     let motif = "motif = { rows = [\"##\"], yarns = { \"#\" = \"dark\" }, place = [40, 30], repeat = \"none\" }";
-    let own = format!("[[fabric.panel]]\ngroup = \"left\"\n{motif}");
+    // Floats would lead the dark yarn from edge to edge.
+    let printed = "cloth = { type = \"knit\", color_work = \"printed\" }";
+    let own = format!("[[fabric.panel]]\ngroup = \"left\"\n{printed}\n{motif}");
     let source = "path = \"g.obj\"";
     let path = write(d, "s.toml", scene(source, "", STILL).replace("[[light]]", &format!("{own}\n[[light]]")));
     let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));

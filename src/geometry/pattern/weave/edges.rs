@@ -29,6 +29,9 @@ const TURN: usize = 8;
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
 
+/// How much thicker cloth counts where it is folded: yarns inside of a fold are pushed together, and would else lie in each other.
+const FOLDED: f64 = 1.3;
+
 /// A point of a yarn: where it is, half its width, its flattening, and its place in the cloth.
 pub(super) type Point = (DVec3, f64, DVec3, [f32; 2]);
 
@@ -49,9 +52,14 @@ pub(super) fn from_points(kind: StrandKind, index: u32, points: &[Point], flat: 
     made
 }
 
+/// Whether hems at both ends of cloth so high do not reach each other.
+pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
+    2.0 * HEM[0] * FOLDED * thickness < height
+}
+
 /// Wefts that a hem takes at each end.
 pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
-    let length = thickness * (HEM[0] + HEM[1] + PI + 0.5 * PI);
+    let length = FOLDED * thickness * (HEM[0] + HEM[1] + PI + 0.5 * PI);
     (length / spacing).floor() as u32
 }
 
@@ -175,7 +183,7 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
 
 /// Folds everything beyond `half` the height to the back, twice.
 pub(super) fn hem(strands: &mut [PatternStrand], half: f64, thickness: f64) {
-    let fold = Fold { half, thickness };
+    let fold = Fold { half, thickness: FOLDED * thickness };
     for strand in strands {
         let flattening = strand.curve.flattening.as_mut();
         if let Some(axes) = flattening {

@@ -317,9 +317,13 @@ impl Cloth<'_> {
     /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top, which
     /// selvedges make one.
     pub fn strands(&self) -> Vec<PatternStrand> {
-        let thickness = self.measures().thickness;
+        let Measures { thickness, size, .. } = self.measures();
         let cut = self.weave.draft.pile().is_some_and(Pile::of_wefts);
-        let edges = if cut { Edges::Live } else { self.weave.edges };
+        let edges = match self.weave.edges {
+            _ if cut => Edges::Live,
+            Edges::Finished if !edges::has_room_for_hems(size[1], thickness) => Edges::Selvedge,
+            edges => edges,
+        };
         let hem = if edges == Edges::Finished { edges::hem_wefts(thickness, self.cell.spacing[1]) } else { 0 };
         let numbers = [0..self.count[0], 0..self.count[1] + 2 * hem];
         let strands = |side: usize| {
@@ -337,7 +341,7 @@ impl Cloth<'_> {
             strands = edges::selvedges(self, strands);
         }
         if edges == Edges::Finished {
-            edges::hem(&mut strands, 0.5 * self.measures().size[1], thickness);
+            edges::hem(&mut strands, 0.5 * size[1], thickness);
         }
         strands
     }
