@@ -11,23 +11,25 @@ const THICKEST: f64 = 24.0;
 const DIRECTIONS: usize = 24;
 const PLACES: usize = 16;
 
+/// What sends light on takes part in its own escape: a chance to escape with so much of it, in mean free paths, `own`.
+pub(crate) fn past_itself(escape: f64, own: f64) -> f64 {
+    escape * (1.0 + own) / (1.0 + own * escape)
+}
+
 /// A disc in which light goes straight until it meets something that sends it on evenly around.
 #[derive(Clone, Debug)]
 pub(crate) struct Disc {
-    /// Chance to leave the disc from each ring without meeting anything.
+    /// Chance to leave the disc from each ring without meeting anything. It says where light enters as well.
     escape: [f64; RINGS],
     /// Chance to meet something next in each other ring.
     next: [[f64; RINGS]; RINGS],
-    /// The same escape as it is without `own` and `taken_back`: it says where light enters as well.
-    enter: [f64; RINGS],
     /// How much thicker the disc is than the one that is looked at; at least 1.
     thicker: f64,
 }
 
 impl Disc {
-    /// A disc of so many mean free paths' radius. What sends light on is `own` wide, in mean free paths, and takes part in
-    /// its own escape: E becomes E (1 + own) / (1 + own E). Of what leaves, the share `taken_back` returns.
-    pub(crate) fn new(radius: f64, own: f64, taken_back: f64) -> Self {
+    /// A disc of so many mean free paths' radius.
+    pub(crate) fn new(radius: f64) -> Self {
         let thicker = (radius / THICKEST).max(1.0);
         let radius = radius.min(THICKEST);
         let (mut escape, mut next) = ([0.0; RINGS], [[0.0; RINGS]; RINGS]);
@@ -48,20 +50,25 @@ impl Disc {
                 }
             }
         }
-        let enter = escape;
-        for (escape, next) in escape.iter_mut().zip(&mut next) {
-            let out = *escape * (1.0 + own) / (1.0 + own * *escape) * (1.0 - taken_back);
+        Self { escape, next, thicker }
+    }
+
+    /// The same for what is `own` wide, see [`past_itself`], if of what leaves the share `taken_back` returns.
+    fn closed(&self, own: f64, taken_back: f64) -> Self {
+        let mut disc = self.clone();
+        for (escape, next) in disc.escape.iter_mut().zip(&mut disc.next) {
+            let out = past_itself(*escape, own) * (1.0 - taken_back);
             let rest = if *escape < 1.0 { (1.0 - out) / (1.0 - *escape) } else { 0.0 };
             *escape = out;
             next.iter_mut().for_each(|chance| *chance *= rest);
         }
-        Self { escape, next, enter, thicker }
+        disc
     }
 
     /// The mean escape over the disc.
     #[cfg(test)]
     fn mean_escape(&self) -> f64 {
-        self.enter.iter().sum::<f64>() / RINGS as f64
+        self.escape.iter().sum::<f64>() / RINGS as f64
     }
 
     /// Of light that meets something in each ring, the share that leaves at last if each meeting keeps the share `albedo`.
@@ -95,15 +102,16 @@ impl Disc {
     }
 
     /// Of light that comes from the middle of each ring, or from the rim, and meets something, and of light that enters from all
-    /// sides: the share that leaves at last.
-    pub(crate) fn shares(&self, albedo: f64) -> ([f64; RINGS + 1], f64) {
-        let leaving = self.leaving(albedo);
+    /// sides: the share that leaves at last. `own` and `taken_back` as in `closed`.
+    pub(crate) fn shares(&self, albedo: f64, own: f64, taken_back: f64) -> ([f64; RINGS + 1], f64) {
+        let closed = self.closed(own, taken_back);
+        let leaving = closed.leaving(albedo);
         let mean = |weights: &[f64; RINGS]| {
             let sum: f64 = weights.iter().sum();
             let all: f64 = weights.iter().zip(leaving).map(|(weight, share)| weight * share).sum();
             if sum > 0.0 { all / sum } else { leaving[RINGS - 1] }
         };
-        let of_rings = self.next.each_ref().map(mean);
+        let of_rings = closed.next.each_ref().map(mean);
         let [before, last] = [of_rings[RINGS - 2], of_rings[RINGS - 1]];
         let rim = (last + 0.5 * (last - before)).clamp(0.0, 1.0);
         let shares: [f64; RINGS + 1] = std::array::from_fn(|i| of_rings.get(i).copied().unwrap_or(rim));
@@ -113,7 +121,7 @@ impl Disc {
             at(&shares, (1.0 - (1.0 - r) * self.thicker).max(0.0).powi(2))
         };
         // What enters is met where what leaves would come from.
-        (if self.thicker > 1.0 { std::array::from_fn(deep) } else { shares }, mean(&self.enter))
+        (if self.thicker > 1.0 { std::array::from_fn(deep) } else { shares }, mean(&self.escape))
     }
 }
 
@@ -140,16 +148,17 @@ mod tests {
     fn a_disc_loses_nothing_that_is_not_absorbed() {
         for radius in [1e-6, 0.1, 1.0, 4.0, 20.0, 200.0, 1e9] {
             for (own, back) in [(0.0, 0.0), (0.3, 0.2)] {
-                let disc = Disc::new(radius, own, back);
-                for (escape, next) in disc.escape.iter().zip(&disc.next) {
+                let disc = Disc::new(radius);
+                let closed = disc.closed(own, back);
+                for (escape, next) in closed.escape.iter().zip(&closed.next) {
                     assert!((escape + next.iter().sum::<f64>() - 1.0).abs() < 1e-9, "radius {radius}");
                 }
-                let (shares, entering) = disc.shares(1.0);
+                let (shares, entering) = disc.shares(1.0, own, back);
                 assert!(
                     shares.iter().chain([&entering]).all(|s| (s - 1.0).abs() < 1e-6),
                     "radius {radius}: {shares:?}"
                 );
-                assert_eq!(disc.shares(0.0).1, 0.0);
+                assert_eq!(disc.shares(0.0, own, back).1, 0.0);
             }
         }
     }
@@ -157,15 +166,15 @@ mod tests {
     #[test]
     fn the_escape_of_all_rings_is_that_of_the_disc() {
         for radius in [0.1, 0.5, 1.0, 2.0, 4.0] {
-            let (found, want) = (Disc::new(radius, 0.0, 0.0).mean_escape(), escape_probability_of_disc(radius));
+            let (found, want) = (Disc::new(radius).mean_escape(), escape_probability_of_disc(radius));
             assert!((found / want - 1.0).abs() < 0.02, "radius {radius}: {found}, not {want}");
         }
     }
 
     #[test]
     fn more_leaves_from_the_rim_than_from_the_middle() {
-        let (shares, entering) = Disc::new(4.0, 0.0, 0.0).shares(0.9);
-        let (thick, _) = Disc::new(1e6, 0.0, 0.0).shares(0.9);
+        let (shares, entering) = Disc::new(4.0).shares(0.9, 0.0, 0.0);
+        let (thick, _) = Disc::new(1e6).shares(0.9, 0.0, 0.0);
         assert!(thick[0] == thick[RINGS - 1] && thick[RINGS] > thick[0] + 0.3, "{thick:?}");
         assert!(shares.windows(2).all(|w| w[1] >= w[0] - 1e-3), "{shares:?}");
         assert!(shares[RINGS - 1] > 1.3 * shares[0] && entering > shares[RINGS / 2], "{shares:?}, {entering}");

@@ -135,30 +135,22 @@ impl PlyOptics {
         let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
         let radius_optical = |c: usize| sigma * rho(c) * round_core;
         let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
-        let escape = |c: usize| {
-            let t = radius_optical(c);
-            let e = escape_probability_of_disc(t);
-            let k = own_escape(c);
-            e * (1.0 + k) / (1.0 + k * e)
-        };
-        let escape_past = |neighbours: f64, c: usize| {
-            let e = escape(c);
-            e * (1.0 - neighbours * (e * radius_optical(c) * PI / 2.0).min(1.0))
-        };
+        let escape = |c: usize| escape::past_itself(escape_probability_of_disc(radius_optical(c)), own_escape(c));
         let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
-        let escape_yarn = |c: usize| escape_past(neighbours, c);
+        let taken_back = |neighbours: f64, c: usize| neighbours * (escape(c) * radius_optical(c) * PI / 2.0).min(1.0);
+        let escape_yarn = |c: usize| escape(c) * (1.0 - taken_back(neighbours, c));
         let closure = |escape: f64, c: usize| {
             let gain = albedo(c) * escape;
             // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
             let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
             if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
         };
-        let disc = |neighbours: f64, c: usize| {
-            let t = radius_optical(c);
-            let taken_back = neighbours * (escape(c) * t * PI / 2.0).min(1.0);
-            Disc::new(t, own_escape(c), taken_back).shares(albedo(c))
-        };
-        let from = [0, 1, 2].map(|c| disc(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c).0);
+        // At last out of the ply, by rings, and out of the yarn, when it comes from another ply.
+        let discs = [0, 1, 2].map(|c| {
+            let disc = Disc::new(radius_optical(c));
+            let leaves = |neighbours: f64| disc.shares(albedo(c), own_escape(c), taken_back(neighbours, c));
+            (leaves(calibrated::NEIGHBOURS_AT_ONCE * neighbours).0, leaves(neighbours).1)
+        });
         let mirrored = |c: usize| {
             let out = r(c) + d(c) + tt_out(c);
             if out <= 0.0 {
@@ -183,8 +175,8 @@ impl PlyOptics {
             single_tt: per_channel(&|c| single(tt_out(c), c)),
             albedo: per_channel(&albedo),
             leaves_yarn: per_channel(&|c| closure(escape_yarn(c), c)),
-            leaves_from: std::array::from_fn(|ring| per_channel(&|c| from[c][ring])),
-            leaves_again: per_channel(&|c| disc(neighbours, c).1),
+            leaves_from: std::array::from_fn(|ring| per_channel(&|c| discs[c].0[ring])),
+            leaves_again: per_channel(&|c| discs[c].1),
             mirrored: per_channel(&mirrored),
             lean: per_channel(&lean),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
