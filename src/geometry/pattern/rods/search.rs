@@ -149,7 +149,7 @@ impl Search<'_> {
         }
         let touch = APART + MARGIN;
         let periodic = self.rods.period.is_some();
-        let (half, middle) = (halves[i], middles.points[i]);
+        let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
         let most = (touch + half + 0.5 * self.longest).powi(2);
         let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
         for near in walk.around(i) {
@@ -166,7 +166,7 @@ impl Search<'_> {
                 continue;
             }
             let widest = touch + half + halves[j];
-            let apart = distance > widest * widest || (self.rods.stays(i) && self.rods.stays(j));
+            let apart = distance > widest * widest || (stays && self.rods.stays(j));
             if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
                 continue;
             }
