@@ -1,6 +1,6 @@
 //! Uniform cubic splines: evaluation of one segment, in `f64` for set-up and in `f32` for hits.
 
-use glam::{DVec4, Vec3A, Vec4};
+use glam::{DVec3, DVec4, Vec3A, Vec4};
 
 use super::curve::Basis;
 
@@ -98,6 +98,19 @@ pub(crate) fn evaluate_f32(basis: Basis, p: &[Vec4; 4], u: f32) -> (Vec4, Vec3A,
     (sum(a), Vec3A::from_vec4(sum(b)), Vec3A::from_vec4(sum(c)))
 }
 
+/// Catmull-Rom between the second and the third of four points, at `t` in 0..1.
+#[inline]
+pub(crate) fn catmull_rom([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
+/// The same through a list of points, which ends in its first and its last one: `t` of the way from point `i` to the next.
+#[inline]
+pub(crate) fn through_points(points: &[DVec3], i: usize, t: f64) -> DVec3 {
+    let at = |k: usize| points[k.min(points.len() - 1)];
+    catmull_rom([at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)], t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,6 +140,10 @@ mod tests {
         }
         assert!((evaluate(Basis::CatmullRom, p, 0.0).at - p[1]).length() < 1e-12);
         assert!((evaluate(Basis::CatmullRom, p, 1.0).at - p[2]).length() < 1e-12);
+        let points = p.map(|v| v.truncate());
+        assert!((catmull_rom(points, 0.3) - evaluate(Basis::CatmullRom, p, 0.3).at.truncate()).length() < 1e-12);
+        assert!((through_points(&points, 1, 0.3) - catmull_rom(points, 0.3)).length() < 1e-12);
+        assert_eq!([through_points(&points, 0, 0.0), through_points(&points, 3, 0.0)], [points[0], points[3]]);
         let start = (p[0] + 4.0 * p[1] + p[2]) / 6.0;
         assert!((evaluate(Basis::BSpline, p, 0.0).at - start).length() < 1e-12);
     }

@@ -2,6 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
+/// From 0 to 1 as x does, level at both ends and beyond them.
+pub(crate) fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
 /// e^-x I1(x), the scaled modified Bessel function of the first kind, order 1, for x >= 0.
 ///
 /// Power series below 20, asymptotic series above; relative error below 1e-14.

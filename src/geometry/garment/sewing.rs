@@ -14,7 +14,7 @@ use super::{
     strain::Shapes,
     surface::{BorderEdge, Pose},
 };
-use crate::geometry::pattern::StrandKind;
+use crate::{geometry::pattern::StrandKind, math::special::smooth_step};
 
 /// An overlock seam takes about so much of each panel, mm, in whole stitches, which are so many at most.
 const TAKEN: f64 = 3.0;
@@ -136,8 +136,7 @@ impl Sewing {
             let near = around.filter_map(|c| cells.get(&c.to_array())).flatten();
             let wanted = near.map(|&i| {
                 let (at, depth, wide) = seams[i];
-                let t = ((p.distance(at) - wide) / (SLOPE * depth)).clamp(0.0, 1.0);
-                depth + (least - depth) * (t * t * (3.0 - 2.0 * t))
+                depth + (least - depth) * smooth_step((p.distance(at) - wide) / (SLOPE * depth))
             });
             wanted.fold(least, f64::max) as f32
         };

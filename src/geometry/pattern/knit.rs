@@ -161,6 +161,13 @@ impl Knit {
         (u64::from(wide) * u64::from(self.chart.rows()) <= LARGEST_CELL.into()).then_some(wide)
     }
 
+    /// The same, or what is wrong with asking for one.
+    fn repeat_for(&self, what: &str) -> Result<u32, ChartError> {
+        let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
+        let problem = || format!("a chart with shaping or short rows has no repeat {what}");
+        self.repeat().ok_or_else(|| ChartError::new(None, problem(), hint))
+    }
+
     /// Width of a stitch and distance between rows, in diameters: given, or found by relaxing a repeat of the chart.
     pub fn gauge(&self) -> [f64; 2] {
         if let [Some(width), Some(height)] = self.size() {
@@ -187,14 +194,7 @@ impl Knit {
     /// A chart that grows or shrinks has no repeat.
     pub(super) fn relaxed_rows(&self) -> Result<RelaxedRows, ChartError> {
         const SMALLEST: f64 = 9.0;
-        let Some(wide) = self.repeat() else {
-            let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
-            return Err(ChartError::new(
-                None,
-                "a chart with shaping or short rows has no repeat that could be laid",
-                hint,
-            ));
-        };
+        let wide = self.repeat_for("that could be laid")?;
         let cell = self.cell(wide, self.size(), self.points);
         let [across, up] = (SMALLEST / cell.period).ceil().max(DVec2::ONE).to_array();
         let row = |r: usize| -> Vec<(DVec3, [f32; 2])> {
@@ -216,23 +216,20 @@ impl Knit {
         Ok(self.worked()?.iter().map(|row| row.len() as u32).collect())
     }
 
-    /// The ways of its yarns through its rows.
-    fn ways(&self, rows: &[Vec<Stitch>]) -> Vec<Way> {
+    /// The ways of its yarns through its rows, of which the first may go from right to left.
+    fn ways(&self, rows: &[Vec<Stitch>], from_right: bool) -> Vec<Way> {
         let (finished, round) = (self.is_finished(), self.form != Form::Flat);
         let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
         let mut ways = self.colors.as_ref().unwrap_or(&one()).ways(finished, round);
         if short_rows::any(rows) {
-            short_rows::lead(&mut ways, rows, finished);
+            short_rows::lead(&mut ways, rows, from_right);
         }
         ways
     }
 
     /// A patch that repeats, of one colour, centred.
     fn patch(&self, diameter: f64) -> Result<Knitted, ChartError> {
-        let Some(wide) = self.repeat() else {
-            let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
-            return Err(ChartError::new(None, "a chart with shaping or short rows has no repeat for a tile", hint));
-        };
+        let wide = self.repeat_for("for a tile")?;
         let high = self.chart.rows();
         if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
             let problem = format!("a tile of {} x {} of what repeats over {wide} x {high}", self.stitches, self.rows);
@@ -270,6 +267,18 @@ impl Knit {
             Closing::Drawn => Some(rims::drawn(self, scaled, rows)?),
         };
         Ok(profile.map(|points: Vec<DVec2>| Revolution::new(&points)))
+    }
+
+    /// What is drawn through what, in all colours.
+    fn loops(&self, rows: &[Vec<Stitch>], border: Border, backwards: bool) -> Loops {
+        match &self.colors {
+            Some(colors) if colors.work == Work::DoubleKnit => Loops::double(rows, border, backwards, colors),
+            colors => {
+                let mut loops = Loops::bound_off(rows, self.stitches as usize, border, backwards);
+                colors.iter().for_each(|colors| loops.dye(colors));
+                loops
+            }
+        }
     }
 
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
@@ -367,16 +376,9 @@ impl Knit {
         let rims = self.rims;
         let mirrored = short_rows::from_right(&rows, finished);
         let border = Border { round: round.then_some(1.0), stacked: false, turns: round, finished, rims, mirrored };
-        let ways = self.ways(&rows);
+        let ways = self.ways(&rows, mirrored);
         let backwards = ways.iter().flat_map(|w| &w.rows).any(|s| s.row == rows.len() as i32 && s.backwards);
-        let mut loops = match &self.colors {
-            Some(colors) if colors.work == Work::DoubleKnit => Loops::double(&rows, border, backwards, colors),
-            colors => {
-                let mut loops = Loops::bound_off(&rows, self.stitches as usize, border, backwards);
-                colors.iter().for_each(|colors| loops.dye(colors));
-                loops
-            }
-        };
+        let mut loops = self.loops(&rows, border, backwards);
         let profile = self.profile(diameter, &rows)?;
         let size = profile.as_ref().map_or(self.size(), |p| self.size_on(p, &rows).map(Some));
         let cell =
@@ -411,18 +413,11 @@ impl Knit {
             points,
         };
         let mut threads = laying.threads(&ways);
-        let steps = if even { EDGE_STEPS } else { PIECE_STEPS };
-        let run = Run {
-            steps,
-            growing: steps / 3,
-            thin: if even { 0.6 } else { 0.8 },
-            free: [false; 2],
-            load: DVec2::ZERO,
-            firm: 2.0,
-            calm: 0.02,
-        };
-        settle(&mut threads, &run);
-        if !even {
+        if even {
+            settle(&mut threads, &finding_room(EDGE_STEPS, 0.6));
+        } else {
+            let run = finding_room(PIECE_STEPS, 0.8);
+            settle(&mut threads, &run);
             threads.iter_mut().for_each(|t| t.refine(f64::from(self.points) / f64::from(points)));
             settle(&mut threads, &Run { steps: FINE_STEPS, growing: 0, firm: 4.0, ..run });
         }
@@ -432,7 +427,7 @@ impl Knit {
         };
         if let (false, Some(cell)) = (self.flat || self.is_double(), &cell) {
             let curl = Curl::of(cell, DVec2::new(width * f64::from(self.stitches), height * count));
-            roll_up(&mut threads, &curl, shift, &run);
+            roll_up(&mut threads, &curl, shift);
         }
         let strand = |(index, thread): (usize, Thread)| PatternStrand {
             curve: Curve {
@@ -483,8 +478,13 @@ impl Knit {
     }
 }
 
+/// How the yarns of a piece relax, which begin so thin.
+fn finding_room(steps: usize, thin: f64) -> Run {
+    Run { steps, growing: steps / 3, thin, free: [false; 2], load: DVec2::ZERO, firm: 2.0, calm: 0.02 }
+}
+
 /// Lays a piece as it curls; then its yarns find room.
-fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3, run: &Run) {
+fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3) {
     if curl.is_flat() {
         return;
     }
@@ -492,7 +492,7 @@ fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3, run: &Run) {
         thread.points.iter_mut().for_each(|p| *p = curl.place(*p + to_middle) - to_middle);
         thread.state.fill(State::Move);
     }
-    settle(threads, &Run { steps: PIECE_STEPS, growing: 0, thin: 1.0, ..*run });
+    settle(threads, &Run { growing: 0, ..finding_room(PIECE_STEPS, 1.0) });
 }
 
 /// Cells of rows that are alike, and which row takes which.

@@ -12,6 +12,7 @@ use super::{
     loops::{Border, Loops, Visit},
     shape::{Piece, Place, bobble::CLOSED, points_of, spaced},
 };
+use crate::geometry::spline::catmull_rom;
 
 /// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
 /// up, open a little under it, plain knit hardly.
@@ -146,10 +147,7 @@ impl Cell {
                     let along = k as f64 * count as f64 / fine as f64;
                     let (i, t) = (along.floor() as usize, along.fract());
                     let i0 = (from + i) as isize;
-                    let [a, b, c, d] = [-1, 0, 1, 2].map(|k| at(i0 + k));
-                    // Catmull-Rom.
-                    let point =
-                        b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+                    let point = catmull_rom([-1, 0, 1, 2].map(|k| at(i0 + k)), t);
                     self.rods.points.push(point);
                     self.rods.rest.push(rest);
                     let (g, h) = (grid[w[0] + i], if i + 1 < count { grid[w[0] + i + 1] } else { grid[w[0] + i] });

@@ -9,6 +9,7 @@ use super::{
     super::rods::{Rods, Run, Strand},
     cell::Cell,
 };
+use crate::math::special::smooth_step;
 
 /// Radii of the rings, in diameters.
 const RADII: [f64; 3] = [5.0, 8.0, 14.0];
@@ -34,21 +35,26 @@ pub(super) enum Way {
     Wales,
 }
 
+/// How rings and the flat cell relax.
+const RUN: Run =
+    Run { steps: STEPS, growing: 0, thin: 1.0, free: [true; 2], load: DVec2::ZERO, firm: 1.0, calm: 0.002 };
+
+/// Energy of a stitch of a cell that nothing bends.
+fn flat_energy(cell: &Cell) -> f64 {
+    let mut flat = cell.rods.clone();
+    flat.relax(&RUN);
+    flat.energy() / f64::from(cell.wide * cell.high)
+}
+
 impl Bending {
-    /// Measured on a cell.
-    pub(super) fn of(cell: &Cell, way: Way) -> Self {
-        let run =
-            Run { steps: STEPS, growing: 0, thin: 1.0, free: [true; 2], load: DVec2::ZERO, firm: 1.0, calm: 0.002 };
-        let mut flat = cell.rods.clone();
-        flat.relax(&run);
-        let stitches = f64::from(cell.wide * cell.high);
-        let flat = flat.energy() / stitches;
+    /// Measured on a cell with so much energy in a stitch while it is flat.
+    pub(super) fn of(cell: &Cell, flat: f64, way: Way) -> Self {
         let mut found = vec![(0.0, flat)];
         for radius in RADII {
             for side in [1.0, -1.0] {
                 let (mut ring, counted, curvature) = bent(cell, way, radius, side);
                 let free = [way == Way::Wales, way == Way::Courses];
-                ring.relax(&Run { free, ..run });
+                ring.relax(&Run { free, ..RUN });
                 found.push((curvature, ring.energy() / counted));
             }
         }
@@ -180,7 +186,8 @@ impl Curl {
     pub(super) fn of(cell: &Cell, size: DVec2) -> Self {
         let z = || cell.rods.points.iter().map(|p| p.z);
         let thickness = z().fold(f64::MIN, f64::max) - z().fold(f64::MAX, f64::min) + 1.0;
-        let [sides, ends] = [Way::Courses, Way::Wales].map(|way| Bending::of(cell, way));
+        let flat = flat_energy(cell);
+        let [sides, ends] = [Way::Courses, Way::Wales].map(|way| Bending::of(cell, flat, way));
         let energy = |b: Bending| b.stiffness * b.natural * b.natural;
         Self {
             sides: Roll::new(sides, thickness, size.x),
@@ -199,8 +206,7 @@ impl Curl {
     pub(super) fn place(&self, p: DVec3) -> DVec3 {
         let share = |own: &Roll, first: Option<Roll>, at: f64, half: f64| {
             let over = |first: Roll| (FADING * own.length).min(half - first.length);
-            let t = first.map_or(1.0, |first| ((half - at.abs() - first.length) / over(first)).clamp(0.0, 1.0));
-            t * t * (3.0 - 2.0 * t)
+            smooth_step(first.map_or(1.0, |first| (half - at.abs() - first.length) / over(first)))
         };
         let across = |p: DVec3, share: f64| {
             let [x, z] = self.sides.map_or([p.x, p.z], |roll| roll.place([p.x, p.z], self.half.x, share));
@@ -228,7 +234,8 @@ mod tests {
         let chart = Chart::named(name).unwrap();
         let wide = chart.even_width(100).unwrap();
         let cell = Cell::relaxed(&chart, wide, YARN_PER_STITCH, 14, [None; 2]);
-        let found = [Way::Courses, Way::Wales].map(|way| Bending::of(&cell, way));
+        let flat = flat_energy(&cell);
+        let found = [Way::Courses, Way::Wales].map(|way| Bending::of(&cell, flat, way));
         eprintln!("{name}: {found:?}");
         found
     }

@@ -164,6 +164,11 @@ pub(in super::super) struct Border {
 }
 
 impl Border {
+    /// Whether the last row is drawn together.
+    pub(in super::super) fn is_drawn(&self) -> bool {
+        self.finished && self.rims.top == Closing::Drawn
+    }
+
     /// A difference across the cloth, the short way round.
     pub(in super::super) fn short(&self, d: f64) -> f64 {
         self.round.map_or(d, |round| d - round * (d / round).round())

@@ -19,6 +19,7 @@ use super::{
     loops::{Course, Loop, Loops, Visit},
     shape::{Piece, Place, points_of, spaced},
 };
+use crate::{geometry::spline::through_points, math::special::smooth_step};
 
 /// Where a piece lies; its unit is the yarn's diameter.
 pub(super) enum Surface {
@@ -125,7 +126,9 @@ impl Laying<'_> {
         }
         let is_in = |row: i32| way.rows.iter().any(|r| r.row == row);
         match here {
-            Some((_, place)) if is_in(self.loops.rows) && self.is_drawn() => all.go_on(&self.drawn_in(place)),
+            Some((_, place)) if is_in(self.loops.rows) && self.loops.border.is_drawn() => {
+                all.go_on(&self.drawn_in(place))
+            }
             Some((row, place)) if is_in(self.loops.rows) => {
                 all.tail(TAIL, self.surface.directions(row, &place)[1], false);
             }
@@ -190,7 +193,7 @@ impl Laying<'_> {
             let (sin, cos) = (PI * t).sin_cos();
             let up = from.up + (to.up - from.up) * 0.5 * (1.0 - cos);
             let middle = self.surface.place(row, &Place { at: from.at + side * BULGE * sin, up, out: 0.0 });
-            let angle = begin + turn * t * t * (3.0 - 2.0 * t);
+            let angle = begin + turn * smooth_step(t);
             let end = from.out.abs() + (to.out.abs() - from.out.abs()) * t;
             let radius = end + (AROUND - end) * sin * sin;
             let away = DVec3::new(side * sin, -cos, 0.0);
@@ -219,12 +222,7 @@ impl Laying<'_> {
             to,
         ]
         .map(|p| self.surface.place(0, &p));
-        let at = |k: usize| knots[k.min(knots.len() - 1)];
-        let line = (0..=8 * (knots.len() - 1)).map(|k| {
-            let (i, t) = (k / 8, (k % 8) as f64 / 8.0);
-            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-            b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
-        });
+        let line = (0..=8 * (knots.len() - 1)).map(|k| through_points(&knots, k / 8, (k % 8) as f64 / 8.0));
         all.go_on(&line.collect::<Vec<_>>());
         all.pop();
         all.join(own, DVec3::ZERO);
@@ -259,9 +257,8 @@ impl Laying<'_> {
         let inward = (middle - end.at).signum() / self.surface.across(&end);
         let line = (0..=64).map(|k| {
             let along = TAIL * f64::from(k) / 64.0;
-            let down = (along / 2.5).min(1.0);
             let at = end.at + inward * (along - 1.2).max(0.0);
-            let share = down * down * (3.0 - 2.0 * down);
+            let share = smooth_step(along / 2.5);
             let out = end.out + (deep - end.out) * share;
             self.surface.place(row, &Place { at, up: end.up + rise * share, out })
         });
@@ -366,8 +363,8 @@ impl Laying<'_> {
         for i in 0..count {
             let along = (i as f64 + 0.5) / count as f64;
             for (by, from) in by.iter().zip([along, 1.0 - along]) {
-                let near = (1.0 - from / REACH).max(0.0);
-                out.points[first + i] += *by * (near * near * (3.0 - 2.0 * near));
+                let near = 1.0 - from / REACH;
+                out.points[first + i] += *by * smooth_step(near);
             }
         }
     }

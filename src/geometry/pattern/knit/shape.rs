@@ -18,6 +18,7 @@ use super::{
     loops::{Border, Course, Loop, Loops, Visit},
     rims::Rims,
 };
+use crate::{geometry::spline::through_points, math::special::smooth_step};
 
 /// How far across, up and out a point is: stitches or turns, rows, yarn diameters.
 #[derive(Clone, Copy, Debug)]
@@ -58,11 +59,6 @@ const FLOAT: f64 = 1.7;
 /// Places of a piece.
 const STEPS: usize = 64;
 
-fn smooth(x: f64) -> f64 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
-}
-
 /// One end of a visit, or its foot.
 #[derive(Clone, Copy)]
 struct Foot {
@@ -91,8 +87,8 @@ impl Loops {
         let share = match own.side {
             0.0 => return 0.0,
             // What is cast on leaves the middle below the feet of the first row.
-            _ if own.sign == 0.0 => smooth(head / 0.45),
-            _ if is_bound() => 1.0 - CLOSED_BY * smooth(head),
+            _ if own.sign == 0.0 => smooth_step(head / 0.45),
+            _ if is_bound() => 1.0 - CLOSED_BY * smooth_step(head),
             _ => 1.0,
         };
         own.side * self.apart * share
@@ -261,12 +257,12 @@ impl Loops {
             let t = TAU * k as f64 / STEPS as f64;
             let head = 0.5 - 0.5 * t.cos();
             let (cos2, sin2) = ((2.0 * t).cos(), (2.0 * t).sin());
-            let upper = smooth((head - 0.3) / 0.4);
+            let upper = smooth_step((head - 0.3) / 0.4);
             let mix = |low: f64, high: f64| low + (high - low) * upper;
             // At its ends a foot goes over into the neighbour's.
-            let inside = smooth(t.min(TAU - t) / reach);
+            let inside = smooth_step(t.min(TAU - t) / reach);
             let (side, end) = if k <= STEPS / 2 { (-1.0, ends[0]) } else { (1.0, ends[1]) };
-            let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth((head - crossing) / 0.24 + 0.5) };
+            let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth_step((head - crossing) / 0.24 + 0.5) };
             let wide = match own.is_lifted() {
                 true => NARROW,
                 // What closes a bobble goes through heads that lie close.
@@ -292,10 +288,10 @@ impl Loops {
             }
             if own.bobble {
                 // The last one of those that it is drawn through lies in the cloth.
-                out += PILED * (1.0 - smooth((head - 0.42) / 0.16));
+                out += PILED * (1.0 - smooth_step((head - 0.42) / 0.16));
             }
             if own.twist != 0.0 {
-                let bump = 1.0 - smooth((head - crossing).abs() / 0.25);
+                let bump = 1.0 - smooth_step((head - crossing).abs() / 0.25);
                 out += side * own.twist * 0.55 * bump;
             }
             out += (1.0 - inside) * (end.out - foot.out);
@@ -316,7 +312,7 @@ fn laid_over(own: &Loop, child: f64, [foot, head_depth]: [f64; 2], head: f64) ->
         true => [0.3, 0.2],
         false => [0.0, 0.5],
     };
-    let (low, high) = (smooth((head - from) / over), smooth(2.0 * head - 1.0));
+    let (low, high) = (smooth_step((head - from) / over), smooth_step(2.0 * head - 1.0));
     foot * (1.0 - low) - child * (legs * low + (head_depth - legs) * high)
 }
 
@@ -341,12 +337,12 @@ impl Swap {
 
     /// How much of the way across is behind it at a share of its height.
     fn moved(self, head: f64) -> f64 {
-        smooth((head - self.from - self.ramp()) / (2.0 * self.ramp()))
+        smooth_step((head - self.from - self.ramp()) / (2.0 * self.ramp()))
     }
 
     /// How far it is in front there.
     fn raised(self, head: f64) -> f64 {
-        let by = |off: f64| smooth((off - self.from) / self.ramp());
+        let by = |off: f64| smooth_step((off - self.from) / self.ramp());
         self.front * by(head.min(1.0 - head)) + self.over * by(head)
     }
 }
@@ -381,7 +377,7 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
     let piece = |k: usize| {
         let t = k as f64 / STEPS as f64;
         let (end, share) = if t < 0.5 { (ends[0], 2.0 * t) } else { (ends[1], 2.0 - 2.0 * t) };
-        let share = smooth(share);
+        let share = smooth_step(share);
         let place = Place {
             at: end.at + (foot.at - end.at) * if t < 0.5 { 2.0 * t } else { 2.0 - 2.0 * t },
             up: end.up + (foot.up - end.up) * share,
@@ -397,16 +393,11 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
 const PASSED: f64 = 0.26;
 
 /// A smooth line through places in so many steps, without the last one.
-fn through(knots: &[Place], steps: usize) -> impl Iterator<Item = Place> + '_ {
-    let at = |k: usize| {
-        let p = knots[k.min(knots.len() - 1)];
-        DVec3::new(p.at, p.up, p.out)
-    };
+fn through(knots: &[Place], steps: usize) -> impl Iterator<Item = Place> {
+    let points: Vec<DVec3> = knots.iter().map(|p| DVec3::new(p.at, p.up, p.out)).collect();
     (0..steps).map(move |k| {
-        let along = k as f64 * (knots.len() - 1) as f64 / steps as f64;
-        let (i, t) = (along as usize, along.fract());
-        let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-        let p = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+        let along = k as f64 * (points.len() - 1) as f64 / steps as f64;
+        let p = through_points(&points, along as usize, along.fract());
         Place { at: p.x, up: p.y, out: p.z }
     })
 }

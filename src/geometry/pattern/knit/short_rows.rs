@@ -29,9 +29,8 @@ pub(super) fn from_right(rows: &[Vec<Stitch>], bound: bool) -> bool {
     any(rows) && follow(rows, false, bound).is_err()
 }
 
-/// Leads the one yarn of a piece with short rows from the side where it begins to where its rows do.
-pub(super) fn lead(ways: &mut [Way], rows: &[Vec<Stitch>], bound: bool) {
-    let first = from_right(rows, bound);
+/// Leads the one yarn of a piece with short rows to where its rows begin; `first` says whether the first goes from right to left.
+pub(super) fn lead(ways: &mut [Way], rows: &[Vec<Stitch>], first: bool) {
     for stretch in ways.iter_mut().flat_map(|way| &mut way.rows) {
         let row = usize::try_from(stretch.row).ok().and_then(|r| rows.get(r));
         stretch.backwards ^= first;

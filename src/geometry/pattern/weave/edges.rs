@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::{Cloth, PatternStrand, StrandKind, strand};
-use crate::math::sampler::hash2;
+use crate::math::{sampler::hash2, special::smooth_step};
 
 /// How the cloth ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,7 +167,7 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
             let aim = 0.15 * radius - last.0.z;
             for k in 1..=steps {
                 let s = k as f64 / steps as f64;
-                let ease = s * s * (3.0 - 2.0 * s);
+                let ease = smooth_step(s);
                 let aside = spacing * (0.5 * lean * s + 0.7 * bend * (PI * s).sin()) * s;
                 let height = aim * ease.min(1.0) + 1.4 * radius * lift * ease;
                 let p = last.0 + DVec3::new(aside, away * length * cut * s, height);

@@ -2,10 +2,8 @@
 
 use glam::DVec3;
 
-use super::{
-    super::{rims::Closing, shape::Place},
-    Laying,
-};
+use super::{super::shape::Place, Laying};
+use crate::geometry::spline::through_points;
 
 /// Points on a stretch of the yarn that is drawn, in a piece with so many in a stitch, and its length.
 pub(super) fn drawn_points(line: &[DVec3], per_stitch: u32) -> (usize, f64) {
@@ -19,10 +17,6 @@ pub(super) fn drawn_points(line: &[DVec3], per_stitch: u32) -> (usize, f64) {
 }
 
 impl Laying<'_> {
-    pub(super) fn is_drawn(&self) -> bool {
-        self.loops.border.finished && self.loops.border.rims.top == Closing::Drawn
-    }
-
     /// The tail: from the last loop to the inside and back down behind the stitches.
     pub(super) fn drawn_in(&self, end: Place) -> Vec<DVec3> {
         const DEEP: f64 = 3.1;
@@ -36,12 +30,6 @@ impl Laying<'_> {
             let up = end.up - down - (at - end.at);
             self.surface.place(self.loops.rows, &Place { at, up, out: end.out - deep * (DEEP + end.out) })
         });
-        let at = |k: usize| knots[k.min(knots.len() - 1)];
-        let line = (0..=16 * (knots.len() - 1)).map(|k| {
-            let (i, t) = (k / 16, (k % 16) as f64 / 16.0);
-            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-            b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
-        });
-        line.collect()
+        (0..=16 * (knots.len() - 1)).map(|k| through_points(&knots, k / 16, (k % 16) as f64 / 16.0)).collect()
     }
 }

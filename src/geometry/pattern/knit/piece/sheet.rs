@@ -11,6 +11,7 @@ use super::super::{
     },
     shape::Place,
 };
+use crate::geometry::spline::catmull_rom;
 
 /// Stiffness of the net against shear and against bending, over that against stretching: it is blocked, and bulges only where
 /// it must.
@@ -256,7 +257,7 @@ impl Sheet {
         }
         let a = if k > 0 { column(k - 1) } else { 2.0 * b - c };
         let d = if k + 2 < n { column(k + 2) } else { 2.0 * c - b };
-        b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+        catmull_rom([a, b, c, d], t)
     }
 
     /// How far a place is above the beginning of its row.

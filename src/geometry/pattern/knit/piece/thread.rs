@@ -8,6 +8,7 @@ use super::super::{
     super::rods::{Rods, Run, Strand},
     shape::spaced,
 };
+use crate::geometry::spline::through_points;
 
 /// The longest segment, in diameters.
 const LONGEST: f64 = 1.0;
@@ -130,12 +131,10 @@ impl Thread {
         let old = std::mem::take(self);
         let n = old.points.len();
         let count = ((n - 1) as f64 * times).round() as usize;
-        let at = |i: usize| old.points[i.min(n - 1)];
         for k in 0..=count {
             let along = k as f64 * (n - 1) as f64 / count as f64;
             let (i, t) = ((along as usize).min(n - 2), along - (along as usize).min(n - 2) as f64);
-            let [a, b, c, d] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
-            let point = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)));
+            let point = through_points(&old.points, i, t);
             let (g, h) = (old.grid[i], old.grid[i + 1]);
             // Where a round begins anew, places jump.
             let h = if (0..2).any(|k| (h[k] - g[k]).abs() > 2.0) { g } else { h };

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::{
     super::loops::{Loop, Loops},
-    CLOSING, DEPTH, Foot, LEAN, Piece, Place, REACH, smooth, through,
+    CLOSING, DEPTH, Foot, LEAN, Piece, Place, REACH, smooth_step, through,
 };
 
 /// Its yarn, in shares of a stitch's.
@@ -47,9 +47,9 @@ struct Pouch {
 impl Pouch {
     /// A place `side` widths from the middle of loop `x` of -2 to 2, `out` diameters off the pouch.
     fn place(&self, x: f64, side: f64, v: f64, out: f64) -> Place {
-        let opened = smooth((v - 1.0) / 0.25);
+        let opened = smooth_step((v - 1.0) / 0.25);
         let wide = NECK + (WIDE - NECK) * opened;
-        let apart = if v < 1.5 { wide } else { CLOSE + (WIDE - CLOSE) * (1.0 - smooth((v - 2.15) / 0.25)) };
+        let apart = if v < 1.5 { wide } else { CLOSE + (WIDE - CLOSE) * (1.0 - smooth_step((v - 2.15) / 0.25)) };
         self.flat(x * apart + side * wide, v, out + bulge(v))
     }
 
@@ -68,9 +68,9 @@ impl Pouch {
             let v = -LOW + (1.5 + BELLY_REACH + LOW) * head;
             let side = t / TAU - 0.5 + LEAN * (2.0 * t).sin();
             let foot = if cos2 > 0.0 { BEHIND } else { DEPTH };
-            let drawn = -(foot + (DEPTH - foot) * smooth((head - 0.3) / 0.4)) * cos2;
-            let behind = -BEHIND - 0.6 * smooth((v + LOW) / 0.4) - bulge(v);
-            let out = if over { behind + (drawn - behind) * smooth((v - 0.8) / 0.35) } else { drawn };
+            let drawn = -(foot + (DEPTH - foot) * smooth_step((head - 0.3) / 0.4)) * cos2;
+            let behind = -BEHIND - 0.6 * smooth_step((v + LOW) / 0.4) - bulge(v);
+            let out = if over { behind + (drawn - behind) * smooth_step((v - 0.8) / 0.35) } else { drawn };
             self.place(x, side, v, out)
         };
         (0..STEPS).map(place).collect()
@@ -84,7 +84,7 @@ impl Pouch {
             let t = TAU * (1.0 - k as f64 / STEPS as f64);
             let head = 0.5 - 0.5 * t.cos();
             let side = t / TAU - 0.5 + LEAN * (2.0 * t).sin();
-            let out = -DEPTH * (2.0 * t).cos() + PILED * (2.0 - x) / 4.0 * smooth((head - 0.31) / 0.14);
+            let out = -DEPTH * (2.0 * t).cos() + PILED * (2.0 - x) / 4.0 * smooth_step((head - 0.31) / 0.14);
             self.place(x, side, foot + (3.0 + LOW - foot) * head, out)
         };
         (0..STEPS).map(place).collect()
@@ -93,7 +93,7 @@ impl Pouch {
 
 /// How far out the pouch is at a height.
 fn bulge(v: f64) -> f64 {
-    OUT * smooth((v - 0.5) / 0.9) * (1.0 - smooth((v - 1.9) / 0.8))
+    OUT * smooth_step((v - 0.5) / 0.9) * (1.0 - smooth_step((v - 1.9) / 0.8))
 }
 
 impl Loops {

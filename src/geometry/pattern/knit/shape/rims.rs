@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use super::{
     super::{
         loops::{Loop, Loops},
-        rims::{CastOn, Closing},
+        rims::CastOn,
     },
-    Foot, Piece, Place, STEPS, smooth, through,
+    Foot, Piece, Place, STEPS, smooth_step, through,
 };
 
 /// How far heads reach beyond the yarn that draws them together, in rows, and how narrow they are.
@@ -23,8 +23,7 @@ const STANDS: [usize; 2] = [STEPS * 9 / 32, STEPS * 23 / 32];
 impl Loops {
     /// Whether a loop is drawn together with all of its row.
     pub(in super::super) fn is_drawn(&self, own: &Loop) -> bool {
-        let drawn = self.border.finished && self.border.rims.top == Closing::Drawn;
-        drawn && own.children.is_empty() && own.held == Some(self.rows)
+        self.border.is_drawn() && own.children.is_empty() && own.held == Some(self.rows)
     }
 
     /// How far out a loop that is drawn together is near its head, so far along it: it stands across the yarn that draws it.
@@ -51,7 +50,7 @@ impl Loops {
         let place = |k: usize| {
             let share = k as f64 / STEPS as f64;
             let s = -0.5 + (end + 0.5) * share;
-            let below = if first { 1.0 - smooth((s + 0.5) / RISE) } else { 0.0 };
+            let below = if first { 1.0 - smooth_step((s + 0.5) / RISE) } else { 0.0 };
             let at = at + s * step;
             let place = Place { at, up: self.ring(at) - 0.6 * below, out: -1.2 * below };
             (place, [column as f32 + share as f32, self.rows as f32 + 0.02])

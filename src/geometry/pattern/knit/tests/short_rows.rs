@@ -37,7 +37,7 @@ fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
     let mirrored = super::super::short_rows::from_right(&rows, true);
     let rims = piece.rims;
     let border = Border { round: None, stacked: false, turns: false, finished: true, rims, mirrored };
-    let backwards = piece.ways(&rows)[0].rows.iter().any(|s| s.row == rows.len() as i32 && s.backwards);
+    let backwards = piece.ways(&rows, mirrored)[0].rows.iter().any(|s| s.row == rows.len() as i32 && s.backwards);
     let loops = Loops::bound_off(&rows, piece.stitches as usize, border, backwards);
     let mut place = BTreeMap::new();
     for course in &loops.courses {
