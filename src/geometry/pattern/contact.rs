@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use wide::f32x8;
 
 /// The nearest points of two segments: how far along each (0 to 1), and the vector from the first to the second.
 #[derive(Clone, Copy, Debug)]
@@ -35,11 +36,19 @@ pub(super) struct PointGrid {
     wrap: Option<[i32; 2]>,
     /// Points by their cells; cells that follow each other along x do so here.
     entries: Vec<Entry>,
+    /// Where each entry is, from `origin`: x, y and z by themselves, and some that are nowhere at the end.
+    places: [Vec<f32>; 3],
+    origin: DVec3,
     /// The cells in order, each with its first entry; one more at the end.
     cells: Vec<(Key, u32)>,
     /// The cell of each point.
     cell_of: Vec<u32>,
 }
+
+/// Points whose distances are found at once.
+const LANES: usize = 8;
+/// So much farther, as a share of the way from the grid's first point, a distance in single precision may be.
+const ROUNDED: f32 = 1e-6;
 
 /// A point in a [`PointGrid`].
 #[derive(Clone, Copy)]
@@ -88,8 +97,12 @@ impl PointGrid {
             cell_of[index as usize] = cells.len() as u32 - 1;
         }
         cells.push((Key::MAX, points.len() as u32));
-        let entries = order.iter().map(|&(_, index)| Entry { at: points[index as usize], index }).collect();
-        Self { wrap, entries, cells, cell_of }
+        let entries: Vec<Entry> = order.iter().map(|&(_, index)| Entry { at: points[index as usize], index }).collect();
+        let origin = entries.first().map_or(DVec3::ZERO, |entry| entry.at);
+        let nowhere = || std::iter::repeat_n(f32::INFINITY, LANES);
+        let places = [0, 1, 2]
+            .map(|axis| entries.iter().map(|entry| (entry.at - origin)[axis] as f32).chain(nowhere()).collect());
+        Self { wrap, entries, places, origin, cells, cell_of }
     }
 
     /// What finds neighbours: quickest of points that follow each other in space.
@@ -165,6 +178,36 @@ impl<'a> Walk<'a> {
         let entries = &self.grid.entries;
         self.runs.iter().flat_map(|run| &entries[run.start as usize..run.end as usize])
     }
+
+    /// Of the points around one, at `at`, those within a distance and some that are a little farther; in the same order. Of a
+    /// grid without a period.
+    pub(super) fn within(&mut self, point: usize, at: DVec3, distance: f64, mut found: impl FnMut(&'a Entry)) {
+        let _ = self.around(point);
+        let PointGrid { entries, places, origin, .. } = self.grid;
+        let from = (at - *origin).as_vec3();
+        let most = f32x8::splat((distance as f32 + ROUNDED * (from.length() + distance as f32)).powi(2));
+        let from = from.to_array().map(f32x8::splat);
+        for run in &self.runs {
+            let (mut first, end) = (run.start as usize, run.end as usize);
+            while first < end {
+                let mut square = f32x8::ZERO;
+                for (places, from) in places.iter().zip(from) {
+                    let lanes: [f32; LANES] = places[first..first + LANES].try_into().expect("so many");
+                    let away = f32x8::from(lanes) - from;
+                    square = away.mul_add(away, square);
+                }
+                let mut near = square.simd_le(most).to_bitmask();
+                if end - first < LANES {
+                    near &= (1 << (end - first)) - 1;
+                }
+                while near != 0 {
+                    found(&entries[first + near.trailing_zeros() as usize]);
+                    near &= near - 1;
+                }
+                first += LANES;
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -207,6 +250,30 @@ mod tests {
             for j in i + 1..points.len() {
                 let count = found[i * points.len() + j];
                 assert!(count <= 1 && (count == 1 || points[i].distance(points[j]) > 0.8), "{i} {j} {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_within_a_distance_is_told_as_one_by_one() {
+        let mut stream = Stream::new(11);
+        // Also far from where all begins.
+        for far in [0.0, 1e4] {
+            let points: Vec<DVec3> = (0..500)
+                .map(|_| 4.0 * DVec3::new(stream.next().into(), stream.next().into(), stream.next().into()) + far)
+                .collect();
+            let grid = PointGrid::new(&points, 1.0, None);
+            for (mut walk, mut all) in [(grid.walk(), grid.walk()), (grid.walk_ahead(), grid.walk_ahead())] {
+                for (i, p) in points.iter().enumerate() {
+                    let mut found = Vec::new();
+                    walk.within(i, *p, 0.9, |e| found.push(e.index));
+                    let mut within = |distance: f64| -> Vec<u32> {
+                        all.around(i).filter(|e| e.at.distance(*p) <= distance).map(|e| e.index).collect()
+                    };
+                    let [least, most] = [within(0.9), within(0.901)];
+                    assert!(least.iter().all(|index| found.contains(index)), "{i}");
+                    assert!(found.iter().all(|index| most.contains(index)), "{i}");
+                }
             }
         }
     }

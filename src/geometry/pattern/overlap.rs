@@ -80,23 +80,29 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
     let grid = PointGrid::new(&middles, reach, None);
     let nearest_of = |walk: &mut Walk<'_>, i: usize| {
         let a = &pieces[i];
+        let half = 0.5 * a.from.distance(a.to);
         let mut best = f64::INFINITY;
-        for near in walk.around(i) {
-            if middles[i].distance_squared(near.at) > reach * reach {
-                continue;
+        walk.within(i, middles[i], reach, |near| {
+            let away = middles[i].distance(near.at);
+            if away > reach {
+                return;
             }
             let b = &pieces[near.index as usize];
             let both = a.radius + b.radius;
+            // Farther than what was found already, however they lie: sections reach no farther than their radii.
+            if away - half - 0.5 * b.from.distance(b.to) > best * both {
+                return;
+            }
             if a.curve == b.curve {
                 let along = (a.along - b.along).abs();
                 if along.min(rings[a.curve as usize] - along) < ALONG * both {
-                    continue;
+                    return;
                 }
             }
             let between = nearest(a.from, a.to, b.from, b.to).between;
             let (distance, way) = (between.length(), between.normalize_or_zero());
             best = best.min(distance / (a.reach(way) + b.reach(way)));
-        }
+        });
         best as f32
     };
     let all = (0..pieces.len()).into_par_iter().with_min_len(512);

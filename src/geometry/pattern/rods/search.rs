@@ -150,37 +150,32 @@ impl Search<'_> {
         let touch = APART + MARGIN;
         let periodic = self.rods.period.is_some();
         let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
-        let most = (touch + half + 0.5 * self.longest).powi(2);
         let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
-        for near in walk.around(i) {
-            // Most of what cells hold is too far away: tell that before anything else is looked at.
-            let distance = near.at.distance_squared(middle);
-            if distance > most {
-                continue;
-            }
+        // Most of what cells hold is too far away: that is told of many at once.
+        walk.within(i, middle, touch + half + 0.5 * self.longest, |near| {
             let (j, mut cells) = middles.images[near.index as usize];
             let j = j as usize;
             // Each pair once. (Images do not lie in the grid as what they are of does.)
             let both = periodic || self.grid.share_cell(i, near.index as usize);
             if both && (j < i || (j == i && cells <= [0, 0])) {
-                continue;
+                return;
             }
             let widest = touch + half + halves[j];
-            let apart = distance > widest * widest || (stays && self.rods.stays(j));
+            let apart = near.at.distance_squared(middle) > widest * widest || (stays && self.rods.stays(j));
             if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
-                continue;
+                return;
             }
             let half_j = 0.5 * edges[j];
             let between = nearest(p0, p1, near.at - half_j, near.at + half_j).between.length();
             if between > touch {
-                continue;
+                return;
             }
             if periodic {
                 let own = middles.own_cells[i].iter().zip(&middles.own_cells[j]);
                 cells.iter_mut().zip(own).for_each(|(cell, (a, b))| *cell += (a - b) as i8);
             }
             found.push(Neighbour { segment: j as u32, cells, gap: (between - APART) as f32 });
-        }
+        });
     }
 
     /// Whether two segments, `away` from each other, are near along the yarn and in space: the same piece of it. (A yarn's
