@@ -44,8 +44,12 @@ const APART: f32 = 1.02;
 const ASIDE: f32 = 0.15;
 /// So much of a stitch is led to what is beside it.
 const LED: f32 = 0.09;
-/// A yarn that catches a float is so far behind it, in diameters.
-const AROUND: f32 = 1.25;
+/// Where a float is caught it is so far above or below the feet of the loops, on its lane's side, in diameters.
+const CAUGHT: f32 = 0.74;
+/// The yarn that catches it goes by on the other side of their feet, so far from them and so far behind the float.
+const AROUND: [f32; 2] = [0.35, 0.5];
+/// What is left behind that, in diameters: half a yarn, and lanes that lie deeper than others.
+const REST: f32 = 1.35;
 
 /// What one colour does between two stitches of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +61,8 @@ enum Joint {
         to_float: bool,
     },
     Floats,
+    /// It floats, and is held by the yarn that knits.
+    Caught,
     /// It goes from loop to loop behind the float of another colour.
     Catches(u16),
 }
@@ -123,6 +129,7 @@ impl Row {
         match (own, hold) {
             ([true, true], Some((float, working))) if working == color => Joint::Catches(float),
             ([true, true], _) => Joint::Knits,
+            ([false, false], Some((float, _))) if float == color => Joint::Caught,
             ([false, false], _) => Joint::Floats,
             ([knits, _], _) => Joint::Leads { to_float: knits },
         }
@@ -150,7 +157,7 @@ pub(super) struct Lanes {
     /// How far out floats lie, mm.
     depth: f32,
     diameter: f32,
-    /// Diameters in a row.
+    /// A diameter, in rows.
     flat: f32,
 }
 
@@ -168,7 +175,7 @@ impl Lanes {
 
     /// How far behind the sheet yarns of stranded cloth reach, mm.
     pub(super) fn reach(shapes: &Shapes) -> f64 {
-        shapes.diameter * f64::from(BEHIND + AROUND + 0.6) - shapes.heights[0]
+        shapes.diameter * f64::from(BEHIND + AROUND[1] + REST) - shapes.heights[0]
     }
 
     /// Where a colour floats, in stitches across, rows up and mm out.
@@ -188,11 +195,20 @@ impl Lanes {
             Joint::Knits => None,
             Joint::Floats => Some(self.float(strand, line, x)),
             Joint::Leads { to_float } => Some(self.float(strand, line, if to_float { x - ASIDE } else { x + ASIDE })),
+            Joint::Caught => Some(self.caught(strand, line, x, CAUGHT)),
             Joint::Catches(color) => {
-                let caught = self.float(Strand { color, ..strand }, line, x);
-                Some(caught - Vec3::Z * AROUND * self.diameter)
+                let [aside, behind] = AROUND;
+                let float = self.caught(Strand { color, ..strand }, line, x, -aside);
+                Some(float - Vec3::Z * behind * self.diameter)
             }
         }
+    }
+
+    /// As deep as a float where it is caught, so many diameters to its lane's side of the feet of the loops.
+    fn caught(&self, strand: Strand<'_>, line: usize, x: f32, aside: f32) -> Vec3 {
+        let side = if strand.row.lift(strand.color) < 0.0 { -1.0 } else { 1.0 };
+        let float = self.float(strand, line, x);
+        Vec3::new(x, line as f32 + self.foot + side * aside * self.flat, float.z)
     }
 }
 
