@@ -92,8 +92,9 @@ fn scenes_look_as_they_did() {
             for (block, found) in found.into_iter().enumerate() {
                 let (mean, variance) = (f64::from(golden.mean[block]), f64::from(golden.variance[block]));
                 let seeds = (*SEEDS.end() - *SEEDS.start() + 1) as f64;
-                // What is black or without noise may still be rounded.
-                let spread = (variance * (1.0 + 1.0 / seeds)).sqrt() + 1e-5 * mean.abs() + 1e-7;
+                // What is black or without noise may still be rounded. A block of background may hold the edge of a yarn
+                // that 24 seeds have not met: 0.18 % of the mean was seen.
+                let spread = (variance * (1.0 + 1.0 / seeds)).sqrt() + 3e-4 * mean.abs() + 1e-7;
                 let deviations = (found - mean) / spread;
                 if deviations.abs() > if block == last { MOST_MEAN } else { MOST } {
                     off.push(format!(

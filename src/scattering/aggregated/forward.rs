@@ -19,8 +19,10 @@ use crate::{
 /// Density (1/steradian) of F's directions below which the lobe ends. What little it would have there ends its chain
 /// instead, and most light that comes from elsewhere pays nothing for F.
 const FORWARD_TAIL: f32 = 1e-4;
-/// How many fibres light goes on before further fibres turn it back.
-const GOES_ON: f32 = 0.8;
+/// Light that further fibres bend passes so many more fibres than there are on its last way from the first one, and so many
+/// more by how far it turned: nothing straight on, four times as many back.
+const DETOUR: f32 = 0.4;
+const BACK: f32 = 2.5;
 
 /// Light that the first fibre on the camera's ray passes on, for one such fibre.
 #[derive(Clone, Debug)]
@@ -30,24 +32,32 @@ pub(super) struct Forward {
     frame: LobeFrame,
     /// What TT keeps at the fibre.
     chain: Rgb,
-    /// Shares of light that passes no other fibre on its way out, one, and more: for each channel, and for the density of
-    /// sampling.
-    shares: [Rgb; 3],
-    drawn_shares: [f32; 3],
-    /// Kernels and azimuthal deviations of so many TT events.
+    /// Share of TT that goes on; the rest goes all round and is no part of F.
+    chain_share: f32,
+    /// Extinction of chains per fibre in the first one's ply.
+    rho: Rgb,
+    /// Kernels and azimuthal deviations of one TT event, of two, and of more.
     kappa: Rgb,
     factor: Rgb,
     sigma: [f32; 3],
-    /// Extinction per fibre in the first fibre's ply, and how many fibres deeper further ones are met.
-    rho: Rgb,
-    on: f32,
-    /// Share of TT that goes on; the rest goes all round and is no part of F.
-    chain_share: f32,
+    /// Where light goes on from the first fibre, if it meets more.
+    more: More,
     /// What may leave from a node where F does not, and the path's weight: they decide between both.
     gain: Rgb,
     weight: Rgb,
     /// A direction drawn from the lobe.
     pub(super) drawn: Drawn,
+}
+
+/// Light that further fibres bend, by the direction in which it left the first one.
+#[derive(Clone, Copy, Debug)]
+struct More {
+    /// Of the light: the shares that one more fibre passes on, and that several do, over what the first one keeps.
+    shares: [Rgb; 2],
+    /// Of sampling.
+    drawn: [f32; 2],
+    /// Optical depth of chains in that direction.
+    depth: Rgb,
 }
 
 /// A direction of F.
@@ -61,15 +71,37 @@ pub(super) struct Drawn {
     pub(super) chance: f32,
 }
 
-/// F in one direction.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Toward {
+/// A part of what F sends in one direction.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Part {
     /// With the cosine, 1/steradian, over 1 - T0.
     pub(super) value: Rgb,
     /// Density of drawing the direction, 1/steradian.
     pub(super) pdf: f32,
     /// The chance that a path goes on this way, were this the direction drawn.
     pub(super) chance: f32,
+}
+
+/// Lobes of one TT event, of two, and of more in one direction.
+#[derive(Clone, Copy, Debug)]
+struct Lobes {
+    /// With the cosine, 1/steradian.
+    values: [f32; 3],
+    /// That of one event around the fibre alone, 1/radian.
+    around: f32,
+    /// By how much the direction turns from straight on: 1 less the cosine.
+    turned: f32,
+}
+
+/// What is ahead of the first fibre in a direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ahead {
+    /// Optical depth of chains.
+    chains: Rgb,
+    /// That of light that meets no fibre.
+    unscattered: f32,
+    /// Expected fibres.
+    fibers: f32,
 }
 
 impl Forward {
@@ -91,92 +123,160 @@ impl Forward {
             return None;
         }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
-
-        // Further TT events, as if light went on straight: on the mean a (1 - e^(-rho n)) / rho, taken as geometric. Three
-        // lobes stand for their number: none, one, and the mean of the others, which is as wide as variances add up to.
-        let left = crossing.fibers - met + crossings[first + 1..].iter().map(|c| c.fibers).sum::<f32>();
-        let depth = optics.rho * left;
-        let more = optics.chain * depth.one_minus_exp_neg() / optics.rho;
-        let (once, again) = (Rgb::ONE / (more + 1.0), more / (more + 1.0));
-        let shares = [once, once * again, again * again];
-        let passed = Rgb::from(normalised((optics.chain * (-depth).exp()).max(Rgb::splat(1e-20)).to_array())) * 3.0;
-        let drawn_shares = shares.map(|share| share.weighted_mean(passed));
-        // Light of a channel that passes few fibres is not as wide as that of one which passes many.
-        let often = shares[2] * passed;
-        let events = 3.0 + more.weighted_mean(often) / often.mean().max(1e-20);
-        let kappa = kappa_of_variance(Rgb::new(1.0, 2.0, events) * optics.beta_tt_squared);
-
         let mut forward = Self {
             spot,
             frame: LobeFrame::new(spot.tangent, view.camera),
             chain: optics.chain,
-            shares,
-            drawn_shares,
-            kappa,
-            factor: normalisation(kappa),
-            sigma: [1.0, 2.0, events].map(|count| count.sqrt() * optics.beta_n),
-            rho: optics.rho,
-            on: GOES_ON.min(left),
             chain_share: optics.chain_share,
+            rho: optics.rho,
+            kappa: Rgb::ZERO,
+            factor: Rgb::ZERO,
+            sigma: [0.0; 3],
+            more: More { shares: [Rgb::ZERO; 2], drawn: [0.0; 2], depth: Rgb::ZERO },
             gain,
             weight,
             drawn: Drawn { direction: Vec3A::ZERO, share: Rgb::ZERO, pdf: 0.0, chance: 0.0 },
         };
-        forward.drawn = forward.draw_direction(view, stream);
+        forward.events(view, 3.0);
+        let first = forward.direction(0, stream);
+        let ahead = forward.ahead(view, first);
+        forward.meets_more(view, &ahead);
+        forward.drawn = forward.draw_direction(view, first, &ahead, stream);
         Some(forward)
     }
 
+    /// Sets how many TT events several are.
     #[inline]
-    pub(super) fn draw_direction(&self, view: &View<'_>, stream: &mut Stream) -> Drawn {
-        let [u_lobe, u_azimuth] = [stream.next(), stream.next()];
-        let [first, second, _] = self.drawn_shares;
-        let lobe = usize::from(u_lobe >= first) + usize::from(u_lobe >= first + second);
-        let kappa = self.kappa.to_array()[lobe];
-        let u = [stream.next(), stream.next()];
-        let sin = sample_sine(kappa, self.frame.sin, self.frame.cos, u, stream);
-        let direction = self.frame.direction(sin, PI + self.sigma[lobe] * normal(u_azimuth));
-        let Toward { value, pdf, chance } = self.toward(view, direction);
-        let share = if pdf > 0.0 { value / pdf } else { Rgb::ZERO };
-        Drawn { direction, share, pdf, chance }
+    fn events(&mut self, view: &View<'_>, several: f32) {
+        let optics = &view.yarn.plies[self.spot.ply];
+        let events = [1.0, 2.0, several];
+        self.kappa = kappa_of_variance(Rgb::from(events) * optics.beta_tt_squared);
+        self.factor = normalisation(self.kappa);
+        self.sigma = events.map(|count| count.sqrt() * optics.beta_n);
     }
 
-    /// The lobe towards `w`.
+    /// Of light that leaves the first fibre in a direction: what meets other fibres, and how many. They are met in the renewal
+    /// process of [`crate::geometry::occluder::PlyGaps`], and each passes on the same share.
     #[inline]
-    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> Toward {
-        let none = Toward { value: Rgb::ZERO, pdf: 0.0, chance: 0.0 };
+    pub(super) fn meets_more(&mut self, view: &View<'_>, ahead: &Ahead) {
+        let optics = &view.yarn.plies[self.spot.ply];
+        let gaps = &optics.gaps;
+        let none = (-ahead.unscattered).exp();
+        // Anywhere on the way, and nothing behind its own chord.
+        let open = (ahead.unscattered - gaps.rate * gaps.density).max(0.0);
+        let one = (open * (-open).exp()).min(1.0 - none);
+        let kept = (-ahead.chains).exp();
+        let several = (kept - Rgb::splat(none) - self.chain * one).max(Rgb::ZERO).min(Rgb::splat(1.0 - none - one));
+        let shares = [self.chain * one, several];
+        // Shares of sampling, and how many fibres several are: of all that light of a channel meets on the mean, what is
+        // not one.
+        let all = (shares[0] + shares[1]).max(Rgb::splat(1e-20));
+        let passed = Rgb::from(normalised((self.chain * all * self.weight).max(Rgb::splat(1e-20)).to_array())) * 3.0;
+        let often = shares[1] / all * passed;
+        let loss = Rgb::splat(gaps.rate) - optics.rho;
+        let mean = loss * ahead.fibers / (loss * gaps.density + 1.0);
+        let count =
+            ((mean * kept - shares[0]) / several.max(Rgb::splat(1e-6))).max(Rgb::splat(2.0)).min(Rgb::splat(32.0));
+        let drawn = shares.map(|share| (share / all).weighted_mean(passed) * (1.0 - none));
+        self.more = More { shares, drawn, depth: ahead.chains };
+        if drawn[1] > 0.0 {
+            self.events(view, 1.0 + count.weighted_mean(often) / often.mean().max(1e-20));
+        }
+    }
+
+    /// Draws a direction of F: that in which light left the `first` fibre, or one in which others send it.
+    #[inline]
+    pub(super) fn draw_direction(&self, view: &View<'_>, first: Vec3A, ahead: &Ahead, stream: &mut Stream) -> Drawn {
+        let through = (-ahead.unscattered).exp();
+        let u = stream.next();
+        let (direction, part) = if u < through {
+            (first, self.alone(&self.lobes(first), ahead))
+        } else {
+            let lobe = if u < through + self.more.drawn[0] { 1 } else { 2 };
+            let direction = self.direction(lobe, stream);
+            let lobes = self.lobes(direction);
+            (direction, self.bent(&lobes, &self.ahead(view, direction)))
+        };
+        let share = if part.pdf > 0.0 { part.value / part.pdf } else { Rgb::ZERO };
+        Drawn { direction, share, pdf: part.pdf, chance: part.chance }
+    }
+
+    /// A direction of one of the lobes.
+    #[inline]
+    pub(super) fn direction(&self, lobe: usize, stream: &mut Stream) -> Vec3A {
+        let u_azimuth = stream.next();
+        let u = [stream.next(), stream.next()];
+        let sin = sample_sine(self.kappa.to_array()[lobe], self.frame.sin, self.frame.cos, u, stream);
+        self.frame.direction(sin, PI + self.sigma[lobe] * normal(u_azimuth))
+    }
+
+    /// F towards `w`: light that the first fibre alone bends, and light that others bend too.
+    #[inline]
+    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> [Part; 2] {
+        let lobes = self.lobes(w);
+        let [once, ..] = lobes.values;
+        if once < FORWARD_TAIL && self.density_of_bent(&lobes) < FORWARD_TAIL {
+            return [Part::default(); 2];
+        }
+        let ahead = self.ahead(view, w);
+        [self.alone(&lobes, &ahead), self.bent(&lobes, &ahead)]
+    }
+
+    #[inline]
+    fn lobes(&self, w: Vec3A) -> Lobes {
         let (at, cos) = self.frame.latitudes(w);
-        let along = normalised_kernel(self.kappa, self.factor, at);
-        if along.max_channel() * cos < FORWARD_TAIL * 1e-4 {
-            return none;
+        let along = normalised_kernel(self.kappa, self.factor, at) * cos;
+        if along.max_channel() < FORWARD_TAIL * 1e-4 {
+            return Lobes { values: [0.0; 3], around: 1.0, turned: 0.0 };
         }
         let off = w.dot(self.frame.y).atan2(w.dot(self.frame.x)) - PI;
         let around = self.sigma.map(|sigma| wrapped_normal(off, sigma));
-        let all = along * Rgb::from(around) * cos;
-        let pdf = 3.0 * Rgb::from(self.drawn_shares).weighted_mean(all);
-        if pdf < FORWARD_TAIL {
-            return none;
-        }
-        let [once, twice, often] = all.to_array();
+        Lobes { values: (along * Rgb::from(around)).to_array(), around: around[0], turned: 1.0 - off.cos() }
+    }
+
+    /// What the first fibre alone bends: nothing else is met on the way out.
+    #[inline]
+    fn alone(&self, lobes: &Lobes, ahead: &Ahead) -> Part {
+        let pdf = lobes.values[0] * (-ahead.unscattered).exp();
         let even = (1.0 - self.chain_share) / TAU;
-        let once = once * (1.0 - even / around[0]).max(0.0) / self.chain_share;
-        // Light that further fibres turned back was deeper in the ply than the way out from the first one.
-        let turned = 1.0 - off.cos();
-        let deeper = (self.rho * (-0.5 * self.on * turned * turned)).exp();
-        let lobe = self.shares[0] * once + (self.shares[1] * twice + self.shares[2] * often) * deeper;
+        self.part(Rgb::splat(pdf * (1.0 - even / lobes.around).max(0.0) / self.chain_share), pdf)
+    }
+
+    /// What others bend too.
+    #[inline]
+    fn bent(&self, lobes: &Lobes, ahead: &Ahead) -> Part {
+        let [_, twice, often] = lobes.values;
+        let More { shares, depth, .. } = &self.more;
+        let farther = DETOUR + BACK * lobes.turned * lobes.turned;
+        let way = (*depth - ahead.chains - self.rho * farther).exp();
+        self.part((shares[0] * twice + shares[1] * often) * way, self.density_of_bent(lobes))
+    }
+
+    #[inline]
+    fn density_of_bent(&self, lobes: &Lobes) -> f32 {
+        self.more.drawn[0] * lobes.values[1] + self.more.drawn[1] * lobes.values[2]
+    }
+
+    /// A part of F, by its value over what the first fibre keeps, and its density.
+    #[inline]
+    fn part(&self, value: Rgb, pdf: f32) -> Part {
+        if pdf < FORWARD_TAIL {
+            return Part::default();
+        }
         // What is drawn for all channels together holds the lobe of each but for rare directions.
-        let value = (self.chain * (-self.depth(view, w)).exp() * lobe).min(Rgb::splat(pdf));
+        let value = (self.chain * value).min(Rgb::splat(pdf));
         let share = value / pdf;
         let passed = share.weighted_mean(self.weight);
         let ended = ((Rgb::ONE - share) * self.gain).weighted_mean(self.weight);
-        Toward { value, pdf, chance: if passed > 0.0 { passed / (passed + ended) } else { 0.0 } }
+        Part { value, pdf, chance: if passed > 0.0 { passed / (passed + ended) } else { 0.0 } }
     }
 
-    /// Optical depth of chains between the first fibre and the outside: a fibre's own chord keeps others away.
+    /// What is between the first fibre and the outside: a fibre's own chord keeps others away.
     #[inline]
-    fn depth(&self, view: &View<'_>, w: Vec3A) -> Rgb {
+    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
         let (yarn, spot) = (view.yarn, &self.spot);
         let tilt = spot.tilt(view.section, w);
-        let mut depth = Rgb::ZERO;
+        let mut all = Ahead { chains: Rgb::ZERO, unscattered: 0.0, fibers: 0.0 };
         view.section.plies_ahead(yarn.occluder().shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
             let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
@@ -184,9 +284,11 @@ impl Forward {
             if ahead.ply == spot.ply {
                 fibers = (fibers - optics.gaps.density).max(0.0);
             }
-            depth += optics.rho * fibers;
+            all.chains += optics.rho * fibers;
+            all.unscattered += optics.gaps.rate * fibers;
+            all.fibers += fibers;
         });
-        depth
+        all
     }
 }
 

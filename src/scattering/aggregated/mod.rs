@@ -179,8 +179,9 @@ impl<'a> Vertex<'a> {
         let mut lobes = LobeValues::default();
         let mut forward_part = 0.0;
         if let Some(forward) = &self.forward {
-            let found = forward.toward(&self.view, w);
-            lobes.f = found.value * mis_weight(light_pdf, found.chance * found.pdf);
+            for part in forward.toward(&self.view, w) {
+                lobes.f += part.value * mis_weight(light_pdf, part.chance * part.pdf);
+            }
             forward_part = lobes.f.mean();
         }
         if let Some(node) = &self.node {

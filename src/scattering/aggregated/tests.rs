@@ -297,12 +297,23 @@ fn sample_densities_match_where_samples_fall() {
     };
     let n = 200_000;
     let mut stream = Stream::new(77);
-    let mut counts = [[0f64; 96]; 2];
+    let (view, node, forward) = (&vertex.view, vertex.node.as_ref().unwrap(), vertex.forward.as_ref().unwrap());
+    // What others bend hangs on where light left the first fibre: the same direction for all samples of that part.
+    let mut meets = forward.clone();
+    let fixed = meets.direction(0, &mut stream);
+    let met = meets.ahead(view, fixed);
+    meets.meets_more(view, &met);
+    let mut counts = [[0f64; 96]; 3];
     for _ in 0..n {
-        // The directions of F and of the node are fixed in a vertex; B is drawn anew.
-        let forward = vertex.forward.as_ref().unwrap().draw_direction(&vertex.view, &mut stream);
-        if stream.next() < forward.chance {
-            counts[0][cell(forward.direction)] += 1.0;
+        // The directions of F and of the node are fixed in a vertex; they are drawn anew.
+        let first = forward.direction(0, &mut stream);
+        let alone = forward.draw_direction(view, first, &forward.ahead(view, first), &mut stream);
+        if alone.direction == first && stream.next() < alone.chance {
+            counts[0][cell(alone.direction)] += 1.0;
+        }
+        let bent = meets.draw_direction(view, fixed, &met, &mut stream);
+        if bent.direction != fixed && stream.next() < bent.chance {
+            counts[2][cell(bent.direction)] += 1.0;
         }
         let u = [0; 3].map(|_| stream.next());
         if let Some(c) = vertex.sample(u, &mut stream)
@@ -311,16 +322,16 @@ fn sample_densities_match_where_samples_fall() {
             counts[1][cell(c.direction)] += 1.0;
         }
     }
-    let mut expected = [[0f64; 96]; 2];
-    let (view, node) = (&vertex.view, vertex.node.as_ref().unwrap());
+    let mut expected = [[0f64; 96]; 3];
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
-        let f = vertex.forward.as_ref().unwrap().toward(view, w);
+        let [alone, bent] = [forward.toward(view, w)[0], meets.toward(view, w)[1]];
         let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
-        expected[0][cell(w)] += f64::from(f.pdf * f.chance) * dw * f64::from(n);
-        expected[1][cell(w)] += f64::from(b) * dw * f64::from(n);
+        for (k, density) in [alone.pdf * alone.chance, b, bent.pdf * bent.chance].into_iter().enumerate() {
+            expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
+        }
     }
-    for k in 0..2 {
+    for k in 0..3 {
         let (mut chi2, mut cells) = (0.0, 0.0);
         for (&got, &want) in counts[k].iter().zip(&expected[k]) {
             if want > 10.0 {
