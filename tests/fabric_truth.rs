@@ -129,10 +129,34 @@ fn boxes(pixels: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
     out
 }
 
+/// Means and 8 x 8 boxes of three fabrics under each light: what is allowed of boxes is a quarter more than what was measured,
+/// which stands in docs/accuracy.md.
 #[test]
-fn a_weave_looks_as_its_fibres_do() {
+fn fabrics_look_as_their_fibres_do() {
     let Some(folder) = shared("oracle/fabric") else { return };
-    let name = "weave50";
+    let mut wrong = Vec::new();
+    for (name, allowed) in FABRICS {
+        for (light, label) in ["env", "front", "back"].into_iter().enumerate() {
+            let (ratio, error) = against_truth(&folder, name, light, label);
+            eprintln!("{name}, {label}: mean ratio {ratio:.3?}, mean relative error of 8 x 8 boxes {error:.4}");
+            let [off, most] = allowed[light];
+            if ratio.iter().any(|r| (r - 1.0).abs() > off) || error > most {
+                wrong.push(format!("{name}, {label}: {ratio:.3?}, {error:.4}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Each fabric, and how far its means and its boxes may be off under the sky, from the front and from behind.
+const FABRICS: [(&str, [[f64; 2]; 3]); 3] = [
+    ("weave50", [[0.05, 0.03], [0.05, 0.066], [0.06, 0.175]]),
+    ("knit50", [[0.05, 0.025], [0.04, 0.047], [0.05, 0.215]]),
+    ("weave25", [[0.05, 0.042], [0.05, 0.083], [0.1, 0.21]]),
+];
+
+/// The aggregated model on the yarns of a truth: ratio of the means where there is cloth, and mean relative error of boxes.
+fn against_truth(folder: &Path, name: &str, light: usize, label: &str) -> ([f64; 3], f64) {
     let truth: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap()).unwrap();
     let curves = folder.join(format!("{name}_yarns.txt")).canonicalize().unwrap();
@@ -146,33 +170,22 @@ fn a_weave_looks_as_its_fibres_do() {
     let sharp: Vec<f64> = picture_of(1).iter().zip(picture_of(2)).map(|(a, b)| a.iter().chain(&b).sum()).collect();
     let limit = 0.02 * sharp.iter().sum::<f64>() / sharp.len() as f64;
     let directory = directory();
-    for (light, label, allowed) in [(0, "sky", 0.05), (1, "front", 0.11)] {
-        let file = write(
-            directory.path(),
-            "scene.toml",
-            scene(&truth, &curves, Curves::Yarns, if light == 0 { "env" } else { "front" }),
-        );
-        let ours = render_file(&file, &["--spp", "48"]);
-        assert_eq!([ours.image.width, ours.image.height], [width, height]);
-        let (ours, theirs) = (ours.colors(), picture_of(light));
-        let on_cloth = |p: &[[f64; 3]]| -> [f64; 3] {
-            crate::support::mean(
-                &p.iter().zip(&sharp).filter(|&(_, &s)| s > limit).map(|(c, _)| *c).collect::<Vec<_>>(),
-            )
-        };
-        let (a, b) = (on_cloth(&ours), on_cloth(&theirs));
-        let ratio: [f64; 3] = std::array::from_fn(|k| a[k] / b[k]);
-        let (a, b) = (boxes(&ours, width), boxes(&theirs, width));
-        let level = crate::support::mean(&b);
-        let errors = a
-            .iter()
-            .zip(&b)
-            .flat_map(|(a, b)| (0..3).map(move |k| (a[k] - b[k]).abs() / (b[k] + 0.05 * level[k])).collect::<Vec<_>>());
-        let error = errors.sum::<f64>() / (3 * a.len()) as f64;
-        eprintln!("{name}, {label}: mean ratio {ratio:.3?}, mean relative error of 8 x 8 boxes {error:.4}");
-        assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.08), "{label}: mean ratio {ratio:.3?}");
-        assert!(error < allowed, "{label}: {error:.4}");
-    }
+    let file = write(directory.path(), "scene.toml", scene(&truth, &curves, Curves::Yarns, label));
+    let ours = render_file(&file, &["--spp", "48"]);
+    assert_eq!([ours.image.width, ours.image.height], [width, height]);
+    let (ours, theirs) = (ours.colors(), picture_of(light));
+    let on_cloth = |p: &[[f64; 3]]| -> [f64; 3] {
+        crate::support::mean(&p.iter().zip(&sharp).filter(|&(_, &s)| s > limit).map(|(c, _)| *c).collect::<Vec<_>>())
+    };
+    let (a, b) = (on_cloth(&ours), on_cloth(&theirs));
+    let ratio: [f64; 3] = std::array::from_fn(|k| a[k] / b[k]);
+    let (a, b) = (boxes(&ours, width), boxes(&theirs, width));
+    let level = crate::support::mean(&b);
+    let errors = a
+        .iter()
+        .zip(&b)
+        .flat_map(|(a, b)| (0..3).map(move |k| (a[k] - b[k]).abs() / (b[k] + 0.05 * level[k])).collect::<Vec<_>>());
+    (ratio, errors.sum::<f64>() / (3 * a.len()) as f64)
 }
 
 #[test]
