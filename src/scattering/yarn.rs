@@ -101,6 +101,14 @@ impl YarnVertex<'_> {
         }
     }
 
+    /// The density, 1/steradian, with which paths go on as lobe F towards `w`; 0 for models without it.
+    pub fn forward_density(&self, w: Vec3A) -> f32 {
+        match self {
+            Self::Aggregated(v) => v.forward_density(w),
+            Self::Chord(_) => 0.0,
+        }
+    }
+
     /// Depth on the camera's ray, in yarn radii, from which light of the node leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {

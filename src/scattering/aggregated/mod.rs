@@ -197,6 +197,13 @@ impl<'a> Vertex<'a> {
         Direct { lobes, forward_share: if total > 0.0 { forward_part / total } else { 0.0 } }
     }
 
+    /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of
+    /// [`Self::sample`], for [`Self::evaluate`] weighs each part by itself.
+    pub fn forward_density(&self, w: Vec3A) -> f32 {
+        let parts = self.forward.as_ref().map(|forward| forward.toward(&self.view, w));
+        parts.map_or(0.0, |parts| parts.iter().map(|part| part.chance * part.pdf).sum())
+    }
+
     /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of B.
     #[inline]
     pub fn sample(&self, u: [f32; 3], stream: &mut Stream) -> Option<Continuation> {

@@ -129,8 +129,9 @@ fn count(yarn: &Yarn, model: Model, (theta, h): (f64, f32), n: u32, seed: u32) -
             let (full, weighted) = (v.evaluate(w, f32::INFINITY).lobes, v.evaluate(w, 1.0).lobes);
             let density =
                 |part: fn(&LobeValues) -> Rgb| density_of(part(&full).max_channel(), part(&weighted).max_channel());
-            let densities =
-                [density(|l| l.f), density(|l| l.r + l.tt + l.d), density(|l| l.b), density(LobeValues::sum)];
+            // Parts of F are weighed by themselves: their density is asked for.
+            let forward = f64::from(v.forward_density(w));
+            let densities = [forward, density(|l| l.r + l.tt + l.d), density(|l| l.b), density(LobeValues::sum)];
             for (expected, density) in counted.expected.iter_mut().zip(densities) {
                 expected[cell] += density * 2.0 * TAU / (BINS * BINS) as f64 * f64::from(SAMPLES_PER_SUM);
             }
