@@ -82,6 +82,14 @@ pub(super) struct Part {
     pub(super) chance: f32,
 }
 
+impl Part {
+    /// The density with which a path goes on this way, 1/steradian.
+    #[inline]
+    pub(super) fn density(&self) -> f32 {
+        self.chance * self.pdf
+    }
+}
+
 /// Lobes of one TT event, of two, and of more in one direction.
 #[derive(Clone, Copy, Debug)]
 struct Lobes {
@@ -98,7 +106,8 @@ struct Lobes {
 pub(super) struct Ahead {
     /// Optical depth of chains.
     chains: Rgb,
-    /// That of light that meets no fibre.
+    /// The share of light that meets no fibre, and its optical depth.
+    through: f32,
     unscattered: f32,
     /// Expected fibres.
     fibers: f32,
@@ -145,13 +154,12 @@ impl Forward {
         Some(forward)
     }
 
-    /// Sets how many TT events several are.
+    /// Sets how many TT events several are. What normalises their kernels waits until that is known.
     #[inline]
     fn events(&mut self, view: &View<'_>, several: f32) {
         let optics = &view.yarn.plies[self.spot.ply];
         let events = [1.0, 2.0, several];
         self.kappa = kappa_of_variance(Rgb::from(events) * optics.beta_tt_squared);
-        self.factor = normalisation(self.kappa);
         self.sigma = events.map(|count| count.sqrt() * optics.beta_n);
     }
 
@@ -161,7 +169,7 @@ impl Forward {
     pub(super) fn meets_more(&mut self, view: &View<'_>, ahead: &Ahead) {
         let optics = &view.yarn.plies[self.spot.ply];
         let gaps = &optics.gaps;
-        let none = (-ahead.unscattered).exp();
+        let none = ahead.through;
         // Anywhere on the way, and nothing behind its own chord.
         let open = (ahead.unscattered - gaps.rate * gaps.density).max(0.0);
         let one = (open * (-open).exp()).min(1.0 - none);
@@ -182,17 +190,17 @@ impl Forward {
         if drawn[1] > 0.0 {
             self.events(view, 1.0 + count.weighted_mean(often) / often.mean().max(1e-20));
         }
+        self.factor = normalisation(self.kappa);
     }
 
     /// Draws a direction of F: that in which light left the `first` fibre, or one in which others send it.
     #[inline]
     pub(super) fn draw_direction(&self, view: &View<'_>, first: Vec3A, ahead: &Ahead, stream: &mut Stream) -> Drawn {
-        let through = (-ahead.unscattered).exp();
         let u = stream.next();
-        let (direction, part) = if u < through {
+        let (direction, part) = if u < ahead.through {
             (first, self.alone(&self.lobes(first), ahead))
         } else {
-            let lobe = if u < through + self.more.drawn[0] { 1 } else { 2 };
+            let lobe = if u < ahead.through + self.more.drawn[0] { 1 } else { 2 };
             let direction = self.direction(lobe, stream);
             let lobes = self.lobes(direction);
             (direction, self.bent(&lobes, &self.ahead(view, direction)))
@@ -237,7 +245,7 @@ impl Forward {
     /// What the first fibre alone bends: nothing else is met on the way out.
     #[inline]
     fn alone(&self, lobes: &Lobes, ahead: &Ahead) -> Part {
-        let pdf = lobes.values[0] * (-ahead.unscattered).exp();
+        let pdf = lobes.values[0] * ahead.through;
         let even = (1.0 - self.chain_share) / TAU;
         self.part(Rgb::splat(pdf * (1.0 - even / lobes.around).max(0.0) / self.chain_share), pdf)
     }
@@ -276,7 +284,7 @@ impl Forward {
     pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
         let (yarn, spot) = (view.yarn, &self.spot);
         let tilt = spot.tilt(view.section, w);
-        let mut all = Ahead { chains: Rgb::ZERO, unscattered: 0.0, fibers: 0.0 };
+        let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, unscattered: 0.0, fibers: 0.0 };
         view.section.plies_ahead(yarn.occluder().shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
             let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
@@ -288,6 +296,7 @@ impl Forward {
             all.unscattered += optics.gaps.rate * fibers;
             all.fibers += fibers;
         });
+        all.through = (-all.unscattered).exp();
         all
     }
 }

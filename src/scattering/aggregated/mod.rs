@@ -34,7 +34,7 @@ use crate::{
 };
 use backward::Backward;
 use chain::ChainEnd;
-use forward::Forward;
+use forward::{Forward, Part};
 use single::Node;
 
 mod backward;
@@ -180,7 +180,7 @@ impl<'a> Vertex<'a> {
         let mut forward_part = 0.0;
         if let Some(forward) = &self.forward {
             for part in forward.toward(&self.view, w) {
-                lobes.f += part.value * mis_weight(light_pdf, part.chance * part.pdf);
+                lobes.f += part.value * mis_weight(light_pdf, part.density());
             }
             forward_part = lobes.f.mean();
         }
@@ -201,7 +201,7 @@ impl<'a> Vertex<'a> {
     /// [`Self::sample`], for [`Self::evaluate`] weighs each part by itself.
     pub fn forward_density(&self, w: Vec3A) -> f32 {
         let parts = self.forward.as_ref().map(|forward| forward.toward(&self.view, w));
-        parts.map_or(0.0, |parts| parts.iter().map(|part| part.chance * part.pdf).sum())
+        parts.map_or(0.0, |parts| parts.iter().map(Part::density).sum())
     }
 
     /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of B.

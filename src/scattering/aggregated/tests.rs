@@ -327,7 +327,7 @@ fn sample_densities_match_where_samples_fall() {
     for (w, dw) in sphere(1600, 1200) {
         let [alone, bent] = [forward.toward(view, w)[0], meets.toward(view, w)[1]];
         let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
-        for (k, density) in [alone.pdf * alone.chance, b, bent.pdf * bent.chance].into_iter().enumerate() {
+        for (k, density) in [alone.density(), b, bent.density()].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
         }
     }
