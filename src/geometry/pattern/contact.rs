@@ -168,13 +168,18 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
-    pub(super) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
+    /// Finds the entries around a point's cell, unless they are those last asked for.
+    fn go_to(&mut self, point: usize) {
         let cell = self.grid.cell_of[point];
         if self.cell != Some(cell) {
             self.grid.runs_around(cell, self.ahead, &mut self.runs);
             self.cell = Some(cell);
         }
+    }
+
+    /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
+    pub(super) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
+        self.go_to(point);
         let entries = &self.grid.entries;
         self.runs.iter().flat_map(|run| &entries[run.start as usize..run.end as usize])
     }
@@ -182,7 +187,7 @@ impl<'a> Walk<'a> {
     /// Of the points around one, at `at`, those within a distance and some that are a little farther; in the same order. Of a
     /// grid without a period.
     pub(super) fn within(&mut self, point: usize, at: DVec3, distance: f64, mut found: impl FnMut(&'a Entry)) {
-        let _ = self.around(point);
+        self.go_to(point);
         let PointGrid { entries, places, origin, .. } = self.grid;
         let from = (at - *origin).as_vec3();
         let most = f32x8::splat((distance as f32 + ROUNDED * (from.length() + distance as f32)).powi(2));
