@@ -174,7 +174,7 @@ impl Garment {
         let lays = |anchor| wanted(surface.at(&pose, anchor).0);
         let sewing = Sewing::new(&options, &shapes, &borders, &cloth);
         let lattices: Vec<Lattice> = borders
-            .iter()
+            .par_iter()
             .enumerate()
             .map(|(panel, border)| Lattice::new(&surface, panel as u32, border, &sewing.division(panel), &lays))
             .collect();

@@ -12,7 +12,7 @@ mod variation;
 pub(super) use self::{coordinates::FabricCoordinates, motif::hex};
 use self::{
     motif::{CellMap, Motif, motif},
-    painter::{LaidCells, Painter, Variants},
+    painter::{LaidCells, Painter},
     variation::Variation,
 };
 use super::{
@@ -235,16 +235,13 @@ impl ColorPlan {
             return Some(());
         }
         let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, print, shades, yarns: &yarns };
-        let mut variants = Variants::default();
-        let curves = fabric.curves.iter().enumerate();
-        let material_indices =
-            curves.map(|(index, (curve, radii))| painter.paint(index, curve, radii, &mut variants)).collect();
-        if variants.made.len() > usize::from(u16::MAX) {
+        let (variants, material_indices) = painter.paint(&fabric.curves);
+        if variants.len() > usize::from(u16::MAX) {
             let hint = "fewer yarns, or a picture of fewer colours";
             context.error(self.header, "more than 65535 kinds and colours of yarn", Some(hint.to_owned()));
             return None;
         }
-        fabric.variants = variants.made;
+        fabric.variants = variants;
         fabric.material_indices = material_indices;
         Some(())
     }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::{
     super::{dyes::Dyes, tint::Print},
@@ -78,60 +79,95 @@ pub(super) struct Painter<'a> {
 }
 
 impl Painter<'_> {
-    /// The material index at each place along a curve; variants are made as they are met.
-    pub(super) fn paint(&self, index: usize, curve: &Curve, radii: &[f64], variants: &mut Variants) -> Vec<u16> {
+    /// The variants that the curves need, in the order in which they are met, and which of them lies at each place along
+    /// each curve. Where there are more variants than numbers for them, the last number stands for all of the rest.
+    pub(super) fn paint(&self, curves: &[(Curve, Vec<f64>)]) -> (Vec<Yarn>, Vec<Vec<u16>>) {
+        let mut painted: Vec<Numbered> =
+            curves.par_iter().enumerate().map(|(index, (curve, radii))| self.keys(index, curve, radii)).collect();
+        let mut all = Numbered::default();
+        let renumber: Vec<Vec<u16>> =
+            painted.iter().map(|curve| curve.keys.iter().map(|key| all.number(*key)).collect()).collect();
+        painted.par_iter_mut().zip(&renumber).for_each(|(curve, numbers)| {
+            curve.places.iter_mut().for_each(|place| *place = numbers[usize::from(*place)]);
+        });
+        let variants = all.keys.into_iter().map(|key| self.variant(key)).collect();
+        (variants, painted.into_iter().map(|curve| curve.places).collect())
+    }
+
+    /// What lies at each place along a curve.
+    fn keys(&self, index: usize, curve: &Curve, radii: &[f64]) -> Numbered {
         let shade = self.shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
-        let shine = self.shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade));
+        let shine = self.shine(shade);
         let cells = self.cells.of(index, self.coordinates);
         let own = self.coordinates.own.get(index).copied();
+        let kind = self.coordinates.kinds.get(index).copied();
         let count = curve.points.len();
         let steps = steps(curve, radii);
         let places = if curve.closed { count * steps } else { (count - 1) * steps + 1 };
-        let material_at = |place: usize| {
-            let [x, y] = self.coordinates.between(index, place, steps, count);
-            let yarn = own.unwrap_or_else(|| cells.at(x, y));
-            let kind = self.coordinates.kinds.get(index).copied();
-            let dye = self.dyes.and_then(|d| d.at(index, kind, [x, y]));
-            let dyed = self.dyes.map_or(Vec3::ONE, |d| d.color(dye));
-            let (key, color) = match &self.print {
-                None => (Key { yarn, shade, dye, levels: [0; 3] }, dyed * shine),
+        let mut out = Numbered { places: Vec::with_capacity(places), ..Numbered::default() };
+        for place in 0..places {
+            let at = self.coordinates.between(index, place, steps, count);
+            let yarn = own.unwrap_or_else(|| cells.at(at[0], at[1]));
+            let dye = self.dyes.and_then(|d| d.at(index, kind, at));
+            let key = match &self.print {
+                None => Key { yarn, shade, dye, levels: None },
                 Some(print) => {
                     let next = self.coordinates.between(index, place + 1, steps, count);
                     let mut stream = Stream::new(hash2(index as u32, place as u32));
-                    let levels = print
-                        .color([x, y], next)
-                        .map(|v| (LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next()).min(LEVELS) as u8);
-                    let color = levels.map(|l| (f32::from(l) / LEVELS).powi(2));
-                    (Key { yarn, shade: None, dye, levels }, dyed * Vec3::from(color))
+                    let level = |v: f32| LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next();
+                    let levels = print.color(at, next).map(level).map(|level| level.min(LEVELS) as u8);
+                    Key { yarn, shade: None, dye, levels: Some(levels) }
                 }
             };
-            variants.material_index(key, || self.yarns[key.yarn].dyed(color.to_array().map(f64::from)))
-        };
-        (0..places).map(material_at).collect()
+            let number = out.number(key);
+            out.places.push(number);
+        }
+        out
+    }
+
+    fn shine(&self, shade: Option<u32>) -> f32 {
+        self.shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade))
+    }
+
+    /// The yarn of a key, in its colour.
+    fn variant(&self, key: Key) -> Yarn {
+        let dyed = self.dyes.map_or(Vec3::ONE, |d| d.color(key.dye));
+        let printed = key.levels.map_or(Vec3::ONE, |l| Vec3::from(l.map(|l| (f32::from(l) / LEVELS).powi(2))));
+        self.yarns[key.yarn].dyed((dyed * printed * self.shine(key.shade)).to_array().map(f64::from))
     }
 }
 
+/// What decides the yarn and colour of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Key {
     yarn: usize,
     shade: Option<u32>,
     dye: Option<u32>,
-    levels: [u8; 3],
+    /// Of a print.
+    levels: Option<[u8; 3]>,
 }
 
-/// Yarns as they are asked for, each made once.
+/// Keys with numbers in the order in which they are met, and the numbers of places.
 #[derive(Default)]
-pub(super) struct Variants {
-    pub(super) made: Vec<Yarn>,
-    places: HashMap<Key, u16>,
+struct Numbered {
+    keys: Vec<Key>,
+    numbers: HashMap<Key, u16>,
+    /// The key that was met last, and its number.
+    last: Option<(Key, u16)>,
+    places: Vec<u16>,
 }
 
-impl Variants {
-    fn material_index(&mut self, key: Key, make: impl FnOnce() -> Yarn) -> u16 {
-        *self.places.entry(key).or_insert_with(|| {
-            self.made.push(make());
+impl Numbered {
+    fn number(&mut self, key: Key) -> u16 {
+        if let Some((_, number)) = self.last.filter(|(last, _)| *last == key) {
+            return number;
+        }
+        let number = *self.numbers.entry(key).or_insert_with(|| {
+            self.keys.push(key);
             // Too many are told as an error before anyone looks.
-            u16::try_from(self.made.len() - 1).unwrap_or(u16::MAX)
-        })
+            u16::try_from(self.keys.len() - 1).unwrap_or(u16::MAX)
+        });
+        self.last = Some((key, number));
+        number
     }
 }

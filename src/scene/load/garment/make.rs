@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::{
     super::{
@@ -395,7 +396,8 @@ fn length(yarns: &[LaidYarn]) -> f64 {
         yarn.points.windows(4).map(|w| knot(&w[..3]).distance(knot(&w[1..]))).sum::<f64>()
     };
     // Chords are a little shorter than what they span: by two percent for loops of twelve points.
-    yarns.iter().map(of).sum()
+    let each: Vec<f64> = yarns.par_iter().map(of).collect();
+    each.iter().sum()
 }
 
 /// Grams of yarns of such lengths, mm, by their tex (grams in a kilometre); `None` where that of one is not known.
