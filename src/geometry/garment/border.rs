@@ -1,6 +1,10 @@
 //! Where the edges of stitches lie on a panel's border, within it or, to be turned in, beyond.
 
 use glam::DVec2;
+use rstar::{
+    RTree,
+    primitives::{GeomWithData, Line},
+};
 
 use super::{
     edges::SeamKind,
@@ -53,6 +57,99 @@ fn nearest<'a>(from: DVec2, edges: impl IntoIterator<Item = &'a Edge>) -> Option
     edges.into_iter().min_by(|a, b| key(a).total_cmp(&key(b)))
 }
 
+/// The border of a panel as stitches see it: its edges, found by where they are.
+pub(super) struct Border {
+    edges: Vec<Edge>,
+    tree: RTree<GeomWithData<Line<[f64; 2]>, usize>>,
+    /// How far the cloth goes on beyond it at the most, mm.
+    pub(super) turned_in: f64,
+    /// How much of the cloth is left out or added at it at the most, mm.
+    widest: f64,
+}
+
+impl Border {
+    pub(super) fn new(edges: Vec<Edge>) -> Self {
+        let line = |(i, edge): (usize, &Edge)| {
+            let [a, b] = edge.border.ends.map(|p| p.to_array());
+            GeomWithData::new(Line::new(a, b), i)
+        };
+        let tree = RTree::bulk_load(edges.iter().enumerate().map(line).collect());
+        let turned_in = edges.iter().map(|e| -e.margin).fold(0.0, f64::max);
+        let widest = edges.iter().map(|e| e.margin.abs()).fold(0.0, f64::max);
+        Self { edges, tree, turned_in, widest }
+    }
+
+    pub(super) fn all(&self) -> &[Edge] {
+        &self.edges
+    }
+
+    /// The edges within a distance of a point, and perhaps a few beyond, in their order.
+    fn around(&self, from: DVec2, reach: f64) -> Vec<&Edge> {
+        // By a little more, for the tree may round otherwise.
+        let reach = 1.000_01 * reach + 1e-9;
+        let mut found: Vec<usize> =
+            self.tree.locate_within_distance(from.to_array(), reach * reach).map(|line| line.data).collect();
+        found.sort_unstable();
+        found.into_iter().map(|i| &self.edges[i]).collect()
+    }
+
+    /// The place on the border nearest to a point, moved by the margins of the edges around, and whether the border is
+    /// free there; the point itself if no border is within `reach`.
+    pub(super) fn onto(&self, from: DVec2, reach: f64) -> (DVec2, bool) {
+        let close = |e: &&Edge| on(&e.border, from).0.distance_squared(from) < (reach + e.margin.abs()).powi(2);
+        let near: Vec<&Edge> = self.around(from, reach + self.widest).into_iter().filter(close).collect();
+        let Some(Edge { border, margin, .. }) = nearest(from, near.iter().copied()) else { return (from, false) };
+        let mut at = on(border, from).0;
+        if *margin < 0.0 {
+            at += (border.ends[1] - border.ends[0]).normalize_or(DVec2::X).perp() * *margin;
+        }
+        for _ in 0..4 {
+            for Edge { border, margin, .. } in near.iter().filter(|e| e.margin >= 0.0) {
+                let [a, b] = border.ends;
+                let d = (b - a).normalize_or(DVec2::X);
+                let (along, off) = ((at - a).dot(d), d.perp_dot(at - a));
+                if (-1e-9..=a.distance(b) + 1e-9).contains(&along) && off < *margin && off > -2.0 * margin - 1e-9 {
+                    at += d.perp() * (margin - off);
+                }
+            }
+        }
+        (at, border.sewn_to.is_none())
+    }
+
+    /// The place of the border nearest to a point.
+    pub(super) fn nearest_anchor(&self, from: DVec2) -> Anchor {
+        let Some(line) = self.tree.nearest_neighbor(&from.to_array()) else { return Anchor::NONE };
+        let distance = on(&self.edges[line.data].border, from).0.distance(from);
+        nearest(from, self.around(from, distance)).map_or(Anchor::NONE, |Edge { border, .. }| {
+            let ([a, b], t) = (border.anchors, on(border, from).1);
+            let mix = |k: usize| a.share[k] + (b.share[k] - a.share[k]) * t as f32;
+            Anchor { face: a.face, share: [mix(0), mix(1)] }
+        })
+    }
+
+    /// Whether a point outside of the panel is on what is turned in at a seam.
+    pub(super) fn is_turned_in(&self, at: DVec2) -> bool {
+        /// The least cosine to an edge's normal of what lies straight before it.
+        const BEFORE: f64 = 0.8;
+        let around = self.around(at, self.turned_in / BEFORE);
+        let Some(Edge { border, margin, .. }) = nearest(at, around) else { return false };
+        let out = -inside(border, at);
+        // Straight before the seam, not beside its ends.
+        *margin < 0.0 && out > 0.0 && out < -margin && out > BEFORE * on(border, at).0.distance(at)
+    }
+
+    /// Where a place lies against the nearest of the seams that are turned in, within a distance of it.
+    pub(super) fn near_seam(&self, at: DVec2, within: f64, on_panel: bool) -> Option<NearSeam> {
+        let edge = nearest(at, self.around(at, within).into_iter().filter(|e| e.margin < 0.0))?;
+        let (to, share) = on(&edge.border, at);
+        let distance = to.distance(at);
+        let over = if on_panel { 0.0 } else { distance as f32 };
+        let found =
+            NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam, first: edge.first };
+        (distance < within).then_some(found)
+    }
+}
+
 /// Whether an edge goes rather up or down than across.
 pub(super) fn is_side(edge: &BorderEdge) -> bool {
     let d = edge.ends[1] - edge.ends[0];
@@ -74,55 +171,4 @@ pub(super) fn closing(panel: u32, border: &[BorderEdge]) -> Option<(f64, f64)> {
     };
     let sound = sides.iter().filter(straight).count();
     (!sides.is_empty() && width > 0.0 && sound == sides.len()).then_some((low, width))
-}
-
-/// The place on the border nearest to a point, moved by the margins of the edges around, and whether the border is free
-/// there; the point itself if no border is within `reach`.
-pub(super) fn onto_border(from: DVec2, edges: &[Edge], reach: f64) -> (DVec2, bool) {
-    let close = |e: &&Edge| on(&e.border, from).0.distance_squared(from) < (reach + e.margin.abs()).powi(2);
-    let near: Vec<Edge> = edges.iter().filter(close).copied().collect();
-    let Some(Edge { border, margin, .. }) = nearest(from, &near) else { return (from, false) };
-    let mut at = on(border, from).0;
-    if *margin < 0.0 {
-        at += (border.ends[1] - border.ends[0]).normalize_or(DVec2::X).perp() * *margin;
-    }
-    for _ in 0..4 {
-        for Edge { border, margin, .. } in near.iter().filter(|e| e.margin >= 0.0) {
-            let [a, b] = border.ends;
-            let d = (b - a).normalize_or(DVec2::X);
-            let (along, off) = ((at - a).dot(d), d.perp_dot(at - a));
-            if (-1e-9..=a.distance(b) + 1e-9).contains(&along) && off < *margin && off > -2.0 * margin - 1e-9 {
-                at += d.perp() * (margin - off);
-            }
-        }
-    }
-    (at, border.sewn_to.is_none())
-}
-
-/// The place of the border nearest to a point.
-pub(super) fn nearest_anchor(from: DVec2, edges: &[Edge]) -> Anchor {
-    nearest(from, edges).map_or(Anchor::NONE, |Edge { border, .. }| {
-        let ([a, b], t) = (border.anchors, on(border, from).1);
-        let mix = |k: usize| a.share[k] + (b.share[k] - a.share[k]) * t as f32;
-        Anchor { face: a.face, share: [mix(0), mix(1)] }
-    })
-}
-
-/// Whether a point outside of the panel is on what is turned in at a seam.
-pub(super) fn is_turned_in(at: DVec2, edges: &[Edge]) -> bool {
-    let Some(Edge { border, margin, .. }) = nearest(at, edges) else { return false };
-    let out = -inside(border, at);
-    // Straight before the seam, not beside its ends.
-    *margin < 0.0 && out > 0.0 && out < -margin && out > 0.8 * on(border, at).0.distance(at)
-}
-
-/// Where a place lies against the nearest of the seams that are turned in, within a distance of it.
-pub(super) fn near_seam(at: DVec2, edges: &[Edge], within: f64, on_panel: bool) -> Option<NearSeam> {
-    let edge = nearest(at, edges.iter().filter(|e| e.margin < 0.0))?;
-    let (to, share) = on(&edge.border, at);
-    let distance = to.distance(at);
-    let over = if on_panel { 0.0 } else { distance as f32 };
-    let found =
-        NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam, first: edge.first };
-    (distance < within).then_some(found)
 }

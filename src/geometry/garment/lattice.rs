@@ -7,7 +7,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{
-    border::{Edge, NearSeam, closing, is_side, is_turned_in, near_seam, nearest_anchor, onto_border},
+    border::{Border, Edge, NearSeam, closing, is_side},
     edges::SeamKind,
     fold::Folds,
     sheet::Sheet,
@@ -90,7 +90,7 @@ impl Lattice {
         };
         // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
         let all = border.iter().zip(division.seams).enumerate().map(edge);
-        let edges: Vec<Edge> = all.filter(|e| around.is_none() || !is_side(&e.border)).collect();
+        let edges = Border::new(all.filter(|e| around.is_none() || !is_side(&e.border)).collect());
         let mut low = border.iter().flat_map(|e| e.ends).fold(DVec2::INFINITY, DVec2::min);
         let mut high = border.iter().flat_map(|e| e.ends).fold(DVec2::NEG_INFINITY, DVec2::max);
         if border.is_empty() {
@@ -101,7 +101,7 @@ impl Lattice {
         for axis in 0..2 {
             for (side, sign) in [(&mut low, 1.0), (&mut high, -1.0)] {
                 let at = side[axis];
-                let near = edges.iter().filter(|e| e.border.ends.iter().all(|p| (p[axis] - at).abs() < 0.5));
+                let near = edges.all().iter().filter(|e| e.border.ends.iter().all(|p| (p[axis] - at).abs() < 0.5));
                 // The widest of what is turned in, unless something is left out.
                 let most = |a: f64, b: f64| if a.max(b) > 0.0 { a.max(b) } else { a.min(b) };
                 side[axis] += sign * near.map(|e| e.margin).fold(0.0, most);
@@ -161,22 +161,21 @@ impl Lattice {
     }
 
     /// Keeps some stitches, and those beyond seams beside them.
-    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &[Edge]) {
+    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &Border) {
         self.kept = kept;
         self.turn_in(middle, edges);
         self.drop_lonely();
     }
 
     /// Adds the stitches beyond seams that are turned in.
-    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &[Edge]) {
-        let widest = edges.iter().map(|e| -e.margin).fold(0.0, f64::max);
-        let steps = (widest / self.stitch.min_element()).ceil() as usize;
+    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &Border) {
+        let steps = (edges.turned_in / self.stitch.min_element()).ceil() as usize;
         let columns = self.counts[0] as isize;
         for _ in 0..steps {
             let beyond = |&i: &usize| {
                 let (x, y) = (i as isize % columns, i as isize / columns);
                 let beside = || (-1..2).any(|dy| (-1..2).any(|dx| self.keeps(x + dx, y + dy)));
-                !self.kept[i] && beside() && is_turned_in(middle(i), edges)
+                !self.kept[i] && beside() && edges.is_turned_in(middle(i))
             };
             let found: Vec<usize> = (0..self.kept.len()).into_par_iter().with_min_len(1024).filter(beyond).collect();
             if found.is_empty() {
@@ -257,7 +256,7 @@ impl Lattice {
     }
 
     /// Finds where each corner of a stitch lies.
-    fn place(&mut self, finder: &Finder<'_>, edges: &[Edge], low: DVec2, bent: f64) {
+    fn place(&mut self, finder: &Finder<'_>, edges: &Border, low: DVec2, bent: f64) {
         let (w, h) = (self.width(), self.height());
         let of_index = |i: usize| {
             let pad = if self.ring { 0 } else { PAD as isize };
@@ -281,7 +280,7 @@ impl Lattice {
                     3 => INNER,
                     _ => 1.0,
                 };
-                let (to, free) = onto_border(here, edges, 2.5 * self.stitch.max_element());
+                let (to, free) = edges.onto(here, 2.5 * self.stitch.max_element());
                 Some((share * (to - here), free))
             })
             .collect();
@@ -305,10 +304,9 @@ impl Lattice {
                 .collect();
             moved = next;
         }
-        let turned = edges.iter().any(|e| e.margin < 0.0);
+        let turned = edges.turned_in > 0.0;
         // Corners so many steps from the border may be near a seam.
-        let steps =
-            ((bent + edges.iter().map(|e| -e.margin).fold(0.0, f64::max)) / self.stitch.min_element()) as isize + 2;
+        let steps = ((bent + edges.turned_in) / self.stitch.min_element()) as isize + 2;
         let by_border = |x: isize, y: isize| {
             turned
                 && [(-steps, 0), (steps, 0), (0, -steps), (0, steps)].iter().any(|(dx, dy)| !self.keeps(x + dx, y + dy))
@@ -327,8 +325,8 @@ impl Lattice {
                     here.x = here.x.max(low.x + 1e-6 * self.stitch.x);
                 }
                 let found = finder.find(here);
-                let near = by_border(x, y).then(|| near_seam(here, edges, bent, found.is_some())).flatten();
-                (if found.is_some() { found } else { nearest_anchor(here, edges) }, near)
+                let near = by_border(x, y).then(|| edges.near_seam(here, bent, found.is_some())).flatten();
+                (if found.is_some() { found } else { edges.nearest_anchor(here) }, near)
             })
             .collect();
         self.free = free;
