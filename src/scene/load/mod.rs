@@ -203,6 +203,27 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 /// # Errors
 /// Everything that is wrong with it, as text for the user.
 pub fn parse(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let Some(threads) = threads(name, text, options) else { return parse_here(name, text, options) };
+    // As much stack as a program's first thread has.
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(8 << 20).build() {
+        Ok(pool) => {
+            let options = options.clone();
+            pool.install(move || parse_here(name, text, &options))
+        }
+        Err(error) => Err(LoadError(format!("{name}: error: cannot start {threads} threads: {error}\n"))),
+    }
+}
+
+/// How many threads a scene or the command line asks for, if they do; what is wrong is told later.
+fn threads(name: &str, text: &str, options: &LoadOptions) -> Option<usize> {
+    let (mut sources, diagnostics) = (Sources::new(), Diagnostics::new());
+    let mut document = Document::parse(name, text, &mut sources, &diagnostics)?;
+    apply_options(&mut document, options, &mut sources, &diagnostics);
+    settings::threads(&Reader::new(&document, &diagnostics).table("render")?)
+}
+
+/// Loads a scene on the threads that there are.
+fn parse_here(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, LoadError> {
     let mut sources = Sources::new();
     let diagnostics = Diagnostics::new();
     match load_text(name, text, options, &mut sources, &diagnostics) {
@@ -241,13 +262,18 @@ fn load_text(
 ) -> Option<Scene> {
     let mut document = Document::parse(name, text, sources, diagnostics)?;
     let libraries_are_read = merge_libraries(&mut document, sources, diagnostics);
+    apply_options(&mut document, options, sources, diagnostics);
+    build(name, &document, options, sources, diagnostics, libraries_are_read)
+}
+
+/// Adds what the command line says of a scene's keys.
+fn apply_options(document: &mut Document, options: &LoadOptions, sources: &mut Sources, diagnostics: &Diagnostics) {
     for (key, value, label) in &options.settings {
         document.set(key, value.clone(), label, sources, diagnostics);
     }
     for assignment in &options.assignments {
         document.apply_option(assignment, sources, diagnostics);
     }
-    build(name, &document, options, sources, diagnostics, libraries_are_read)
 }
 
 /// Adds the tables of the files under `library`; what the scene itself says wins. Whether all of them could be read.

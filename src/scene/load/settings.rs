@@ -8,6 +8,11 @@ use crate::{image::png::ToneMap, input::diagnostic::shortened};
 
 const SIZE: std::ops::RangeInclusive<u64> = 1..=65_536;
 
+/// On how many threads a scene is loaded and rendered, where it says so.
+pub(super) fn threads(table: &Reader<'_>) -> Option<usize> {
+    table.u64("threads", 1..=4096).map(|t| t as usize)
+}
+
 /// The settings of `[render]`; `None` if one is wrong.
 pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
     let otherwise = RenderSettings::default();
@@ -56,7 +61,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         noise: table.f64("noise", Range::above(0.0)),
         max_bounces: table.u64_or("max_bounces", defaults::max_bounces(mode).into(), 0..=1_000_000) as u32,
         adaptive: table.bool_or("adaptive", otherwise.adaptive),
-        threads: table.u64("threads", 1..=4096).map(|t| t as usize),
+        threads: threads(table),
         seed: table.u64_or("seed", otherwise.seed.into(), 0..=u64::from(u32::MAX)) as u32,
         frame: table.u64("frame", 0..=u64::from(u32::MAX)).map(|f| f as u32),
         compact_bvh: table.one_of_or("bvh", otherwise.compact_bvh, &[("compact", true), ("fast", false)]),
