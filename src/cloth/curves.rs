@@ -164,7 +164,7 @@ impl Prepared<'_> {
             all.extend(slots.map(|ply| wound.flyaways(ply, flyaways)));
         }
         if mode == Mode::Yarn {
-            let scatterers = material::of_yarns(yarn, &fabric.variants, model, strands.mean_flattening());
+            let scatterers = material::of_yarns(yarn, &fabric.variants, model);
             all.push(Piece::of_yarns(index, 0, strands, scatterers));
         }
         all
@@ -279,6 +279,7 @@ fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usi
     // helix: the axis to the yarn turns by cos^2(alpha) of what it turns in the yarn's frame.
     let cos = 1.0 / (wp * ply.distance).hypot(1.0);
     let wide = plies.mean_width(&strands);
+    let flatter = (strands.mean_flattening() / plies.mean_flattening()).sqrt();
     let fiber_twist = (((wf - wp) * cos + wp * cos * cos) * wide).atan();
     let alone = PlyParameters {
         radius: 1.0,
@@ -286,9 +287,9 @@ fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usi
         distance: 0.0,
         angle: 0.0,
         fibers: ply.fibers,
-        fiber_radius: ply.fiber_radius / wide,
+        fiber_radius: ply.fiber_radius / (wide * flatter),
         fiber_twist,
     };
-    let shape = YarnShape::new(&[alone], 0.0, of.tilted).pressed(strands.mean_flattening());
+    let shape = YarnShape::new(&[alone], 0.0, of.tilted);
     (strands, shape)
 }

@@ -28,14 +28,13 @@ pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
     of_shape(shape_for(yarn, model), &materials(yarn), model)
 }
 
-/// Whole yarns, pressed flat in the mean to a ratio of the axes of their section. Variants whose plies are the same
-/// share one shape.
-pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model, flattening: f64) -> PerVariant<YarnScatterer> {
-    let pressed = |of: &Yarn| Arc::new(shape_for(of, model).pressed(flattening));
-    let shape = pressed(yarn);
+/// Whole yarns. Variants whose plies are the same share one shape.
+pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model) -> PerVariant<YarnScatterer> {
+    let own = |of: &Yarn| Arc::new(shape_for(of, model));
+    let shape = own(yarn);
     let scatterer = |of: &Yarn| {
         let alike = of.plies == yarn.plies && of.placement == yarn.placement;
-        of_shape(if alike { Arc::clone(&shape) } else { pressed(of) }, &materials(of), model)
+        of_shape(if alike { Arc::clone(&shape) } else { own(of) }, &materials(of), model)
     };
     PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
 }

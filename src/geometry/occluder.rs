@@ -24,7 +24,7 @@ impl PlyShape {
     /// Area fraction eta of fibres that keep out of each other, at most 0.85; 0 for fibres that lie at random.
     pub fn density(&self) -> f64 {
         let (n, radius, fiber) = (f64::from(self.fibers), f64::from(self.radius), f64::from(self.fiber_radius));
-        let filled = (n * fiber * fiber / (radius * radius) * f64::from(self.squeeze)).min(0.85);
+        let filled = (n * fiber * fiber / (radius * radius)).min(0.85);
         if self.exclusive { filled } else { 0.0 }
     }
 }

@@ -182,10 +182,11 @@ impl<'a> Section<'a> {
         self.centre + self.radius * self.to_world(self.point(depth))
     }
 
-    /// By how much fibres are closer to each other than in the round section: its area over this one's.
+    /// How many more fibres lie on a chord than on that of the round section, by its length there: fibres are closer to each
+    /// other by the ratio of the axes, and thinner than the yarn by its root (see [`YarnFrame::round_radius`]).
     #[inline]
     pub fn squeeze(&self) -> f32 {
-        self.pressed.map_or(1.0, |pressed| pressed.stretch)
+        self.pressed.map_or(1.0, |pressed| pressed.stretch.sqrt())
     }
 
     /// The tangent of a fibre of a ply at a `point` of this frame, `travel` farther along the yarn: its part along the yarn

@@ -68,9 +68,6 @@ pub struct PlyShape {
     pub fibers: f32,
     /// Turns of the fibre pattern around the ply's axis, radians per yarn radius along the yarn.
     pub fiber_rate: f32,
-    /// By how much its fibres are closer to each other than `radius` says, in the mean along a yarn that is pressed flat:
-    /// area of the round section over that of the pressed one.
-    pub squeeze: f32,
     /// How much fibres crowd at the wall, or with a minus sign at the axis: see [`super::density`].
     pub crowding: f32,
     /// Whether fibres keep out of each other.
@@ -120,7 +117,6 @@ impl YarnShape {
                     core_radius: (p.radius - fiber_radius) as f32,
                     fibers: p.fibers as f32,
                     fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
-                    squeeze: 1.0,
                     crowding: 0.0,
                     exclusive: true,
                 }
@@ -151,16 +147,6 @@ impl YarnShape {
         for (ply, packing) in self.plies.iter_mut().zip(packings) {
             ply.crowding = packing.crowding as f32;
             ply.exclusive = packing.exclusive;
-        }
-        self
-    }
-}
-
-impl YarnShape {
-    /// The same yarn pressed flat to a mean ratio of the short to the long axis of its section.
-    pub fn pressed(mut self, ratio: f64) -> Self {
-        for ply in &mut self.plies {
-            ply.squeeze = (1.0 / ratio) as f32;
         }
         self
     }

@@ -41,6 +41,11 @@ impl YarnFrame {
         let across = self.tangent.cross(self.normal);
         self.centre + self.radius * (at.x * self.normal + at.y * across)
     }
+
+    /// Radius of the circle that has the section's area: fibres stay as thick when a yarn is pressed flat.
+    pub fn round_radius(&self) -> f32 {
+        Pressed::new(self.flattening).map_or(self.radius, |pressed| self.radius / pressed.stretch.sqrt())
+    }
 }
 
 /// How a section is pressed flat: an affine map that takes circles to ellipses, and with them the plies inside.

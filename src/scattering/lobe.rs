@@ -80,14 +80,18 @@ pub(crate) fn normalised<const N: usize>(w: [f32; N]) -> [f32; N] {
     if total > 0.0 { w.map(|x| x / total) } else { [0.0; N] }
 }
 
-/// Index chosen with the given chances, which sum to 1.
+/// Index chosen with the given chances, which sum to 1: never one whose chance is 0.
 #[inline]
-pub(crate) fn choose(chances: [f32; 3], u: f32) -> usize {
-    if u < chances[0] {
-        0
-    } else if u < chances[0] + chances[1] || chances[2] <= 0.0 {
-        if chances[1] > 0.0 { 1 } else { 0 }
-    } else {
-        2
+pub(crate) fn choose<const N: usize>(chances: [f32; N], mut u: f32) -> usize {
+    let mut last = 0;
+    for (index, chance) in chances.into_iter().enumerate() {
+        if chance > 0.0 {
+            if u < chance {
+                return index;
+            }
+            last = index;
+        }
+        u -= chance;
     }
+    last
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use super::{
     escape::{self, Disc, RINGS},
     fiber::FiberMaterial,
+    kernel::{kappa_of_variance, normalisation},
 };
 use crate::{
     geometry::{occluder::PlyGaps, yarn::PlyShape},
@@ -27,6 +28,9 @@ mod calibrated {
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
 const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
+
+/// Below this ratio of their variances R is much narrower than TT.
+const SHARP: f64 = 0.3;
 
 /// The effective extinction, per expected fibre, of a chain of light that keeps the weight `1 - loss` at each fibre,
 /// when hard cores of area fraction `density` keep fibres apart.
@@ -91,8 +95,20 @@ pub(crate) struct PlyOptics {
     pub leaves_again: Rgb,
     /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
     pub mirrored: Rgb,
+    /// Inverse width of that lobe, of [`super::kernel`], and its normalisation.
+    pub mirrored_kappa: Rgb,
+    /// As above.
+    pub mirrored_factor: Rgb,
     /// Of that light: the share that leaves as a matt cylinder would send it off; the rest leaves evenly.
     pub lean: Rgb,
+    /// Whether R is so much narrower than TT that what met no TT on its way is told from what did.
+    pub sharp: bool,
+    /// Of light that goes on in chains: TT events per expected fibre.
+    pub events: Rgb,
+    /// The share that has met none falls so fast with the fibres passed,
+    pub untouched: Rgb,
+    /// and is this, but at most one, where a chain that came from outside ends at once.
+    pub first: Rgb,
     /// Squares of the fibre's widths.
     pub beta_r_squared: f32,
     /// As above.
@@ -116,11 +132,8 @@ impl PlyOptics {
     pub(crate) fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
         let n = f64::from(ply.fibers);
         let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
-        let squeeze = f64::from(ply.squeeze);
         let density = ply.density();
         let sigma = 2.0 * fiber * n / (PI * core * core);
-        // An ellipse is about as thick for light as the circle of its area.
-        let round_core = core * squeeze.sqrt();
         let f = material.chain_share();
         let per_channel = |value: &dyn Fn(usize) -> f64| Rgb::from([value(0), value(1), value(2)]);
 
@@ -133,7 +146,7 @@ impl PlyOptics {
         // Light that leaves the chain, over what the chain loses; 0 where nothing is lost.
         let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
         let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
-        let radius_optical = |c: usize| sigma * rho(c) * round_core;
+        let radius_optical = |c: usize| sigma * rho(c) * core;
         let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
         let escape = |c: usize| escape::past_itself(escape_probability_of_disc(radius_optical(c)), own_escape(c));
         let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
@@ -160,13 +173,28 @@ impl PlyOptics {
             let again = albedo(c) * (1.0 - escape_yarn(c));
             share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
         };
+        let gaps = PlyGaps::new(ply);
+        // So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
+        let hit = |c: usize| if ended(c) > 1e-9 { rho(c) / ended(c) } else { 1.0 };
+        let events = |c: usize| chain(c) * hit(c);
+        let untouched = |c: usize| (f64::from(gaps.rate) - rho(c)).max(0.0);
+        let first = |c: usize| f64::from(gaps.rate) / hit(c);
+        // Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
+        // often, and there are three flights and more.
+        let mirrored_variance = |c: usize| {
+            let again = albedo(c) * (1.0 - escape_yarn(c)) * single(r(c), c) / albedo(c).max(1e-12);
+            let more = again / (1.0 - again).max(1e-12);
+            let flight = events(c) / rho(c).max(LEAST_RATE) * (1.0 - escape(c));
+            (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
+        };
+        let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
         let lean = |c: usize| {
             let t = radius_optical(c);
             (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c)))
                 .clamp(0.0, 1.0)
         };
         Self {
-            gaps: PlyGaps::new(ply),
+            gaps,
             chain_share: f as f32,
             rho: per_channel(&|c| rho(c).max(LEAST_RATE)),
             chain: per_channel(&chain),
@@ -178,7 +206,13 @@ impl PlyOptics {
             leaves_from: std::array::from_fn(|ring| per_channel(&|c| discs[c].0[ring])),
             leaves_again: per_channel(&|c| discs[c].1),
             mirrored: per_channel(&mirrored),
+            mirrored_kappa,
+            mirrored_factor: normalisation(mirrored_kappa),
             lean: per_channel(&lean),
+            sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
+            events: per_channel(&events),
+            untouched: per_channel(&untouched),
+            first: per_channel(&first),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
             beta_tt_squared: (material.beta_tt * material.beta_tt) as f32,
             beta_n: material.beta_n as f32,
@@ -190,6 +224,21 @@ impl PlyOptics {
 }
 
 impl PlyOptics {
+    /// Of light that passes so many fibres in chains before its node, and so many after: the share that meets none, if R tells
+    /// it from the rest, and how many TT events the rest has on the mean.
+    #[inline]
+    pub(crate) fn touched(&self, before: f32, after: Rgb) -> (Rgb, Rgb) {
+        let events = self.events * (after + before);
+        if !self.sharp {
+            return (Rgb::ZERO, events);
+        }
+        let into = (self.first * (self.untouched * -before).exp()).min(Rgb::ONE);
+        // No other fibre is within the node's own.
+        let beyond = (after - Rgb::splat(self.gaps.density)).max(Rgb::ZERO);
+        let untouched = into * (-(self.untouched * beyond)).exp();
+        (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
+    }
+
     /// [`Self::leaves_from`] at a square distance from the axis, as a share of that of the outermost fibres.
     #[inline]
     pub(crate) fn leaves_at(&self, r2: f32) -> Rgb {

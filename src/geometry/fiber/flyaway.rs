@@ -99,7 +99,7 @@ impl Plies<'_> {
                     let place = guide.frame_at(along);
                     let axis = self.axis(&place, shape);
                     let at = axis * (f64::from(shape.distance) + at.x) + axis.perp() * at.y;
-                    (point(&place, at), place.radius)
+                    (point(&place, at), place.round_radius())
                 })
                 .collect();
             let points: Vec<_> = knots.iter().map(|k| k.0).collect();

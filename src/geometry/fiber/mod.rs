@@ -242,7 +242,7 @@ impl<'a> Plies<'a> {
                     let in_ply = q / shape.stretch.as_dvec2();
                     point(place, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
                 }));
-                spline_through(&knots, |step| places[step].1.radius * radius)
+                spline_through(&knots, |step| places[step].1.round_radius() * radius)
             })
             .collect()
     }
@@ -282,6 +282,11 @@ impl<'a> Plies<'a> {
     pub fn mean_width(&self, plies: &Strands) -> f64 {
         let all = |of: &Strands| (0..of.yarns()).map(|yarn| of.mean_radius_of(yarn)).sum::<f64>();
         all(plies) / all(self.strands).max(1e-300)
+    }
+
+    /// Mean ratio of the short to the long axis of the yarns' sections.
+    pub fn mean_flattening(&self) -> f64 {
+        self.strands.mean_flattening()
     }
 
     /// One curve for each yarn along the middle of a ply, as wide as the ply. Its section is what an ellipse, pressed flat

@@ -213,8 +213,11 @@ fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
     for ply in 0..3 {
         let tubes = made.fibers(ply, Placement::Regular).0;
         for segment in 0..tubes.segments().len() as u32 {
-            let centre = tubes.place(segment, 0.5).centre;
+            let place = tubes.place(segment, 0.5);
+            let centre = place.centre;
             assert!(centre.x.hypot(2.0 * centre.y) < 1.0, "within the ellipse");
+            let thick = place.radius / (0.5f32.sqrt() * shape.plies[ply].fiber_radius);
+            assert!((thick - 1.0).abs() < 1e-3, "as thick as in a round yarn of the same area: {thick}");
             (wide, high) = (wide.max(centre.x.abs()), high.max(centre.y.abs()));
         }
         // The ply as a tube of its own: its section is the ellipse that the fibres' circle became.

@@ -9,8 +9,9 @@ use glam::Vec3A;
 
 use super::{
     super::{
-        kernel::{DIFFUSE, MIN_VARIANCE, kernel_scalar, sample_sine, sample_sine_diffuse},
+        kernel::{DIFFUSE, normalised_kernel, sample_sine, sample_sine_diffuse},
         lobe::LobeFrame,
+        medium::PlyOptics,
         mis_weight,
     },
     View,
@@ -44,10 +45,8 @@ pub(super) struct Lobe {
     pub(super) chance: f32,
     /// In a yarn of several plies: light that leaves the ply and meets another one.
     again: Option<Again>,
-    /// Channel means of the ply's shares, for sampling.
-    mirrored: f32,
+    /// Channel mean of the ply's share, for sampling.
     lean: f32,
-    kappa: f32,
 }
 
 /// Light that left the node's ply in a direction drawn from its lobe, as far as other plies took it up.
@@ -83,7 +82,7 @@ impl Lobe {
         let energy = node.amplitude * optics.albedo * node.leaves * (Rgb::ONE - node.drawn.value.clear);
         let mut lobe = Self::new(view, &node.crossing, energy, 1.0 - node.drawn.escape);
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
-            let w = lobe.draw(stream);
+            let w = lobe.draw(optics, stream);
             let (value, pdf) = lobe.value(view, node.spot.ply, w);
             if pdf > 0.0 {
                 let open = (-node.optical_depth(view, w).1).exp();
@@ -109,9 +108,7 @@ impl Lobe {
             energy,
             chance,
             again: None,
-            mirrored: optics.mirrored.mean(),
             lean: optics.lean.mean(),
-            kappa: 0.125 / optics.beta_r_squared.max(MIN_VARIANCE),
         }
     }
 
@@ -121,12 +118,15 @@ impl Lobe {
         let optics = &view.yarn.plies[ply];
         let (at, cos) = self.frame.latitudes(w);
         let lean = self.leaning(w);
-        let m = if self.mirrored > 0.0 { kernel_scalar(self.kappa, at) } else { 0.0 };
         let even = cos * (0.5 * FRAC_1_PI);
-        let latitude = optics.mirrored * (m - DIFFUSE) + DIFFUSE;
+        let mut latitude = Rgb::splat(DIFFUSE);
+        if optics.mirrored.max_channel() > 0.0 {
+            let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
+            latitude += optics.mirrored * (m - latitude);
+        }
         let matt = off_a_matt_cylinder(lean) - 1.0;
         let value = self.energy * latitude * (optics.lean * matt + 1.0) * even;
-        let pdf = (self.mirrored * (m - DIFFUSE) + DIFFUSE) * (self.lean * lean + 1.0) * even;
+        let pdf = latitude.mean() * (self.lean * lean + 1.0) * even;
         (value, pdf)
     }
 
@@ -168,7 +168,7 @@ impl Lobe {
     pub(super) fn sample(&self, view: &View<'_>, node: &Node, u: [f32; 2], stream: &mut Stream) -> (Vec3A, Rgb, f32) {
         let (direction, value, pdf) = match &self.again {
             None => {
-                let w = self.draw(stream);
+                let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
                 let (value, pdf) = self.value(view, node.spot.ply, w);
                 (w, value, pdf)
             }
@@ -187,11 +187,14 @@ impl Lobe {
 
     /// Draws a direction from the lobe.
     #[inline]
-    fn draw(&self, stream: &mut Stream) -> Vec3A {
+    fn draw(&self, optics: &PlyOptics, stream: &mut Stream) -> Vec3A {
         let frame = &self.frame;
         let lat = [stream.next(), stream.next()];
-        let sin = if stream.next() < self.mirrored {
-            sample_sine(self.kappa, frame.sin, frame.cos, lat, stream)
+        // A channel, and then the share of its lobe.
+        let at = 3.0 * stream.next();
+        let channel = (at as usize).min(2);
+        let sin = if at - (channel as f32) < optics.mirrored.to_array()[channel] {
+            sample_sine(optics.mirrored_kappa.to_array()[channel], frame.sin, frame.cos, lat, stream)
         } else {
             sample_sine_diffuse(lat)
         };

@@ -35,11 +35,10 @@ pub(super) struct Node {
     before: f32,
     /// Weight of an event here, before any albedo.
     pub(super) amplitude: Rgb,
-    /// Widths for sampling the lobes.
-    kappa_r: f32,
-    kappa_tt: f32,
-    /// Chances of R, TT and D.
-    chance: [f32; 3],
+    /// For sampling: widths of R that met TT on its way and of R that did not, and of TT.
+    kappa: [f32; 3],
+    /// Chances of these, and of D.
+    chance: [f32; 4],
     /// Throughput times amplitude and albedo: what decides between escape and B.
     pub(super) weight: Rgb,
     /// Of light that meets another fibre after this one: the share that leaves the ply at last.
@@ -103,10 +102,10 @@ impl Node {
         // Before rejection sampling takes an unknown number of them: a stream's first numbers may be the even ones, and
         // what lies in the way of the azimuth makes most of the noise under a wide light.
         let [u_azimuth, u_lobe] = [stream.next(), stream.next()];
-        let sin = match choose(node.chance, u_lobe) {
-            0 => sample_sine(node.kappa_r, node.sin, node.cos, u, stream),
-            1 => sample_sine(node.kappa_tt, node.sin, node.cos, u, stream),
-            _ => sample_sine_diffuse(u),
+        let lobe = choose(node.chance, u_lobe);
+        let sin = match node.kappa.get(lobe) {
+            Some(kappa) => sample_sine(*kappa, node.sin, node.cos, u, stream),
+            None => sample_sine_diffuse(u),
         };
         let frame = LobeFrame::new(node.spot.tangent, view.camera);
         let direction = frame.direction(sin, TAU * u_azimuth);
@@ -122,13 +121,15 @@ impl Node {
         let spot = view.spot(crossing, x);
         let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
         let before = crossing.fibers * x;
-        let widened = optics.chain.max_channel() * (before + SAMPLING_WIDENING);
         let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
         let weight = throughput * amplitude;
         let core = view.yarn.occluder().shape().plies[spot.ply].core_radius;
         let along = (crossing.foot - spot.depth) * view.section.cos;
         let leaves = optics.leaves_at((crossing.offset * crossing.offset + along * along) / (core * core));
-        let lobes = [optics.single_r, optics.single_tt, optics.single_d].map(|a| a.weighted_mean(weight));
+        let (untouched, events) = optics.touched(before, Rgb::splat(SAMPLING_WIDENING));
+        let lobes =
+            [optics.single_r * (Rgb::ONE - untouched), optics.single_r * untouched, optics.single_tt, optics.single_d];
+        let beta_tt = optics.beta_tt_squared;
         Self {
             spot,
             crossing: *crossing,
@@ -136,9 +137,12 @@ impl Node {
             cos: (1.0 - sin * sin).sqrt(),
             before,
             amplitude,
-            kappa_r: kappa(optics.beta_r_squared + widened * optics.beta_tt_squared),
-            kappa_tt: kappa((1.0 + widened) * optics.beta_tt_squared),
-            chance: normalised(lobes),
+            kappa: [
+                kappa(optics.beta_r_squared + events.max_channel() * beta_tt),
+                kappa(optics.beta_r_squared),
+                kappa((1.0 + (optics.events * (before + SAMPLING_WIDENING)).max_channel()) * beta_tt),
+            ],
+            chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
             leaves,
             drawn: Drawn { direction: Vec3A::ZERO, value: NodeValue::NOTHING, escape: 0.0 },
@@ -155,11 +159,11 @@ impl Node {
         let cos = (1.0 - sin * sin).sqrt();
         let at = Latitudes::new(self.sin, self.cos, sin, cos);
         // Chains of TT on both sides widen the lobes.
-        let passed = optics.chain * (depth / optics.rho + self.before);
+        let after = depth / optics.rho;
         let beta_tt = Rgb::splat(optics.beta_tt_squared);
         let even = cos * (0.5 * FRAC_1_PI);
         let scale = self.amplitude * clear * even;
-        let [p_r, p_tt, p_d] = self.chance;
+        let [p_touched, p_untouched, p_tt, p_d] = self.chance;
         let mut value = NodeValue {
             r: Rgb::ZERO,
             tt: Rgb::ZERO,
@@ -168,15 +172,22 @@ impl Node {
             clear,
             open: (-others).exp(),
         };
-        if p_r > 0.0 {
-            let m = kernel(kappa_of_variance(passed * beta_tt + optics.beta_r_squared), at);
-            value.r = optics.single_r * scale * m;
-            value.pdf += p_r * kernel_scalar(self.kappa_r, at);
+        let mut r = Rgb::ZERO;
+        let (untouched, events) = optics.touched(self.before, after);
+        if p_touched > 0.0 {
+            r += (Rgb::ONE - untouched) * kernel(kappa_of_variance(events * beta_tt + optics.beta_r_squared), at);
+            value.pdf += p_touched * kernel_scalar(self.kappa[0], at);
         }
+        if p_untouched > 0.0 {
+            let m = kernel_scalar(self.kappa[1], at);
+            r += untouched * m;
+            value.pdf += p_untouched * m;
+        }
+        value.r = optics.single_r * scale * r;
         if p_tt > 0.0 {
-            let m = kernel(kappa_of_variance((passed + 1.0) * beta_tt), at);
+            let m = kernel(kappa_of_variance((optics.events * (after + self.before) + 1.0) * beta_tt), at);
             value.tt = optics.single_tt * scale * m;
-            value.pdf += p_tt * kernel_scalar(self.kappa_tt, at);
+            value.pdf += p_tt * kernel_scalar(self.kappa[2], at);
         }
         value.pdf *= even;
         value

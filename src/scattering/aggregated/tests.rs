@@ -13,7 +13,7 @@ use crate::geometry::yarn::{PlyParameters, touching_plies};
 use crate::{
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
     scattering::{
-        kernel::{kappa_of_variance, kernel},
+        kernel::{kappa_of_variance, kernel, normalisation},
         lobe::LobeFrame,
         testing::{SILK, lossless, material, section, silk, sphere},
     },
@@ -162,6 +162,12 @@ fn values_agree_with_the_reference_vectors() {
         let shape = YarnShape::new(&parameters, 0.0, true);
         let mut yarn = AggregatedYarn::new(shape, &vec![&m; count as usize]);
         yarn.plain = true;
+        for ply in &mut yarn.plies {
+            // Chains widen R by their mean, and what was only ever reflected is as wide as two reflections.
+            (ply.sharp, ply.events) = (false, ply.chain);
+            ply.mirrored_kappa = Rgb::splat(0.125 / ply.beta_r_squared);
+            ply.mirrored_factor = normalisation(ply.mirrored_kappa);
+        }
         let section = section(
             v["theta_c"].as_f64().unwrap() as f32,
             (v["h"].as_f64().unwrap() * radius) as f32,
