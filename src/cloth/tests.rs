@@ -1,6 +1,8 @@
 //! What stands for a scene's cloth, and what scatters where a ray meets it.
 
-use glam::{DVec3, Vec3A};
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3, Vec3A};
 
 use super::*;
 use crate::{
@@ -99,5 +101,38 @@ fn every_mode_and_model_makes_what_was_estimated() {
         let made: usize = cloth.world().of_fabric(0).map(|geometry| geometry.curves().2.len()).sum();
         assert_eq!(estimates(&scene)[0].segments, made as u64, "{mode}");
         assert_eq!(cloth.scatterers.len(), cloth.world().geometries().len());
+    }
+}
+
+#[test]
+fn rays_come_in_through_the_flat_ends_of_yarns() {
+    let text = "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
+         [yarn.a]\nradius = 0.5\nplies = 1\nfibers = 60\ndensity = 0.4\nfiber = \"f\"\n\
+         [[fabric]]\nyarn = \"a\"\nsource = { type = \"straight\", count = 1, length = 10 }\n";
+    let scene = parse("a test", text, &LoadOptions::default()).unwrap();
+    let points = scene.fabrics[0].curves[0].0.points.clone();
+    let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+    let mut stream = Stream::new(3);
+    let mut crossings = Crossings::new();
+    for [end, next] in [[points[0], points[1]], [points[points.len() - 1], points[points.len() - 2]]] {
+        let inward = (next - end).normalize();
+        let across = inward.any_orthonormal_vector();
+        let (mut met, mut first) = (0, 0);
+        for _ in 0..400 {
+            let [angle, turn, r] = [(); 3].map(|()| f64::from(stream.next()));
+            let side = DQuat::from_axis_angle(inward, TAU * turn) * across;
+            let direction = inward.lerp(side, 0.1 + 0.7 * angle).normalize();
+            let at = end + 0.45 * r.sqrt() * (DQuat::from_axis_angle(inward, 9.0 * TAU * turn) * across);
+            let ray = Ray::new((at - 20.0 * direction).as_vec3a(), direction.as_vec3a());
+            if let Some(hit) = cloth.world().intersect(&ray) {
+                met += 1;
+                first += usize::from((hit.t - 20.0).abs() < 1e-3);
+                let Met::Yarn { section, scatterer, .. } = cloth.at(&hit) else { panic!("{hit:?}") };
+                section.crossings(scatterer.shape(), &mut crossings);
+                assert!(!crossings.is_empty(), "{section:?}");
+            }
+            assert!(cloth.world().transmittance(&ray, &mut crossings) < 1.0);
+        }
+        assert!(met == 400 && first == 400, "{met} {first}");
     }
 }

@@ -12,10 +12,47 @@ use crate::{
 /// Below this a shadow ray counts as blocked.
 const OPAQUE: f32 = 1e-3;
 
+/// How many segments from an end a ray leaves a yarn at the most that came in through it.
+const NEAR_AN_END: usize = 4;
+
 /// Whether a hit is where the ray leaves a yarn.
 #[inline]
 fn leaves(ray: &Ray, hit: &RawHit) -> bool {
     hit.normal.dot(ray.direction) > 0.0
+}
+
+/// Where a ray that hits a yarn enters it: there, or, if it leaves there, at the flat end through which it came. Embree's tubes
+/// are open, and offer the inside of the far wall alone. `None` if the ray started within the yarn.
+#[inline]
+pub(super) fn entry(yarns: &YarnGeometry, ray: &Ray, hit: &RawHit) -> Option<RawHit> {
+    if leaves(ray, hit) {
+        [false, true].into_iter().find_map(|forward| through_end(yarns, ray, hit, forward))
+    } else {
+        Some(*hit)
+    }
+}
+
+/// Where a ray comes in through the yarn's last end, or its first, before it leaves.
+fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, last: bool) -> Option<RawHit> {
+    let strands = &yarns.strands;
+    let mut segment = leaving.segment;
+    for _ in 0..NEAR_AN_END {
+        match strands.neighbour(segment, last) {
+            Some(next) => segment = next,
+            None => break,
+        }
+    }
+    if strands.goes_on(segment, last) {
+        return None;
+    }
+    let u = f32::from(u8::from(last));
+    let place = strands.frame_at(segment, u, ray.time);
+    let outward = if last { place.tangent } else { -place.tangent };
+    let slope = ray.direction.dot(outward);
+    let t = (place.centre - ray.origin).dot(outward) / slope;
+    let off = ray.origin + t * ray.direction - place.centre;
+    (slope < 0.0 && t > ray.t_near && t < leaving.t && off.length_squared() <= place.radius * place.radius)
+        .then_some(RawHit { t, normal: outward, u, segment, ..*leaving })
 }
 
 /// Lets rays through between the plies.
@@ -40,7 +77,7 @@ impl<'a, 'r> GapFilter<'a, 'r> {
             {
                 *section
             }
-            _ => section_at(yarns, self.ray, hit),
+            _ => section_at(yarns, self.ray, &entry(yarns, self.ray, hit).unwrap_or(*hit)),
         }
     }
 }
@@ -50,15 +87,13 @@ impl HitFilter for GapFilter<'_, '_> {
     fn accept(&mut self, hit: &RawHit) -> bool {
         // Meshes count from both sides.
         let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
-        if leaves(self.ray, hit) {
-            return false;
-        }
-        let CurveGeometry::Yarns(yarns) = geometry else { return true };
+        let CurveGeometry::Yarns(yarns) = geometry else { return !leaves(self.ray, hit) };
+        let Some(entry) = entry(yarns, self.ray, hit) else { return false };
         let shape = yarns.occluder_at(hit.segment).shape();
         if shape.filled && !yarns.strands.flattened() {
             return true;
         }
-        let section = section_at(yarns, self.ray, hit);
+        let section = section_at(yarns, self.ray, &entry);
         let stands = section.meets_ply(shape);
         if stands {
             self.last = Some((*hit, section));
@@ -110,11 +145,9 @@ impl HitFilter for ShadowFilter<'_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> bool {
         let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
-        if leaves(self.ray, hit) {
-            return false;
-        }
-        let CurveGeometry::Yarns(yarns) = geometry else { return true };
-        let section = section_at(yarns, self.ray, hit);
+        let CurveGeometry::Yarns(yarns) = geometry else { return !leaves(self.ray, hit) };
+        let Some(entry) = entry(yarns, self.ray, hit) else { return false };
+        let section = section_at(yarns, self.ray, &entry);
         let yarn = yarns.occluder_at(hit.segment);
         section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {

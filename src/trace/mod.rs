@@ -179,10 +179,15 @@ impl World {
     #[inline]
     fn hit<'a>(&'a self, ray: &Ray, raw: &RawHit, filter: &GapFilter<'a, '_>) -> Hit<'a> {
         let geometry = raw.geometry as usize;
+        let mut raw = *raw;
         let place = match self.geometries.get(geometry) {
-            Some(CurveGeometry::Yarns(yarns)) => HitPlace::Yarn(filter.section(yarns, raw)),
+            Some(CurveGeometry::Yarns(yarns)) => {
+                let section = filter.section(yarns, &raw);
+                raw = filter::entry(yarns, ray, &raw).unwrap_or(raw);
+                HitPlace::Yarn(section)
+            }
             Some(CurveGeometry::Fibers(fibers)) => HitPlace::Fiber(fibers.tubes.place(raw.segment, raw.u)),
-            None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, raw)),
+            None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, &raw)),
         };
         let normal = raw.normal.normalize_or(-ray.direction);
         Hit { t: raw.t, geometry, segment: raw.segment, u: raw.u, normal, place }
