@@ -20,7 +20,7 @@ use crate::{
 
 /// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
 /// light's side, unknown then, does not make the true lobe wider than the sampled one.
-const SAMPLING_WIDENING: f32 = 0.7;
+const SAMPLING_WIDENING: f32 = 1.2;
 
 /// A place inside a ply where light ends its chain.
 #[derive(Clone, Copy, Debug)]
