@@ -164,14 +164,15 @@ impl PlyOptics {
             let leaves = |neighbours: f64| disc.shares(albedo(c), own_escape(c), taken_back(neighbours, c));
             (leaves(calibrated::NEIGHBOURS_AT_ONCE * neighbours).0, leaves(neighbours).1)
         });
-        let mirrored = |c: usize| {
+        // Of what a fibre sends out of a chain: the share that it reflects, and of a ply's events: those that another follows.
+        let reflected = |c: usize| {
             let out = r(c) + d(c) + tt_out(c);
-            if out <= 0.0 {
-                return 0.0;
-            }
-            let share = r(c) / out;
-            let again = albedo(c) * (1.0 - escape_yarn(c));
-            share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
+            if out > 0.0 { r(c) / out } else { 0.0 }
+        };
+        let again = |c: usize| albedo(c) * (1.0 - escape_yarn(c));
+        let mirrored = |c: usize| {
+            let share = reflected(c);
+            share * share * (1.0 - again(c)) / (1.0 - again(c) * share).max(1e-12)
         };
         let gaps = PlyGaps::new(ply);
         // So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
@@ -182,7 +183,7 @@ impl PlyOptics {
         // Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
         // often, and there are three flights and more.
         let mirrored_variance = |c: usize| {
-            let again = albedo(c) * (1.0 - escape_yarn(c)) * single(r(c), c) / albedo(c).max(1e-12);
+            let again = again(c) * reflected(c);
             let more = again / (1.0 - again).max(1e-12);
             let flight = events(c) / rho(c).max(LEAST_RATE) * (1.0 - escape(c));
             (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
