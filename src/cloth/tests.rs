@@ -136,3 +136,36 @@ fn rays_come_in_through_the_flat_ends_of_yarns() {
         assert!(met == 400 && first == 400, "{met} {first}");
     }
 }
+
+#[test]
+fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
+    // Tubes of yarns that are pressed flat overlap where the yarns touch.
+    let text = "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
+         [yarn.a]\nradius = 0.5\nplies = 3\nply_twist = 15\nfibers = 30\ndensity = 0.2\nfiber = \"f\"\n\
+         [[fabric]]\nyarn = \"a\"\nsource = { type = \"weave\", warps = 6, wefts = 5, flatten = 1.8 }\n";
+    let scene = parse("a test", text, &LoadOptions::default()).unwrap();
+    let (low, high) = scene.bounds().unwrap();
+    let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+    let world = cloth.world();
+    let (mut stream, mut crossings) = (Stream::new(5), Crossings::new());
+    let (mut within, mut same, mut off) = (0, 0, 0.0);
+    for _ in 0..4000 {
+        let [x, y, z, tilt, turn] = [(); 5].map(|()| f64::from(stream.next()));
+        let at = low + DVec3::new(0.2 + 0.6 * x, 0.2 + 0.6 * y, z) * (high - low);
+        let direction = DQuat::from_rotation_z(TAU * turn) * DVec3::new(tilt.sqrt(), 0.0, -(1.0 - tilt).sqrt());
+        let ray = Ray::new((at - 50.0 * direction).as_vec3a(), direction.as_vec3a());
+        let Some(hit) = world.intersect(&ray) else { continue };
+        let Met::Yarn { section, scatterer, .. } = cloth.at(&hit) else { panic!("{hit:?}") };
+        section.crossings(scatterer.shape(), &mut crossings);
+        // In the tube, before its first ply.
+        let Some(first) = crossings.first().copied() else { continue };
+        let start = section.point_on_ray(0.8 * (first.enter - 0.05).max(0.0));
+        let inner = Ray::new(start, ray.direction);
+        let (whole, ahead) = (world.transmittance(&ray, &mut crossings), world.transmittance(&inner, &mut crossings));
+        within += usize::from(first.enter > 0.2);
+        same += usize::from((whole - ahead).abs() < 0.02);
+        off += whole - ahead;
+    }
+    println!("within {within} same {same} off {off}");
+    assert!(within > 1000 && same as f64 > 0.97 * within as f64, "{within} {same} {off}");
+}

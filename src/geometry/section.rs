@@ -148,6 +148,15 @@ impl<'a> Section<'a> {
         section
     }
 
+    /// The section of a yarn at the place abreast of the start of a ray within it.
+    #[inline]
+    pub fn at_start(at: (Walker<'a>, YarnFrame), origin: Vec3A, direction: Vec3A, tilted: bool) -> Self {
+        let (centre, radius) = (at.1.centre, at.1.radius);
+        let mut section = Self::at_hit(at, origin, direction, 0.0, tilted);
+        section.enter = (origin - centre).dot(section.x) / radius;
+        section
+    }
+
     /// A vector of this frame in the world.
     #[inline]
     pub fn to_world(&self, v: Vec3A) -> Vec3A {
@@ -196,13 +205,14 @@ impl<'a> Section<'a> {
         self.inside(shape, point, travel).fiber_tangent(shape, self, ply)
     }
 
-    /// Whether the ray meets any ply: what the filter asks of every candidate hit.
+    /// How deep the ray comes nearest to the axis of the first ply it meets, if it meets any: what the filter asks of every
+    /// candidate hit.
     #[inline]
-    pub fn meets_ply(&self, shape: &YarnShape) -> bool {
-        let mut met = false;
+    pub fn meets_ply(&self, shape: &YarnShape) -> Option<f32> {
+        let mut met = None;
         self.march_ray(shape, |a, b| {
             met = way::passes(a, b, &shape.fours);
-            if met { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if met.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         met
     }

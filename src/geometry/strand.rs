@@ -320,6 +320,13 @@ impl Strands {
         segments.map(|s| f64::from(self.points[self.segments[s as usize] as usize + 1].w)).sum::<f64>() / n
     }
 
+    /// The larger radius of a segment's ends.
+    #[inline]
+    pub fn radius_about(&self, segment: u32) -> f32 {
+        let first = self.segments[segment as usize] as usize;
+        self.points[first + 1].w.max(self.points[first + 2].w)
+    }
+
     /// Everything a ray needs to know at `u` (0 to 1) of a segment.
     #[inline]
     pub fn frame(&self, segment: u32, u: f32) -> YarnFrame {

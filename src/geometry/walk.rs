@@ -3,7 +3,7 @@
 use super::{strand::Strands, yarn_frame::YarnFrame};
 
 /// The least that a point inside of a bend counts as away from the centre of the bend, in radii of the bend.
-pub(super) const LEAST_STRAIGHTNESS: f32 = 0.15;
+pub(crate) const LEAST_STRAIGHTNESS: f32 = 0.15;
 
 /// A place of a yarn from which one can walk.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +32,18 @@ impl<'a> Walker<'a> {
             if self.strands.goes_on(self.segment, false) { f32::NEG_INFINITY } else { -self.u * self.stride },
             if self.strands.goes_on(self.segment, true) { f32::INFINITY } else { (1.0 - self.u) * self.stride },
         ]
+    }
+
+    /// The segment it is on.
+    #[inline]
+    pub fn segment(&self) -> u32 {
+        self.segment
+    }
+
+    /// How far along that segment, 0 to 1.
+    #[inline]
+    pub fn u(&self) -> f32 {
+        self.u
     }
 
     /// Walks so much further along the yarn, in yarn radii: the frame there, or `None` where the yarn does not go on so far.

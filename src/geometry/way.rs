@@ -273,11 +273,17 @@ impl FourPlies {
     }
 }
 
-/// Whether the way from one station to the next passes any ply.
+/// The depth at which the way from one station to the next comes nearest to the axis of a ply that it passes; the first, if it
+/// passes several of four.
 #[inline]
-pub(super) fn passes(a: &Station, b: &Station, plies: &[FourPlies]) -> bool {
+pub(super) fn passes(a: &Station, b: &Station, plies: &[FourPlies]) -> Option<f32> {
     let arc = Arc::between(a, b);
-    plies.iter().any(|four| arc.nearest::<2>(four).0 != 0)
+    plies.iter().find_map(|four| {
+        let (met, u) = arc.nearest::<2>(four);
+        let u = u.to_array();
+        let first = (0..4).filter(|lane| met >> lane & 1 != 0).map(|lane| u[lane]).fold(f32::INFINITY, f32::min);
+        (met != 0).then_some(a.depth + first * (b.depth - a.depth))
+    })
 }
 
 /// Share of the core's radius below which the length of a chord does not tell how fast it is passed.

@@ -3,7 +3,12 @@
 use glam::{Vec2, Vec3A};
 
 use super::{Counters, Integrator, Path, Scratch, add, distance_to_ground};
-use crate::{film::Sample, geometry::ray::Ray, math::Rgb, scattering::LobeValues};
+use crate::{
+    film::Sample,
+    geometry::ray::{DoneWith, Ray},
+    math::Rgb,
+    scattering::LobeValues,
+};
 
 /// What a vertex answers to light from one direction. Values are per steradian and hold the cosine.
 pub(super) struct Response {
@@ -13,6 +18,8 @@ pub(super) struct Response {
     pub(super) weight: f32,
     /// Where the shadow ray starts.
     pub(super) start: Vec3A,
+    /// What the shadow ray is done with.
+    pub(super) done: DoneWith,
 }
 
 /// A value of scattering.
@@ -40,12 +47,13 @@ impl Integrator<'_> {
     ) {
         let Some((light, chance)) = self.lights.choose(at, u[0]) else { return };
         let Some(towards) = light.sample(at, Vec2::new(u[1], u[2])) else { return };
-        let Some(Response { value, weight, start }) = respond(towards.direction, towards.pdf * chance) else { return };
+        let Some(Response { value, weight, start, done }) = respond(towards.direction, towards.pdf * chance) else {
+            return;
+        };
         if value.sum().max_channel() <= 0.0 {
             return;
         }
-        let mut ray = Ray::new(start, towards.direction);
-        ray.t_far = towards.distance;
+        let ray = Ray { t_far: towards.distance, done, ..Ray::new(start, towards.direction) };
         counters.shadow += 1;
         let passed = self.shadow(&ray, scratch);
         if passed <= 0.0 {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     film::Sample,
-    geometry::ray::Ray,
+    geometry::ray::{DoneWith, Ray},
     geometry::tube::TubePlace,
     math::Rgb,
     scattering::{fiber::FiberBcsdf, lobe::LobeFrame, mis_weight},
@@ -49,7 +49,12 @@ impl Integrator<'_> {
         self.next_event(here, [u_choice, u_x, u_y], path, sample, scratch, counters, |direction, pdf| {
             let (lobes, own_pdf) = fiber.evaluate(frame.sin, frame.cos, frame.to_local(direction), path.throughput);
             let start = place.leave(hit.normal, direction);
-            Some(Response { value: Scattered::Cloth(lobes), weight: mis_weight(pdf, own_pdf), start })
+            Some(Response {
+                value: Scattered::Cloth(lobes),
+                weight: mis_weight(pdf, own_pdf),
+                start,
+                done: DoneWith::default(),
+            })
         });
 
         let mut stream = path.sampler.stream(path.sampler.position());

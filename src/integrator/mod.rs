@@ -20,7 +20,7 @@ use crate::{
     cloth::{Cloth, Met},
     film::{ClothId, Sample},
     geometry::{
-        ray::Ray,
+        ray::{DoneWith, Ray},
         section::{Crossings, Section},
     },
     light::{AreaLight, Environment, Light, LightChooser},
@@ -326,7 +326,8 @@ impl<'a> Integrator<'a> {
             path.passes += 1;
             // Behind the surface, so that the same hit is not found again.
             let behind = section.point_on_ray(0.0) - PASS_OFFSET * section.radius * hit.normal;
-            path.ray = Ray::new(behind, path.ray.direction);
+            let done = path.ray.done.and(hit.yarn_place());
+            path.ray = Ray { done, ..Ray::new(behind, path.ray.direction) };
             return (path.passes < MOST_PASSES, false);
         }
         if path.bounces >= self.max_bounces {
@@ -355,13 +356,15 @@ impl<'a> Integrator<'a> {
             let direct = vertex.evaluate(section.to_local(direction), pdf);
             let forward = u_start < direct.forward_share;
             let start = if forward { section.point_on_ray(vertex.forward_start()) } else { node };
-            Some(Response { value: Scattered::Cloth(direct.lobes), weight: 1.0, start })
+            let done = DoneWith::only(hit.yarn_place());
+            Some(Response { value: Scattered::Cloth(direct.lobes), weight: 1.0, start, done })
         });
 
         let Some(next) = vertex.sample([u_component, u_x, u_y], &mut stream) else { return (false, true) };
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
-        path.ray = Ray::new(section.point_on_ray(next.start), section.to_world(next.direction));
+        let done = DoneWith::only(hit.yarn_place());
+        path.ray = Ray { done, ..Ray::new(section.point_on_ray(next.start), section.to_world(next.direction)) };
         (self.survives(path, node, next.weight, u_roulette, ROULETTE_AFTER), true)
     }
 

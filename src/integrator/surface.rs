@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     film::Sample,
-    geometry::ray::Ray,
+    geometry::ray::{DoneWith, Ray},
     math::{Rgb, frame::orthonormal_basis},
     scattering::mis_weight,
     trace::SurfacePlace,
@@ -62,7 +62,12 @@ impl Integrator<'_> {
                 return None;
             }
             let (value, own_pdf) = material.surface.evaluate(albedo, wo, to_local(direction));
-            Some(Response { value: Scattered::Surface(value), weight: mis_weight(pdf, own_pdf), start })
+            Some(Response {
+                value: Scattered::Surface(value),
+                weight: mis_weight(pdf, own_pdf),
+                start,
+                done: DoneWith::default(),
+            })
         });
         let Some(next) = material.surface.sample(albedo, wo, [u_part, x, y]) else { return false };
         let direction = next.wi.x * tangent + next.wi.y * bitangent + next.wi.z * normal;

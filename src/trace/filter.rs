@@ -1,11 +1,14 @@
 //! What Embree asks during traversal.
 
+use glam::Vec3A;
+
 use super::{CurveGeometry, YarnGeometry, section_at};
 use crate::{
     ffi::embree::{HitFilter, RawHit},
     geometry::{
-        ray::Ray,
+        ray::{Ray, YarnPlace},
         section::{Crossings, Section},
+        walk::{LEAST_STRAIGHTNESS, Walker},
     },
 };
 
@@ -15,20 +18,82 @@ const OPAQUE: f32 = 1e-3;
 /// How many segments from an end a ray leaves a yarn at the most that came in through it.
 const NEAR_AN_END: usize = 4;
 
+/// The longest chord of a tube times the slope at which a ray leaves it, in yarn radii: 2 if it is straight.
+const LONGEST_CHORD: f32 = 3.0;
+/// A step along the yarn below which a place counts as abreast of a point, in yarn radii.
+const ABREAST: f32 = 0.01;
+/// How far along the yarn a ray may be from where it was scattered, and still be within the same stretch of it, in yarn radii.
+const OWN: f32 = 8.0;
+
 /// Whether a hit is where the ray leaves a yarn.
 #[inline]
 fn leaves(ray: &Ray, hit: &RawHit) -> bool {
     hit.normal.dot(ray.direction) > 0.0
 }
 
-/// Where a ray that hits a yarn enters it: there, or, if it leaves there, at the flat end through which it came. Embree's tubes
-/// are open, and offer the inside of the far wall alone. `None` if the ray started within the yarn.
-#[inline]
-pub(super) fn entry(yarns: &YarnGeometry, ray: &Ray, hit: &RawHit) -> Option<RawHit> {
-    if leaves(ray, hit) {
-        [false, true].into_iter().find_map(|forward| through_end(yarns, ray, hit, forward))
-    } else {
-        Some(*hit)
+/// A yarn where a ray meets it.
+#[derive(Clone, Copy)]
+pub(super) struct Met<'a> {
+    /// Where: the distance is that of the tube, or, for a ray that starts within it, that of the first ply.
+    pub(super) hit: RawHit,
+    pub(super) section: Section<'a>,
+    /// How far it is to the first ply, about: infinite unless it was asked.
+    first_ply: f32,
+}
+
+impl<'a> Met<'a> {
+    /// At one of Embree's hits: where the ray enters the yarn, or comes in through its flat end, or starts within its tube with
+    /// plies still ahead. Embree's tubes are open, and offer the inside of the far wall alone to the latter two. `None` where the
+    /// ray only leaves the yarn.
+    #[inline]
+    fn at(yarns: &'a YarnGeometry, ray: &Ray, hit: &RawHit) -> Option<Self> {
+        if !leaves(ray, hit) {
+            return Some(Self::entering(yarns, ray, *hit));
+        }
+        let end = [false, true].into_iter().find_map(|forward| through_end(yarns, ray, hit, forward));
+        end.map(|end| Self::entering(yarns, ray, end)).or_else(|| Self::within(yarns, ray, hit))
+    }
+
+    #[inline]
+    fn entering(yarns: &'a YarnGeometry, ray: &Ray, hit: RawHit) -> Self {
+        Self { hit, section: section_at(yarns, ray, &hit), first_ply: f32::INFINITY }
+    }
+
+    /// From the start of a ray within the yarn's tube, unless the ray is done with that.
+    fn within(yarns: &'a YarnGeometry, ray: &Ray, leaving: &RawHit) -> Option<Self> {
+        let place = |segment| YarnPlace { geometry: leaving.geometry, segment };
+        if ray.done.holds(place(leaving.segment), 3) {
+            return None;
+        }
+        let slope = leaving.normal.normalize_or_zero().dot(ray.direction);
+        if leaving.t * slope > LONGEST_CHORD * yarns.strands.radius_about(leaving.segment) {
+            return None;
+        }
+        let (mut walker, mut abreast) = Walker::new(&yarns.strands, leaving.segment, leaving.u, ray.time);
+        for _ in 0..4 {
+            let off = ray.origin - abreast.centre;
+            let along = off.dot(abreast.tangent) / abreast.radius;
+            if along.abs() < ABREAST {
+                break;
+            }
+            let straightness = (1.0 - off.dot(abreast.curvature)).max(LEAST_STRAIGHTNESS);
+            abreast = walker.walk(along / straightness)?;
+        }
+        let own = (OWN / abreast.stride.max(1e-2)).ceil() as u32;
+        let outside = (ray.origin - abreast.centre).length_squared() >= abreast.radius * abreast.radius;
+        if outside || ray.done.holds(place(walker.segment()), own) {
+            return None;
+        }
+        let hit = RawHit { t: 0.0, normal: Vec3A::ZERO, u: walker.u(), segment: walker.segment(), ..*leaving };
+        let tilted = yarns.occluders.own().shape().tilted;
+        let section = Section::at_start((walker, abreast), ray.origin, ray.direction, tilted);
+        Some(Self { hit, section: Section { looked_at: ray.looks, ..section }, first_ply: f32::INFINITY })
+    }
+
+    /// Whether the ray starts within the yarn's tube.
+    #[inline]
+    fn starts(&self) -> bool {
+        self.hit.normal == Vec3A::ZERO
     }
 }
 
@@ -59,8 +124,8 @@ fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, last: bool) ->
 pub(super) struct GapFilter<'a, 'r> {
     geometries: &'a [CurveGeometry],
     ray: &'r Ray,
-    /// The hit accepted last and its section: mostly the one that stands in the end.
-    last: Option<(RawHit, Section<'a>)>,
+    /// The hit accepted last, as Embree offered it, and the yarn there: the one that stands in the end.
+    last: Option<(RawHit, Met<'a>)>,
 }
 
 impl<'a, 'r> GapFilter<'a, 'r> {
@@ -68,37 +133,36 @@ impl<'a, 'r> GapFilter<'a, 'r> {
         Self { geometries, ray, last: None }
     }
 
-    /// The section at a hit: the one made when it was accepted, or made anew.
+    /// The yarn at the hit that stands: as it was when it was accepted, or made anew.
     #[inline]
-    pub(super) fn section(&self, yarns: &'a YarnGeometry, hit: &RawHit) -> Section<'a> {
+    pub(super) fn met(&self, yarns: &'a YarnGeometry, hit: &RawHit) -> Met<'a> {
         match &self.last {
-            Some((last, section))
-                if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u =>
-            {
-                *section
+            Some((last, met)) if last.segment == hit.segment && last.geometry == hit.geometry && last.u == hit.u => {
+                *met
             }
-            _ => section_at(yarns, self.ray, &entry(yarns, self.ray, hit).unwrap_or(*hit)),
+            _ => Met::at(yarns, self.ray, hit).unwrap_or_else(|| Met::entering(yarns, self.ray, *hit)),
         }
     }
 }
 
 impl HitFilter for GapFilter<'_, '_> {
     #[inline]
-    fn accept(&mut self, hit: &RawHit) -> bool {
+    fn accept(&mut self, hit: &RawHit) -> Option<f32> {
         // Meshes count from both sides.
-        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
-        let CurveGeometry::Yarns(yarns) = geometry else { return !leaves(self.ray, hit) };
-        let Some(entry) = entry(yarns, self.ray, hit) else { return false };
-        let shape = yarns.occluder_at(hit.segment).shape();
-        if shape.filled && !yarns.strands.flattened() {
-            return true;
+        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return Some(hit.t) };
+        let CurveGeometry::Yarns(yarns) = geometry else { return (!leaves(self.ray, hit)).then_some(hit.t) };
+        let mut met = Met::at(yarns, self.ray, hit)?;
+        let depth = met.section.meets_ply(yarns.occluder_at(hit.segment).shape())?;
+        met.first_ply = met.hit.t + depth * met.section.radius;
+        // Tubes overlap where yarns touch that are pressed flat: what counts is whose plies come first.
+        if self.last.as_ref().is_some_and(|(_, last)| last.first_ply <= met.first_ply) {
+            return None;
         }
-        let section = section_at(yarns, self.ray, &entry);
-        let stands = section.meets_ply(shape);
-        if stands {
-            self.last = Some((*hit, section));
+        if met.starts() {
+            met.hit.t = met.first_ply.min(hit.t);
         }
-        stands
+        self.last = Some((*hit, met));
+        Some(met.hit.t)
     }
 }
 
@@ -143,24 +207,20 @@ impl<'a> ShadowFilter<'a> {
 
 impl HitFilter for ShadowFilter<'_> {
     #[inline]
-    fn accept(&mut self, hit: &RawHit) -> bool {
-        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return true };
-        let CurveGeometry::Yarns(yarns) = geometry else { return !leaves(self.ray, hit) };
-        let Some(entry) = entry(yarns, self.ray, hit) else { return false };
-        let section = section_at(yarns, self.ray, &entry);
+    fn accept(&mut self, hit: &RawHit) -> Option<f32> {
+        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return Some(hit.t) };
+        let CurveGeometry::Yarns(yarns) = geometry else { return (!leaves(self.ray, hit)).then_some(hit.t) };
+        let Met { section, .. } = Met::at(yarns, self.ray, hit)?;
         let yarn = yarns.occluder_at(hit.segment);
         section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {
-            return false;
+            return None;
         }
         let through = yarn.transparency(self.crossings);
-        if through < OPAQUE {
-            return true;
-        }
-        if !self.repeated(hit, section.radius) {
+        if through >= OPAQUE && !self.repeated(hit, section.radius) {
             self.passed *= through;
         }
-        self.passed < OPAQUE
+        (through.min(self.passed) < OPAQUE).then_some(hit.t)
     }
 }
 
@@ -172,7 +232,7 @@ pub(super) struct Counting<F> {
 
 impl<F: HitFilter> HitFilter for Counting<F> {
     #[inline]
-    fn accept(&mut self, hit: &RawHit) -> bool {
+    fn accept(&mut self, hit: &RawHit) -> Option<f32> {
         self.calls += 1;
         self.filter.accept(hit)
     }

@@ -3,9 +3,11 @@
 //! Nothing here knows light: yarns have a shape and a transparency, segments a material index, and
 //! [`crate::cloth`] says what scatters there.
 //!
-//! Both filters are pure functions of ray and hit (the shadow filter also of the hits it has seen, by which repeats
-//! are told), allocate nothing and may be called in any order. Exit hits never count: Embree as built by Debian does
-//! not cull the back faces of curves, and a ray born inside a yarn must leave it.
+//! Both filters are pure functions of ray and hit (and of the hits they have seen, by which repeats are told, and which yarn
+//! has the nearer ply), and allocate nothing. Embree as built by Debian does not cull the back faces of curves. Where a ray
+//! leaves a yarn is no hit of its own: a ray that was scattered within must leave. But it tells of a yarn whose tube the ray
+//! started in while its plies are still ahead. Tubes are round and yarns may be pressed flat, so that they overlap where
+//! yarns touch: light that leaves one of them mostly starts within the other's tube ([`crate::geometry::ray::DoneWith`]).
 
 mod filter;
 mod mesh;
@@ -21,7 +23,7 @@ use crate::{
     geometry::{
         curve::Basis,
         occluder::Occluder,
-        ray::Ray,
+        ray::{Ray, YarnPlace},
         section::{Crossings, Section},
         segment_uvs::SegmentUvs,
         strand::{Strands, TightBend},
@@ -98,6 +100,14 @@ pub struct Hit<'a> {
     pub normal: Vec3A,
     /// What was met.
     pub place: HitPlace<'a>,
+}
+
+impl Hit<'_> {
+    /// The place of the yarn that was met.
+    #[inline]
+    pub fn yarn_place(&self) -> YarnPlace {
+        YarnPlace { geometry: self.geometry as u32, segment: self.segment }
+    }
 }
 
 /// What a ray met.
@@ -182,9 +192,9 @@ impl World {
         let mut raw = *raw;
         let place = match self.geometries.get(geometry) {
             Some(CurveGeometry::Yarns(yarns)) => {
-                let section = filter.section(yarns, &raw);
-                raw = filter::entry(yarns, ray, &raw).unwrap_or(raw);
-                HitPlace::Yarn(section)
+                let met = filter.met(yarns, &raw);
+                raw = met.hit;
+                HitPlace::Yarn(met.section)
             }
             Some(CurveGeometry::Fibers(fibers)) => HitPlace::Fiber(fibers.tubes.place(raw.segment, raw.u)),
             None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, &raw)),

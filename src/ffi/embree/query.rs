@@ -45,8 +45,8 @@ pub(crate) struct RawHit {
 
 /// Decides which hits count. Called during traversal, in any order, and possibly more than once for one hit.
 pub(crate) trait HitFilter {
-    /// Whether the hit stands. A hit that does not stand lets the ray pass.
-    fn accept(&mut self, hit: &RawHit) -> bool;
+    /// The distance at which the hit stands, no more than its own; `None` lets the ray pass.
+    fn accept(&mut self, hit: &RawHit) -> Option<f32>;
 }
 
 /// Embree's context of a query with our own fields behind it: "users can extend the context at its end".
@@ -73,7 +73,7 @@ impl<'f, F> QueryContext<'f, F> {
 unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes valid arguments; the context is the `QueryContext<F>` of this very query, which is
     // the only user of it, on this thread; only single rays are traced (N is 1), for which the layouts of ray
-    // and hit are those of the plain structs, readable for the time of the call.
+    // and hit are those of the plain structs, readable (the ray's end writable too) for the time of the call.
     unsafe {
         let args = &*args;
         debug_assert_eq!(args.N, 1, "only single-ray queries are made");
@@ -81,7 +81,7 @@ unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilter
             return;
         }
         let context = &mut *args.context.cast::<QueryContext<'_, F>>();
-        let ray = &*args.ray.cast::<sys::RTCRay>();
+        let ray = &mut *args.ray.cast::<sys::RTCRay>();
         let hit = &*args.hit.cast::<sys::RTCHit>();
         let hit = RawHit {
             t: ray.tfar,
@@ -93,8 +93,9 @@ unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilter
         };
         let filter = &mut *context.filter;
         match catch_unwind(AssertUnwindSafe(|| filter.accept(&hit))) {
-            Ok(true) => {}
-            Ok(false) => *args.valid = 0,
+            // All of a ray that a filter may change is how far it goes, and that only to less.
+            Ok(Some(t)) => ray.tfar = ray.tfar.min(t),
+            Ok(None) => *args.valid = 0,
             Err(payload) => context.panic = Some(payload),
         }
     }

@@ -62,9 +62,9 @@ struct Counting {
 }
 
 impl HitFilter for Counting {
-    fn accept(&mut self, _: &RawHit) -> bool {
+    fn accept(&mut self, hit: &RawHit) -> Option<f32> {
         self.calls += 1;
-        self.accept
+        self.accept.then_some(hit.t)
     }
 }
 
@@ -120,7 +120,7 @@ fn triangles_are_met_from_both_sides() {
 fn a_panic_in_a_filter_comes_back_to_rust() {
     struct Panicking;
     impl HitFilter for Panicking {
-        fn accept(&mut self, _: &RawHit) -> bool {
+        fn accept(&mut self, _: &RawHit) -> Option<f32> {
             panic!("parked")
         }
     }
