@@ -94,9 +94,10 @@ fn measure(
     })
 }
 
-/// Which pixels the reference covers.
+/// Which pixels the reference covers, if only in part: of half-covered ones alone, methods would be told apart by which of them
+/// have a little more of their yarns' edges.
 fn cloth(reference: &Halves) -> Vec<bool> {
-    reference.alpha.iter().map(|alpha| *alpha >= 0.5).collect()
+    reference.alpha.iter().map(|alpha| *alpha > 0.0).collect()
 }
 
 fn cloth_mean(colors: &[[f32; 3]], reference: &Halves) -> [f64; 3] {

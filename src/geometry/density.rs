@@ -6,7 +6,7 @@
 //! of the fibres is taken to lie on the circle r = R_c and the rest even; for q < 0 their density falls as
 //! 1 - 3 q (1 - 2 r^2 / R_c^2). Both have the second moment that was measured.
 
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
 use super::yarn::PlyShape;
 
@@ -15,8 +15,18 @@ use super::yarn::PlyShape;
 pub struct PlyPacking {
     /// q, above -1 and at most 1; below -1/3 it counts as -1/3, where no fibre is left at the wall.
     pub crowding: f64,
-    /// Whether fibres keep out of each other, so that what a line meets is more regular than chance.
-    pub exclusive: bool,
+    /// How much more regular than chance what a line meets is, because fibres keep out of each other: the dead zone after each
+    /// fibre, over the share of the line that lies inside fibres. 0 where they lie at random.
+    pub regularity: f64,
+}
+
+/// What of [`PlyPacking`] is known, and not to be measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct KnownPacking {
+    /// [`PlyPacking::crowding`].
+    pub crowding: Option<f64>,
+    /// [`PlyPacking::regularity`], at least 0.
+    pub regularity: Option<f64>,
 }
 
 /// The fibres a line through a ply meets. Lengths are in yarn radii along the line, from the point nearest to the ply's
@@ -35,12 +45,13 @@ pub struct ChordFibers {
 
 impl PlyShape {
     /// The expected fibres on an untwisted chord whose signed distance from the ply's axis is `offset` (yarn radii, in
-    /// the circle of [`Self::radius`]); `length` is how much of that circle a unit of the line passes, 1 for round plies.
+    /// the circle of [`Self::radius`]); `length` is how much of that circle a unit of the line passes, 1 for round plies; `thin`
+    /// how thick fibres are along the line, over their radius, 1 where the yarn is not pressed flat.
     ///
     /// Exact for the density above: the number of centres within a fibre's radius of the line. (The paper's Eq. 2,
     /// d l sqrt(n / pi), lacks a factor of 1.128 / sqrt(d) against counted fibres.)
     #[inline]
-    pub fn chord(&self, offset: f32, length: f32) -> ChordFibers {
+    pub fn chord(&self, offset: f32, length: f32, thin: f32) -> ChordFibers {
         let inverse = 1.0 / self.core_radius;
         let upper = Segment::new((offset + self.fiber_radius) * inverse);
         let lower = Segment::new((offset - self.fiber_radius) * inverse);
@@ -57,8 +68,19 @@ impl PlyShape {
         let beside = (offset.abs() - 0.5 * self.fiber_radius).max(0.0);
         let half = (self.core_radius * self.core_radius - beside * beside).max(0.0).sqrt().max(0.5 * self.fiber_radius);
         let half = half / length;
-        let zone = (2.0 * self.fiber_radius).min(half);
+        let zone = (2.0 * thin * self.fiber_radius).min(half);
         ChordFibers { even: (count * even).max(0.0), ring: (count * ring).max(0.0), half, zone }
+    }
+}
+
+impl PlyShape {
+    /// The dead zone after each fibre that a chord of [`Self::chord`] meets, in expected fibres: the share of the whole line through
+    /// the ply that lies inside fibres, a mean chord pi / 2 r_f in each, times [`PlyPacking::regularity`]; at most 0.85.
+    #[inline]
+    pub fn dead_zone(&self, chord: &ChordFibers, offset: f32, length: f32) -> f32 {
+        let line = 2.0 * (self.radius * self.radius - offset * offset).max(0.0).sqrt();
+        let inside = FRAC_PI_2 * self.fiber_radius * chord.total() * length;
+        (self.regularity * inside / line.max(1e-12)).min(0.85)
     }
 }
 
@@ -162,7 +184,7 @@ mod tests {
                 let (mut sum, mut moment) = (0.0, 0.0);
                 for i in 0..n {
                     let y = -1.0 + 2.0 * (i as f32 + 0.5) / n as f32;
-                    let count = f64::from(ply.chord(y, 1.0).total()) * 2.0 / f64::from(n);
+                    let count = f64::from(ply.chord(y, 1.0, 1.0).total()) * 2.0 / f64::from(n);
                     sum += count;
                     moment += count * f64::from(y * y);
                 }
@@ -171,7 +193,7 @@ mod tests {
                 let (core, fiber) = (f64::from(ply.core_radius), f64::from(ply.fiber_radius));
                 let want = (1.0 + f64::from(crowding)) * core * core / 4.0 + fiber * fiber / 3.0;
                 assert!((moment / sum / want - 1.0).abs() < 2e-3, "{fibers} {crowding}: {} {want}", moment / sum);
-                assert_eq!(ply.chord(1.5, 1.0).total(), 0.0);
+                assert_eq!(ply.chord(1.5, 1.0, 1.0).total(), 0.0);
             }
         }
     }
@@ -182,7 +204,7 @@ mod tests {
             for (fibers, density) in [(1, 0.5), (25, 0.1), (70, 0.5)] {
                 let ply = ply(fibers, density, crowding);
                 for i in 0..=40 {
-                    let chord = ply.chord(0.025 * i as f32 * ply.radius, 1.3);
+                    let chord = ply.chord(0.025 * i as f32 * ply.radius, 1.3, 1.0);
                     if chord.total() < 1e-6 {
                         continue;
                     }

@@ -10,55 +10,63 @@ use super::{
 
 /// The gaps between the fibres of a ply, along a line and counted in expected fibres.
 ///
-/// Fibres on a line are a renewal process: gaps of eta, a fibre's own chord, and an exponential beyond it. The chance
-/// that a stretch with n fibres on the mean holds none is 1 - n up to n = eta, then (1 - eta) e^(-(n - eta) / (1 - eta)).
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Fibres on a line are a renewal process: gaps of a dead zone d and an exponential beyond it. The chance that a stretch
+/// with n fibres on the mean holds none is 1 - n up to n = d, then (1 - d) e^(-(n - d) / (1 - d)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlyGaps {
-    /// Area fraction eta of fibres that keep out of each other: [`PlyShape::density`].
-    pub density: f32,
-    /// Extinction per expected fibre of unscattered light beyond the first eta fibres: 1 / (1 - eta).
+    /// d, of fibres that keep out of each other.
+    pub dead_zone: f32,
+    /// Extinction per expected fibre of unscattered light beyond the first d fibres: 1 / (1 - d).
     pub rate: f32,
 }
 
 impl PlyShape {
     /// Area fraction eta of fibres that keep out of each other, at most 0.85; 0 for fibres that lie at random.
     pub fn density(&self) -> f64 {
+        if self.regularity == 0.0 {
+            return 0.0;
+        }
         let (n, radius, fiber) = (f64::from(self.fibers), f64::from(self.radius), f64::from(self.fiber_radius));
-        let filled = (n * fiber * fiber / (radius * radius)).min(0.85);
-        if self.exclusive { filled } else { 0.0 }
+        (n * fiber * fiber / (radius * radius)).min(0.85)
+    }
+
+    /// The dead zone after each fibre of a line that finds as much of itself inside fibres as the ply has area in them, in expected
+    /// fibres; at most 0.85.
+    pub fn mean_dead_zone(&self) -> f64 {
+        (f64::from(self.regularity) * self.density()).min(0.85)
     }
 }
 
 impl PlyGaps {
-    /// Those of a ply.
-    pub fn new(ply: &PlyShape) -> Self {
-        let density = ply.density();
-        Self { density: density as f32, rate: (1.0 / (1.0 - density)) as f32 }
+    /// With a dead zone below one.
+    #[inline]
+    pub fn new(dead_zone: f32) -> Self {
+        Self { dead_zone, rate: 1.0 / (1.0 - dead_zone) }
     }
 
     /// The share of light that passes a chord with so many expected `fibers` and meets none.
     #[inline]
     pub fn unscattered(&self, fibers: f32) -> f32 {
-        if fibers < self.density {
+        if fibers < self.dead_zone {
             1.0 - fibers
         } else {
-            (1.0 - self.density) * (-self.rate * (fibers - self.density)).exp()
+            (1.0 - self.dead_zone) * (-self.rate * (fibers - self.dead_zone)).exp()
         }
     }
 
     /// The inverse of [`Self::unscattered`]: after how many expected fibres the share `passed` is left.
     #[inline]
     pub fn fibers_passed(&self, passed: f32) -> f32 {
-        let open = 1.0 - self.density;
-        if passed > open { 1.0 - passed } else { self.density - (passed / open).max(1e-30).ln() * open }
+        let open = 1.0 - self.dead_zone;
+        if passed > open { 1.0 - passed } else { self.dead_zone - (passed / open).max(1e-30).ln() * open }
     }
 }
 
 /// What light finds between the fibres of a yarn.
 #[derive(Clone, Debug)]
 pub enum Transparency {
-    /// The gaps of each ply.
-    Gaps(Vec<PlyGaps>),
+    /// Those of each crossing.
+    Gaps,
     /// Gaps between fibres that lie at random: e^-n for n expected fibres.
     Random,
     /// No gaps.
@@ -93,7 +101,7 @@ impl Occluder {
     #[inline]
     pub fn transparency(&self, crossings: &[PlyCrossing]) -> f32 {
         match &self.transparency {
-            Transparency::Gaps(plies) => crossings.iter().map(|c| plies[c.ply].unscattered(c.fibers)).product(),
+            Transparency::Gaps => crossings.iter().map(|c| c.gaps.unscattered(c.fibers)).product(),
             Transparency::Random => (-crossings.iter().map(|c| c.fibers).sum::<f32>()).exp(),
             Transparency::Opaque if crossings.is_empty() => 1.0,
             Transparency::Opaque => 0.0,
@@ -104,12 +112,11 @@ impl Occluder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::yarn::tests::touching_yarn;
 
     #[test]
     fn what_meets_no_fiber_falls_evenly_and_is_inverted() {
         for density in [1e-4, 0.1, 0.5, 0.8] {
-            let gaps = PlyGaps::new(&touching_yarn(1, 50, density, 0.0, 0.0).plies[0]);
+            let gaps = PlyGaps::new(density);
             assert_eq!(gaps.unscattered(0.0), 1.0);
             let mut before = 1.0;
             for i in 1..400 {

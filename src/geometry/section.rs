@@ -32,6 +32,7 @@ use self::{
     neighbourhood::Unbent,
 };
 use super::{
+    occluder::PlyGaps,
     walk::Walker,
     way::{self, Passage, Station, Way},
     yarn::YarnShape,
@@ -198,6 +199,12 @@ impl<'a> Section<'a> {
         self.pressed.map_or(1.0, |pressed| pressed.stretch.sqrt())
     }
 
+    /// How thick fibres are there over those of the round section, in radii of the yarn.
+    #[inline]
+    pub fn thinness(&self) -> f32 {
+        1.0 / self.squeeze()
+    }
+
     /// The tangent of a fibre of a ply at a `point` of this frame, `travel` farther along the yarn: its part along the yarn
     /// is 1.
     #[inline]
@@ -229,7 +236,9 @@ impl<'a> Section<'a> {
                 return;
             }
             let Passage { enter, exit, offset, .. } = passage;
-            let chord = ply.chord(passage.offset, passage.speed / self.cos);
+            let length = passage.speed / self.cos;
+            let chord = ply.chord(passage.offset, length, self.thinness());
+            let gaps = PlyGaps::new(ply.dead_zone(&chord, passage.offset, length));
             let fibers =
                 chord.total() * passage.share / self.cos * self.fibers_over_chord(shape, index, &way, &enter, &exit);
             let (from, to) = (enter.depth, exit.depth);
@@ -237,7 +246,7 @@ impl<'a> Section<'a> {
             let travel = [enter.travel, exit.travel];
             // Signed as h is: seen from the camera, towards which x points.
             let offset = -offset;
-            let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers };
+            let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers, gaps };
             let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
             if out.is_full() {
                 // What lies deepest is seen least.

@@ -70,8 +70,8 @@ pub struct PlyShape {
     pub fiber_rate: f32,
     /// How much fibres crowd at the wall, or with a minus sign at the axis: see [`super::density`].
     pub crowding: f32,
-    /// Whether fibres keep out of each other.
-    pub exclusive: bool,
+    /// How regularly a line meets fibres: [`PlyPacking::regularity`].
+    pub regularity: f32,
 }
 
 /// The cross-section of a yarn and how it turns along it.
@@ -118,7 +118,7 @@ impl YarnShape {
                     fibers: p.fibers as f32,
                     fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
                     crowding: 0.0,
-                    exclusive: true,
+                    regularity: 1.0,
                 }
             })
             .collect();
@@ -146,7 +146,7 @@ impl YarnShape {
         assert_eq!(self.plies.len(), packings.len(), "one packing for each ply");
         for (ply, packing) in self.plies.iter_mut().zip(packings) {
             ply.crowding = packing.crowding as f32;
-            ply.exclusive = packing.exclusive;
+            ply.regularity = packing.regularity as f32;
         }
         self
     }

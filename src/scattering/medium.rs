@@ -142,12 +142,15 @@ impl PlyOptics {
         let tt_out = |c: usize| material.tt[c] * (1.0 - f);
         let chain = |c: usize| material.tt[c] * f;
         let ended = |c: usize| 1.0 - chain(c);
-        let rho = |c: usize| extinction_rate(ended(c), density);
+        let dead_zone = ply.mean_dead_zone();
+        let rho = |c: usize| extinction_rate(ended(c), dead_zone);
         // Light that leaves the chain, over what the chain loses; 0 where nothing is lost.
         let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
         let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
-        let radius_optical = |c: usize| sigma * rho(c) * core;
-        let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * sigma * rho(c) * fiber;
+        // Light that is scattered on starts at fibres, on no line that was drawn: its extinction is the mean medium's.
+        let extinction = |c: usize| sigma * extinction_rate(ended(c), density);
+        let radius_optical = |c: usize| extinction(c) * core;
+        let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * extinction(c) * fiber;
         let escape = |c: usize| escape::past_itself(escape_probability_of_disc(radius_optical(c)), own_escape(c));
         let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
         let taken_back = |neighbours: f64, c: usize| neighbours * (escape(c) * radius_optical(c) * PI / 2.0).min(1.0);
@@ -174,7 +177,7 @@ impl PlyOptics {
             let share = reflected(c);
             share * share * (1.0 - again(c)) / (1.0 - again(c) * share).max(1e-12)
         };
-        let gaps = PlyGaps::new(ply);
+        let gaps = PlyGaps::new(dead_zone as f32);
         // So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
         let hit = |c: usize| if ended(c) > 1e-9 { rho(c) / ended(c) } else { 1.0 };
         let events = |c: usize| chain(c) * hit(c);
@@ -235,7 +238,7 @@ impl PlyOptics {
         }
         let into = (self.first * (self.untouched * -before).exp()).min(Rgb::ONE);
         // No other fibre is within the node's own.
-        let beyond = (after - Rgb::splat(self.gaps.density)).max(Rgb::ZERO);
+        let beyond = (after - Rgb::splat(self.gaps.dead_zone)).max(Rgb::ZERO);
         let untouched = into * (-(self.untouched * beyond)).exp();
         (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
     }
@@ -282,7 +285,7 @@ mod tests {
     fn the_rate_of_unscattered_light_is_that_of_chains_that_keep_nothing() {
         for density in [1e-3, 0.1, 0.5, 0.8] {
             let ply = &crate::geometry::yarn::tests::touching_yarn(1, 50, density, 0.0, 0.0).plies[0];
-            let rate = f64::from(PlyGaps::new(ply).rate);
+            let rate = f64::from(PlyGaps::new(ply.density() as f32).rate);
             assert!((rate / extinction_rate(1.0, ply.density()) - 1.0).abs() < 1e-6, "density {density}: {rate}");
         }
     }

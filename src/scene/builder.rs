@@ -12,6 +12,7 @@ use super::{
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        density::KnownPacking,
         fiber::{Placement, packing},
         yarn::{PlyParameters, touching_plies},
     },
@@ -339,7 +340,7 @@ impl Yarn {
             ply_twist: twists[0],
             fibers: vec![fiber; plies as usize],
             placement: Placement::Regular,
-            crowding: None,
+            known_packing: KnownPacking::default(),
             flyaways: None,
             tex: None,
             tilted: defaults::TILTED,

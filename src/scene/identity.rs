@@ -11,7 +11,7 @@ use twox_hash::XxHash3_128;
 
 use super::{AlbedoTexture, Camera, CurveKind, Fabric, FabricMotion, Material, Object, RenderSettings, Scene, Yarn};
 use crate::{
-    geometry::{curve::Curve, mesh::Mesh},
+    geometry::{curve::Curve, density::KnownPacking, mesh::Mesh},
     light::{Environment, Light},
 };
 
@@ -203,14 +203,16 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
 }
 
 fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
-    let Yarn { name, radius, plies, ply_twist, fibers, placement, crowding, flyaways, tex: _, tilted } = yarn;
+    let Yarn { name, radius, plies, ply_twist, fibers, placement, known_packing, flyaways, tex: _, tilted } = yarn;
     let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("yarn.{name}.{key}"), value);
     key("radius", radius);
     key("ply", plies);
     key("ply_twist", ply_twist);
     key("fiber", &fibers.iter().map(|(name, _)| name).collect::<Vec<_>>());
     key("packing", placement);
+    let KnownPacking { crowding, regularity } = known_packing;
     key("crowding", crowding);
+    key("regularity", regularity);
     key("flyaways", flyaways);
     key("ply_intersection", &if *tilted { "tilted" } else { "perpendicular" });
     let mut different: Vec<_> = fibers.iter().collect();

@@ -28,7 +28,7 @@ pub use layers::{LayerName, Layers};
 use crate::{
     geometry::{
         curve::{Basis, Curve},
-        density::PlyPacking,
+        density::{KnownPacking, PlyPacking},
         fiber::{Placement, flyaway::Flyaways},
         mesh::Mesh,
         yarn::{PlyParameters, YarnShape},
@@ -195,8 +195,8 @@ pub struct Yarn {
     pub fibers: Vec<(String, FiberMaterial)>,
     /// Where explicit fibres lie.
     pub placement: Placement,
-    /// How much fibres crowd, where it is known and not to be measured from `placement`: see [`PlyPacking`].
-    pub crowding: Option<f64>,
+    /// How they lie, where that is known and not to be measured from `placement`.
+    pub known_packing: KnownPacking,
     /// Fibres that leave the plies.
     pub flyaways: Option<Flyaways>,
     /// Grams in a kilometre, if known.
@@ -233,12 +233,9 @@ impl Yarn {
             let alike = |p: &PlyParameters| {
                 [p.radius, p.fiber_radius, f64::from(p.fibers)] == [ply.radius, ply.fiber_radius, f64::from(ply.fibers)]
             };
-            let packing = match (self.plies[..k].iter().position(alike), self.crowding) {
-                (Some(same), _) => packings[same],
-                (None, Some(crowding)) => {
-                    PlyPacking { crowding, exclusive: matches!(self.placement, Placement::Regular) }
-                }
-                (None, None) => self.placement.packing_of(ply),
+            let packing = match self.plies[..k].iter().position(alike) {
+                Some(same) => packings[same],
+                None => self.placement.packing_of(ply, self.known_packing),
             };
             packings.push(packing);
         }

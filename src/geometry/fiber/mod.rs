@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::{
     curve::{Basis, Curve},
-    density::PlyPacking,
+    density::{KnownPacking, PlyPacking},
     segment_uvs::SegmentUvs,
     strand::Strands,
     tube::{Tubes, spline_through},
@@ -342,20 +342,22 @@ fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
 }
 
 impl Placement {
-    /// How the fibres that are placed in a ply lie, from some that are: a number to 0.005 or so.
-    pub fn packing_of(self, ply: &PlyParameters) -> PlyPacking {
-        let core = ply.radius - ply.fiber_radius;
-        if ply.fibers == 0 || core <= 0.0 {
-            return PlyPacking { crowding: 0.0, exclusive: true };
+    /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.005 or so,
+    /// and the regularity to some hundredths.
+    pub fn packing_of(self, ply: &PlyParameters, known: KnownPacking) -> PlyPacking {
+        if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
+            return PlyPacking { crowding, regularity };
         }
-        match self {
-            Self::Regular => {
-                let crowding = packing::crowding(ply.fibers, ply.fiber_radius / core);
-                PlyPacking { crowding, exclusive: true }
-            }
-            Self::Measured(distribution) => {
-                PlyPacking { crowding: distribution.crowding(ply.fiber_radius / core), exclusive: false }
-            }
+        let core = ply.radius - ply.fiber_radius;
+        let fiber = ply.fiber_radius / core;
+        let measured = match self {
+            _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, regularity: 1.0 },
+            Self::Regular => packing::measured(ply.fibers, fiber),
+            Self::Measured(distribution) => PlyPacking { crowding: distribution.crowding(fiber), regularity: 0.0 },
+        };
+        PlyPacking {
+            crowding: known.crowding.unwrap_or(measured.crowding),
+            regularity: known.regularity.unwrap_or(measured.regularity),
         }
     }
 }

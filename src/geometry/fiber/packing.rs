@@ -4,7 +4,14 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use crate::math::sampler::Stream;
+use crate::{
+    geometry::{
+        density::PlyPacking,
+        occluder::PlyGaps,
+        yarn::{PlyParameters, YarnShape},
+    },
+    math::sampler::Stream,
+};
 
 /// Area fraction (of fibres in the ply) up to which [`hard_discs`] finds packings without overlap for any number.
 pub const DENSEST: f64 = 0.78;
@@ -23,31 +30,82 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
     })
 }
 
-/// 2 <r^2> - 1 of the centres' distances r from the middle, over some of the packings that [`hard_discs`] makes; 0 where
-/// they are even over the core. `radius` is in core radii.
+/// How the packings that [`hard_discs`] makes lie, from some of them; `radius` is in core radii.
+///
+/// The crowding is 2 <r^2> - 1 of the centres' distances r from the middle. The regularity is that with which the gaps of
+/// [`PlyGaps`] pass as much as lines through the packings do, by least squares of the roots over the ply's width.
 ///
 /// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
-pub fn crowding(count: u32, radius: f64) -> f64 {
+pub fn measured(count: u32, radius: f64) -> PlyPacking {
     let packed = count.min(MOST_MEASURED);
     let fewer = (f64::from(packed) / f64::from(count.max(1))).sqrt();
     // The same area fraction of the ply, whose radius is 1 + radius.
     let share = radius / (1.0 + radius) / fewer;
     if packed == 0 || share >= 1.0 {
-        return 0.0;
+        return PlyPacking { crowding: 0.0, regularity: 1.0 };
     }
-    let discs = (0..MEASURED.div_ceil(packed)).flat_map(|seed| {
-        let mut stream = Stream::new(seed);
-        hard_discs(packed, share / (1.0 - share), &mut stream)
-    });
-    let (sum, n) = discs.fold((0.0, 0.0), |(sum, n), at| (sum + at.length_squared(), n + 1.0));
-    (2.0 * sum / n - 1.0) * fewer
+    let radius = share / (1.0 - share);
+    let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
+        .map(|seed| hard_discs(packed, radius, &mut Stream::new(seed)))
+        .collect();
+    let squares: f64 = packings.iter().flatten().map(|at| at.length_squared()).sum();
+    let crowding = 2.0 * squares / (packings.len() as f64 * f64::from(packed)) - 1.0;
+    PlyPacking { crowding: crowding * fewer, regularity: regularity(&packings, radius, crowding) }
 }
 
-/// The most discs of a packing whose crowding is measured.
-const MOST_MEASURED: u32 = 150;
-/// About how many discs are looked at.
-const MEASURED: u32 = 600;
+/// The most discs of a packing that is measured, about how many discs are looked at, and in how many packings.
+const MOST_MEASURED: u32 = 100;
+const MEASURED: u32 = 1500;
+const LEAST_PACKINGS: u32 = 15;
+const MOST_PACKINGS: u32 = 100;
+
+fn regularity(packings: &[Vec<DVec2>], radius: f64, crowding: f64) -> f64 {
+    const LINES: usize = 24;
+    const ANGLES: u32 = 64;
+    let offset = |line: usize| (1.0 + radius) * (line as f64 + 0.5) / LINES as f64;
+    let mut clear = [0u32; LINES];
+    for discs in packings {
+        for angle in 0..ANGLES {
+            let across = DVec2::from_angle(TAU * f64::from(angle) / f64::from(ANGLES));
+            let mut met = [false; LINES];
+            for disc in discs {
+                let at = disc.dot(across);
+                for (line, met) in met.iter_mut().enumerate() {
+                    *met |= (at - offset(line)).abs() < radius;
+                }
+            }
+            for (clear, met) in clear.iter_mut().zip(met) {
+                *clear += u32::from(!met);
+            }
+        }
+    }
+    let parameters = PlyParameters {
+        radius: 1.0 + radius,
+        aspect: 1.0,
+        distance: 0.0,
+        angle: 0.0,
+        fibers: packings[0].len() as u32,
+        fiber_radius: radius,
+        fiber_twist: 0.0,
+    };
+    let mut ply = YarnShape::new(&[parameters], 0.0, true).plies.remove(0);
+    ply.crowding = crowding as f32;
+    let lines = packings.len() as f64 * f64::from(ANGLES);
+    let mut error = |regularity: f64| -> f64 {
+        ply.regularity = regularity as f32;
+        let off = |line: usize| {
+            let at = offset(line) as f32;
+            let chord = ply.chord(at, 1.0, 1.0);
+            let passes = PlyGaps::new(ply.dead_zone(&chord, at, 1.0)).unscattered(chord.total());
+            f64::from(passes).sqrt() - (f64::from(clear[line]) / lines).sqrt()
+        };
+        (0..LINES).map(|line| off(line).powi(2)).sum()
+    };
+    // The error has one least value; steps of a hundredth are finer than it is known.
+    let tries = (1..=300).map(|i| 0.01 * f64::from(i));
+    tries.map(|s| (s, error(s))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1.0, |best| best.0)
+}
 
 /// A point of the unit disc.
 fn anywhere(stream: &mut Stream) -> DVec2 {
@@ -193,14 +251,27 @@ mod tests {
                 .map(|at| at.length_squared())
                 .collect();
             let want = 2.0 * many.iter().sum::<f64>() / many.len() as f64 - 1.0;
-            let got = crowding(count, radius);
+            let got = measured(count, radius).crowding;
             assert!((got - want).abs() < 0.03, "{count}: {got}, not {want}");
         }
         let (few, radius) = of(100, 0.5);
         let (many, smaller) = of(10_000, 0.5);
+        let crowding = |count, radius| measured(count, radius).crowding;
         assert!(crowding(many, smaller).abs() < 0.5 * crowding(few, radius).abs() + 0.01);
         assert_eq!(crowding(0, 0.1), 0.0);
         assert!(crowding(1, 1.0).is_finite() && crowding(u32::MAX, 1e-9).is_finite());
+    }
+
+    #[test]
+    fn lines_pass_loose_packings_more_regularly_than_dense_ones_that_are_pushed_apart() {
+        let of = |count: u32, density: f64| {
+            let fiber = (density / f64::from(count)).sqrt();
+            measured(count, fiber / (1.0 - fiber)).regularity
+        };
+        let (loose, dense) = (of(100, 0.2), of(100, 0.6));
+        assert!((1.2..1.7).contains(&loose) && (0.4..1.1).contains(&dense), "{loose} {dense}");
+        // Thin fibres are packed as fewer thick ones of the same share.
+        assert_eq!(of(10_000, 0.4), of(1_000, 0.4));
     }
 
     #[test]

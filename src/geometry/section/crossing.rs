@@ -8,6 +8,7 @@ use super::Section;
 use crate::{
     geometry::{
         density::ChordFibers,
+        occluder::PlyGaps,
         way::{self, Station, Way},
         yarn::{MAX_PLIES, YarnShape, fiber_tangent},
     },
@@ -36,6 +37,8 @@ pub struct PlyCrossing {
     pub travel: [f32; 2],
     /// Expected number of fibres on the chord.
     pub fibers: f32,
+    /// The gaps between them.
+    pub gaps: PlyGaps,
 }
 
 impl PlyCrossing {

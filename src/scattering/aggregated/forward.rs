@@ -125,7 +125,7 @@ impl Forward {
         weight: Rgb,
         stream: &mut Stream,
     ) -> Option<Self> {
-        let (first, met) = first_fiber(view, crossings, unscattered, stream.next())?;
+        let (first, met) = first_fiber(crossings, unscattered, stream.next())?;
         let crossing = &crossings[first];
         let optics = &view.yarn.plies[crossing.ply];
         if optics.chain.max_channel() <= 0.0 {
@@ -171,7 +171,7 @@ impl Forward {
         let gaps = &optics.gaps;
         let none = ahead.through;
         // Anywhere on the way, and nothing behind its own chord.
-        let open = (ahead.unscattered - gaps.rate * gaps.density).max(0.0);
+        let open = (ahead.unscattered - gaps.rate * gaps.dead_zone).max(0.0);
         let one = (open * (-open).exp()).min(1.0 - none);
         let kept = (-ahead.chains).exp();
         let several = (kept - Rgb::splat(none) - self.chain * one).max(Rgb::ZERO).min(Rgb::splat(1.0 - none - one));
@@ -182,7 +182,7 @@ impl Forward {
         let passed = Rgb::from(normalised((self.chain * all * self.weight).max(Rgb::splat(1e-20)).to_array())) * 3.0;
         let often = shares[1] / all * passed;
         let loss = Rgb::splat(gaps.rate) - optics.rho;
-        let mean = loss * ahead.fibers / (loss * gaps.density + 1.0);
+        let mean = loss * ahead.fibers / (loss * gaps.dead_zone + 1.0);
         let count =
             ((mean * kept - shares[0]) / several.max(Rgb::splat(1e-6))).max(Rgb::splat(2.0)).min(Rgb::splat(32.0));
         let drawn = shares.map(|share| (share / all).weighted_mean(passed) * (1.0 - none));
@@ -283,14 +283,14 @@ impl Forward {
     #[inline]
     pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
         let (yarn, spot) = (view.yarn, &self.spot);
-        let tilt = spot.tilt(view.section, w);
+        let (tilt, thin) = (spot.tilt(view.section, w), view.section.thinness());
         let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, unscattered: 0.0, fibers: 0.0 };
         view.section.plies_ahead(yarn.occluder().shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
-            let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length);
+            let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length, thin);
             let mut fibers = tilt * chord.ahead(-ahead.foot);
             if ahead.ply == spot.ply {
-                fibers = (fibers - optics.gaps.density).max(0.0);
+                fibers = (fibers - optics.gaps.dead_zone).max(0.0);
             }
             all.chains += optics.rho * fibers;
             all.unscattered += optics.gaps.rate * fibers;
@@ -304,16 +304,15 @@ impl Forward {
 /// The crossing in which a ray meets its first fibre, and the expected fibres before it there: `u` of the light that is
 /// not unscattered has met one by then.
 #[inline]
-fn first_fiber(view: &View<'_>, crossings: &[PlyCrossing], unscattered: f32, u: f32) -> Option<(usize, f32)> {
+fn first_fiber(crossings: &[PlyCrossing], unscattered: f32, u: f32) -> Option<(usize, f32)> {
     let mut left = 1.0 - u * (1.0 - unscattered);
     let (last, before) = crossings.split_last()?;
     for (index, c) in before.iter().enumerate() {
-        let gaps = &view.yarn.plies[c.ply].gaps;
-        let through = gaps.unscattered(c.fibers);
+        let through = c.gaps.unscattered(c.fibers);
         if left > through {
-            return Some((index, gaps.fibers_passed(left).min(c.fibers)));
+            return Some((index, c.gaps.fibers_passed(left).min(c.fibers)));
         }
         left = (left / through.max(1e-30)).min(1.0);
     }
-    Some((before.len(), view.yarn.plies[last.ply].gaps.fibers_passed(left).min(last.fibers)))
+    Some((before.len(), last.gaps.fibers_passed(left).min(last.fibers)))
 }

@@ -65,8 +65,7 @@ impl AggregatedYarn {
         let count = shape.plies.len();
         let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        let gaps = plies.iter().map(|p| p.gaps).collect();
-        Self { occluder: Occluder::new(shape, Transparency::Gaps(gaps)), plies, node_gain, plain: false }
+        Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, node_gain, plain: false }
     }
 
     /// The yarn without its colours: what rays see that only ask whether they pass.

@@ -21,6 +21,8 @@ use crate::{
 /// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
 /// light's side, unknown then, does not make the true lobe wider than the sampled one.
 const SAMPLING_WIDENING: f32 = 1.2;
+/// The power of half the versed angle from straight on with which light finds a fibre's own chord free of others.
+const STRAIGHT_ON: i32 = 4;
 
 /// A place inside a ply where light ends its chain.
 #[derive(Clone, Copy, Debug)]
@@ -212,16 +214,20 @@ impl Node {
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
         let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
-        let shift = optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
-        let strip = ClearedStrip::new(2.0 * shape.plies[spot.ply].fiber_radius, ahead);
+        let thin = view.section.thinness();
+        let shift = thin * optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
+        let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, ahead);
         // Light that goes on is inside its own fibre first; light that turns back is not.
-        let hole = optics.fiber_chord * 0.5 * (1.0 - ahead.x);
+        let hole = thin * optics.fiber_chord * 0.5 * (1.0 - ahead.x);
+        let lead = thin * optics.lead;
+        // Straight on, no other fibre lies within its own chord; aside, others do, as the mean medium has it.
+        let alone = (0.5 * (1.0 - ahead.x)).powi(STRAIGHT_ON);
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let (ply, passed) = (&shape.plies[way.ply], &yarn.plies[way.ply]);
             if yarn.plain {
-                let depth = passed.rho * plain_fibers(ply, &way, &strip, optics.lead);
+                let depth = passed.rho * plain_fibers(ply, &way, &strip, lead);
                 if way.ply == spot.ply {
                     own += depth
                 } else {
@@ -229,13 +235,14 @@ impl Node {
                 }
                 return;
             }
-            let chord = ply.chord(way.offset, way.length);
+            let chord = ply.chord(way.offset, way.length, thin);
             if way.ply == spot.ply {
                 let (from, to) = ((way.foot - chord.half).max(0.0), way.foot + chord.half);
                 if to > 0.0 {
-                    let even = strip.length(from + optics.lead, to + optics.lead) / (2.0 * chord.half);
+                    let even = strip.length(from + lead, to + lead) / (2.0 * chord.half);
                     let ring = ((to - hole) / chord.zone).clamp(0.0, 1.0);
-                    own += passed.rho * (chord.even * even + 0.5 * chord.ring * ring);
+                    let fibers = chord.even * even + 0.5 * chord.ring * ring - alone * passed.gaps.dead_zone;
+                    own += passed.rho * fibers.max(0.0);
                 }
             } else {
                 others += passed.rho * chord.ahead(-way.foot);

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     geometry::{
+        density::KnownPacking,
         fiber::{
             Distribution, Placement,
             flyaway::{Flyaways, Spread},
@@ -115,8 +116,8 @@ impl PlyKeys {
     }
 }
 
-/// `[yarn.NAME.packing]`: where explicit fibres lie, and how much they crowd where that is stated.
-fn packing(table: Reader<'_>) -> (Placement, Option<f64>) {
+/// `[yarn.NAME.packing]`: where explicit fibres lie, and how they lie where that is stated.
+fn packing(table: Reader<'_>) -> (Placement, KnownPacking) {
     let measured = table.one_of_or("type", false, &[("regular", false), ("measured", true)]);
     let distribution = Distribution {
         epsilon: table.f64_or("epsilon", 0.0, Range::between(0.0, 0.5)),
@@ -141,9 +142,12 @@ fn packing(table: Reader<'_>) -> (Placement, Option<f64>) {
             }
         }
     }
-    let crowding = table.f64("crowding", Range::between(-1.0, 1.0));
+    let known = KnownPacking {
+        crowding: table.f64("crowding", Range::between(-1.0, 1.0)),
+        regularity: table.f64("regularity", Range::between(0.0, 3.0)),
+    };
     table.finish();
-    (if measured { Placement::Measured(distribution) } else { Placement::Regular }, crowding)
+    (if measured { Placement::Measured(distribution) } else { Placement::Regular }, known)
 }
 
 /// `[yarn.NAME.flyaways]`: lengths in the scene's unit, as the yarn's radius; counts for each ply and unit of length.
@@ -313,7 +317,8 @@ fn yarn(
     let shared = PlyKeys::read(&table, None, context.sources);
     let ply_tables = table.tables("ply");
     let count = ply_count(&table, ply_tables.len(), name)?;
-    let (placement, crowding) = table.table("packing").map_or((Placement::Regular, None), packing);
+    let (placement, known_packing) =
+        table.table("packing").map_or((Placement::Regular, KnownPacking::default()), packing);
     let flyaways = table.table("flyaways").map(|t| flyaways(t, radius.unwrap_or(1.0)));
     let Some(radius) = radius else {
         if !table.has("radius") {
@@ -348,7 +353,7 @@ fn yarn(
         ply_twist: radians(ply_twist),
         fibers: materials,
         placement,
-        crowding,
+        known_packing,
         flyaways,
         tex,
         tilted,

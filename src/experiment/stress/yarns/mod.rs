@@ -11,6 +11,7 @@ use crate::{
     cloth::scatterer,
     experiment::goniometer::{self, Effort, Specimen, View, straight_section},
     geometry::{
+        density::KnownPacking,
         fiber::Placement,
         section::Crossings,
         yarn::{MAX_PLIES, PlyParameters, touching_plies},
@@ -104,7 +105,7 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
         fibers: (0..plies).map(|_| ("stress".to_owned(), material.clone())).collect(),
         tilted: true,
         placement: Placement::Regular,
-        crowding: None,
+        known_packing: KnownPacking::default(),
         flyaways: None,
         tex: None,
     }
