@@ -9,9 +9,9 @@ use glam::{DVec3, Vec3A};
 use super::{Case, Checks, Group::Geometry, Scale};
 use crate::{
     cloth::Cloth,
-    geometry::ray::Ray,
     geometry::{
         curve::{Basis, Curve},
+        ray::{DoneWith, Ray, YarnPlace},
         section::Crossings,
     },
     math::sampler::Stream,
@@ -19,7 +19,7 @@ use crate::{
         Scene,
         load::{LoadOptions, parse},
     },
-    trace::{Hit, HitPlace, World},
+    trace::{CurveGeometry, Hit, HitPlace, World},
 };
 use exact::exact_rays;
 
@@ -195,11 +195,11 @@ fn radii(scale: Scale, checks: &mut Checks) {
                 // From anywhere inside in any direction: nothing may be in the way.
                 let (d, o) = (any_direction(&mut stream), any_direction(&mut stream) * f64::from(stream.next()) * 0.98);
                 let from = (o - o.dot(axis) * axis) * radius;
-                let ray = Ray::new(from.as_vec3a(), d.as_vec3a());
+                let ray = scattered_in(&world, from, d);
                 again += u32::from(world.intersect(&ray).is_some());
             }
             checks.at_most(
-                "rays born inside that meet their own curve, share",
+                "rays scattered inside that meet their own curve, share",
                 f64::from(again) / f64::from(n),
                 0.0,
                 &at,
@@ -324,6 +324,16 @@ fn degenerate(scale: Scale, checks: &mut Checks) {
     }
 }
 
+/// A ray from inside the world's only curve that was scattered there.
+fn scattered_in(world: &World, from: DVec3, direction: DVec3) -> Ray {
+    let ray = Ray::new(from.as_vec3a(), direction.as_vec3a());
+    let CurveGeometry::Yarns(yarns) = &world.geometries()[0] else { return ray };
+    let off = |segment: &u32| yarns.strands.frame(*segment, 0.5).centre.distance_squared(ray.origin);
+    let nearest = yarns.strands.segments_of(0).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let done = DoneWith::only(YarnPlace { geometry: 0, segment: nearest.unwrap_or(0) });
+    Ray { done, ..ray }
+}
+
 fn inside(scale: Scale, checks: &mut Checks) {
     let n = scale.pick(500, 5000);
     let mut crossings = Crossings::new();
@@ -353,9 +363,9 @@ fn inside(scale: Scale, checks: &mut Checks) {
             }
             // From inside the first towards the second: the first is behind the ray at once.
             let from = a + DVec3::new(x, 0.6 * h, 0.6 * (f64::from(stream.next()) - 0.5));
-            let away = Ray::new(from.as_vec3a(), Vec3A::NEG_Z);
+            let away = scattered_in(&one, from, DVec3::NEG_Z);
             let met = one.intersect(&away).is_some() || one.transmittance(&away, &mut crossings) != 1.0;
-            checks.never("a ray born inside meets its own yarn", met, &at);
+            checks.never("a ray scattered inside meets its own yarn", met, &at);
         }
     }
     // On a bent yarn, from the surface inwards and outwards: the yarn itself may be met again only round the bend.
