@@ -148,7 +148,7 @@ fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
     let (cloth, _) = Cloth::new(&scene, 1).unwrap();
     let world = cloth.world();
     let (mut stream, mut crossings) = (Stream::new(5), Crossings::new());
-    let (mut within, mut same, mut off) = (0, 0, 0.0);
+    let (mut within, mut same, mut missed) = (0, 0, 0);
     for _ in 0..4000 {
         let [x, y, z, tilt, turn] = [(); 5].map(|()| f64::from(stream.next()));
         let at = low + DVec3::new(0.2 + 0.6 * x, 0.2 + 0.6 * y, z) * (high - low);
@@ -157,15 +157,18 @@ fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
         let Some(hit) = world.intersect(&ray) else { continue };
         let Met::Yarn { section, scatterer, .. } = cloth.at(&hit) else { panic!("{hit:?}") };
         section.crossings(scatterer.shape(), &mut crossings);
-        // In the tube, before its first ply.
+        // In the tube, before its first ply, and before those of any other yarn.
         let Some(first) = crossings.first().copied() else { continue };
-        let start = section.point_on_ray(0.8 * (first.enter - 0.05).max(0.0));
-        let inner = Ray::new(start, ray.direction);
+        if first.enter < 0.2 {
+            continue;
+        }
+        let inner = Ray::new(section.point_on_ray(0.8 * (first.enter - 0.05)), ray.direction);
         let (whole, ahead) = (world.transmittance(&ray, &mut crossings), world.transmittance(&inner, &mut crossings));
-        within += usize::from(first.enter > 0.2);
+        within += 1;
         same += usize::from((whole - ahead).abs() < 0.02);
-        off += whole - ahead;
+        missed += usize::from(ahead - whole > 0.3);
     }
-    println!("within {within} same {same} off {off}");
-    assert!(within > 1000 && same as f64 > 0.97 * within as f64, "{within} {same} {off}");
+    // The rest is mostly grazed by plies: a little less or more, by where the yarn was looked at from.
+    assert!(within > 1000 && same as f64 > 0.92 * within as f64, "{same} of {within}");
+    assert!((missed as f64) < 0.01 * within as f64, "{missed} of {within} miss what is ahead");
 }

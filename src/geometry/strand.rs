@@ -327,6 +327,14 @@ impl Strands {
         self.points[first + 1].w.max(self.points[first + 2].w)
     }
 
+    /// About how long a segment is, in yarn radii.
+    #[inline]
+    pub fn stride_about(&self, segment: u32) -> f32 {
+        let first = self.segments[segment as usize] as usize;
+        let (from, to) = (self.points[first + 1], self.points[first + 2]);
+        (to - from).truncate().length() / from.w.max(1e-30)
+    }
+
     /// Everything a ray needs to know at `u` (0 to 1) of a segment.
     #[inline]
     pub fn frame(&self, segment: u32, u: f32) -> YarnFrame {

@@ -1,5 +1,7 @@
 //! Walking along a yarn from one of its places.
 
+use glam::Vec3A;
+
 use super::{strand::Strands, yarn_frame::YarnFrame};
 
 /// The least that a point inside of a bend counts as away from the centre of the bend, in radii of the bend.
@@ -60,5 +62,15 @@ impl<'a> Walker<'a> {
         let frame = self.strands.frame_at(self.segment, u, self.time);
         self.stride = frame.stride;
         Some(frame)
+    }
+
+    /// Walks from `place`, where it is, towards the place abreast of a point: there, where the yarn is a circle between, and no
+    /// more than two yarn radii at once.
+    #[inline]
+    pub fn walk_abreast(&mut self, place: &YarnFrame, point: Vec3A) -> Option<YarnFrame> {
+        let off = point - place.centre;
+        let straightness = (1.0 - off.dot(place.curvature)).max(LEAST_STRAIGHTNESS);
+        let distance = off.dot(place.tangent) / (straightness * place.radius);
+        self.walk(distance.clamp(-2.0, 2.0))
     }
 }

@@ -42,6 +42,13 @@ impl YarnFrame {
         self.centre + self.radius * (at.x * self.normal + at.y * across)
     }
 
+    /// From the yarn's axis to a point, across the yarn.
+    #[inline]
+    pub fn beside(&self, point: Vec3A) -> Vec3A {
+        let off = point - self.centre;
+        off - off.dot(self.tangent) * self.tangent
+    }
+
     /// Radius of the circle that has the section's area: fibres stay as thick when a yarn is pressed flat.
     pub fn round_radius(&self) -> f32 {
         Pressed::new(self.flattening).map_or(self.radius, |pressed| self.radius / pressed.stretch.sqrt())

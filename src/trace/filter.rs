@@ -8,7 +8,7 @@ use crate::{
     geometry::{
         ray::{Ray, YarnPlace},
         section::{Crossings, Section},
-        walk::{LEAST_STRAIGHTNESS, Walker},
+        walk::Walker,
     },
 };
 
@@ -19,9 +19,15 @@ const OPAQUE: f32 = 1e-3;
 const NEAR_AN_END: usize = 4;
 
 /// The longest chord of a tube times the slope at which a ray leaves it, in yarn radii: 2 if it is straight.
-const LONGEST_CHORD: f32 = 3.0;
-/// A step along the yarn below which a place counts as abreast of a point, in yarn radii.
+const LONGEST_CHORD: f32 = 5.0;
+/// The longest step by which a ray is followed back through a tube, in yarn radii, and how many there are at the most.
+const STEP: f32 = 1.0;
+const MOST_STEPS: f32 = 16.0;
+/// The square of how far from its axis a place still counts as within a tube while it is walked to, in yarn radii.
+const ABOUT_WITHIN: f32 = 1.2;
+/// A step along the yarn below which a place counts as abreast of a point, in yarn radii, and how many there are at the most.
 const ABREAST: f32 = 0.01;
+const MOST_CORRECTIONS: usize = 4;
 /// How far along the yarn a ray may be from where it was scattered, and still be within the same stretch of it, in yarn radii.
 const OWN: f32 = 8.0;
 
@@ -34,11 +40,9 @@ fn leaves(ray: &Ray, hit: &RawHit) -> bool {
 /// A yarn where a ray meets it.
 #[derive(Clone, Copy)]
 pub(super) struct Met<'a> {
-    /// Where: the distance is that of the tube, or, for a ray that starts within it, that of the first ply.
+    /// Where the ray enters the tube, or starts within it.
     pub(super) hit: RawHit,
     pub(super) section: Section<'a>,
-    /// How far it is to the first ply, about: infinite unless it was asked.
-    first_ply: f32,
 }
 
 impl<'a> Met<'a> {
@@ -56,44 +60,47 @@ impl<'a> Met<'a> {
 
     #[inline]
     fn entering(yarns: &'a YarnGeometry, ray: &Ray, hit: RawHit) -> Self {
-        Self { hit, section: section_at(yarns, ray, &hit), first_ply: f32::INFINITY }
+        Self { hit, section: section_at(yarns, ray, &hit) }
     }
 
     /// From the start of a ray within the yarn's tube, unless the ray is done with that.
     fn within(yarns: &'a YarnGeometry, ray: &Ray, leaving: &RawHit) -> Option<Self> {
-        let place = |segment| YarnPlace { geometry: leaving.geometry, segment };
-        if ray.done.holds(place(leaving.segment), 3) {
-            return None;
-        }
+        let strands = &yarns.strands;
+        let done = |segment| {
+            let own = (OWN / strands.stride_about(segment).max(1e-2)).ceil() as u32;
+            ray.done.holds(YarnPlace { geometry: leaving.geometry, segment }, own)
+        };
         let slope = leaving.normal.normalize_or_zero().dot(ray.direction);
-        if leaving.t * slope > LONGEST_CHORD * yarns.strands.radius_about(leaving.segment) {
+        let radius = strands.radius_about(leaving.segment);
+        if leaving.t * slope > LONGEST_CHORD * radius || done(leaving.segment) {
             return None;
         }
-        let (mut walker, mut abreast) = Walker::new(&yarns.strands, leaving.segment, leaving.u, ray.time);
-        for _ in 0..4 {
-            let off = ray.origin - abreast.centre;
-            let along = off.dot(abreast.tangent) / abreast.radius;
-            if along.abs() < ABREAST {
+        // Back along the ray, which is within the tube all the way if it starts there.
+        let (mut walker, mut place) = Walker::new(strands, leaving.segment, leaving.u, ray.time);
+        let steps = (leaving.t / (STEP * radius)).ceil().clamp(1.0, MOST_STEPS);
+        let mut left = steps;
+        while left > 0.0 {
+            left -= 1.0;
+            let point = ray.origin + left / steps * leaving.t * ray.direction;
+            place = walker.walk_abreast(&place, point)?;
+            if place.beside(point).length_squared() > ABOUT_WITHIN * place.radius * place.radius {
+                return None;
+            }
+        }
+        for _ in 0..MOST_CORRECTIONS {
+            if (ray.origin - place.centre).dot(place.tangent).abs() < ABREAST * place.radius {
                 break;
             }
-            let straightness = (1.0 - off.dot(abreast.curvature)).max(LEAST_STRAIGHTNESS);
-            abreast = walker.walk(along / straightness)?;
+            place = walker.walk_abreast(&place, ray.origin)?;
         }
-        let own = (OWN / abreast.stride.max(1e-2)).ceil() as u32;
-        let outside = (ray.origin - abreast.centre).length_squared() >= abreast.radius * abreast.radius;
-        if outside || ray.done.holds(place(walker.segment()), own) {
+        let outside = (ray.origin - place.centre).length_squared() >= place.radius * place.radius;
+        if outside || done(walker.segment()) {
             return None;
         }
         let hit = RawHit { t: 0.0, normal: Vec3A::ZERO, u: walker.u(), segment: walker.segment(), ..*leaving };
         let tilted = yarns.occluders.own().shape().tilted;
-        let section = Section::at_start((walker, abreast), ray.origin, ray.direction, tilted);
-        Some(Self { hit, section: Section { looked_at: ray.looks, ..section }, first_ply: f32::INFINITY })
-    }
-
-    /// Whether the ray starts within the yarn's tube.
-    #[inline]
-    fn starts(&self) -> bool {
-        self.hit.normal == Vec3A::ZERO
+        let section = Section::at_start((walker, place), ray.origin, ray.direction, tilted);
+        Some(Self { hit, section: Section { looked_at: ray.looks, ..section } })
     }
 }
 
@@ -120,17 +127,19 @@ fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, last: bool) ->
         .then_some(RawHit { t, normal: outward, u, segment, ..*leaving })
 }
 
-/// Lets rays through between the plies.
+/// Lets rays through between the plies, and finds whose plies come first: tubes overlap where yarns touch that are pressed flat.
 pub(super) struct GapFilter<'a, 'r> {
     geometries: &'a [CurveGeometry],
     ray: &'r Ray,
-    /// The hit accepted last, as Embree offered it, and the yarn there: the one that stands in the end.
+    /// How far it is to the hit that stands: in a yarn, to its first ply.
+    nearest: f32,
+    /// The yarn's hit accepted last, as Embree offered it, and the yarn there.
     last: Option<(RawHit, Met<'a>)>,
 }
 
 impl<'a, 'r> GapFilter<'a, 'r> {
     pub(super) fn new(geometries: &'a [CurveGeometry], ray: &'r Ray) -> Self {
-        Self { geometries, ray, last: None }
+        Self { geometries, ray, nearest: f32::INFINITY, last: None }
     }
 
     /// The yarn at the hit that stands: as it was when it was accepted, or made anew.
@@ -143,26 +152,34 @@ impl<'a, 'r> GapFilter<'a, 'r> {
             _ => Met::at(yarns, self.ray, hit).unwrap_or_else(|| Met::entering(yarns, self.ray, *hit)),
         }
     }
+
+    /// How far it is to what is met at a hit: in a yarn, about to its first ply.
+    #[inline]
+    fn distance(&mut self, hit: &RawHit) -> Option<f32> {
+        // Meshes count from both sides.
+        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return Some(hit.t) };
+        let CurveGeometry::Yarns(yarns) = geometry else { return (!leaves(self.ray, hit)).then_some(hit.t) };
+        let shape = yarns.occluder_at(hit.segment).shape();
+        if shape.filled && !yarns.strands.flattened() && !leaves(self.ray, hit) {
+            return Some(hit.t);
+        }
+        let met = Met::at(yarns, self.ray, hit)?;
+        let distance = met.hit.t + met.section.meets_ply(shape)? * met.section.radius;
+        if distance < self.nearest {
+            self.last = Some((*hit, met));
+        }
+        Some(distance)
+    }
 }
 
 impl HitFilter for GapFilter<'_, '_> {
     #[inline]
     fn accept(&mut self, hit: &RawHit) -> Option<f32> {
-        // Meshes count from both sides.
-        let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return Some(hit.t) };
-        let CurveGeometry::Yarns(yarns) = geometry else { return (!leaves(self.ray, hit)).then_some(hit.t) };
-        let mut met = Met::at(yarns, self.ray, hit)?;
-        let depth = met.section.meets_ply(yarns.occluder_at(hit.segment).shape())?;
-        met.first_ply = met.hit.t + depth * met.section.radius;
-        // Tubes overlap where yarns touch that are pressed flat: what counts is whose plies come first.
-        if self.last.as_ref().is_some_and(|(_, last)| last.first_ply <= met.first_ply) {
-            return None;
-        }
-        if met.starts() {
-            met.hit.t = met.first_ply.min(hit.t);
-        }
-        self.last = Some((*hit, met));
-        Some(met.hit.t)
+        let distance = self.distance(hit)?;
+        (distance < self.nearest).then(|| {
+            self.nearest = distance;
+            distance
+        })
     }
 }
 
@@ -210,14 +227,14 @@ impl HitFilter for ShadowFilter<'_> {
     fn accept(&mut self, hit: &RawHit) -> Option<f32> {
         let Some(geometry) = self.geometries.get(hit.geometry as usize) else { return Some(hit.t) };
         let CurveGeometry::Yarns(yarns) = geometry else { return (!leaves(self.ray, hit)).then_some(hit.t) };
-        let Met { section, .. } = Met::at(yarns, self.ray, hit)?;
+        let Met { hit, section } = Met::at(yarns, self.ray, hit)?;
         let yarn = yarns.occluder_at(hit.segment);
         section.crossings(yarn.shape(), self.crossings);
         if self.crossings.is_empty() {
             return None;
         }
         let through = yarn.transparency(self.crossings);
-        if through >= OPAQUE && !self.repeated(hit, section.radius) {
+        if through >= OPAQUE && !self.repeated(&hit, section.radius) {
             self.passed *= through;
         }
         (through.min(self.passed) < OPAQUE).then_some(hit.t)

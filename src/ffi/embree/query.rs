@@ -45,7 +45,8 @@ pub(crate) struct RawHit {
 
 /// Decides which hits count. Called during traversal, in any order, and possibly more than once for one hit.
 pub(crate) trait HitFilter {
-    /// The distance at which the hit stands, no more than its own; `None` lets the ray pass.
+    /// The distance at which the hit stands; `None` lets the ray pass. Beyond the hit's own distance it leaves room for nearer
+    /// hits between, but a hit stands no farther away than one that stood before, nor than the ray goes.
     fn accept(&mut self, hit: &RawHit) -> Option<f32>;
 }
 
@@ -54,11 +55,13 @@ pub(crate) trait HitFilter {
 struct QueryContext<'f, F> {
     base: sys::RTCRayQueryContext,
     filter: &'f mut F,
+    /// How far the ray goes before the hit that is asked about: Embree writes the hit's distance over it.
+    t_far: f32,
     panic: Option<Box<dyn Any + Send>>,
 }
 
 impl<'f, F> QueryContext<'f, F> {
-    fn new(filter: &'f mut F) -> Self {
+    fn new(filter: &'f mut F, t_far: f32) -> Self {
         // SAFETY: the struct is plain integers, for which all bit patterns are valid; all ones is
         // RTC_INVALID_GEOMETRY_ID, which is what rtcInitRayQueryContext writes into each of its fields.
         let base = unsafe {
@@ -66,7 +69,7 @@ impl<'f, F> QueryContext<'f, F> {
             ptr::write_bytes(base.as_mut_ptr(), 0xff, 1);
             base.assume_init()
         };
-        Self { base, filter, panic: None }
+        Self { base, filter, t_far, panic: None }
     }
 }
 
@@ -93,8 +96,11 @@ unsafe extern "C" fn filter_trampoline<F: HitFilter>(args: *const sys::RTCFilter
         };
         let filter = &mut *context.filter;
         match catch_unwind(AssertUnwindSafe(|| filter.accept(&hit))) {
-            // All of a ray that a filter may change is how far it goes, and that only to less.
-            Ok(Some(t)) => ray.tfar = ray.tfar.min(t),
+            // All of a ray that a filter may change is how far it goes, and that to no more than before the hit.
+            Ok(Some(t)) => {
+                context.t_far = context.t_far.min(t);
+                ray.tfar = context.t_far;
+            }
             Ok(None) => *args.valid = 0,
             Err(payload) => context.panic = Some(payload),
         }
@@ -123,7 +129,7 @@ impl CommittedScene {
     /// The nearest hit that `filter` lets stand.
     #[inline]
     pub(crate) fn intersect<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> Option<RawHit> {
-        let mut context = QueryContext::new(filter);
+        let mut context = QueryContext::new(filter, ray.t_far);
         let mut query = sys::RTCRayHit { ray: embree_ray(ray), hit: no_hit() };
         let mut args = sys::RTCIntersectArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER,
@@ -152,7 +158,7 @@ impl CommittedScene {
     /// Whether any hit stands that `filter` is asked about.
     #[inline]
     pub(crate) fn occluded<F: HitFilter>(&self, ray: &RawRay, filter: &mut F) -> bool {
-        let mut context = QueryContext::new(filter);
+        let mut context = QueryContext::new(filter, ray.t_far);
         let mut query = embree_ray(ray);
         let mut args = sys::RTCOccludedArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER,

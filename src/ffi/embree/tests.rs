@@ -99,6 +99,35 @@ fn a_rejected_hit_lets_the_ray_pass() {
     assert!(scene.occluded(&ray, &mut accept));
 }
 
+/// A hit of the geometry 0 stands farther away than it is.
+struct Deferring(f32);
+
+impl HitFilter for Deferring {
+    fn accept(&mut self, hit: &RawHit) -> Option<f32> {
+        Some(hit.t + if hit.geometry == 0 { self.0 } else { 0.0 })
+    }
+}
+
+#[test]
+fn a_hit_that_stands_farther_away_leaves_room_for_nearer_ones() {
+    let device = Device::new(1).unwrap();
+    let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
+    for z in [0.0, -1.0, -2.0] {
+        let points: Arc<[Vec3A]> = [Vec3A::ZERO, Vec3A::X, Vec3A::Y].map(|p| p + z * Vec3A::Z).into();
+        builder.add_triangles(points, [[0, 1, 2]].into()).unwrap();
+    }
+    let scene = builder.commit().unwrap();
+    let ray = endless(Vec3A::new(0.25, 0.5, 5.0), Vec3A::NEG_Z);
+    for (by, geometry, t) in [(0.0, 0, 5.0), (0.5, 0, 5.5), (1.5, 1, 6.0)] {
+        let hit = scene.intersect(&ray, &mut Deferring(by)).unwrap();
+        assert!(hit.geometry == geometry && (hit.t - t).abs() < 1e-5, "by {by}: {hit:?}");
+    }
+    // No farther than the ray goes.
+    let short = RawRay { t_far: 5.2, ..ray };
+    let hit = scene.intersect(&short, &mut Deferring(0.5)).unwrap();
+    assert!(hit.geometry == 0 && hit.t == 5.2, "{hit:?}");
+}
+
 #[test]
 fn triangles_are_met_from_both_sides() {
     let device = Device::new(1).unwrap();
