@@ -27,7 +27,7 @@
 //!
 //! # The rooms, from ground to top
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
-//! * [`ffi`]: Embree, OpenImageIO and Open Image Denoise behind a safe face; the only `unsafe` code.
+//! * [`ffi`]: Embree, OpenImageIO, Open Image Denoise and the heap behind a safe face; the only `unsafe` code.
 //! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
 //! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
 //! * [`trace`]: rays against curves and meshes, no light.

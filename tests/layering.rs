@@ -36,7 +36,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
 
 /// All that a room takes from the foreign libraries: kept small, so that Embree could be exchanged.
 const FROM_FFI: [(&str, &[&str]); 4] = [
-    ("cli", &["ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
+    ("cli", &["ffi::heap", "ffi::oidn::Denoiser", "ffi::oidn::OidnError"]),
     (
         "image",
         &[

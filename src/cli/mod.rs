@@ -29,6 +29,7 @@ use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::{
     cloth::BuildError,
     experiment::{converge::ConvergeError, table3::BenchError},
+    ffi::heap,
     geometry::pattern::overlap::{self, Overlap},
     image::output,
     input::document::Value,
@@ -202,6 +203,7 @@ fn take_negative_numbers(command: clap::Command) -> clap::Command {
 
 /// Runs the program with the process's arguments.
 pub fn run() -> ExitCode {
+    heap::give_back_large_pieces();
     let matches = take_negative_numbers(Cli::command()).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match cli.command {

@@ -7,6 +7,7 @@
 #![allow(unsafe_code, reason = "calling C is unsafe; this folder is where it is checked")]
 
 pub(crate) mod embree;
+pub(crate) mod heap;
 pub(crate) mod oidn;
 #[cfg(feature = "oiio")]
 pub(crate) mod oiio;
