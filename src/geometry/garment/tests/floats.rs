@@ -145,3 +145,49 @@ fn floats_are_counted_before_they_are_laid() {
     assert!((points as f64 / (colored - plain) as f64 - 1.0).abs() < 0.05, "{points} {colored} {plain}");
     assert!((length / (floats.stitches as f64 * 4.0) - 1.0).abs() < 0.05);
 }
+
+#[test]
+fn floats_follow_the_cloth_from_frame_to_frame() {
+    // Rolled about the wales, face inside or outside, without being stretched.
+    const RADIUS: f64 = 40.0;
+    let roll = |p: DVec3, inside: f64| {
+        let (sin, cos) = ((p.x - 50.0) / RADIUS).sin_cos();
+        let r = RADIUS - inside * p.z;
+        DVec3::new(50.0 + r * sin, p.y, inside * (RADIUS - r * cos))
+    };
+    let unroll = |p: DVec3, inside: f64| {
+        let (x, z) = (p.x - 50.0, RADIUS - inside * p.z);
+        DVec3::new(50.0 + RADIUS * x.atan2(z), p.y, inside * (RADIUS - x.hypot(z)))
+    };
+    let still = square();
+    let frames = [1.0, -1.0].map(|inside| {
+        let mut frame = still.clone();
+        frame.points.iter_mut().for_each(|p| *p = roll(*p, inside));
+        frame
+    });
+    let tile = stockinette();
+    let d = tile.diameter();
+    let garment = Garment::new(&still, options(tile)).unwrap();
+    let all = [&still, &frames[0], &frames[1]];
+    let laid = garment.lay(&still, &all, &[], &[Some(stranded(wide, Some(5)))], &mut Vec::new()).unwrap();
+    let [at_rest, rolled @ ..] = laid.as_slice() else { panic!("three frames") };
+    let share = |yarns: &[LaidYarn]| run_into_each_other(yarns).share;
+    let rest = share(&within(&at_rest.concat(), &middle));
+    for (frame, inside) in rolled.iter().zip([1.0, -1.0]) {
+        let mut furthest: f64 = 0.0;
+        let mut unrolled = frame.concat();
+        for (yarn, own) in unrolled.iter_mut().zip(at_rest.concat()) {
+            assert_eq!((yarn.color, yarn.closed, yarn.points.len()), (own.color, own.closed, own.points.len()));
+            assert_eq!(yarn.coordinates, own.coordinates);
+            for (p, q) in yarn.points.iter_mut().zip(&own.points) {
+                *p = unroll(*p, inside);
+                if middle(*q) {
+                    furthest = furthest.max(p.distance(*q));
+                }
+            }
+        }
+        let found = share(&within(&unrolled, &middle));
+        eprintln!("{inside}: {:.3} diameters, {found:.3} of {rest:.3} overlap", furthest / d);
+        assert!(furthest < 0.1 * d && found < rest + 0.01, "{inside}: {furthest} {found} {rest}");
+    }
+}
