@@ -29,7 +29,7 @@ const EXAMPLES: &str = "Examples:
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct InfoArgs {
-    /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .yarns, .txt, .usda, .usdc, .usdz, .abc) or a film (a checkpoint, a part of a render).
+    /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .yarns, .smobj, .txt, .curves, .usd, .usda, .usdc, .usdz, .abc) or a film (a checkpoint, a part of a render).
     file: PathBuf,
     /// Radius of the yarns of a curve file that has none, in its unit: tells how far they overlap.
     #[arg(long, value_name = "R", value_parser = positive)]

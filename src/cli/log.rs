@@ -29,7 +29,7 @@ pub(super) struct LogArgs {
     /// No progress and no summary: errors only.
     #[arg(long, short)]
     pub(super) quiet: bool,
-    /// More about the scene and the run; -vv for every checkpoint and wave.
+    /// More about the scene and the run, checkpoints among it; -vv for every step of 1 to 32 samples a pixel.
     #[arg(long, short, action = clap::ArgAction::Count)]
     pub(super) verbose: u8,
     /// Say everything as lines of JSON on standard error, with the times of all phases.

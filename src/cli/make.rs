@@ -41,7 +41,7 @@ const EXAMPLES: &str = "Examples:
   yarnray make weave --yarn linen --as plies -o linen.usdc
   yarnray render scenes/glove.toml --curves rib.hair --set fabric.0.source.unit=mm -o rib.png
 
-The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .txt (x y z radius, as Mitsuba reads it),
+The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), .yarns, .txt (x y z radius, as Mitsuba reads it),
 .usda and .usdc (BasisCurves with widths, colours and the numbers of yarns and plies, in millimetres). Lengths have no unit
 in the others; what reads them gives one.";
 
@@ -116,7 +116,7 @@ struct WeaveArgs {
     /// The warp's share of the crimp, 0 to 1; by the yarns' stiffness if not given.
     #[arg(long, value_name = "X", value_parser = share)]
     crimp: Option<f64>,
-    /// Cut all around, with selvedges at the sides, with a fringe or with hems.
+    /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
     #[arg(long, value_parser = ["live", "selvedge", "fringe", "finished"])]
     edges: Option<String>,
     /// How high the pile of terry, velvet and corduroy stands.

@@ -13,7 +13,7 @@ use crate::{render::Shard, scene::animation::numbered};
 const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml                                  writes out/swatch.exr
   yarnray render scenes/swatch.toml --spp 256 -o s.exr -o s.png      two formats of one render
-  yarnray render scenes/glove.toml --curves glove.bcc --time 30      the best picture of half a minute
+  yarnray render scenes/swatch.toml --spp 100000 --time 30           the best picture of half a minute
   yarnray render scenes/swatch.toml --crop 300,200,460,320 -o c.png  a part of the frame
   yarnray render scenes/swatch.toml --checkpoint c.film --resume     goes on where it was stopped
   yarnray render scenes/swatch.toml --shard 1/3 -o 1.film            a third of the samples, for `yarnray merge`
