@@ -5,7 +5,10 @@
 
 mod woven;
 
-use std::{collections::BTreeMap, fmt};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+};
 
 pub use woven::{WifUse, WovenWif};
 
@@ -260,9 +263,9 @@ fn crossings(
         }
         for (pick, entry) in file.numbered("TREADLING") {
             let Some(pick) = within(pick) else { continue };
-            for treadle in list(entry, "TREADLING", treadles, "treadle")? {
-                moved_at_pick[pick].extend(shafts_of_treadle.get(&treadle).into_iter().flatten());
-            }
+            let pressed: BTreeSet<u64> = list(entry, "TREADLING", treadles, "treadle")?.into_iter().collect();
+            let moved = pressed.iter().filter_map(|treadle| shafts_of_treadle.get(treadle)).flatten();
+            moved_at_pick[pick] = moved.copied().collect::<BTreeSet<u64>>().into_iter().collect();
         }
     }
     let rising = match file.entry("WEAVING", "RISING SHED") {

@@ -89,6 +89,9 @@ impl Spread {
 impl Batch {
     /// Adds the curves, in the space of the stage.
     pub(super) fn add_to(self, set: &mut CurveSet, to_stage: &DMat4) -> Result<(), Problem> {
+        if !to_stage.is_finite() {
+            return Err(Problem::new("its transform is not finite"));
+        }
         let mut kind = Kind::new(self.basis, self.wrap);
         let Self { counts, points, .. } = self;
         let mut total = 0usize;

@@ -204,11 +204,13 @@ impl Stage {
     ) -> Result<(CurveSet, Vec<(String, usize)>), StageError> {
         let mut set = CurveSet { unit_mm: self.unit_mm(), up_axis: self.up_axis(), ..CurveSet::default() };
         let mut objects = Vec::new();
+        let mut points = 0;
         let mut add = |path: &str, batch: curves::Batch, to_stage: &DMat4| {
             let before = set.curves.len();
             batch.add_to(&mut set, to_stage).map_err(|p| p.at(path))?;
             objects.push((path.to_owned(), set.curves.len() - before));
-            if set.curves.iter().map(|c| c.points.len()).sum::<usize>() > MAX_POINTS {
+            points += set.curves[before..].iter().map(|c| c.points.len()).sum::<usize>();
+            if points > MAX_POINTS {
                 return Err(Problem::new(format!("more than {MAX_POINTS} points")).at(path));
             }
             Ok(())

@@ -103,7 +103,13 @@ impl PolygonMesh {
 
     /// Puts it into the space of the stage; faces are turned where that mirrors them, or where they were wound the
     /// other way from the start.
-    pub(super) fn place(&mut self, to_stage: &DMat4, clockwise: bool) {
+    ///
+    /// # Errors
+    /// If that space is nowhere.
+    pub(super) fn place(&mut self, to_stage: &DMat4, clockwise: bool) -> Result<(), Problem> {
+        if !to_stage.is_finite() {
+            return Err(Problem::new("its transform is not finite"));
+        }
         for p in &mut self.points {
             *p = to_stage.transform_point3(*p);
         }
@@ -125,6 +131,7 @@ impl PolygonMesh {
                 first = own.end;
             }
         }
+        Ok(())
     }
 
     /// Puts faces of no group into one of this name.
@@ -226,7 +233,9 @@ mod tests {
     #[test]
     fn mirrored_faces_are_turned() {
         let mut mesh = quad();
-        mesh.place(&DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)), false);
+        mesh.place(&DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)), false).unwrap();
+        let nowhere = DMat4::from_translation(DVec3::new(f64::NAN, 0.0, 0.0));
+        assert!(mesh.clone().place(&nowhere, false).is_err());
         assert_eq!(mesh.corners, [3, 2, 1, 0]);
         assert_eq!(mesh.triangles().collect::<Vec<_>>(), [[0, 1, 2], [0, 2, 3]]);
     }

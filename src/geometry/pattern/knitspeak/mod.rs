@@ -44,6 +44,9 @@ const MOST_ROWS: usize = 20_000;
 
 const MOST_STITCHES: u32 = 20_000;
 
+/// Rounds of repeats in a row, within each other counted too.
+const MOST_ROUNDS: u32 = 1_000_000;
+
 /// How deep repeats may lie in one another.
 const MOST_NESTED: usize = 16;
 
@@ -120,8 +123,8 @@ impl Sequence {
         let unworked = |count| Steps { name: "-".to_owned(), takes: 1, makes: 1, count };
         let mut out: Vec<Steps> = Vec::new();
         push(&mut out, unworked(behind));
-        let mut left = found - behind;
-        self.follow(&mut left, &mut out, line, row)?;
+        let (mut left, mut rounds) = (found - behind, MOST_ROUNDS);
+        self.follow(&mut left, &mut out, &mut rounds, line, row)?;
         if left > 0 && !matches!(self.0.last(), Some(Item::Turn)) {
             let problem = format!("row {row} leaves {left} of {} stitches unworked", found - behind);
             return error(line, problem, "rep from * to end, `turn` for a short row, or another number of `stitches`");
@@ -139,7 +142,12 @@ impl Sequence {
         self.0.iter().map(of).fold(0, u32::saturating_add)
     }
 
-    fn follow(&self, left: &mut u32, out: &mut Vec<Steps>, line: usize, row: usize) -> Result<()> {
+    /// `rounds` are those that are left: repeats of what takes no stitch would never end.
+    fn follow(&self, left: &mut u32, out: &mut Vec<Steps>, rounds: &mut u32, line: usize, row: usize) -> Result<()> {
+        let Some(fewer) = rounds.checked_sub(1) else {
+            return error(line, format!("row {row} repeats more than {MOST_ROUNDS} times"), "fewer repeats");
+        };
+        *rounds = fewer;
         for item in &self.0 {
             match item {
                 Item::Steps(steps) => {
@@ -162,7 +170,7 @@ impl Sequence {
                 Item::Turn => {}
                 Item::Times(sequence, times) => {
                     for _ in 0..*times {
-                        sequence.follow(left, out, line, row)?;
+                        sequence.follow(left, out, rounds, line, row)?;
                     }
                 }
                 Item::Repeat(sequence, last) => {
@@ -174,7 +182,7 @@ impl Sequence {
                         return error(line, problem, format!("{rest} fewer `stitches`, or {} more, fit", takes - rest));
                     }
                     for _ in 0..room / takes {
-                        sequence.follow(left, out, line, row)?;
+                        sequence.follow(left, out, rounds, line, row)?;
                     }
                 }
             }
@@ -188,7 +196,7 @@ impl Sequence {
 
 fn push(out: &mut Vec<Steps>, steps: Steps) {
     match out.last_mut() {
-        Some(last) if last.name == steps.name => last.count += steps.count,
+        Some(last) if last.name == steps.name => last.count = last.count.saturating_add(steps.count),
         _ if steps.count > 0 => out.push(steps),
         _ => {}
     }

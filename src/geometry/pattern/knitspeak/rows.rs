@@ -90,7 +90,8 @@ struct Head {
 impl Head {
     fn read(text: &str, line: usize) -> Result<Self> {
         let lower = text.to_lowercase();
-        let side = match (lower.contains("(rs)"), lower.contains("(ws)")) {
+        let says = |side: &str| [")", ","].iter().any(|end| lower.contains(&format!("({side}{end}")));
+        let side = match (says("rs"), says("ws")) {
             (true, false) => Some(Side::Right),
             (false, true) => Some(Side::Wrong),
             _ => None,
@@ -100,7 +101,15 @@ impl Head {
             .iter()
             .any(|words| lower.contains(words));
         let known = round || starts_with(&lower, "row");
-        let numbers = lower.split("all").next().unwrap_or_default();
+        // Sides and counts of stitches stand in brackets.
+        let mut deep = 0_i32;
+        let outside = |c: &char| {
+            let was = deep;
+            deep += i32::from(*c == '(') - i32::from(*c == ')');
+            was == 0 && *c != '('
+        };
+        let plain: String = lower.chars().filter(outside).collect();
+        let numbers = plain.split("all").next().unwrap_or_default();
         let mut rows = Vec::new();
         let digits = |t: &str| t.chars().filter(char::is_ascii_digit).collect::<String>().parse::<usize>().ok();
         for part in numbers.split([',', '&']).flat_map(|p| p.split(" and ")) {

@@ -48,6 +48,7 @@ fn repeats_and_ranges() {
     assert_eq!(rows("Row 1: (k1, [p1, k1] 2 times) 2x", 10), ["k p k p k2 p k p k"]);
     assert_eq!(rows("Row 1: sl1 wyif, k to last 2 sts, k1 tbl, sl1 wyib", 6), ["sl ktbl k3 slwyif"]);
     assert_eq!(rows("Row 1: 2/1 LC, c4f, k1", 8), ["k c4f 2/1lc"]);
+    assert_eq!(rows("Row 1 (RS, 4 sts): k4\nRow 2 (4 sts): p4", 4), ["k4", "k4"]);
 }
 
 #[test]
@@ -63,6 +64,9 @@ fn mistakes_are_named() {
     assert!(wrong("Row 1: k1] ", 1).problem.contains("closes nothing"));
     assert!(wrong("k2, p2", 4).line == Some(0));
     assert!(wrong("", 4).problem.contains("no row"));
+    let endless = "Row 1: [[[yo] 20000 times] 20000 times] 20000 times, k to end";
+    assert!(wrong(endless, 4).problem.contains("repeats more than"));
+    assert!(wrong("Row 1: 4294967295/1 LC", 4).problem.contains("is no cable"));
     let deep = format!("Row 1: {}k1", "[".repeat(100));
     assert!(wrong(&deep, 1).problem.contains("deep"));
 }

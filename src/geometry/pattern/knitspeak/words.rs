@@ -244,7 +244,11 @@ impl Parser<'_> {
         self.at += 1;
         let counts: Vec<u32> = word.split('/').filter_map(|n| n.parse().ok()).collect();
         let &[front, back] = &counts[..] else { return error(self.line, format!("\"{word}\" is no cable"), KNOWN) };
-        if !matches!(kind.as_str(), "lc" | "rc" | "lpc" | "rpc") || front == 0 || back == 0 || front + back > 24 {
+        if !matches!(kind.as_str(), "lc" | "rc" | "lpc" | "rpc")
+            || front == 0
+            || back == 0
+            || front.saturating_add(back) > 24
+        {
             return error(self.line, format!("\"{word} {}\" is no cable", short(&kind)), "as in 2/1 LC, 2/2 RPC");
         }
         let both = front + back;

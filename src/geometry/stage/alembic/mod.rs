@@ -228,7 +228,7 @@ impl Archive {
         }
         mesh.group_the_rest(object.name);
         // Alembic winds its faces clockwise.
-        mesh.place(&object.to_stage, true);
+        mesh.place(&object.to_stage, true)?;
         Ok(Some(mesh))
     }
 
@@ -411,6 +411,11 @@ fn at_corners<T>(mesh: &PolygonMesh, name: &str, given: AtCorners<T>, spread: Sp
     };
     if found != expected {
         return Err(Problem::new(format!("`{name}` should have {expected} values, found {found}")));
+    }
+    // Of pairs and triples there are fewer than of numbers.
+    let known = given.values.len();
+    if let Some(index) = given.indices.iter().flatten().find(|&&i| i as usize >= known) {
+        return Err(Problem::new(format!("`{name}` has index {index} of {known} values")));
     }
     if spread == Spread::FaceVarying {
         return Ok(given);

@@ -43,7 +43,7 @@ pub(super) fn read(values: &Values<'_>, to_stage: &DMat4) -> Result<PolygonMesh,
     if values.token("subdivisionScheme")?.is_none_or(|s| s != "none") && mesh.normals.is_empty() {
         mesh.notes.push(format!("{}: a subdivision surface is taken as its control mesh", values.prim.path().as_str()));
     }
-    mesh.place(to_stage, values.token("orientation")?.is_some_and(|o| o == "leftHanded"));
+    mesh.place(to_stage, values.token("orientation")?.is_some_and(|o| o == "leftHanded"))?;
     Ok(mesh)
 }
 

@@ -41,6 +41,10 @@ pub(super) fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&st
     }
     let mut key = Vec::new();
     if let Some(yarns) = table.required_table("yarns") {
+        if yarns.keys().next().is_none() {
+            context.error(yarns.header(), "`yarns` names no yarn", Some("as in \"#c02a1f\" = \"red\"".to_owned()));
+            return None;
+        }
         for sign in yarns.keys().collect::<Vec<_>>() {
             let span = yarns.span(sign).unwrap_or(yarns.header());
             if let Some(name) = yarns.string(sign) {
