@@ -53,6 +53,11 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
 /// The cell itself, millimetres.
 pub(super) fn tile(bytes: &[u8]) -> Result<Tile, CurveFileError> {
     let cell = PatternCell::parse(bytes)?;
+    if cell.radius > cell.period[0].max(cell.period[1]) {
+        let [x, y] = cell.period;
+        let problem = format!("the radius {} is larger than the cell of {x} x {y} that repeats", cell.radius);
+        return Err(CurveFileError::new(FileLocation::File, problem));
+    }
     let strand = |yarn: Yarn| {
         let points = yarn.stops.iter().map(|&(vertex, offset)| place(&cell, vertex, offset));
         let mut points: Vec<DVec3> = points.collect::<Result<_, _>>()?;
@@ -409,6 +414,14 @@ mod tests {
         assert_eq!(curves, expected);
         // Two corners of the cloth hold one vertex of a yarn each.
         assert_eq!(set.notes, ["2 curves (first: curve 2) without two distinct points; skipped"]);
+    }
+
+    #[test]
+    fn a_tile_is_wider_than_half_its_yarn() {
+        let text = file(&[[1.0, 1.0]], &[[0, 0, 1, 0]]);
+        assert_eq!(tile(text.as_bytes()).unwrap().counts[1], 1);
+        let error = tile(text.replace("10 20 0.5", "10 20 2e4").as_bytes()).unwrap_err();
+        assert!(error.to_string().contains("radius 20000 is larger than the cell of 10 x 20"), "{error}");
     }
 
     #[test]

@@ -13,7 +13,12 @@ pub(super) struct Body {
     normals: Vec<[DVec3; 3]>,
     cells: HashMap<[i32; 3], Vec<u32>>,
     size: f64,
+    /// How far inside of it a point still comes out, mm.
+    depth: f64,
 }
+
+/// Cells that triangles are in, for each and for all: beyond that cells are made larger.
+const MOST_ENTRIES: [f64; 2] = [32.0, 1e6];
 
 impl Body {
     /// `reach` is the furthest from its surface that will be asked about, mm.
@@ -23,11 +28,26 @@ impl Body {
         let triangles: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|t| t.map(|i| mesh.points[i as usize])).collect();
         let normals = mesh.triangles.iter().map(|t| t.map(|i| mesh.normals[i as usize])).collect();
         let mean = triangles.iter().map(|[a, b, _]| a.distance(*b)).sum::<f64>() / triangles.len().max(1) as f64;
-        let size = (2.0 * reach).max(mean);
+        let depth = (2.0 * reach).max(mean);
+        let mut size = depth;
+        let range = |t: &[DVec3; 3], size: f64| {
+            let [low, high] = [t[0].min(t[1]).min(t[2]) - reach, t[0].max(t[1]).max(t[2]) + reach];
+            [low, high].map(|p| (p / size).floor())
+        };
+        // A floor of two triangles under a body of small ones is in very many cells of theirs.
+        let entries = |size: f64| -> f64 {
+            let count = |t: &[DVec3; 3]| {
+                let [low, high] = range(t, size);
+                (high - low + 1.0).element_product()
+            };
+            triangles.iter().map(count).sum()
+        };
+        while entries(size) > MOST_ENTRIES[0] * triangles.len() as f64 + MOST_ENTRIES[1] {
+            size *= 2.0;
+        }
         let mut cells: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
         for (i, t) in triangles.iter().enumerate() {
-            let low = ((t[0].min(t[1]).min(t[2]) - reach) / size).floor().as_ivec3();
-            let high = ((t[0].max(t[1]).max(t[2]) + reach) / size).floor().as_ivec3();
+            let [low, high] = range(t, size).map(DVec3::as_ivec3);
             for z in low.z..=high.z {
                 for y in low.y..=high.y {
                     for x in low.x..=high.x {
@@ -36,7 +56,7 @@ impl Body {
                 }
             }
         }
-        Self { triangles, normals, cells, size }
+        Self { triangles, normals, cells, size, depth }
     }
 
     /// Where a point goes that is nearer to the body than `clearance` or inside of it by less than the reach.
@@ -55,7 +75,7 @@ impl Body {
         let (_, on, normal) = best?;
         let normal = normal.normalize_or(DVec3::Y);
         let height = (at - on).dot(normal);
-        (height < clearance && height > -self.size).then(|| at + normal * (clearance - height))
+        (height < clearance && height > -self.depth).then(|| at + normal * (clearance - height))
     }
 }
 
@@ -107,6 +127,25 @@ mod tests {
                 }
                 None => assert!(!moved, "{radius}"),
             }
+        }
+    }
+
+    /// A body that stands on a floor of a kilometre: what is near the body is found as without the floor.
+    #[test]
+    fn a_wide_floor_takes_no_room() {
+        let ball = Mesh::sphere(100.0, 96);
+        let mut both = ball.clone();
+        let first = both.points.len() as u32;
+        let corner = |x: f64, z: f64| DVec3::new(5e5 * x, -100.0, 5e5 * z);
+        both.points.extend([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+        both.triangles.extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
+        let (alone, standing) = (Body::new(&ball, 5.0), Body::new(&both, 5.0));
+        assert!(standing.cells.values().map(Vec::len).sum::<usize>() < 3_000_000);
+        for radius in [99.0, 101.0, 103.0] {
+            let at = DVec3::new(0.3, 0.5, 0.8).normalize() * radius;
+            let [a, b] = [&alone, &standing].map(|body| body.push_out(at, 2.0));
+            assert_eq!(a.is_some(), b.is_some());
+            assert!(a.zip(b).is_none_or(|(a, b)| a.distance(b) < 0.1), "{a:?} {b:?}");
         }
     }
 }

@@ -21,7 +21,7 @@ mod strain;
 mod subdivide;
 mod surface;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::{
@@ -169,6 +169,19 @@ impl Garment {
         let widest = options.cloths.iter().map(|c| c.tile.stitch().x).fold(0.0, f64::max);
         let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
         let borders = surface.borders(panels.panels.len());
+        let boxes = borders.iter().zip(&cloth).map(|(border, &c)| {
+            let low = border.iter().flat_map(|e| e.ends).fold(DVec2::INFINITY, DVec2::min);
+            let high = border.iter().flat_map(|e| e.ends).fold(DVec2::NEG_INFINITY, DVec2::max);
+            ((high - low).max(DVec2::ZERO) / options.cloths[c].tile.stitch()).element_product()
+        });
+        if let Some((panel, places)) = boxes.enumerate().find(|(_, places)| *places > 4.0 * MOST_STITCHES) {
+            let panel = &panels.panels[panel];
+            let problem = format!(
+                "panel `{}` lies askew in the texture coordinates: the rows and wales of the box around it hold {places:.1e} stitches",
+                panel.group
+            );
+            return Err(GarmentError::at(panel.line, problem, "turn it upright, or its wales with `grain`, or cut it"));
+        }
         let pose = surface.pose(&points);
         let wanted = |at: DVec3| options.near.is_none_or(|(middle, radius)| at.distance(middle) <= radius);
         let lays = |anchor| wanted(surface.at(&pose, anchor).0);

@@ -174,9 +174,13 @@ impl Areas<'_> {
         let total: f64 = faces.iter().map(|f| self.of(f)).sum();
         let total_uv: f64 = faces.iter().map(|f| self.in_uv(f).abs()).sum();
         let count = faces.len() as f64;
-        if total_uv <= 0.0 || !total_uv.is_finite() || total <= 0.0 {
+        if total_uv <= 0.0 || total <= 0.0 {
             let hint = "the texture coordinates are the flat panels of the garment";
             return Err(GarmentError::at(0, "the texture coordinates have no area", hint));
+        }
+        if !(total_uv.is_finite() && total.is_finite()) {
+            let problem = "the mesh is so large that its area is no number";
+            return Err(GarmentError::at(0, problem, "coordinates of some thousands at the most, and another `unit`"));
         }
         let sound = |f: &Face| {
             let [a, b, c] = f.points.map(|i| weld[i as usize]);

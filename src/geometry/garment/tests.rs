@@ -329,4 +329,27 @@ fn what_cannot_be_laid_is_said() {
     let error = Garment::new(&mesh, options(stockinette())).err().unwrap();
     assert!(error.problem.contains("`spiral` overlaps itself") && error.line > 0, "{error:?}");
     assert!(Garment::new(&GarmentMesh::parse(&text).unwrap(), options(stockinette())).is_ok());
+    // A band of 85 m that lies on the diagonal: its stitches are few, those of the box around it are not.
+    let n = 50;
+    let mut band = String::new();
+    for i in 0..=n {
+        let along = 60_000.0 * f64::from(i) / f64::from(n);
+        for side in [-3.0, 3.0] {
+            let (u, v) = (along - side, along + side);
+            writeln!(band, "v {u} {v} 0\nvt {u} {v}").unwrap();
+        }
+    }
+    band.push_str("g band\n");
+    for i in 0..n {
+        let a = 2 * i + 1;
+        writeln!(band, "f {0}/{0} {2}/{2} {3}/{3} {1}/{1}", a, a + 1, a + 2, a + 3).unwrap();
+    }
+    let band = GarmentMesh::parse(&band).unwrap();
+    let error = Garment::new(&band, options(stockinette())).err().unwrap();
+    assert!(error.problem.contains("`band` lies askew") && error.line > 0, "{error:?}");
+    // Stages have transforms in double precision.
+    let mut huge = square();
+    huge.points[0] = DVec3::splat(1e200);
+    let error = Garment::new(&huge, options(stockinette())).err().unwrap();
+    assert!(error.problem.contains("area is no number"), "{error:?}");
 }

@@ -22,7 +22,7 @@
 //!
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
 
-use std::fmt;
+use std::{fmt, sync::Arc};
 
 /// Which of several stitches worked together is on top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,7 +154,8 @@ pub struct Chart {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
-    steps: Vec<Step>,
+    /// Shared by all rows that one line stands for.
+    steps: Arc<[Step]>,
     /// The line of the description it came from, from 0.
     line: usize,
 }
@@ -252,7 +253,7 @@ impl Chart {
                 },
                 None => (1, text),
             };
-            let steps = parse_steps(steps, line)?;
+            let steps = Arc::from(parse_steps(steps, line)?);
             if rows.len() + count > MOST_ROWS {
                 let problem = format!("more than {MOST_ROWS} rows");
                 return Err(ChartError::new(Some(line), problem, "rows repeat by themselves"));

@@ -228,10 +228,16 @@ impl Tile {
         out
     }
 
-    /// How far its yarns run into each other, lying flat.
+    /// How far its yarns run into each other, lying flat; `None` where nothing lies near, and where yarns are so much thicker
+    /// than the tile is wide that this would take more than 2^24 points.
     pub fn overlap(&self) -> Option<Overlap> {
         // Enough of it that most of the yarn has all its neighbours.
-        let count = (16.0 * self.diameter() / self.period).ceil().max(DVec2::splat(3.0)).as_uvec2();
+        let count = (16.0 * self.diameter() / self.period).ceil().max(DVec2::splat(3.0));
+        let points: usize = self.strands.iter().map(|s| s.points.len()).sum();
+        if count.max_element() > 3.0 && count.element_product() * points as f64 > f64::from(1 << 24) {
+            return None;
+        }
+        let count = count.as_uvec2();
         let piece = self.repeated(count.x, count.y);
         let curves: Vec<(Curve, Vec<f64>)> = piece
             .strands
@@ -452,6 +458,10 @@ mod tests {
         assert!((tile.stitch() - 0.5 * DVec2::new(STITCH_WIDTH, ROW_HEIGHT)).length() < 1e-9, "{}", tile.stitch());
         let found = tile.overlap().unwrap();
         assert!(found.share < 0.05 && found.nearest < 1.1, "{found:?}");
+        // Yarns a thousand times as thick as the tile would run through millions of its repeats.
+        let mut thick = tile.clone();
+        thick.strands.iter_mut().for_each(|s| s.radius *= 1000.0);
+        assert!(thick.overlap().is_none());
         let per_stitch = tile.length() / f64::from(tile.counts[0] * tile.counts[1]) / 0.5;
         assert!((per_stitch - YARN_PER_STITCH).abs() < 0.4, "{per_stitch}");
         assert_eq!(tile.strands.len(), tile.counts[1] as usize);

@@ -144,9 +144,9 @@ fn number(entry: &Entry, section: &str) -> Result<f64, WifError> {
     value.ok_or_else(|| wrong(entry.line, format!("a number in [{section}] is expected, found \"{}\"", entry.value)))
 }
 
-/// Numbers between commas; 0 stands for none.
+/// Numbers between commas, each once and in order; 0 stands for none.
 fn list(entry: &Entry, section: &str, most: u64, of_what: &str) -> Result<Vec<u64>, WifError> {
-    let mut out = Vec::new();
+    let mut out = BTreeSet::new();
     for part in entry.value.split(',').map(str::trim).filter(|p| !p.is_empty()) {
         let value: u64 = part
             .parse()
@@ -156,10 +156,10 @@ fn list(entry: &Entry, section: &str, most: u64, of_what: &str) -> Result<Vec<u6
             return Err(wrong(entry.line, message));
         }
         if value > 0 {
-            out.push(value);
+            out.insert(value);
         }
     }
-    Ok(out)
+    Ok(out.into_iter().collect())
 }
 
 /// Reads a file.
@@ -231,6 +231,8 @@ fn crossings(
             shafts_of_end[end as usize - 1] = list(entry, "THREADING", shafts, "shaft")?;
         }
     }
+    // Shafts without an end move nothing.
+    let threaded: BTreeSet<u64> = shafts_of_end.iter().flatten().copied().collect();
     let unthreaded = shafts_of_end.iter().filter(|s| s.is_empty()).count();
     if unthreaded > 0 {
         notes.push(format!("{unthreaded} of {ends} ends are on no shaft and stay down"));
@@ -259,11 +261,13 @@ fn crossings(
         }
         let mut shafts_of_treadle: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
         for (treadle, entry) in file.numbered("TIEUP") {
-            shafts_of_treadle.insert(treadle, list(entry, "TIEUP", shafts, "shaft")?);
+            let mut tied = list(entry, "TIEUP", shafts, "shaft")?;
+            tied.retain(|shaft| threaded.contains(shaft));
+            shafts_of_treadle.insert(treadle, tied);
         }
         for (pick, entry) in file.numbered("TREADLING") {
             let Some(pick) = within(pick) else { continue };
-            let pressed: BTreeSet<u64> = list(entry, "TREADLING", treadles, "treadle")?.into_iter().collect();
+            let pressed = list(entry, "TREADLING", treadles, "treadle")?;
             let moved = pressed.iter().filter_map(|treadle| shafts_of_treadle.get(treadle)).flatten();
             moved_at_pick[pick] = moved.copied().collect::<BTreeSet<u64>>().into_iter().collect();
         }
@@ -278,8 +282,7 @@ fn crossings(
     };
     Ok(moved_at_pick
         .into_iter()
-        .map(|mut moved| {
-            moved.sort_unstable();
+        .map(|moved| {
             let moves = |end: &Vec<u64>| end.iter().any(|shaft| moved.binary_search(shaft).is_ok());
             shafts_of_end.iter().map(|end| moves(end) == rising && (rising || !end.is_empty())).collect()
         })
@@ -437,6 +440,12 @@ mod tests {
         assert_eq!(picture(&parse(lift.as_bytes()).unwrap()), ["#.#.", "....", "....", ".#.."]);
         let both = TWILL.replace("[TREADLING]\n1=1\n", "[TREADLING]\n1=1,3\n");
         assert_eq!(picture(&parse(both.as_bytes()).unwrap())[0], "####");
+        // What is said more than once counts once, and shafts without an end move nothing.
+        let again = both
+            .replace("1=1,3\n", "1=3,1,1,3\n")
+            .replace("4=1,4\n[T", "4=4,9,1,4\n[T")
+            .replace("Shafts=4", "Shafts=9");
+        assert_eq!(picture(&parse(again.as_bytes()).unwrap()), picture(&parse(both.as_bytes()).unwrap()));
     }
 
     #[test]

@@ -351,11 +351,14 @@ impl Widths {
         let segments: usize = counts.iter().map(|&c| kind.segments(c as usize)).sum();
         if spread == Spread::Varying && kind.wrap == Wrap::Periodic && widths.len() == segments + counts.len() {
             // Some writers give a ring's first value again at its end, as usd-core counts linear ones.
-            let mut end = 0;
+            let mut rest = widths.as_slice();
+            let mut kept = Vec::with_capacity(segments);
             for &count in counts {
-                end += kind.segments(count as usize);
-                widths.remove(end);
+                let (own, others) = rest.split_at(kind.segments(count as usize));
+                kept.extend_from_slice(own);
+                rest = &others[1..];
             }
+            widths = kept;
         }
         let points: usize = counts.iter().map(|&c| c as usize).sum();
         let varying: usize = counts.iter().map(|&c| kind.varying_values(c as usize)).sum();

@@ -66,6 +66,16 @@ impl std::error::Error for DraftError {}
 const LARGEST: usize = 1024;
 
 impl Draft {
+    /// Itself, unless it is too large to be relaxed.
+    fn limited(self) -> Result<Self, DraftError> {
+        if self.over.len() <= MOST_CROSSINGS {
+            return Ok(self);
+        }
+        let problem = format!("the smallest repeat of the draft is {} ends x {} picks", self.warps(), self.wefts());
+        let hint = format!("at most {MOST_CROSSINGS} crossings are woven, as of 512 x 512");
+        Err(DraftError { problem, hint })
+    }
+
     fn from_fn(warps: usize, wefts: usize, over: impl Fn(usize, usize) -> bool) -> Self {
         let over = (0..wefts).flat_map(|weft| (0..warps).map(move |warp| (weft, warp))).map(|(i, j)| over(i, j));
         Self { warps, over: over.collect(), layers: 1, crossing: false, pile: None }
@@ -102,7 +112,7 @@ impl Draft {
             return Err(wrong(format!("`treadling` has treadle {treadle}; `tie_up` has 1 to {}", tie_up.len())));
         }
         let over = |weft: usize, warp: usize| tie_up[treadling[weft] as usize - 1].contains(&threading[warp]);
-        Ok(Self::from_fn(threading.len(), treadling.len(), over))
+        Self::from_fn(threading.len(), treadling.len(), over).limited()
     }
 
     /// A weave as a picture of its right side, the top row first: `#` where the warp is on top, `.` where the weft is.
@@ -139,7 +149,7 @@ impl Draft {
         if warps == 0 {
             return Err(wrong("a draft without crossings".to_owned()));
         }
-        Ok(Self { warps, over, layers: 1, crossing: false, pile: None })
+        Self { warps, over, layers: 1, crossing: false, pile: None }.limited()
     }
 
     /// Warps of a repeat.
@@ -207,6 +217,13 @@ mod tests {
 
     #[test]
     fn mistakes_are_explained() {
+        let too_many = |draft: Result<Draft, DraftError>| draft.is_err_and(|e| e.problem.contains("smallest repeat"));
+        assert!(too_many(Draft::matrix(&vec!["#".repeat(600); 600])));
+        let every: Vec<u32> = (1..=600).collect();
+        assert!(too_many(Draft::from_loom(&every, &vec![vec![1]; 600], &every)));
+        for name in ["basket 512", "satin 1023", "herringbone 300/300", "twill 600/2", "honeycomb 600"] {
+            assert!(too_many(Draft::named(name)), "{name}");
+        }
         for (rows, problem) in [
             (&["#a"][..], "expected # or . in a draft, found 'a'"),
             (&["#x"], "expected # or . in a draft, found 'x'"),

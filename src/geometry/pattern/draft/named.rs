@@ -200,7 +200,7 @@ impl Draft {
         if words.turned() && words.name != "twill" {
             return Err(unknown());
         }
-        match (words.name.as_str(), groups.as_slice()) {
+        let draft = match (words.name.as_str(), groups.as_slice()) {
             ("plain", []) => Ok(Self::from_fn(2, 2, |i, j| (i + j) % 2 == 0)),
             ("basket", [[m]]) => Ok(basket(*m, *m)),
             ("basket", [[m, n]]) => Ok(basket(*m, *n)),
@@ -223,7 +223,8 @@ impl Draft {
             ("velvet", []) => Ok(velvet()),
             ("corduroy", []) => Ok(corduroy()),
             _ => Err(unknown()),
-        }
+        };
+        draft?.limited()
     }
 }
 

@@ -34,24 +34,31 @@ impl Draft {
         };
         let warps = period(ends, |i, j| alike(0, i, j) && over.iter().all(|row| row[i] == row[j]));
         let wefts = period(picks, |i, j| alike(1, i, j) && over[i] == over[j]);
-        if warps * wefts > MOST_CROSSINGS {
-            let problem = format!("the smallest repeat of the draft is {warps} ends x {wefts} picks");
-            let hint = format!("at most {MOST_CROSSINGS} crossings are woven, as of 512 x 512");
-            return Err(DraftError { problem, hint });
-        }
+        let draft = Self::from_fn(warps, wefts, |weft, warp| over[weft][warp]).limited()?;
         for (threads, count) in threads.iter_mut().zip([warps, wefts]) {
             for values in [&mut threads.thickness, &mut threads.spacing] {
                 values.truncate(count);
                 relative(values);
             }
         }
-        Ok(Self::from_fn(warps, wefts, |weft, warp| over[weft][warp]))
+        Ok(draft)
     }
 }
 
-/// The least distance at which all that follows is the same again; a repeat is seen twice at least.
+/// The least distance at which all that follows is the same again; a repeat is seen twice at least. By the failure function
+/// of Knuth, Morris and Pratt ("Fast Pattern Matching in Strings", 1977), which compares at most `2 * count` times.
 fn period(count: usize, same: impl Fn(usize, usize) -> bool) -> usize {
-    (1..=count / 2).find(|&p| (p..count).all(|i| same(i - p, i))).unwrap_or(count)
+    // For each place: how many of the first are the last up to there.
+    let mut again = vec![0; count];
+    for i in 1..count {
+        let mut length: usize = again[i - 1];
+        while length > 0 && !same(length, i) {
+            length = again[length - 1];
+        }
+        again[i] = length + usize::from(same(length, i));
+    }
+    let period = count - again[count - 1];
+    if 2 * period <= count { period } else { count }
 }
 
 /// Values over their mean; none where all are the same.
@@ -82,6 +89,14 @@ mod tests {
         assert_eq!((draft.warps(), draft.wefts()), (10, 4));
         assert!((threads[0].thickness[0] - 3.0 / 1.4).abs() < 1e-12 && threads[0].thickness.len() == 10);
         assert!(threads[1].spacing.is_empty());
+    }
+
+    #[test]
+    fn periods_are_the_least_that_are_seen_twice() {
+        for (text, want) in [("aaaa", 1), ("abcabca", 3), ("abcab", 5), ("aabaab", 3), ("aabaaab", 7), ("a", 1)] {
+            let text = text.as_bytes();
+            assert_eq!(period(text.len(), |i, j| text[i] == text[j]), want);
+        }
     }
 
     #[test]

@@ -120,6 +120,8 @@ pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
 /// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
 /// have no room.
 const MOST_OVERLAP: f64 = 0.03;
+/// Share of the distance at which yarns lie side by side below which no draft has room.
+const HOPELESS: f64 = 0.2;
 
 /// Woven cloth in equilibrium, ready to be repeated.
 #[derive(Clone, Debug)]
@@ -193,22 +195,28 @@ impl Weave {
     pub fn relax(&self) -> Result<Cloth<'_>, Impossible> {
         let options = self.options();
         let free = || UnitCell::relax(&self.draft, &CellOptions { spacing: [None; 2], ..options.clone() });
+        // Where the others may give way, yarns need not have more room than side by side.
+        let full = || [0, 1].map(|side| full(&self.draft, &options, side));
+        let too_tight = |least: [f64; 2], share: f64| {
+            let tight = |side: usize| options.spacing[side].is_some_and(|s| s < least[side] * share);
+            let side = [0, 1].into_iter().find(|&side| tight(side))?;
+            Some(Impossible::TooTight { warp: side == 0, least: least[side] })
+        };
+        // Each yarn would meet all the others.
+        if let Some(impossible) = too_tight(full(), HOPELESS) {
+            return Err(impossible);
+        }
         if let Some(cover) = self.cover {
             let free = free();
             let spacing = self.spacing_for(cover, &free)?;
             return self.cloth(UnitCell::relax(&self.draft, &CellOptions { spacing, ..options.clone() }));
         }
         let cell = UnitCell::relax(&self.draft, &options);
-        if options.spacing != [None; 2] && cell.overlap[1] > MOST_OVERLAP {
-            let least = match options.spacing {
-                [Some(_), Some(_)] => free().spacing,
-                // Where the others may give way, yarns need not have more room than side by side.
-                _ => [0, 1].map(|side| full(&self.draft, &options, side)),
-            };
+        if options.spacing != [None; 2] && cell.overlap(options.unit())[1] > MOST_OVERLAP {
+            let least = if options.spacing.iter().all(Option::is_some) { free().spacing } else { full() };
             // What the loom gives by itself always fits.
-            let tight = |side: usize| options.spacing[side].is_some_and(|s| s < least[side] * 0.999);
-            if let Some(side) = [0, 1].into_iter().find(|&side| tight(side)) {
-                return Err(Impossible::TooTight { warp: side == 0, least: least[side] });
+            if let Some(impossible) = too_tight(least, 0.999) {
+                return Err(impossible);
             }
         }
         self.cloth(cell)

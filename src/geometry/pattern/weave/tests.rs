@@ -45,7 +45,7 @@ fn yarns_touch_and_hardly_run_into_each_other() {
     for name in NAMES {
         let weave = weave(name);
         let cloth = weave.relax().unwrap();
-        let [deepest, share] = cloth.cell.overlap;
+        let [deepest, share] = cloth.cell.overlap(weave.options().unit());
         // Twined warps, the ridges of a honeycomb and wefts that are held in the same places press hardest.
         let (most, depth) = match *name {
             "leno" => (0.06, 0.3),
@@ -299,7 +299,8 @@ fn threads_of_several_kinds_have_their_own_thickness_and_room() {
         assert!((round - want).abs() < 0.01, "{round} for {want}");
     }
     assert!((cloth.measures().size[0] - 32.0).abs() < 1e-9);
-    assert!(cloth.cell.overlap[1] < 0.03, "{:?}", cloth.cell.overlap);
+    let overlap = cloth.cell.overlap(piece.options().unit());
+    assert!(overlap[1] < 0.03, "{overlap:?}");
 }
 
 /// Yarns do not coincide in the folds of a hem, and cloth that is lower than two hems has none.
@@ -323,4 +324,18 @@ fn hems_have_room_or_are_left_out() {
     assert!(high.nearest > 0.4 && folded < -5.0, "{high:?}, {folded}");
     let (small, flat) = made(5);
     assert!(small.nearest > 0.4 && flat > -3.0, "{small:?}, {flat}");
+}
+
+/// A distance given in another unit would have each yarn meet thousands of others.
+#[test]
+fn hopeless_spacings_are_refused_before_anything_is_relaxed() {
+    for (given, cover) in [([Some(2e-3), None], None), ([None, Some(1e-12)], Some(0.7)), ([Some(0.3), Some(3.0)], None)]
+    {
+        let [warp_spacing, weft_spacing] = given;
+        let cloth = Weave { warp_spacing, weft_spacing, cover, ..weave("satin 8") };
+        match cloth.relax() {
+            Err(Impossible::TooTight { warp, least }) => assert!(warp == given[0].is_some() && least > 1.0, "{least}"),
+            other => panic!("{given:?}: {:?}", other.map(|c| c.measures())),
+        }
+    }
 }

@@ -52,6 +52,13 @@ pub(super) struct CellOptions {
     pub(super) thickness: [Vec<f64>; 2],
 }
 
+impl CellOptions {
+    /// The mean radius, by which all is divided while it is relaxed.
+    pub(super) fn unit(&self) -> f64 {
+        0.5 * (self.radius[0] + self.radius[1])
+    }
+}
+
 /// A place of a yarn in the cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Node {
@@ -72,8 +79,6 @@ pub(super) struct UnitCell {
     pub(super) nodes: usize,
     /// For warps and wefts, for each yarn of the repeat: its nodes; node `i * nodes` is at crossing i.
     pub(super) yarns: [Vec<Vec<Node>>; 2],
-    /// The deepest that yarns run into each other, in mean diameters, and the share of their surface deeper than 5 %.
-    pub(super) overlap: [f64; 2],
 }
 
 /// The distance at which yarns of a side lie side by side, in the unit of the radii.
@@ -84,7 +89,7 @@ pub(super) fn full(draft: &Draft, options: &CellOptions, side: usize) -> f64 {
 impl UnitCell {
     /// Relaxes one repeat of `draft`.
     pub(super) fn relax(draft: &Draft, options: &CellOptions) -> Self {
-        let unit = 0.5 * (options.radius[0] + options.radius[1]);
+        let unit = options.unit();
         let mut energy = Energy::new(draft, options, unit);
         let begin = Self::first_spacing(draft, options).map(|s| s.map(|s| s / unit));
         let mut x = energy.start(begin);
@@ -107,15 +112,18 @@ impl UnitCell {
             minimize(&mut free, &mut value, 1e-3, 0.3, most);
         }
         x.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
-        let mut cell = Self {
+        Self {
             spacing: energy.spacing(&x).map(|s| s * unit),
             nodes: options.nodes,
             yarns: [0, 1].map(|side| energy.nodes_of(side, &x, unit)),
-            overlap: [0.0; 2],
-        };
-        let (deepest, share) = intrusion(&cell.sections(), 0.1 * unit);
-        cell.overlap = [deepest / (2.0 * unit), share];
-        cell
+        }
+    }
+
+    /// The deepest that yarns of a mean radius `unit` run into each other, in mean diameters, and the share of their surface
+    /// deeper than 5 %.
+    pub(super) fn overlap(&self, unit: f64) -> [f64; 2] {
+        let (deepest, share) = intrusion(&self.sections(), 0.1 * unit);
+        [deepest / (2.0 * unit), share]
     }
 
     /// The spacings of the middle of a large repeat by itself, in the unit of the radii.

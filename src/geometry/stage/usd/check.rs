@@ -4,6 +4,8 @@
 //! The reader of binary files takes room for as many values as a count says. So every count of the structural sections,
 //! and of the arrays that fields point at, is held against the size of the file.
 
+use std::cell::Cell;
+
 use crate::geometry::stage::Problem;
 
 const MAGIC: &[u8] = b"PXR-USDC";
@@ -99,7 +101,7 @@ fn binary(bytes: &[u8]) -> Result<(), Problem> {
     packed_numbers(bytes, section("FIELDSETS")?.start, 1)?;
     packed_numbers(bytes, section("SPECS")?.start, 3)?;
     paths(bytes, &tokens, section("PATHS")?.start)?;
-    fields(&Crate { bytes, version }, &section("FIELDS")?)
+    fields(&Crate { bytes, version, looked_at: Cell::new(0) }, &section("FIELDS")?)
 }
 
 /// Unpacks a block into at most so many bytes.
@@ -210,7 +212,12 @@ fn packed_numbers(bytes: &[u8], at: usize, blocks: usize) -> Result<usize, Probl
 struct Crate<'a> {
     bytes: &'a [u8],
     version: [u64; 2],
+    /// Values that were looked at: several fields may share one, and dictionaries that share each other multiply.
+    looked_at: Cell<usize>,
 }
+
+/// How often a value of eight bytes may be shared in the mean, as the reader would make as many of it.
+const MOST_SHARED: usize = 128;
 
 /// Every field that points at an array points at a count that the file can hold.
 fn fields(file: &Crate<'_>, section: &Section) -> Result<(), Problem> {
@@ -259,6 +266,10 @@ mod kind {
 /// Looks a value over: arrays and lists have counts, dictionaries and time samples hold further values.
 fn representation(file: &Crate<'_>, value: u64, depth: usize) -> Result<(), Problem> {
     let (bytes, at) = (file.bytes, (value & PAYLOAD) as usize);
+    file.looked_at.set(file.looked_at.get() + 1);
+    if file.looked_at.get() > bytes.len() / 8 * MOST_SHARED {
+        return Err(Problem::new(format!("byte {at}: dictionaries or time samples share each other without end")));
+    }
     let own = (value >> 48) & 0xff;
     if value & IS_INLINED != 0 || at == 0 {
         return Ok(());
@@ -428,4 +439,33 @@ fn text(bytes: &[u8]) -> Result<(), Problem> {
         return Err(Problem::new(format!("brackets lie {deepest} deep in one another, at most {MOST} are read")));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each dictionary holds the next one twice: the reader would make two to the power of their number.
+    #[test]
+    fn dictionaries_that_multiply_are_refused() {
+        let chain = |count: u64| {
+            let value = |i: u64| kind::DICTIONARY << 48 | (8 + i * 48);
+            let mut bytes = vec![0; 8];
+            for i in 0..count {
+                bytes.extend(2u64.to_le_bytes());
+                for _ in 0..2 {
+                    bytes.extend(0u32.to_le_bytes());
+                    bytes.extend(8u64.to_le_bytes());
+                    bytes.extend(value(i + 1).to_le_bytes());
+                }
+            }
+            // The last one is empty.
+            bytes.extend(0u64.to_le_bytes());
+            let file = Crate { bytes: &bytes, version: [0, 8], looked_at: Cell::new(0) };
+            representation(&file, value(0), 0)
+        };
+        assert!(chain(4).is_ok());
+        let problem = chain(30).unwrap_err();
+        assert!(problem.text.contains("share each other"), "{}", problem.text);
+    }
 }

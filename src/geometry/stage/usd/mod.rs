@@ -13,6 +13,7 @@ mod value;
 pub(super) mod write;
 
 use std::{
+    collections::HashSet,
     fmt,
     panic::{AssertUnwindSafe, catch_unwind},
     path::Path,
@@ -257,15 +258,15 @@ impl Walk<'_> {
         let positions = values.vectors("positions")?.unwrap_or_default();
         let turns = values.rotations("orientations")?.unwrap_or_default();
         let scales = values.vectors("scales")?.unwrap_or_default();
-        let hidden = values.integers("invisibleIds")?.unwrap_or_default();
+        let hidden: HashSet<i64> = values.integers("invisibleIds")?.unwrap_or_default().into_iter().collect();
         let ids = values.integers("ids")?.unwrap_or_default();
         let count = indices.len();
         let fits = |n: usize| n == 0 || n == count;
         if positions.len() != count || !fits(turns.len()) || !fits(scales.len()) || !fits(ids.len()) {
-            let found = [positions.len(), turns.len(), scales.len()];
+            let found = [positions.len(), turns.len(), scales.len(), ids.len()];
             return Err(Problem::new(format!(
-                "{count} protoIndices, but {} positions, {} orientations and {} scales",
-                found[0], found[1], found[2]
+                "{count} protoIndices, but {} positions, {} orientations, {} scales and {} ids",
+                found[0], found[1], found[2], found[3]
             ))
             .at(&name.path));
         }
