@@ -85,25 +85,21 @@ impl Colors {
             let backwards = row.rem_euclid(2) == 1;
             let mut taken = vec![false; below.len()];
             let mut here = Vec::new();
-            for (color, columns) in self.fields(row) {
-                let shared = |other: &Range<u32>| {
-                    let (from, to) = (other.start.max(columns.start), other.end.min(columns.end));
-                    // Fields that touch at a corner only go on too.
-                    if from <= to { Some(to - from) } else { None }
-                };
-                // An edge is knitted with the yarn that hangs at its side.
-                let hangs = |other: &Range<u32>| match row {
-                    0 if finished => columns.start == 0,
-                    r if r == rows && backwards => other.end == columns.end,
-                    r if r == rows => other.start == 0,
-                    _ => true,
-                };
+            // In the order in which they are knitted: where a field parts, its yarn goes on with what comes first.
+            let mut fields = self.fields(row);
+            if backwards {
+                fields.reverse();
+            }
+            for (color, columns) in fields {
+                // Fields that touch at a corner only go on too.
+                let touches = |other: &Range<u32>| other.start <= columns.end && columns.start <= other.end;
+                // Where a yarn hangs after the row below is where the next one begins; the nearest is taken up.
+                let begin = |field: &Range<u32>| if backwards { field.end } else { field.start };
                 let best = (0..below.len())
-                    .filter(|&b| !taken[b] && ways[below[b].0].color == color && hangs(&below[b].1))
-                    .filter_map(|b| shared(&below[b].1).map(|s| (s, b)))
-                    .max_by_key(|&(s, b)| (s, std::cmp::Reverse(b)));
+                    .filter(|&b| !taken[b] && ways[below[b].0].color == color && touches(&below[b].1))
+                    .min_by_key(|&b| begin(&below[b].1).abs_diff(begin(&columns)));
                 let way = match best {
-                    Some((_, b)) => {
+                    Some(b) => {
                         taken[b] = true;
                         below[b].0
                     }
@@ -359,6 +355,15 @@ mod tests {
         let ways = colors.ways(true, false);
         assert_eq!(ways.iter().map(|w| (w.color, w.rows[0].row)).collect::<Vec<_>>(), [(0, -1), (1, 0), (0, 2)]);
         assert_eq!(ways[2].rows.last().map(|s| s.row), Some(3));
+    }
+
+    /// The yarn goes on with what it comes to first; the field beyond has a new one, which hangs nearer where both meet again.
+    #[test]
+    fn a_field_of_intarsia_parts_and_meets_again() {
+        let colors = Colors { work: Work::Intarsia, ..colors(&["aaaaa", "aabaa", "aaaaa"]) };
+        let rows = |w: &Way| (w.color, w.rows.iter().map(|s| (s.row, s.first)).collect::<Vec<_>>());
+        let ways: Vec<_> = colors.ways(false, false).iter().map(rows).collect();
+        assert_eq!(ways, [(0, vec![(0, 0), (1, 3)]), (1, vec![(1, 2)]), (0, vec![(1, 0), (2, 0)])]);
     }
 
     #[test]

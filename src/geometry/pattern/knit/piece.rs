@@ -130,7 +130,11 @@ impl Laying<'_> {
                 all.go_on(&self.drawn_in(place))
             }
             Some((row, place)) if is_in(self.loops.rows) => {
-                all.tail(TAIL, self.surface.directions(row, &place)[1], false);
+                // The last loop is drawn out whole: what comes up through the stitch is the yarn's end.
+                let [across, up] = self.surface.directions(row, &place);
+                all.draw_out(up);
+                let backwards = way.rows.last().is_some_and(|r| r.backwards);
+                all.tail(TAIL, (up - self.side(backwards) * across).normalize(), false);
             }
             Some((row, place)) => all.go_on(&self.hidden(row, place)),
             None => {}
@@ -154,7 +158,7 @@ impl Laying<'_> {
 
     /// How far a yarn bulges where it turns before it goes through a row: beside a stitch that stays on the needle hardly.
     fn turn(&self, row: i32, from: &Place, backwards: bool) -> DVec3 {
-        const BULGE: f64 = 0.8;
+        const BULGE: f64 = 0.45;
         const BESIDE: f64 = 0.35;
         let inside = 0.5 * self.loops.wide as f64 - from.at.abs() > 0.75;
         let bulge = if inside && matches!(self.surface, Surface::Bent(_)) { BESIDE } else { BULGE };

@@ -116,6 +116,15 @@ impl Thread {
         self.state.pop();
     }
 
+    /// Ends at the head of its last loop, whose leg goes back down from there.
+    pub(super) fn draw_out(&mut self, up: DVec3) {
+        while let [.., before, last] = self.points.as_slice()
+            && before.dot(up) >= last.dot(up)
+        {
+            self.pop();
+        }
+    }
+
     /// Goes on straight for a while at its end or its start.
     pub(super) fn tail(&mut self, length: f64, way: DVec3, at_start: bool) {
         let end = if at_start { self.points.first() } else { self.points.last() };

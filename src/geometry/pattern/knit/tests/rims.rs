@@ -115,3 +115,23 @@ fn loops_of_a_cable_cast_on_come_from_between_the_two_before_them() {
         assert!(wound.iter().all(|w| *w == wound[0] && w.abs() == 1), "{name}: {wound:?}");
     }
 }
+
+/// Bound off, the yarn's end comes up out of the last stitch and bends nowhere as tightly as a loop that is not there would.
+#[test]
+fn the_last_loop_is_drawn_out() {
+    for (pattern, stitches) in [("stockinette", 12), ("garter", 12), ("cable", 16)] {
+        let knit = Knit { yarn_per_stitch: Some(14.5), ..knit(pattern, stitches, 9) };
+        let strands = knit.strands(1.0).unwrap();
+        let points = &strands[0].curve.points;
+        let end = &points[points.len() - 2 * POINTS as usize..];
+        // The radius of the circle through three points.
+        let radius = |p: &[DVec3]| {
+            let [a, b, c] = [p[1] - p[0], p[2] - p[1], p[0] - p[2]];
+            a.length() * b.length() * c.length() / (2.0 * a.cross(b).length()).max(1e-9)
+        };
+        let least = end.windows(3).map(radius).fold(f64::MAX, f64::min);
+        assert!(least > 0.6, "{pattern}: a bend of {least} diameters");
+        let highest = points.iter().map(|p| p.y).fold(f64::MIN, f64::max);
+        assert!(highest - points[points.len() - 1].y < 1e-9, "{pattern}: the end hangs down");
+    }
+}
