@@ -106,10 +106,25 @@ fn every_mode_and_model_makes_what_was_estimated() {
 
 #[test]
 fn rays_come_in_through_the_flat_ends_of_yarns() {
-    let text = "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
+    // Of short segments, a ray along the yarn leaves it many of them from where it came in.
+    let folder = tempfile::tempdir().unwrap();
+    let line: String = (0..=40).map(|k| format!("{} 0 0\n", 0.25 * f64::from(k))).collect();
+    std::fs::write(folder.path().join("line.txt"), line).unwrap();
+    let path = folder.path().join("line.txt");
+    for source in
+        ["type = \"straight\", count = 1, length = 10".to_owned(), format!("type = \"file\", path = {path:?}")]
+    {
+        come_in_through_ends(&source);
+    }
+}
+
+fn come_in_through_ends(source: &str) {
+    let text = format!(
+        "[render]\ncurve_tolerance = 0\n[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
          [yarn.a]\nradius = 0.5\nplies = 1\nfibers = 60\ndensity = 0.4\nfiber = \"f\"\n\
-         [[fabric]]\nyarn = \"a\"\nsource = { type = \"straight\", count = 1, length = 10 }\n";
-    let scene = parse("a test", text, &LoadOptions::default()).unwrap();
+         [[fabric]]\nyarn = \"a\"\nsource = {{ {source} }}\n"
+    );
+    let scene = parse("a test", &text, &LoadOptions::default()).unwrap();
     let points = scene.fabrics[0].curves[0].0.points.clone();
     let (cloth, _) = Cloth::new(&scene, 1).unwrap();
     let mut stream = Stream::new(3);
@@ -121,7 +136,7 @@ fn rays_come_in_through_the_flat_ends_of_yarns() {
         for _ in 0..400 {
             let [angle, turn, r] = [(); 3].map(|()| f64::from(stream.next()));
             let side = DQuat::from_axis_angle(inward, TAU * turn) * across;
-            let direction = inward.lerp(side, 0.1 + 0.7 * angle).normalize();
+            let direction = inward.lerp(side, 0.12 + 0.7 * angle).normalize();
             let at = end + 0.45 * r.sqrt() * (DQuat::from_axis_angle(inward, 9.0 * TAU * turn) * across);
             let ray = Ray::new((at - 20.0 * direction).as_vec3a(), direction.as_vec3a());
             if let Some(hit) = cloth.world().intersect(&ray) {

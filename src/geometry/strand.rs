@@ -267,6 +267,24 @@ impl Strands {
         (first.abs_diff(self.segments[segment as usize]) == 1).then_some(next)
     }
 
+    /// The last segment of a yarn, or its first, if it is at most so many segments from another one without going over a seam.
+    #[inline]
+    pub fn last_within(&self, segment: u32, forward: bool, count: u32) -> Option<u32> {
+        let first = self.segments[segment as usize];
+        let at = |n: u32| if forward { segment.checked_add(n) } else { segment.checked_sub(n) };
+        // Segments of one yarn begin at consecutive points; from one yarn to the next there are more.
+        let same = |n: u32| at(n).and_then(|s| self.segments.get(s as usize)).is_some_and(|f| f.abs_diff(first) == n);
+        if same(count + 1) {
+            return None;
+        }
+        let (mut own, mut beyond) = (0, count + 1);
+        while beyond - own > 1 {
+            let middle = (own + beyond) / 2;
+            if same(middle) { own = middle } else { beyond = middle }
+        }
+        at(own)
+    }
+
     /// Whether a yarn goes on before or behind one of its segments: it ends at the last one, unless it is closed.
     #[inline]
     pub fn goes_on(&self, segment: u32, forward: bool) -> bool {

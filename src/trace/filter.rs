@@ -16,7 +16,7 @@ use crate::{
 const OPAQUE: f32 = 1e-3;
 
 /// How many segments from an end a ray leaves a yarn at the most that came in through it.
-const NEAR_AN_END: usize = 4;
+const NEAR_AN_END: f32 = 64.0;
 
 /// The longest chord of a tube times the slope at which a ray leaves it, in yarn radii: 2 if it is straight.
 const LONGEST_CHORD: f32 = 5.0;
@@ -107,13 +107,11 @@ impl<'a> Met<'a> {
 /// Where a ray comes in through the yarn's last end, or its first, before it leaves.
 fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, last: bool) -> Option<RawHit> {
     let strands = &yarns.strands;
-    let mut segment = leaving.segment;
-    for _ in 0..NEAR_AN_END {
-        match strands.neighbour(segment, last) {
-            Some(next) => segment = next,
-            None => break,
-        }
-    }
+    // The flatter it leaves, the farther it may have come.
+    let slope = leaving.normal.normalize_or_zero().dot(ray.direction);
+    let chord = (LONGEST_CHORD / slope).min(leaving.t / strands.radius_about(leaving.segment));
+    let count = (chord / strands.stride_about(leaving.segment)).clamp(1.0, NEAR_AN_END);
+    let segment = strands.last_within(leaving.segment, last, count.ceil() as u32)?;
     if strands.goes_on(segment, last) {
         return None;
     }

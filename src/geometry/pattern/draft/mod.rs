@@ -38,11 +38,6 @@ impl Pile {
         let found = self.yarns.iter().find(|(y, _)| *y == yarn && self.side == side);
         found.map(|(_, back)| *back)
     }
-
-    /// Whether its yarns are wefts.
-    pub fn of_wefts(&self) -> bool {
-        self.side == 1
-    }
 }
 
 /// Why text is no draft: what is wrong and what to write.
@@ -180,6 +175,11 @@ impl Draft {
     /// Yarns that stand up, if any do.
     pub fn pile(&self) -> Option<&Pile> {
         self.pile.as_ref()
+    }
+
+    /// Whether wefts stand up and are cut.
+    pub fn cut_wefts(&self) -> bool {
+        self.pile.as_ref().is_some_and(|pile| pile.side == 1)
     }
 
     /// Yarns of a repeat that never change sides and so hold nothing: warps from the left, wefts from the bottom.

@@ -162,9 +162,10 @@ fn velvet() -> Draft {
     Draft { pile: Some(Pile { side: 0, yarns: vec![(1, false), (3, false)], cut: true }), ..draft }
 }
 
-/// Plain ground; two wefts after each ground weft float over five warps, are held by the same two and cut between.
+/// Plain ground; two wefts after each ground weft float over five warps, are each held by one, with another between them, and
+/// cut between: wales stand where they are held.
 fn corduroy() -> Draft {
-    let draft = Draft::from_fn(6, 6, |i, j| if i % 3 == 0 { (i / 3 + j) % 2 == 0 } else { j == i % 3 - 1 });
+    let draft = Draft::from_fn(6, 6, |i, j| if i % 3 == 0 { (i / 3 + j) % 2 == 0 } else { j == 2 * (i % 3 - 1) });
     let yarns = [1, 2, 4, 5].map(|i| (i, false)).to_vec();
     Draft { pile: Some(Pile { side: 1, yarns, cut: true }), ..draft }
 }

@@ -19,7 +19,7 @@ pub use self::edges::Edges;
 use self::unit_cell::{BEAT, CellOptions, UnitCell, full};
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
-    draft::{Draft, Pile, Threads},
+    draft::{Draft, Threads},
 };
 use crate::geometry::curve::{Basis, Curve};
 
@@ -122,6 +122,11 @@ pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
 const MOST_OVERLAP: f64 = 0.03;
 /// Share of the distance at which yarns lie side by side below which no draft has room.
 const HOPELESS: f64 = 0.2;
+/// Distance of wefts over that of warps where wefts are cut: corduroys have two and a half picks to an end and more, so that the
+/// ground is closed when the floats are gone.
+const CUT_SETT: f64 = 0.4;
+/// How much harder such cloth is beaten up than other: its wefts slide over each other.
+const CUT_BEAT: f64 = 40.0;
 
 /// Woven cloth in equilibrium, ready to be repeated.
 #[derive(Clone, Debug)]
@@ -138,6 +143,9 @@ fn sett(draft: &Draft) -> f64 {
     const MOST: f64 = 2.0;
     if draft.layers() > 1 {
         return 1.0;
+    }
+    if draft.cut_wefts() {
+        return CUT_SETT;
     }
     let crossings = (0..draft.wefts()).flat_map(|weft| (0..draft.warps()).map(move |warp| (weft, warp)));
     let over = crossings.clone().filter(|&(weft, warp)| draft.warp_over(weft, warp)).count() as f64;
@@ -168,6 +176,7 @@ impl Weave {
 
     fn options(&self) -> CellOptions {
         let [p, q] = [self.warp_radius, self.weft_radius].map(|r| r * r);
+        let cut = self.draft.cut_wefts();
         CellOptions {
             radius: [self.warp_radius, self.weft_radius],
             aspect: [self.flatten; 2],
@@ -177,7 +186,7 @@ impl Weave {
             // Under pressure the crimp of equal yarns would all go into one of them.
             sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)))
                 .then(|| sett(&self.draft)),
-            beat: BEAT,
+            beat: if cut { CUT_BEAT * BEAT } else { BEAT },
             nodes: self.points as usize,
             thickness: [0, 1].map(|side| self.threads[side].thickness.clone()),
         }
@@ -326,7 +335,7 @@ impl Cloth<'_> {
     /// selvedges make one.
     pub fn strands(&self) -> Vec<PatternStrand> {
         let Measures { thickness, size, .. } = self.measures();
-        let cut = self.weave.draft.pile().is_some_and(Pile::of_wefts);
+        let cut = self.weave.draft.cut_wefts();
         let edges = match self.weave.edges {
             _ if cut => Edges::Live,
             Edges::Finished if !edges::has_room_for_hems(size[1], thickness) => Edges::Selvedge,

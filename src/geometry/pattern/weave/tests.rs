@@ -247,6 +247,15 @@ fn pile_is_made_in_pieces_of_any_size() {
     }
 }
 
+/// Once its floats are cut, what is left of a corduroy must cover what they did.
+#[test]
+fn corduroy_has_more_picks_than_ends() {
+    let cloth = weave("corduroy");
+    let Measures { spacing: [p, q], see_through, .. } = cloth.relax().unwrap().measures();
+    // Radii are 1: picks lie closer than side by side.
+    assert!(p > 2.4 * q && q < 2.0 && see_through < 0.01, "{p} {q} {see_through}");
+}
+
 #[test]
 fn pile_stands_as_high_as_it_is_asked_to() {
     for (name, kind, cut) in
