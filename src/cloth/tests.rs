@@ -136,7 +136,7 @@ fn come_in_through_ends(source: &str) {
         for _ in 0..400 {
             let [angle, turn, r] = [(); 3].map(|()| f64::from(stream.next()));
             let side = DQuat::from_axis_angle(inward, TAU * turn) * across;
-            let direction = inward.lerp(side, 0.12 + 0.7 * angle).normalize();
+            let direction = inward.lerp(side, 0.1 + 0.7 * angle).normalize();
             let at = end + 0.45 * r.sqrt() * (DQuat::from_axis_angle(inward, 9.0 * TAU * turn) * across);
             let ray = Ray::new((at - 20.0 * direction).as_vec3a(), direction.as_vec3a());
             if let Some(hit) = cloth.world().intersect(&ray) {

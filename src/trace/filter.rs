@@ -54,8 +54,10 @@ impl<'a> Met<'a> {
         if !leaves(ray, hit) {
             return Some(Self::entering(yarns, ray, *hit));
         }
-        let end = [false, true].into_iter().find_map(|forward| through_end(yarns, ray, hit, forward));
-        end.map(|end| Self::entering(yarns, ray, end)).or_else(|| Self::within(yarns, ray, hit))
+        let slope = hit.normal.normalize_or_zero().dot(ray.direction);
+        let count = segments_behind(yarns, hit, slope);
+        let end = [false, true].into_iter().find_map(|forward| through_end(yarns, ray, hit, count, forward));
+        end.map(|end| Self::entering(yarns, ray, end)).or_else(|| Self::within(yarns, ray, hit, slope))
     }
 
     #[inline]
@@ -63,14 +65,13 @@ impl<'a> Met<'a> {
         Self { hit, section: section_at(yarns, ray, &hit) }
     }
 
-    /// From the start of a ray within the yarn's tube, unless the ray is done with that.
-    fn within(yarns: &'a YarnGeometry, ray: &Ray, leaving: &RawHit) -> Option<Self> {
+    /// From the start of a ray within the yarn's tube, which it leaves at a slope, unless the ray is done with that.
+    fn within(yarns: &'a YarnGeometry, ray: &Ray, leaving: &RawHit, slope: f32) -> Option<Self> {
         let strands = &yarns.strands;
         let done = |segment| {
             let own = (OWN / strands.stride_about(segment).max(1e-2)).ceil() as u32;
             ray.done.holds(YarnPlace { geometry: leaving.geometry, segment }, own)
         };
-        let slope = leaving.normal.normalize_or_zero().dot(ray.direction);
         let radius = strands.radius_about(leaving.segment);
         if leaving.t * slope > LONGEST_CHORD * radius || done(leaving.segment) {
             return None;
@@ -104,14 +105,18 @@ impl<'a> Met<'a> {
     }
 }
 
-/// Where a ray comes in through the yarn's last end, or its first, before it leaves.
-fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, last: bool) -> Option<RawHit> {
+/// How many segments back a ray may have come in that leaves a yarn at a slope: the flatter, the more.
+#[inline]
+fn segments_behind(yarns: &YarnGeometry, leaving: &RawHit, slope: f32) -> u32 {
     let strands = &yarns.strands;
-    // The flatter it leaves, the farther it may have come.
-    let slope = leaving.normal.normalize_or_zero().dot(ray.direction);
     let chord = (LONGEST_CHORD / slope).min(leaving.t / strands.radius_about(leaving.segment));
-    let count = (chord / strands.stride_about(leaving.segment)).clamp(1.0, NEAR_AN_END);
-    let segment = strands.last_within(leaving.segment, last, count.ceil() as u32)?;
+    (chord / strands.stride_about(leaving.segment)).clamp(1.0, NEAR_AN_END).ceil() as u32
+}
+
+/// Where a ray comes in through the yarn's last end, or its first, at most `count` segments from where it leaves.
+fn through_end(yarns: &YarnGeometry, ray: &Ray, leaving: &RawHit, count: u32, last: bool) -> Option<RawHit> {
+    let strands = &yarns.strands;
+    let segment = strands.last_within(leaving.segment, last, count)?;
     if strands.goes_on(segment, last) {
         return None;
     }

@@ -11,7 +11,7 @@ use super::{
     edges::SeamKind,
     fold::Folds,
     sheet::Sheet,
-    surface::{Anchor, BorderEdge, Finder, Pose, Surface},
+    surface::{Anchor, BorderEdge, Finder, Pose, Surface, bounds},
 };
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
@@ -91,8 +91,7 @@ impl Lattice {
         // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
         let all = border.iter().zip(division.seams).enumerate().map(edge);
         let edges = Border::new(all.filter(|e| around.is_none() || !is_side(&e.border)).collect());
-        let mut low = border.iter().flat_map(|e| e.ends).fold(DVec2::INFINITY, DVec2::min);
-        let mut high = border.iter().flat_map(|e| e.ends).fold(DVec2::NEG_INFINITY, DVec2::max);
+        let [mut low, mut high] = bounds(border);
         if border.is_empty() {
             (low, high) = (finder.low(), finder.low());
         }

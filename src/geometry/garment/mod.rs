@@ -33,7 +33,7 @@ use self::{
     panels::Panels,
     sewing::Sewing,
     strain::Shapes,
-    surface::Surface,
+    surface::{Surface, bounds},
 };
 pub(crate) use self::{
     edges::SeamKind,
@@ -170,8 +170,7 @@ impl Garment {
         let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
         let borders = surface.borders(panels.panels.len());
         let boxes = borders.iter().zip(&cloth).map(|(border, &c)| {
-            let low = border.iter().flat_map(|e| e.ends).fold(DVec2::INFINITY, DVec2::min);
-            let high = border.iter().flat_map(|e| e.ends).fold(DVec2::NEG_INFINITY, DVec2::max);
+            let [low, high] = bounds(border);
             ((high - low).max(DVec2::ZERO) / options.cloths[c].tile.stitch()).element_product()
         });
         if let Some((panel, places)) = boxes.enumerate().find(|(_, places)| *places > 4.0 * MOST_STITCHES) {

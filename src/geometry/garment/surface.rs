@@ -82,6 +82,12 @@ pub(super) struct BorderEdge {
     pub(super) sewn_to: Option<(u32, u32)>,
 }
 
+/// The lowest and the highest corner of the box around a border; the lowest is above the highest where there is none.
+pub(super) fn bounds(border: &[BorderEdge]) -> [DVec2; 2] {
+    let ends = || border.iter().flat_map(|e| e.ends);
+    [ends().fold(DVec2::INFINITY, DVec2::min), ends().fold(DVec2::NEG_INFINITY, DVec2::max)]
+}
+
 impl BorderEdge {
     /// Whether it, which is edge `i` of a panel, is the first of two that are sewn together.
     pub(super) fn is_first(&self, panel: u32, i: usize) -> bool {

@@ -205,14 +205,14 @@ impl Weave {
         let options = self.options();
         let free = || UnitCell::relax(&self.draft, &CellOptions { spacing: [None; 2], ..options.clone() });
         // Where the others may give way, yarns need not have more room than side by side.
-        let full = || [0, 1].map(|side| full(&self.draft, &options, side));
+        let side_by_side = || [0, 1].map(|side| full(&self.draft, &options, side));
         let too_tight = |least: [f64; 2], share: f64| {
             let tight = |side: usize| options.spacing[side].is_some_and(|s| s < least[side] * share);
             let side = [0, 1].into_iter().find(|&side| tight(side))?;
             Some(Impossible::TooTight { warp: side == 0, least: least[side] })
         };
         // Each yarn would meet all the others.
-        if let Some(impossible) = too_tight(full(), HOPELESS) {
+        if let Some(impossible) = too_tight(side_by_side(), HOPELESS) {
             return Err(impossible);
         }
         if let Some(cover) = self.cover {
@@ -222,7 +222,7 @@ impl Weave {
         }
         let cell = UnitCell::relax(&self.draft, &options);
         if options.spacing != [None; 2] && cell.overlap(options.unit())[1] > MOST_OVERLAP {
-            let least = if options.spacing.iter().all(Option::is_some) { free().spacing } else { full() };
+            let least = if options.spacing.iter().all(Option::is_some) { free().spacing } else { side_by_side() };
             // What the loom gives by itself always fits.
             if let Some(impossible) = too_tight(least, 0.999) {
                 return Err(impossible);
