@@ -286,6 +286,15 @@ impl<'a> Section<'a> {
         way::passages::<false>(&way, shape, &mut pass);
     }
 
+    /// The place at a `distance` in the section, as [`Self::plies_ahead`] gives them, from a point `shift` beside one inside the yarn.
+    #[inline]
+    pub fn beyond(&self, shape: &YarnShape, from: &Inside, shift: Vec3A, w: Vec3A, distance: f32) -> Inside {
+        let depth = distance / (1.0 - w.z * w.z).max(1e-9).sqrt();
+        let direction = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
+        let travel = from.travel + depth * direction.dot(from.z) / from.straightness;
+        self.inside(shape, from.point + shift + depth * direction, travel)
+    }
+
     /// A point of this frame, which is about `travel` along the yarn, in the unwound yarn.
     #[inline]
     pub fn inside(&self, shape: &YarnShape, point: Vec3A, travel: f32) -> Inside {

@@ -1,47 +1,44 @@
-//! Lobe F: light that passes the first fibre it meets as TT, and all others on its own way out (docs/model.md, section 5).
+//! Lobe F: light that passes the fibres it meets as TT, each of which bends it, until it is out (docs/model.md, section 5).
 
 use std::f32::consts::{PI, TAU};
 
+use arrayvec::ArrayVec;
 use glam::Vec3A;
 
 use super::{
     super::{
         kernel::{kappa_of_variance, normalisation, normalised_kernel, sample_sine},
-        lobe::{LobeFrame, normalised},
+        lobe::LobeFrame,
+        medium::PlyOptics,
     },
     Spot, View,
 };
 use crate::{
-    geometry::section::{Crossings, PlyCrossing},
+    geometry::{
+        density::ChordFibers,
+        occluder::PlyGaps,
+        section::{Crossings, PlyCrossing},
+    },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
 };
 
 /// Density (1/steradian) of F's directions below which the lobe ends. What little it would have there ends its chain
 /// instead, and most light that comes from elsewhere pays nothing for F.
 const FORWARD_TAIL: f32 = 1e-4;
-/// Light that further fibres bend passes so many more fibres than there are on its last way from the first one, and so many
-/// more by how far it turned: nothing straight on, four times as many back.
-const DETOUR: f32 = 0.4;
-const BACK: f32 = 2.5;
+/// Fibres to which light is followed one by one. What meets more goes on along a straight way, in one wider lobe.
+const FOLLOWED: usize = 4;
+/// Light is followed no farther once it is so much less than what the first fibre passes on.
+const TOO_LITTLE: f32 = 1e-3;
+/// The most stretches of plies that are told apart on a way out.
+const STRETCHES: usize = 16;
 
-/// Light that the first fibre on the camera's ray passes on, for one such fibre.
+/// Light that the first fibre on the camera's ray passes on, for one such fibre and one way on from it.
 #[derive(Clone, Debug)]
 pub(super) struct Forward {
-    /// The first fibre.
-    pub(super) spot: Spot,
-    frame: LobeFrame,
-    /// What TT keeps at the fibre.
-    chain: Rgb,
-    /// Share of TT that goes on; the rest goes all round and is no part of F.
-    chain_share: f32,
-    /// Extinction of chains per fibre in the first one's ply.
-    rho: Rgb,
-    /// Kernels and azimuthal deviations of one TT event, of two, and of more.
-    kappa: Rgb,
-    factor: Rgb,
-    sigma: [f32; 3],
-    /// Where light goes on from the first fibre, if it meets more.
-    more: More,
+    /// The fibres that it meets, one after the other: at least one.
+    pub(super) fibers: ArrayVec<Fiber, FOLLOWED>,
+    /// What meets more after the last of them.
+    pub(super) more: Option<More>,
     /// What may leave from a node where F does not, and the path's weight: they decide between both.
     gain: Rgb,
     weight: Rgb,
@@ -49,15 +46,36 @@ pub(super) struct Forward {
     pub(super) drawn: Drawn,
 }
 
-/// Light that further fibres bend, by the direction in which it left the first one.
+/// A fibre on the way of F.
 #[derive(Clone, Copy, Debug)]
-struct More {
-    /// Of the light: the shares that one more fibre passes on, and that several do, over what the first one keeps.
-    shares: [Rgb; 2],
-    /// Of sampling.
-    drawn: [f32; 2],
-    /// Optical depth of chains in that direction.
+pub(super) struct Fiber {
+    pub(super) spot: Spot,
+    /// About its tangent; the camera of this frame is where the light came from.
+    frame: LobeFrame,
+    /// What this fibre and those before it pass on.
+    passed: Rgb,
+    /// The width of its TT: of the kernel, with its factor, and azimuthal.
+    pub(super) width: Width,
+    /// Where the light came from.
+    from: Vec3A,
+}
+
+/// Width of a lobe of TT.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Width {
+    kappa: f32,
+    factor: f32,
+    sigma: f32,
+}
+
+/// Light that meets further fibres after the last one that was followed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct More {
+    /// The share that they pass on of what meets any, over what the last one does.
+    share: Rgb,
+    /// Optical depth of chains in the direction in which light left the last one.
     depth: Rgb,
+    width: Width,
 }
 
 /// A direction of F.
@@ -69,6 +87,15 @@ pub(super) struct Drawn {
     pub(super) pdf: f32,
     /// The chance that a path goes on this way.
     pub(super) chance: f32,
+}
+
+impl Drawn {
+    const NOTHING: Self = Self { direction: Vec3A::ZERO, share: Rgb::ZERO, pdf: 0.0, chance: 0.0 };
+
+    fn new(direction: Vec3A, part: &Part) -> Self {
+        let share = if part.pdf > 0.0 { part.value / part.pdf } else { Rgb::ZERO };
+        Self { direction, share, pdf: part.pdf, chance: part.chance }
+    }
 }
 
 /// A part of what F sends in one direction.
@@ -90,31 +117,32 @@ impl Part {
     }
 }
 
-/// Lobes of one TT event, of two, and of more in one direction.
-#[derive(Clone, Copy, Debug)]
-struct Lobes {
-    /// With the cosine, 1/steradian.
-    values: [f32; 3],
-    /// That of one event around the fibre alone, 1/radian.
-    around: f32,
-    /// By how much the direction turns from straight on: 1 less the cosine.
-    turned: f32,
-}
-
-/// What is ahead of the first fibre in a direction.
+/// What is ahead of a fibre in a direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead {
     /// Optical depth of chains.
     chains: Rgb,
-    /// The share of light that meets no fibre, and its optical depth.
+    /// The share of light that meets no fibre.
     through: f32,
-    unscattered: f32,
     /// Expected fibres.
     fibers: f32,
 }
 
+/// A ply on a way out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    ply: usize,
+    /// Whether the way begins in it, at a fibre.
+    own: bool,
+    /// Distance in the section to the point nearest to the ply's axis.
+    foot: f32,
+    /// Expected fibres: beyond the fibre's dead zone, if it is the own ply.
+    fibers: f32,
+    chord: ChordFibers,
+}
+
 impl Forward {
-    /// Draws the first fibre that a ray meets, and a direction. `gain` is [`super::chain::ChainEnd::gain`], `weight` the
+    /// Draws the first fibre that a ray meets, and a way out from there. `gain` is [`super::chain::ChainEnd::gain`], `weight` the
     /// path's. `None` if nothing passes fibres.
     #[inline]
     pub(super) fn draw(
@@ -127,177 +155,242 @@ impl Forward {
     ) -> Option<Self> {
         let (first, met) = first_fiber(crossings, unscattered, stream.next())?;
         let crossing = &crossings[first];
-        let optics = &view.yarn.plies[crossing.ply];
-        if optics.chain.max_channel() <= 0.0 {
+        if view.yarn.plies[crossing.ply].chain.max_channel() <= 0.0 {
             return None;
         }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
-        let mut forward = Self {
-            spot,
-            frame: LobeFrame::new(spot.tangent, view.camera),
-            chain: optics.chain,
-            chain_share: optics.chain_share,
-            rho: optics.rho,
-            kappa: Rgb::ZERO,
-            factor: Rgb::ZERO,
-            sigma: [0.0; 3],
-            more: More { shares: [Rgb::ZERO; 2], drawn: [0.0; 2], depth: Rgb::ZERO },
-            gain,
-            weight,
-            drawn: Drawn { direction: Vec3A::ZERO, share: Rgb::ZERO, pdf: 0.0, chance: 0.0 },
-        };
-        forward.events(view, 3.0);
-        let first = forward.direction(0, stream);
-        let ahead = forward.ahead(view, first);
-        forward.meets_more(view, &ahead);
-        forward.drawn = forward.draw_direction(view, first, &ahead, stream);
+        let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
+        forward.follow(view, Fiber::new(view, spot, view.camera, Rgb::ONE), stream);
         Some(forward)
     }
 
-    /// Sets how many TT events several are. What normalises their kernels waits until that is known.
+    /// The first fibre.
     #[inline]
-    fn events(&mut self, view: &View<'_>, several: f32) {
-        let optics = &view.yarn.plies[self.spot.ply];
-        let events = [1.0, 2.0, several];
-        self.kappa = kappa_of_variance(Rgb::from(events) * optics.beta_tt_squared);
-        self.sigma = events.map(|count| count.sqrt() * optics.beta_n);
+    pub(super) fn first(&self) -> &Fiber {
+        &self.fibers[0]
     }
 
-    /// Of light that leaves the first fibre in a direction: what meets other fibres, and how many. They are met in the renewal
-    /// process of [`crate::geometry::occluder::PlyGaps`], and each passes on the same share.
+    /// Follows light from a fibre to the next, and so on, until it is out.
     #[inline]
-    pub(super) fn meets_more(&mut self, view: &View<'_>, ahead: &Ahead) {
-        let optics = &view.yarn.plies[self.spot.ply];
-        let gaps = &optics.gaps;
-        let none = ahead.through;
-        // Anywhere on the way, and nothing behind its own chord.
-        let open = (ahead.unscattered - gaps.rate * gaps.dead_zone).max(0.0);
-        let one = (open * (-open).exp()).min(1.0 - none);
-        let kept = (-ahead.chains).exp();
-        let several = (kept - Rgb::splat(none) - self.chain * one).max(Rgb::ZERO).min(Rgb::splat(1.0 - none - one));
-        let shares = [self.chain * one, several];
-        // Shares of sampling, and how many fibres several are: of all that light of a channel meets on the mean, what is
-        // not one.
-        let all = (shares[0] + shares[1]).max(Rgb::splat(1e-20));
-        let passed = Rgb::from(normalised((self.chain * all * self.weight).max(Rgb::splat(1e-20)).to_array())) * 3.0;
-        let often = shares[1] / all * passed;
-        let loss = Rgb::splat(gaps.rate) - optics.rho;
-        let mean = loss * ahead.fibers / (loss * gaps.dead_zone + 1.0);
-        let count =
-            ((mean * kept - shares[0]) / several.max(Rgb::splat(1e-6))).max(Rgb::splat(2.0)).min(Rgb::splat(32.0));
-        let drawn = shares.map(|share| (share / all).weighted_mean(passed) * (1.0 - none));
-        self.more = More { shares, drawn, depth: ahead.chains };
-        if drawn[1] > 0.0 {
-            self.events(view, 1.0 + count.weighted_mean(often) / often.mean().max(1e-20));
+    pub(super) fn follow(&mut self, view: &View<'_>, first: Fiber, stream: &mut Stream) {
+        (self.more, self.drawn) = (None, Drawn::NOTHING);
+        self.fibers.clear();
+        let least = TOO_LITTLE * (first.passed * self.weight).max_channel();
+        let mut fiber = first;
+        loop {
+            self.fibers.push(fiber);
+            let w = fiber.direction(&fiber.width, stream);
+            let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
+            let ahead = fiber.ahead(view, w, |stretch| {
+                let _ = stretches.try_push(stretch);
+            });
+            // Of light that goes this way so much is left where it meets the next one.
+            let left = stream.next();
+            if left < ahead.through {
+                let (lobe, around) = fiber.lobe(&fiber.width, w);
+                self.drawn = Drawn::new(w, &self.alone(view, &fiber, lobe, around, &ahead));
+                return;
+            }
+            if self.fibers.is_full() {
+                let more = More::new(view, &fiber, &ahead, self.weight);
+                self.more = Some(more);
+                self.drawn = self.draw_bent(view, &fiber, &more, stream);
+                return;
+            }
+            let Some(next) = fiber.next(view, w, &mut stretches, left) else { return };
+            if (next.passed * self.weight).max_channel() < least {
+                return;
+            }
+            fiber = next;
         }
-        self.factor = normalisation(self.kappa);
     }
 
-    /// Draws a direction of F: that in which light left the `first` fibre, or one in which others send it.
+    /// A direction of light that others bend after the last fibre.
     #[inline]
-    pub(super) fn draw_direction(&self, view: &View<'_>, first: Vec3A, ahead: &Ahead, stream: &mut Stream) -> Drawn {
-        let u = stream.next();
-        let (direction, part) = if u < ahead.through {
-            (first, self.alone(&self.lobes(first), ahead))
-        } else {
-            let lobe = if u < ahead.through + self.more.drawn[0] { 1 } else { 2 };
-            let direction = self.direction(lobe, stream);
-            let lobes = self.lobes(direction);
-            (direction, self.bent(&lobes, &self.ahead(view, direction)))
-        };
-        let share = if part.pdf > 0.0 { part.value / part.pdf } else { Rgb::ZERO };
-        Drawn { direction, share, pdf: part.pdf, chance: part.chance }
+    pub(super) fn draw_bent(&self, view: &View<'_>, last: &Fiber, more: &More, stream: &mut Stream) -> Drawn {
+        let w = last.direction(&more.width, stream);
+        let ahead = last.ahead(view, w, |_| {});
+        Drawn::new(w, &self.bent(last, more, last.lobe(&more.width, w).0, &ahead))
     }
 
-    /// A direction of one of the lobes.
+    /// F towards `w`: what leaves from each of the fibres, and what others bend that come after the last.
     #[inline]
-    pub(super) fn direction(&self, lobe: usize, stream: &mut Stream) -> Vec3A {
-        let u_azimuth = stream.next();
-        let u = [stream.next(), stream.next()];
-        let sin = sample_sine(self.kappa.to_array()[lobe], self.frame.sin, self.frame.cos, u, stream);
-        self.frame.direction(sin, PI + self.sigma[lobe] * normal(u_azimuth))
-    }
-
-    /// F towards `w`: light that the first fibre alone bends, and light that others bend too.
-    #[inline]
-    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> [Part; 2] {
-        let lobes = self.lobes(w);
-        let [once, ..] = lobes.values;
-        if once < FORWARD_TAIL && self.density_of_bent(&lobes) < FORWARD_TAIL {
-            return [Part::default(); 2];
+    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(Part)) {
+        let Some((last, before)) = self.fibers.split_last() else { return };
+        for fiber in before {
+            let (lobe, around) = fiber.lobe(&fiber.width, w);
+            if lobe >= FORWARD_TAIL {
+                visit(self.alone(view, fiber, lobe, around, &fiber.ahead(view, w, |_| {})));
+            }
         }
-        let ahead = self.ahead(view, w);
-        [self.alone(&lobes, &ahead), self.bent(&lobes, &ahead)]
-    }
-
-    #[inline]
-    fn lobes(&self, w: Vec3A) -> Lobes {
-        let (at, cos) = self.frame.latitudes(w);
-        let along = normalised_kernel(self.kappa, self.factor, at) * cos;
-        if along.max_channel() < FORWARD_TAIL * 1e-4 {
-            return Lobes { values: [0.0; 3], around: 1.0, turned: 0.0 };
+        let (lobe, around) = last.lobe(&last.width, w);
+        let often = self.more.map_or(0.0, |more| last.lobe(&more.width, w).0);
+        if lobe < FORWARD_TAIL && often < FORWARD_TAIL {
+            return;
         }
-        let off = w.dot(self.frame.y).atan2(w.dot(self.frame.x)) - PI;
-        let around = self.sigma.map(|sigma| wrapped_normal(off, sigma));
-        Lobes { values: (along * Rgb::from(around)).to_array(), around: around[0], turned: 1.0 - off.cos() }
+        let ahead = last.ahead(view, w, |_| {});
+        visit(self.alone(view, last, lobe, around, &ahead));
+        if let Some(more) = &self.more {
+            visit(self.bent(last, more, often, &ahead));
+        }
     }
 
-    /// What the first fibre alone bends: nothing else is met on the way out.
+    /// What leaves from a fibre: nothing else is met on the way out.
     #[inline]
-    fn alone(&self, lobes: &Lobes, ahead: &Ahead) -> Part {
-        let pdf = lobes.values[0] * ahead.through;
-        let even = (1.0 - self.chain_share) / TAU;
-        self.part(Rgb::splat(pdf * (1.0 - even / lobes.around).max(0.0) / self.chain_share), pdf)
+    fn alone(&self, view: &View<'_>, fiber: &Fiber, lobe: f32, around: f32, ahead: &Ahead) -> Part {
+        let share = view.yarn.plies[fiber.spot.ply].chain_share;
+        let pdf = lobe * ahead.through;
+        let even = (1.0 - share) / TAU;
+        self.part(fiber.passed * (pdf * (1.0 - even / around).max(0.0) / share), pdf)
     }
 
     /// What others bend too.
     #[inline]
-    fn bent(&self, lobes: &Lobes, ahead: &Ahead) -> Part {
-        let [_, twice, often] = lobes.values;
-        let More { shares, depth, .. } = &self.more;
-        let farther = DETOUR + BACK * lobes.turned * lobes.turned;
-        let way = (*depth - ahead.chains - self.rho * farther).exp();
-        self.part((shares[0] * twice + shares[1] * often) * way, self.density_of_bent(lobes))
+    fn bent(&self, fiber: &Fiber, more: &More, lobe: f32, ahead: &Ahead) -> Part {
+        let way = (more.depth - ahead.chains).min(Rgb::ZERO).exp();
+        self.part(fiber.passed * more.share * way * lobe, lobe)
     }
 
-    #[inline]
-    fn density_of_bent(&self, lobes: &Lobes) -> f32 {
-        self.more.drawn[0] * lobes.values[1] + self.more.drawn[1] * lobes.values[2]
-    }
-
-    /// A part of F, by its value over what the first fibre keeps, and its density.
+    /// A part of F, by its value and its density.
     #[inline]
     fn part(&self, value: Rgb, pdf: f32) -> Part {
         if pdf < FORWARD_TAIL {
             return Part::default();
         }
         // What is drawn for all channels together holds the lobe of each but for rare directions.
-        let value = (self.chain * value).min(Rgb::splat(pdf));
+        let value = value.min(Rgb::splat(pdf));
         let share = value / pdf;
         let passed = share.weighted_mean(self.weight);
         let ended = ((Rgb::ONE - share) * self.gain).weighted_mean(self.weight);
         Part { value, pdf, chance: if passed > 0.0 { passed / (passed + ended) } else { 0.0 } }
     }
+}
 
-    /// What is between the first fibre and the outside: a fibre's own chord keeps others away.
+impl Fiber {
+    /// A fibre that light meets on its way against `from`, of which those before it have passed on a share.
     #[inline]
-    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
+    fn new(view: &View<'_>, spot: Spot, from: Vec3A, passed: Rgb) -> Self {
+        let optics = &view.yarn.plies[spot.ply];
+        Self {
+            spot,
+            frame: LobeFrame::new(spot.tangent, from),
+            passed: passed * optics.chain,
+            width: Width::new(optics, 1.0),
+            from,
+        }
+    }
+
+    /// A direction of one of the lobes.
+    #[inline]
+    pub(super) fn direction(&self, width: &Width, stream: &mut Stream) -> Vec3A {
+        let u_azimuth = stream.next();
+        let u = [stream.next(), stream.next()];
+        let sin = sample_sine(width.kappa, self.frame.sin, self.frame.cos, u, stream);
+        self.frame.direction(sin, PI + width.sigma * normal(u_azimuth))
+    }
+
+    /// A lobe of TT about this fibre with the cosine, 1/steradian, and its part around the fibre, 1/radian.
+    #[inline]
+    fn lobe(&self, width: &Width, w: Vec3A) -> (f32, f32) {
+        let (at, cos) = self.frame.latitudes(w);
+        let [along, ..] = normalised_kernel(Rgb::splat(width.kappa), Rgb::splat(width.factor), at).to_array();
+        if along * cos < FORWARD_TAIL * 1e-4 {
+            return (0.0, 1.0);
+        }
+        let off = w.dot(self.frame.y).atan2(w.dot(self.frame.x)) - PI;
+        let around = wrapped_normal(off, width.sigma);
+        (along * cos * around, around)
+    }
+
+    /// Light starts where it met the fibre, on the side where it came from, and is inside of it first if it goes on forward.
+    #[inline]
+    fn shift(&self, view: &View<'_>, w: Vec3A) -> Vec3A {
+        let across = |v: Vec3A| Vec3A::new(v.x, v.y, 0.0).normalize_or_zero();
+        let (back, out) = (across(self.from), across(w));
+        let lead = view.section.thinness() * view.yarn.plies[self.spot.ply].lead;
+        lead * (back + (-back.dot(out)).max(0.0) * out)
+    }
+
+    /// What is between the fibre and the outside: its own chord keeps others away.
+    #[inline]
+    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(Stretch)) -> Ahead {
         let (yarn, spot) = (view.yarn, &self.spot);
         let (tilt, thin) = (spot.tilt(view.section, w), view.section.thinness());
-        let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, unscattered: 0.0, fibers: 0.0 };
-        view.section.plies_ahead(yarn.occluder().shape(), &spot.inside, Vec3A::ZERO, w, |ahead| {
+        let shape = yarn.occluder().shape();
+        let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, fibers: 0.0 };
+        view.section.plies_ahead(shape, &spot.inside, self.shift(view, w), w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
-            let chord = yarn.occluder().shape().plies[ahead.ply].chord(ahead.offset, ahead.length, thin);
-            let mut fibers = tilt * chord.ahead(-ahead.foot);
-            if ahead.ply == spot.ply {
-                fibers = (fibers - optics.gaps.dead_zone).max(0.0);
-            }
+            let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin);
+            let own = ahead.ply == spot.ply;
+            let fibers = tilt * (chord.ahead(-ahead.foot) - if own { optics.gaps.dead_zone } else { 0.0 }).max(0.0);
+            let stretch = Stretch { ply: ahead.ply, own, foot: ahead.foot, fibers, chord };
             all.chains += optics.rho * fibers;
-            all.unscattered += optics.gaps.rate * fibers;
+            all.through *= stretch.unscattered(&optics.gaps);
             all.fibers += fibers;
+            visit(stretch);
         });
-        all.through = (-all.unscattered).exp();
         all
+    }
+
+    /// The fibre that light meets next in the direction `w`, where so much of it is `left`.
+    #[inline]
+    fn next(&self, view: &View<'_>, w: Vec3A, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
+        stretches.sort_unstable_by(|a, b| a.foot.total_cmp(&b.foot));
+        let tilt = self.spot.tilt(view.section, w);
+        for stretch in &*stretches {
+            let gaps = &view.yarn.plies[stretch.ply].gaps;
+            let through = stretch.unscattered(gaps);
+            if left < through {
+                left /= through;
+                continue;
+            }
+            let passed = if stretch.own { -left.ln() / gaps.rate } else { gaps.fibers_passed(left) };
+            let behind = (stretch.fibers - passed).max(0.0) / tilt;
+            let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
+            let shape = view.yarn.occluder().shape();
+            let distance = (stretch.foot + at).max(0.0);
+            let inside = view.section.beyond(shape, &self.spot.inside, self.shift(view, w), w, distance);
+            let spot = Spot::new(view, stretch.ply, self.spot.depth, inside);
+            return Some(Self::new(view, spot, -w, self.passed));
+        }
+        None
+    }
+}
+
+impl Stretch {
+    /// The share of light that meets no fibre of it.
+    #[inline]
+    fn unscattered(&self, gaps: &PlyGaps) -> f32 {
+        if self.own { (-gaps.rate * self.fibers).exp() } else { gaps.unscattered(self.fibers) }
+    }
+}
+
+impl Width {
+    /// That of so many events of TT.
+    #[inline]
+    fn new(optics: &PlyOptics, events: f32) -> Self {
+        let kappa = kappa_of_variance(Rgb::splat(events * optics.beta_tt_squared));
+        let [factor, ..] = normalisation(kappa).to_array();
+        Self { kappa: kappa.to_array()[0], factor, sigma: events.sqrt() * optics.beta_n }
+    }
+}
+
+impl More {
+    /// Of light that left `fiber` in a direction with so much `ahead`: what is left of the chains, and how many events they are. They
+    /// are met in the renewal process of [`PlyGaps`], and each passes on the same share.
+    #[inline]
+    pub(super) fn new(view: &View<'_>, fiber: &Fiber, ahead: &Ahead, weight: Rgb) -> Self {
+        let optics = &view.yarn.plies[fiber.spot.ply];
+        let none = ahead.through;
+        let kept = (-ahead.chains).exp();
+        let several = (kept - Rgb::splat(none)).max(Rgb::ZERO);
+        let share = (several / (1.0 - none).max(1e-6)).min(Rgb::ONE);
+        let loss = Rgb::splat(optics.gaps.rate) - optics.rho;
+        let mean = loss * ahead.fibers / (loss * optics.gaps.dead_zone + 1.0);
+        let count = (mean * kept / several.max(Rgb::splat(1e-6))).max(Rgb::ONE).min(Rgb::splat(32.0));
+        // One for all channels, by what each passes so often.
+        let often = (share * fiber.passed * weight).max(Rgb::splat(1e-20));
+        Self { share, depth: ahead.chains, width: Width::new(optics, 1.0 + count.weighted_mean(often) / often.mean()) }
     }
 }
 

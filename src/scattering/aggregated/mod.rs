@@ -34,7 +34,7 @@ use crate::{
 };
 use backward::Backward;
 use chain::ChainEnd;
-use forward::{Forward, Part};
+use forward::Forward;
 use single::Node;
 
 mod backward;
@@ -115,13 +115,19 @@ impl<'a> View<'a> {
             (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
         };
         let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
-        let tangent = inside.fiber_tangent(yarn.occluder().shape(), section, crossing.ply);
-        let stretch = tangent.length();
-        Spot { ply: crossing.ply, depth, inside, tangent: tangent / stretch, stretch }
+        Spot::new(self, crossing.ply, depth, inside)
     }
 }
 
 impl Spot {
+    /// A place in a ply, seen from a depth on the camera's ray.
+    #[inline]
+    fn new(view: &View<'_>, ply: usize, depth: f32, inside: Inside) -> Self {
+        let tangent = inside.fiber_tangent(view.yarn.occluder().shape(), view.section, ply);
+        let stretch = tangent.length();
+        Self { ply, depth, inside, tangent: tangent / stretch, stretch }
+    }
+
     /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the
     /// section, times the fibres' width as seen along it, and how much closer they are where the yarn is pressed flat.
     #[inline]
@@ -178,9 +184,9 @@ impl<'a> Vertex<'a> {
         let mut lobes = LobeValues::default();
         let mut forward_part = 0.0;
         if let Some(forward) = &self.forward {
-            for part in forward.toward(&self.view, w) {
+            forward.toward(&self.view, w, |part| {
                 lobes.f += part.value * mis_weight(light_pdf, part.density());
-            }
+            });
             forward_part = lobes.f.mean();
         }
         if let Some(node) = &self.node {
@@ -199,8 +205,11 @@ impl<'a> Vertex<'a> {
     /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of
     /// [`Self::sample`], for [`Self::evaluate`] weighs each part by itself.
     pub fn forward_density(&self, w: Vec3A) -> f32 {
-        let parts = self.forward.as_ref().map(|forward| forward.toward(&self.view, w));
-        parts.map_or(0.0, |parts| parts.iter().map(Part::density).sum())
+        let mut density = 0.0;
+        if let Some(forward) = &self.forward {
+            forward.toward(&self.view, w, |part| density += part.density());
+        }
+        density
     }
 
     /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of B.
@@ -244,7 +253,7 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of F leaves: that of the first fibre.
     #[inline]
     pub fn forward_start(&self) -> f32 {
-        self.forward.as_ref().map_or(0.0, |f| f.spot.depth)
+        self.forward.as_ref().map_or(0.0, |f| f.first().spot.depth)
     }
 }
 

@@ -7,6 +7,7 @@ use std::{
 
 use super::{
     backward::{Lobe, off_a_matt_cylinder},
+    forward::More,
     *,
 };
 use crate::geometry::yarn::{PlyParameters, touching_plies};
@@ -287,6 +288,42 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
     }
 }
 
+/// Fibres that only transmit, many of them on a way: each fibre that light is followed to, and what comes after the last, has its share.
+#[test]
+fn light_finds_as_much_of_f_as_directions_do() {
+    let m = material(([0.0; 3], [0.98, 0.9, 0.5], [0.0; 3]), [0.15, 0.2, 0.6]);
+    for case in [CASES[3], CASES[5]] {
+        let (yarn, section) = build(case, &m);
+        let mut crossings = Crossings::new();
+        section.crossings(yarn.occluder().shape(), &mut crossings);
+        let t0 = yarn.occluder().transparency(&crossings);
+        let mut stream = Stream::new(12);
+        let n = 100_000;
+        let (mut sum, mut square) = ([[0f64; 3]; 2], [[0f64; 3]; 2]);
+        for _ in 0..n {
+            let u = [0; 4].map(|_| stream.next());
+            let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
+            let z = 2.0 * stream.next() - 1.0;
+            let (s, c) = (TAU * stream.next()).sin_cos();
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            let lit = vertex.evaluate(Vec3A::new(r * c, r * s, z), f32::INFINITY).lobes.f * (4.0 * PI);
+            let drawn = vertex.forward.as_ref().map_or(Rgb::ZERO, |f| f.drawn.share);
+            for (k, value) in [lit, drawn].into_iter().enumerate() {
+                for (c, value) in value.to_array().into_iter().enumerate() {
+                    sum[k][c] += f64::from(value) / f64::from(n);
+                    square[k][c] += f64::from(value).powi(2) / f64::from(n);
+                }
+            }
+        }
+        for c in 0..3 {
+            let se = |k: usize| ((square[k][c] - sum[k][c] * sum[k][c]) / f64::from(n)).sqrt();
+            let [lit, drawn] = [sum[0][c], sum[1][c]];
+            eprintln!("{case:?} channel {c}: {lit:.4} +- {:.4}, {drawn:.4} +- {:.4}", se(0), se(1));
+            assert!((lit - drawn).abs() < 4.5 * (se(0) + se(1)) && se(0) < 0.02 * lit, "{case:?} {c}: {lit} {drawn}");
+        }
+    }
+}
+
 #[test]
 fn sample_densities_match_where_samples_fall() {
     // Chi-square per component over 8 x 12 cells of (sin theta, phi): the density of the component, times its chance,
@@ -304,22 +341,26 @@ fn sample_densities_match_where_samples_fall() {
     let n = 200_000;
     let mut stream = Stream::new(77);
     let (view, node, forward) = (&vertex.view, vertex.node.as_ref().unwrap(), vertex.forward.as_ref().unwrap());
-    // What others bend hangs on where light left the first fibre: the same direction for all samples of that part.
-    let mut meets = forward.clone();
-    let fixed = meets.direction(0, &mut stream);
-    let met = meets.ahead(view, fixed);
-    meets.meets_more(view, &met);
+    // F hangs on the fibres that light met: what leaves from the first, and what others bend were that the last, after a
+    // direction that is the same for all samples.
+    let first = *forward.first();
+    let fixed = first.direction(&first.width, &mut stream);
+    let more = More::new(view, &first, &first.ahead(view, fixed, |_| {}), Rgb::ONE);
+    let (mut alone, mut bent) = (forward.clone(), forward.clone());
+    alone.fibers.truncate(1);
+    bent.fibers.truncate(1);
+    (alone.more, bent.more) = (None, Some(more));
     let mut counts = [[0f64; 96]; 3];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
-        let first = forward.direction(0, &mut stream);
-        let alone = forward.draw_direction(view, first, &forward.ahead(view, first), &mut stream);
-        if alone.direction == first && stream.next() < alone.chance {
-            counts[0][cell(alone.direction)] += 1.0;
+        let mut again = forward.clone();
+        again.follow(view, first, &mut stream);
+        if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
+            counts[0][cell(again.drawn.direction)] += 1.0;
         }
-        let bent = meets.draw_direction(view, fixed, &met, &mut stream);
-        if bent.direction != fixed && stream.next() < bent.chance {
-            counts[2][cell(bent.direction)] += 1.0;
+        let drawn = bent.draw_bent(view, &first, &more, &mut stream);
+        if stream.next() < drawn.chance {
+            counts[2][cell(drawn.direction)] += 1.0;
         }
         let u = [0; 3].map(|_| stream.next());
         if let Some(c) = vertex.sample(u, &mut stream)
@@ -331,9 +372,14 @@ fn sample_densities_match_where_samples_fall() {
     let mut expected = [[0f64; 96]; 3];
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
-        let [alone, bent] = [forward.toward(view, w)[0], meets.toward(view, w)[1]];
+        let density = |forward: &Forward| {
+            let mut density = 0.0;
+            forward.toward(view, w, |part| density += part.density());
+            density
+        };
+        let (alone, with_bent) = (density(&alone), density(&bent));
         let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
-        for (k, density) in [alone.density(), b, bent.density()].into_iter().enumerate() {
+        for (k, density) in [alone, b, with_bent - alone].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
         }
     }
