@@ -74,10 +74,10 @@ fn cloth_under_a_ball_of_light_is_as_under_a_disc_of_the_sky() {
         "{cloth}[[light]]\ntype = \"distant\"\ntowards = [0, 0.6, 0.8]\nangular_radius = 25\nirradiance = {}\n",
         4.0 * std::f64::consts::PI * (1.0 - angle.cos())
     );
-    let args = ["--spp", "128"];
+    let args = ["--spp", "1024"];
     let (ball, disc) = (render(&ball, &args), render(&disc, &args));
     let (a, b) = (ball.mean(), disc.mean());
-    // Both share the random numbers of their paths: 0.06 % apart with these samples, 0.03 % with 4096.
+    // Both share the random numbers of their paths, but for those that the ball alone asks for.
     for k in 0..3 {
         assert!((a[k] / b[k] - 1.0).abs() < 0.0015, "{a:?} {b:?}");
     }
