@@ -267,9 +267,7 @@ impl<'a> Section<'a> {
         w: Vec3A,
         mut visit: impl FnMut(PlyAhead),
     ) {
-        // Distances in the section, of which a steep way has few.
-        let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
-        let direction = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
+        let (cos, direction) = self.direction_out(w);
         let mut pass = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
             visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos });
         };
@@ -286,11 +284,18 @@ impl<'a> Section<'a> {
         way::passages::<false>(&way, shape, &mut pass);
     }
 
+    /// The length in the section of a unit of a way out in the direction `w`, of which a steep way has little, and where the way leads.
+    #[inline]
+    fn direction_out(&self, w: Vec3A) -> (f32, Vec3A) {
+        let cos = (1.0 - w.z * w.z).max(1e-9).sqrt();
+        (cos, if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) })
+    }
+
     /// The place at a `distance` in the section, as [`Self::plies_ahead`] gives them, from a point `shift` beside one inside the yarn.
     #[inline]
     pub fn beyond(&self, shape: &YarnShape, from: &Inside, shift: Vec3A, w: Vec3A, distance: f32) -> Inside {
-        let depth = distance / (1.0 - w.z * w.z).max(1e-9).sqrt();
-        let direction = if self.tilted { w } else { Vec3A::new(w.x, w.y, 0.0) };
+        let (cos, direction) = self.direction_out(w);
+        let depth = distance / cos;
         let travel = from.travel + depth * direction.dot(from.z) / from.straightness;
         self.inside(shape, from.point + shift + depth * direction, travel)
     }

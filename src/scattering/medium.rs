@@ -29,6 +29,10 @@ mod calibrated {
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
 const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
 
+/// What the strip that the camera's ray has cleared leaves out straight on from a node, in expected fibres over the area fraction: half of
+/// two fibre radii, less the way within the fibre itself, (1 - pi/4 + (pi/4)^2 / 4) 2 / pi.
+const CLEARED_AHEAD: f32 = 0.235;
+
 /// Below this ratio of their variances R is much narrower than TT.
 const SHARP: f64 = 0.3;
 
@@ -63,6 +67,26 @@ pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
             w *= (1.0 + l - w.ln()) / (1.0 + w);
         }
         (b - w) / density
+    }
+}
+
+/// Width of a lobe of TT: of [`super::kernel`], with its normalisation, and azimuthal, radians.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TtWidth {
+    pub kappa: f32,
+    /// As above.
+    pub factor: f32,
+    /// As above.
+    pub sigma: f32,
+}
+
+impl TtWidth {
+    /// That of so many events, each with these widths, radians squared and radians.
+    #[inline]
+    fn new(events: f32, beta_tt_squared: f32, beta_n: f32) -> Self {
+        let kappa = kappa_of_variance(Rgb::splat(events * beta_tt_squared));
+        let [factor, ..] = normalisation(kappa).to_array();
+        Self { kappa: kappa.to_array()[0], factor, sigma: events.sqrt() * beta_n }
     }
 }
 
@@ -115,6 +139,10 @@ pub(crate) struct PlyOptics {
     pub beta_tt_squared: f32,
     /// Azimuthal width of TT, radians.
     pub beta_n: f32,
+    /// The width of one event of TT.
+    pub tt: TtWidth,
+    /// Expected fibres that a node's own chord keeps away straight on, beyond those in the strip that the camera's ray has cleared.
+    pub own_chord: f32,
     /// How far outside a fibre's centre the way of the light begins.
     pub shift: f32,
     /// How much longer the way of the light is than measured between cores.
@@ -192,6 +220,7 @@ impl PlyOptics {
             (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
         };
         let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
+        let (beta_tt_squared, beta_n) = ((material.beta_tt * material.beta_tt) as f32, material.beta_n as f32);
         let lean = |c: usize| {
             let t = radius_optical(c);
             (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c)))
@@ -218,8 +247,10 @@ impl PlyOptics {
             untouched: per_channel(&untouched),
             first: per_channel(&first),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
-            beta_tt_squared: (material.beta_tt * material.beta_tt) as f32,
-            beta_n: material.beta_n as f32,
+            beta_tt_squared,
+            beta_n,
+            tt: TtWidth::new(1.0, beta_tt_squared, beta_n),
+            own_chord: (gaps.dead_zone - CLEARED_AHEAD * density as f32).max(0.0),
             shift: (FRAC_PI_4 * (1.0 - calibrated::START_SHRINK * density).max(0.0) * fiber) as f32,
             lead: (FRAC_PI_4 * fiber) as f32,
             fiber_chord: (2.0 * FRAC_PI_4 * fiber) as f32,
@@ -228,6 +259,12 @@ impl PlyOptics {
 }
 
 impl PlyOptics {
+    /// The width of so many events of TT.
+    #[inline]
+    pub(crate) fn tt_width(&self, events: f32) -> TtWidth {
+        TtWidth::new(events, self.beta_tt_squared, self.beta_n)
+    }
+
     /// Of light that passes so many fibres in chains before its node, and so many after: the share that meets none, if R tells
     /// it from the rest, and how many TT events the rest has on the mean.
     #[inline]

@@ -7,16 +7,15 @@ use glam::Vec3A;
 
 use super::{
     super::{
-        kernel::{kappa_of_variance, normalisation, normalised_kernel, sample_sine},
+        kernel::{normalised_kernel, sample_sine},
         lobe::LobeFrame,
-        medium::PlyOptics,
+        medium::TtWidth,
     },
     Spot, View,
 };
 use crate::{
     geometry::{
         density::ChordFibers,
-        occluder::PlyGaps,
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -40,8 +39,8 @@ pub(super) struct Forward {
     /// What meets more after the last of them.
     pub(super) more: Option<More>,
     /// What may leave from a node where F does not, and the path's weight: they decide between both.
-    gain: Rgb,
-    weight: Rgb,
+    pub(super) gain: Rgb,
+    pub(super) weight: Rgb,
     /// A direction drawn from the lobe.
     pub(super) drawn: Drawn,
 }
@@ -54,18 +53,10 @@ pub(super) struct Fiber {
     frame: LobeFrame,
     /// What this fibre and those before it pass on.
     passed: Rgb,
-    /// The width of its TT: of the kernel, with its factor, and azimuthal.
-    pub(super) width: Width,
-    /// Where the light came from.
-    from: Vec3A,
-}
-
-/// Width of a lobe of TT.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Width {
-    kappa: f32,
-    factor: f32,
-    sigma: f32,
+    /// The width of its TT.
+    pub(super) width: TtWidth,
+    /// Where the light came from, in the section.
+    back: Vec3A,
 }
 
 /// Light that meets further fibres after the last one that was followed.
@@ -75,7 +66,7 @@ pub(super) struct More {
     share: Rgb,
     /// Optical depth of chains in the direction in which light left the last one.
     depth: Rgb,
-    width: Width,
+    width: TtWidth,
 }
 
 /// A direction of F.
@@ -138,7 +129,19 @@ pub(super) struct Stretch {
     foot: f32,
     /// Expected fibres: beyond the fibre's dead zone, if it is the own ply.
     fibers: f32,
+    /// The share of light that meets none of them.
+    through: f32,
     chord: ChordFibers,
+}
+
+/// A straight way on from a fibre.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    w: Vec3A,
+    /// From the fibre's place to where the way begins.
+    shift: Vec3A,
+    /// How many more fibres it meets than one across the yarn.
+    tilt: f32,
 }
 
 impl Forward {
@@ -159,57 +162,45 @@ impl Forward {
             return None;
         }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
-        let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
-        forward.follow(view, Fiber::new(view, spot, view.camera, Rgb::ONE), stream);
-        Some(forward)
-    }
-
-    /// The first fibre.
-    #[inline]
-    pub(super) fn first(&self) -> &Fiber {
-        &self.fibers[0]
+        Some(Self::follow(view, Fiber::new(view, spot, view.camera, Rgb::ONE), gain, weight, stream))
     }
 
     /// Follows light from a fibre to the next, and so on, until it is out.
     #[inline]
-    pub(super) fn follow(&mut self, view: &View<'_>, first: Fiber, stream: &mut Stream) {
-        (self.more, self.drawn) = (None, Drawn::NOTHING);
-        self.fibers.clear();
-        let least = TOO_LITTLE * (first.passed * self.weight).max_channel();
-        let mut fiber = first;
-        loop {
-            self.fibers.push(fiber);
-            let w = fiber.direction(&fiber.width, stream);
+    pub(super) fn follow(view: &View<'_>, first: Fiber, gain: Rgb, weight: Rgb, stream: &mut Stream) -> Self {
+        let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
+        let least = TOO_LITTLE * (first.passed * weight).max_channel();
+        let mut next = Some(first);
+        while let Some(fiber) = next.filter(|fiber| (fiber.passed * weight).max_channel() >= least) {
+            forward.fibers.push(fiber);
+            let way = fiber.way(view, fiber.direction(&fiber.width, stream));
             let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
-            let ahead = fiber.ahead(view, w, |stretch| {
+            let ahead = fiber.follow_way(view, &way, |stretch| {
                 let _ = stretches.try_push(stretch);
             });
             // Of light that goes this way so much is left where it meets the next one.
             let left = stream.next();
             if left < ahead.through {
-                let (lobe, around) = fiber.lobe(&fiber.width, w);
-                self.drawn = Drawn::new(w, &self.alone(view, &fiber, lobe, around, &ahead));
-                return;
+                let (lobe, around) = fiber.lobe(&fiber.width, way.w);
+                forward.drawn = Drawn::new(way.w, &forward.alone(view, &fiber, lobe, around, &ahead));
+                break;
             }
-            if self.fibers.is_full() {
-                let more = More::new(view, &fiber, &ahead, self.weight);
-                self.more = Some(more);
-                self.drawn = self.draw_bent(view, &fiber, &more, stream);
-                return;
+            if forward.fibers.is_full() {
+                let more = More::new(view, &fiber, &ahead, weight);
+                forward.more = Some(more);
+                forward.drawn = forward.draw_bent(view, &fiber, &more, stream);
+                break;
             }
-            let Some(next) = fiber.next(view, w, &mut stretches, left) else { return };
-            if (next.passed * self.weight).max_channel() < least {
-                return;
-            }
-            fiber = next;
+            next = fiber.next(view, &way, &mut stretches, left);
         }
+        forward
     }
 
     /// A direction of light that others bend after the last fibre.
     #[inline]
     pub(super) fn draw_bent(&self, view: &View<'_>, last: &Fiber, more: &More, stream: &mut Stream) -> Drawn {
         let w = last.direction(&more.width, stream);
-        let ahead = last.ahead(view, w, |_| {});
+        let ahead = last.ahead(view, w);
         Drawn::new(w, &self.bent(last, more, last.lobe(&more.width, w).0, &ahead))
     }
 
@@ -220,7 +211,7 @@ impl Forward {
         for fiber in before {
             let (lobe, around) = fiber.lobe(&fiber.width, w);
             if lobe >= FORWARD_TAIL {
-                visit(self.alone(view, fiber, lobe, around, &fiber.ahead(view, w, |_| {})));
+                visit(self.alone(view, fiber, lobe, around, &fiber.ahead(view, w)));
             }
         }
         let (lobe, around) = last.lobe(&last.width, w);
@@ -228,11 +219,18 @@ impl Forward {
         if lobe < FORWARD_TAIL && often < FORWARD_TAIL {
             return;
         }
-        let ahead = last.ahead(view, w, |_| {});
+        let ahead = last.ahead(view, w);
         visit(self.alone(view, last, lobe, around, &ahead));
         if let Some(more) = &self.more {
             visit(self.bent(last, more, often, &ahead));
         }
+    }
+
+    /// The density with which a path goes on as F towards `w`, whichever of its parts that belongs to, 1/steradian.
+    pub(super) fn density(&self, view: &View<'_>, w: Vec3A) -> f32 {
+        let mut density = 0.0;
+        self.toward(view, w, |part| density += part.density());
+        density
     }
 
     /// What leaves from a fibre: nothing else is met on the way out.
@@ -275,14 +273,14 @@ impl Fiber {
             spot,
             frame: LobeFrame::new(spot.tangent, from),
             passed: passed * optics.chain,
-            width: Width::new(optics, 1.0),
-            from,
+            width: optics.tt,
+            back: across(from),
         }
     }
 
     /// A direction of one of the lobes.
     #[inline]
-    pub(super) fn direction(&self, width: &Width, stream: &mut Stream) -> Vec3A {
+    pub(super) fn direction(&self, width: &TtWidth, stream: &mut Stream) -> Vec3A {
         let u_azimuth = stream.next();
         let u = [stream.next(), stream.next()];
         let sin = sample_sine(width.kappa, self.frame.sin, self.frame.cos, u, stream);
@@ -291,7 +289,7 @@ impl Fiber {
 
     /// A lobe of TT about this fibre with the cosine, 1/steradian, and its part around the fibre, 1/radian.
     #[inline]
-    fn lobe(&self, width: &Width, w: Vec3A) -> (f32, f32) {
+    fn lobe(&self, width: &TtWidth, w: Vec3A) -> (f32, f32) {
         let (at, cos) = self.frame.latitudes(w);
         let [along, ..] = normalised_kernel(Rgb::splat(width.kappa), Rgb::splat(width.factor), at).to_array();
         if along * cos < FORWARD_TAIL * 1e-4 {
@@ -302,82 +300,75 @@ impl Fiber {
         (along * cos * around, around)
     }
 
-    /// Light starts where it met the fibre, on the side where it came from, and is inside of it first if it goes on forward.
+    /// The way in the direction `w`. Light starts where it met the fibre, on the side where it came from, and is inside of it first if it
+    /// goes on forward.
     #[inline]
-    fn shift(&self, view: &View<'_>, w: Vec3A) -> Vec3A {
-        let across = |v: Vec3A| Vec3A::new(v.x, v.y, 0.0).normalize_or_zero();
-        let (back, out) = (across(self.from), across(w));
+    fn way(&self, view: &View<'_>, w: Vec3A) -> Way {
+        let out = across(w);
         let lead = view.section.thinness() * view.yarn.plies[self.spot.ply].lead;
-        lead * (back + (-back.dot(out)).max(0.0) * out)
+        let shift = lead * (self.back + (-self.back.dot(out)).max(0.0) * out);
+        Way { w, shift, tilt: self.spot.tilt(view.section, w) }
     }
 
-    /// What is between the fibre and the outside: its own chord keeps others away.
+    /// What is between the fibre and the outside in the direction `w`.
     #[inline]
-    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(Stretch)) -> Ahead {
-        let (yarn, spot) = (view.yarn, &self.spot);
-        let (tilt, thin) = (spot.tilt(view.section, w), view.section.thinness());
+    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
+        self.follow_way(view, &self.way(view, w), |_| {})
+    }
+
+    /// The same on a way, ply by ply, in no order: the fibre's own chord keeps others away.
+    #[inline]
+    fn follow_way(&self, view: &View<'_>, way: &Way, mut visit: impl FnMut(Stretch)) -> Ahead {
+        let (yarn, spot, thin) = (view.yarn, &self.spot, view.section.thinness());
         let shape = yarn.occluder().shape();
         let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, fibers: 0.0 };
-        view.section.plies_ahead(shape, &spot.inside, self.shift(view, w), w, |ahead| {
+        view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
+            let gaps = &optics.gaps;
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin);
             let own = ahead.ply == spot.ply;
-            let fibers = tilt * (chord.ahead(-ahead.foot) - if own { optics.gaps.dead_zone } else { 0.0 }).max(0.0);
-            let stretch = Stretch { ply: ahead.ply, own, foot: ahead.foot, fibers, chord };
+            let fibers = way.tilt * (chord.ahead(-ahead.foot) - if own { gaps.dead_zone } else { 0.0 }).max(0.0);
+            let through = if own { (-gaps.rate * fibers).exp() } else { gaps.unscattered(fibers) };
             all.chains += optics.rho * fibers;
-            all.through *= stretch.unscattered(&optics.gaps);
+            all.through *= through;
             all.fibers += fibers;
-            visit(stretch);
+            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, fibers, through, chord });
         });
         all
     }
 
-    /// The fibre that light meets next in the direction `w`, where so much of it is `left`.
+    /// The fibre that light meets next on a way, where so much of it is `left`.
     #[inline]
-    fn next(&self, view: &View<'_>, w: Vec3A, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
+    fn next(&self, view: &View<'_>, way: &Way, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
         stretches.sort_unstable_by(|a, b| a.foot.total_cmp(&b.foot));
-        let tilt = self.spot.tilt(view.section, w);
-        for stretch in &*stretches {
-            let gaps = &view.yarn.plies[stretch.ply].gaps;
-            let through = stretch.unscattered(gaps);
-            if left < through {
-                left /= through;
-                continue;
+        let stretch = stretches.iter().find(|stretch| {
+            let ends = left >= stretch.through;
+            if !ends {
+                left /= stretch.through;
             }
-            let passed = if stretch.own { -left.ln() / gaps.rate } else { gaps.fibers_passed(left) };
-            let behind = (stretch.fibers - passed).max(0.0) / tilt;
-            let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
-            let shape = view.yarn.occluder().shape();
-            let distance = (stretch.foot + at).max(0.0);
-            let inside = view.section.beyond(shape, &self.spot.inside, self.shift(view, w), w, distance);
-            let spot = Spot::new(view, stretch.ply, self.spot.depth, inside);
-            return Some(Self::new(view, spot, -w, self.passed));
-        }
-        None
+            ends
+        })?;
+        let gaps = &view.yarn.plies[stretch.ply].gaps;
+        let passed = if stretch.own { -left.ln() / gaps.rate } else { gaps.fibers_passed(left) };
+        let behind = (stretch.fibers - passed).max(0.0) / way.tilt;
+        let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
+        let distance = (stretch.foot + at).max(0.0);
+        let shape = view.yarn.occluder().shape();
+        let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
+        let spot = Spot::new(view, stretch.ply, self.spot.depth, inside);
+        Some(Self::new(view, spot, -way.w, self.passed))
     }
 }
 
-impl Stretch {
-    /// The share of light that meets no fibre of it.
-    #[inline]
-    fn unscattered(&self, gaps: &PlyGaps) -> f32 {
-        if self.own { (-gaps.rate * self.fibers).exp() } else { gaps.unscattered(self.fibers) }
-    }
-}
-
-impl Width {
-    /// That of so many events of TT.
-    #[inline]
-    fn new(optics: &PlyOptics, events: f32) -> Self {
-        let kappa = kappa_of_variance(Rgb::splat(events * optics.beta_tt_squared));
-        let [factor, ..] = normalisation(kappa).to_array();
-        Self { kappa: kappa.to_array()[0], factor, sigma: events.sqrt() * optics.beta_n }
-    }
+/// The part of a direction in the section, of unit length; zero along the yarn.
+#[inline]
+fn across(v: Vec3A) -> Vec3A {
+    Vec3A::new(v.x, v.y, 0.0).normalize_or_zero()
 }
 
 impl More {
     /// Of light that left `fiber` in a direction with so much `ahead`: what is left of the chains, and how many events they are. They
-    /// are met in the renewal process of [`PlyGaps`], and each passes on the same share.
+    /// are met in the renewal process of [`crate::geometry::occluder::PlyGaps`], and each passes on the same share.
     #[inline]
     pub(super) fn new(view: &View<'_>, fiber: &Fiber, ahead: &Ahead, weight: Rgb) -> Self {
         let optics = &view.yarn.plies[fiber.spot.ply];
@@ -390,7 +381,7 @@ impl More {
         let count = (mean * kept / several.max(Rgb::splat(1e-6))).max(Rgb::ONE).min(Rgb::splat(32.0));
         // One for all channels, by what each passes so often.
         let often = (share * fiber.passed * weight).max(Rgb::splat(1e-20));
-        Self { share, depth: ahead.chains, width: Width::new(optics, 1.0 + count.weighted_mean(often) / often.mean()) }
+        Self { share, depth: ahead.chains, width: optics.tt_width(1.0 + count.weighted_mean(often) / often.mean()) }
     }
 }
 

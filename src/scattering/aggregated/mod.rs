@@ -205,11 +205,7 @@ impl<'a> Vertex<'a> {
     /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of
     /// [`Self::sample`], for [`Self::evaluate`] weighs each part by itself.
     pub fn forward_density(&self, w: Vec3A) -> f32 {
-        let mut density = 0.0;
-        if let Some(forward) = &self.forward {
-            forward.toward(&self.view, w, |part| density += part.density());
-        }
-        density
+        self.forward.as_ref().map_or(0.0, |forward| forward.density(&self.view, w))
     }
 
     /// Draws where the path goes on. `u` are three fresh numbers: which component, and the direction of B.
@@ -253,7 +249,7 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of F leaves: that of the first fibre.
     #[inline]
     pub fn forward_start(&self) -> f32 {
-        self.forward.as_ref().map_or(0.0, |f| f.first().spot.depth)
+        self.forward.as_ref().and_then(|f| f.fibers.first()).map_or(0.0, |first| first.spot.depth)
     }
 }
 

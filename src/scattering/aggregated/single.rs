@@ -23,9 +23,6 @@ use crate::{
 const SAMPLING_WIDENING: f32 = 1.2;
 /// The power of half the versed angle from straight on with which light finds a fibre's own chord free of others.
 const STRAIGHT_ON: i32 = 4;
-/// What the cleared strip leaves out straight on already, in expected fibres over the area fraction: of a strip of two fibre radii half, less the
-/// way within the fibre itself, (1 - pi/4 + (pi/4)^2 / 4) 2 / pi.
-const CLEARED_AHEAD: f32 = 0.235;
 
 /// A place inside a ply where light ends its chain.
 #[derive(Clone, Copy, Debug)]
@@ -225,7 +222,6 @@ impl Node {
         let lead = thin * optics.lead;
         // Straight on, no other fibre lies within its own chord; aside, others do, as the mean medium has it.
         let alone = (0.5 * (1.0 - ahead.x)).powi(STRAIGHT_ON);
-        let known = CLEARED_AHEAD * shape.plies[spot.ply].density() as f32;
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
@@ -245,8 +241,7 @@ impl Node {
                 if to > 0.0 {
                     let even = strip.length(from + lead, to + lead) / (2.0 * chord.half);
                     let ring = ((to - hole) / chord.zone).clamp(0.0, 1.0);
-                    let fibers =
-                        chord.even * even + 0.5 * chord.ring * ring - alone * (passed.gaps.dead_zone - known).max(0.0);
+                    let fibers = chord.even * even + 0.5 * chord.ring * ring - alone * passed.own_chord;
                     own += passed.rho * fibers.max(0.0);
                 }
             } else {

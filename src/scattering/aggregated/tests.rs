@@ -343,9 +343,9 @@ fn sample_densities_match_where_samples_fall() {
     let (view, node, forward) = (&vertex.view, vertex.node.as_ref().unwrap(), vertex.forward.as_ref().unwrap());
     // F hangs on the fibres that light met: what leaves from the first, and what others bend were that the last, after a
     // direction that is the same for all samples.
-    let first = *forward.first();
+    let first = forward.fibers[0];
     let fixed = first.direction(&first.width, &mut stream);
-    let more = More::new(view, &first, &first.ahead(view, fixed, |_| {}), Rgb::ONE);
+    let more = More::new(view, &first, &first.ahead(view, fixed), Rgb::ONE);
     let (mut alone, mut bent) = (forward.clone(), forward.clone());
     alone.fibers.truncate(1);
     bent.fibers.truncate(1);
@@ -353,8 +353,7 @@ fn sample_densities_match_where_samples_fall() {
     let mut counts = [[0f64; 96]; 3];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
-        let mut again = forward.clone();
-        again.follow(view, first, &mut stream);
+        let again = Forward::follow(view, first, forward.gain, forward.weight, &mut stream);
         if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
             counts[0][cell(again.drawn.direction)] += 1.0;
         }
@@ -372,12 +371,7 @@ fn sample_densities_match_where_samples_fall() {
     let mut expected = [[0f64; 96]; 3];
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
-        let density = |forward: &Forward| {
-            let mut density = 0.0;
-            forward.toward(view, w, |part| density += part.density());
-            density
-        };
-        let (alone, with_bent) = (density(&alone), density(&bent));
+        let (alone, with_bent) = (alone.density(view, w), bent.density(view, w));
         let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
         for (k, density) in [alone, b, with_bent - alone].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
