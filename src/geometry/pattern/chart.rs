@@ -213,7 +213,7 @@ pub const PATTERNS: [(&str, &[&str]); 20] = [
 const MOST_ROWS: usize = 20_000;
 const MOST_STEPS: usize = 20_000;
 /// Most stitches in a cable.
-const WIDEST_CABLE: u8 = 24;
+pub(super) const WIDEST_CABLE: u8 = 24;
 /// How far from what is asked a number of stitches is looked for that a chart fits.
 const LARGEST_STEP_ASIDE: usize = 200;
 const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \

@@ -67,6 +67,11 @@ fn mistakes_are_named() {
     let endless = "Row 1: [[[yo] 20000 times] 20000 times] 20000 times, k to end";
     assert!(wrong(endless, 4).problem.contains("repeats more than"));
     assert!(wrong("Row 1: 4294967295/1 LC", 4).problem.contains("is no cable"));
+    // As wide as a chart's, and no wider.
+    assert_eq!(rows("Row 1: 20/4 LC", 24), ["20/4lc"]);
+    assert!(wrong("Row 1: 20/5 LC", 25).problem.contains("is no cable"));
+    assert_eq!(rows("Row 1: c24f", 24), ["c24f"]);
+    assert!(wrong("Row 1: c26f", 26).problem.contains("c26f"));
     let deep = format!("Row 1: {}k1", "[".repeat(100));
     assert!(wrong(&deep, 1).problem.contains("deep"));
 }

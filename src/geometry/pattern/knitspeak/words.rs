@@ -1,6 +1,8 @@
 //! The words of a row: steps, repeats and brackets.
 
-use super::{Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps, error, short};
+use super::{
+    super::chart::WIDEST_CABLE, Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps, error, short,
+};
 
 /// Words, brackets and signs of a row.
 fn tokens(text: &str) -> Vec<String> {
@@ -247,7 +249,7 @@ impl Parser<'_> {
         if !matches!(kind.as_str(), "lc" | "rc" | "lpc" | "rpc")
             || front == 0
             || back == 0
-            || front.saturating_add(back) > 24
+            || front.saturating_add(back) > WIDEST_CABLE.into()
         {
             return error(self.line, format!("\"{word} {}\" is no cable", short(&kind)), "as in 2/1 LC, 2/2 RPC");
         }
@@ -290,7 +292,7 @@ fn step(word: &str) -> Option<Steps> {
     if let Some(rest) = word.strip_prefix(['c', 't'])
         && let Some(count) = rest.strip_suffix(['f', 'b'])
     {
-        let count = count.parse::<u32>().ok().filter(|n| (2..=24).contains(n))?;
+        let count = count.parse::<u32>().ok().filter(|n| (2..=WIDEST_CABLE.into()).contains(n))?;
         return one(word, count, count);
     }
     let digits = word.find(|c: char| c.is_ascii_digit());
