@@ -46,6 +46,14 @@ fn cables_cross_halves() {
     assert_eq!(worked(&["k4", "c4b"], 4, 2)[1][0].layer, -1);
 }
 
+/// Else a line of 13 characters asks for 20,000 rows of 20,000 steps.
+#[test]
+fn rows_of_one_line_share_their_steps() {
+    let chart = Chart::parse(&["20000: k20000"]).unwrap();
+    assert_eq!((chart.rows.len(), chart.rows[0].steps.len()), (20_000, 20_000));
+    assert!(chart.rows.iter().all(|row| Arc::ptr_eq(&row.steps, &chart.rows[0].steps)));
+}
+
 #[test]
 fn plain_rows_may_be_cut_and_others_not() {
     assert_eq!(worked(&["k2 p2"], 7, 1)[0].iter().filter(|s| s.purl).count(), 3);
