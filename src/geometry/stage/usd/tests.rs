@@ -207,6 +207,26 @@ fn transforms_visibility_and_instances_are_applied() {
 }
 
 #[test]
+fn instances_are_hidden_by_their_ids() {
+    let folder = tempfile::tempdir().unwrap();
+    let seen = |name: &str, ids: &str, hidden: &str| -> Vec<f64> {
+        let path = folder.path().join(name);
+        let text = format!(
+            "#usda 1.0\ndef PointInstancer \"many\" {{\nrel prototypes = </many/a>\nint[] protoIndices = [0, 0, 0]\n\
+             point3f[] positions = [(0,0,0), (10,0,0), (20,0,0)]\n{ids}{hidden}def BasisCurves \"a\" {{\n\
+             uniform token type = \"linear\"\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0,0,0), (0,1,0)]\n\
+             float[] widths = [0.1, 0.1]\n}}\n}}\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let (set, _) = Stage::open(&path).and_then(|stage| stage.curves(&PrimPattern::all(), None)).unwrap();
+        set.curves.iter().map(|curve| curve.points[0].x).collect()
+    };
+    assert_eq!(seen("all.usda", "", ""), [0.0, 10.0, 20.0]);
+    assert_eq!(seen("by_place.usda", "", "int64[] invisibleIds = [1, 7]\n"), [0.0, 20.0]);
+    assert_eq!(seen("by_id.usda", "int64[] ids = [7, 8, 9]\n", "int64[] invisibleIds = [1, 7]\n"), [10.0, 20.0]);
+}
+
+#[test]
 fn prims_are_chosen_by_path_and_material_and_times_by_frame() {
     let stage = open("scene.usda");
     assert_eq!(curves(&stage, "/top/*", None).1.len(), 2);
