@@ -110,6 +110,46 @@ fn a_hat_keeps_its_yarns_apart_and_its_form() {
 }
 
 #[test]
+fn rows_share_the_lean_that_decreases_make() {
+    // A row of decreases takes a tenth of the stitches: evenly spaced, those beside them would jump by half a stitch.
+    let chart = Chart::parse(&["6: k", "k8 k2tog", "6: k"]).unwrap();
+    let knit = Knit { rows: chart.rows(), chart, form: Form::Tube, ..knit("stockinette", 100, 1) };
+    let rows = knit.worked().unwrap();
+    let border = Border {
+        round: Some(1.0),
+        stacked: false,
+        turns: true,
+        finished: true,
+        rims: Rims::default(),
+        mirrored: false,
+    };
+    let made = Loops::new(&rows, 100, border);
+    let lean = |row: i32| {
+        let count = rows[row as usize].len() as f64;
+        let of = |l: &loops::Loop| match l.parents[..] {
+            [p] if l.row == row => border.short(l.at - made.loops[p as usize].at).abs() * count,
+            _ => 0.0,
+        };
+        made.loops.iter().map(of).fold(0.0, f64::max)
+    };
+    let worst = (1..13).map(lean).fold(0.0, f64::max);
+    assert!(worst < 0.25, "{:?}", (1..13).map(lean).collect::<Vec<_>>());
+    // Those above and below lean less and less.
+    assert!(
+        lean(6) > lean(8) && lean(8) > 2.0 * lean(12) && lean(6) > lean(4) && lean(4) > lean(2),
+        "{:?}",
+        (1..13).map(lean).collect::<Vec<_>>()
+    );
+    // Stitches keep about their width.
+    for row in 0..13 {
+        let mut at: Vec<f64> = made.loops.iter().filter(|l| l.row == row).map(|l| l.at).collect();
+        at.sort_by(f64::total_cmp);
+        let count = rows[row as usize].len() as f64;
+        assert!(at.windows(2).all(|w| (0.75..1.25).contains(&((w[1] - w[0]) * count))), "{row}: {at:?}");
+    }
+}
+
+#[test]
 fn the_same_knit_is_the_same_to_the_bit() {
     // Large enough that rods are relaxed side by side.
     let once = hat(48).strands(1.3).unwrap();

@@ -1,5 +1,7 @@
 //! Makes the loops of a chart's stitches: where they are, what they are drawn through, and the edges.
 
+mod across;
+
 use super::{
     super::rims::CastOn,
     super::{
@@ -66,16 +68,6 @@ impl<'a> Maker<'a> {
         }
     }
 
-    fn even(&self, count: usize) -> Vec<f64> {
-        let n = count as f64;
-        let at = |j: usize| match (self.border.turns, self.border.round) {
-            (true, _) => (j as f64 + 0.5) / n,
-            (false, Some(_)) => j as f64 + 0.5,
-            (false, None) => j as f64 + 0.5 - 0.5 * n,
-        };
-        (0..count).map(at).collect()
-    }
-
     /// Mean place of what a stitch is made of in the row below, measured from `near`.
     fn parent_middle(&self, below: &[f64], stitch: &Stitch, near: f64) -> f64 {
         let at = |p: u32| near + self.border.short(below[p as usize % below.len()] - near);
@@ -91,27 +83,6 @@ impl<'a> Maker<'a> {
         }
         let last = stitch.first_parent + u32::from(stitch.parents);
         (stitch.first_parent..last).map(at).sum::<f64>() / f64::from(stitch.parents)
-    }
-
-    /// Where stitches are across the cloth: evenly.
-    pub(super) fn positions(&mut self) {
-        self.middles = self.rows.iter().map(|r| self.even(r.len())).collect();
-        if self.border.round.is_none() {
-            // Each row of a shaped piece lies over the one below.
-            let mut shift = 0.0;
-            for r in 1..self.rows.len() {
-                let (row, below) = (&self.rows[r], self.even(self.rows[r - 1].len()));
-                let own = self.even(row.len());
-                let worked: Vec<f64> = row
-                    .iter()
-                    .zip(&own)
-                    .filter(|(s, _)| s.parents > 0)
-                    .map(|(s, at)| self.parent_middle(&below, s, *at) - at)
-                    .collect();
-                shift += worked.iter().sum::<f64>() / worked.len().max(1) as f64;
-                self.middles[r].iter_mut().for_each(|at| *at += shift);
-            }
-        }
     }
 
     fn push(&mut self, made: Loop) -> u32 {

@@ -1,0 +1,111 @@
+//! Where stitches are across the cloth.
+
+use super::{super::super::super::chart::Stitch, Maker};
+
+/// Rounds of looking for it.
+const ROUNDS: usize = 100;
+/// By how much a round goes beyond what it finds.
+const BEYOND: f64 = 1.5;
+
+impl Maker<'_> {
+    pub(super) fn even(&self, count: usize) -> Vec<f64> {
+        let n = count as f64;
+        let at = |j: usize| match (self.border.turns, self.border.round) {
+            (true, _) => (j as f64 + 0.5) / n,
+            (false, Some(_)) => j as f64 + 0.5,
+            (false, None) => j as f64 + 0.5 - 0.5 * n,
+        };
+        (0..count).map(at).collect()
+    }
+
+    /// Where stitches are: evenly, and in shaped cloth so that wales run on where stitches come and go.
+    pub(in super::super) fn positions(&mut self) {
+        self.middles = self.rows.iter().map(|r| self.even(r.len())).collect();
+        if self.border.round.is_none() {
+            self.lie_over_each_other();
+        }
+        let is_shaped = self.rows.windows(2).any(|w| w[0].len() != w[1].len());
+        if is_shaped && !self.border.stacked {
+            self.share_shaping();
+        }
+    }
+
+    /// Each row of a shaped flat piece lies over the one below.
+    fn lie_over_each_other(&mut self) {
+        let mut shift = 0.0;
+        for r in 1..self.rows.len() {
+            let (row, below) = (&self.rows[r], self.even(self.rows[r - 1].len()));
+            let own = self.even(row.len());
+            let worked: Vec<f64> = row
+                .iter()
+                .zip(&own)
+                .filter(|(s, _)| s.parents > 0)
+                .map(|(s, at)| self.parent_middle(&below, s, *at) - at)
+                .collect();
+            shift += worked.iter().sum::<f64>() / worked.len().max(1) as f64;
+            self.middles[r].iter_mut().for_each(|at| *at += shift);
+        }
+    }
+
+    /// A row of decreases would move every stitch of the next one against its wale. Springs along the courses, as long as
+    /// stitches are wide, and along the wales, which want to be straight, are equally stiff: rows above and below share
+    /// what moves. The first row stays, and the sides of a tube, where a round goes over into the next.
+    fn share_shaping(&mut self) {
+        // What takes each stitch: stitches of the row above.
+        let mut children: Vec<Vec<Vec<usize>>> = self.rows.iter().map(|r| vec![Vec::new(); r.len()]).collect();
+        for r in 1..self.rows.len() {
+            for (j, s) in self.rows[r].iter().enumerate().filter(|(_, s)| is_in_line(s)) {
+                for p in s.first_parent..s.first_parent + u32::from(s.parents) {
+                    let n = children[r - 1].len();
+                    children[r - 1][p as usize % n].push(j);
+                }
+            }
+        }
+        for _ in 0..ROUNDS {
+            for (r, row) in children.iter().enumerate().skip(1) {
+                for (j, above) in row.iter().enumerate() {
+                    let by = self.drawn_by(r, j, above);
+                    self.middles[r][j] += BEYOND * by;
+                }
+            }
+        }
+    }
+
+    /// How far the springs of a stitch would move it.
+    fn drawn_by(&self, r: usize, j: usize, children: &[usize]) -> f64 {
+        let (own, row) = (&self.middles[r], &self.rows[r]);
+        let (at, n) = (own[j], own.len());
+        let width = if self.border.turns { 1.0 / n as f64 } else { 1.0 };
+        let (mut pull, mut stiffness) = (0.0, 0.0);
+        let mut add = |by: f64, weight: f64| {
+            pull += weight * by;
+            stiffness += weight;
+        };
+        // Beside the border of a tube is the middle of half a stitch.
+        match (j.checked_sub(1), self.border.turns) {
+            (Some(left), _) => add(own[left] + width - at, 1.0),
+            (None, true) => add(0.5 * width - at, 2.0),
+            (None, false) => {}
+        }
+        match (own.get(j + 1), self.border.turns) {
+            (Some(right), _) => add(right - width - at, 1.0),
+            (None, true) => add(1.0 - 0.5 * width - at, 2.0),
+            (None, false) => {}
+        }
+        if is_in_line(&row[j]) {
+            add(self.parent_middle(&self.middles[r - 1], &row[j], at) - at, 1.0);
+        }
+        for &c in children {
+            let (child, middle) = (&self.rows[r + 1][c], self.middles[r + 1][c]);
+            let many = f64::from(child.parents);
+            let lean = self.border.short(middle - self.parent_middle(own, child, middle));
+            add(lean * many, 1.0 / (many * many));
+        }
+        if stiffness > 0.0 { pull / stiffness } else { 0.0 }
+    }
+}
+
+/// Whether a stitch is in the wale of those that it takes: strands of a cable change places.
+fn is_in_line(stitch: &Stitch) -> bool {
+    stitch.parents > 0 && stitch.layer == 0
+}
