@@ -26,7 +26,7 @@ use self::{
     cell::Cell,
     curl::Curl,
     loops::{Border, Loops},
-    piece::{Laying, State, Surface, Thread, settle, sheet::Sheet},
+    piece::{Laying, State, Surface, Thread, ease, settle, sheet::Sheet},
 };
 pub use self::{
     colors::{Colors, Work},
@@ -125,6 +125,7 @@ const LARGEST_CELL: u32 = 2048;
 const EDGE_STEPS: usize = 300;
 const PIECE_STEPS: usize = 40;
 const FINE_STEPS: usize = 8;
+const EASE_STEPS: usize = 20;
 /// Points of a stitch while a piece without a cell is relaxed.
 const COARSE: u32 = 14;
 
@@ -419,7 +420,9 @@ impl Knit {
             let run = finding_room(PIECE_STEPS, 0.8);
             settle(&mut threads, &run);
             threads.iter_mut().for_each(|t| t.refine(f64::from(self.points) / f64::from(points)));
-            settle(&mut threads, &Run { steps: FINE_STEPS, growing: 0, firm: 4.0, ..run });
+            let run = Run { growing: 0, ..run };
+            settle(&mut threads, &Run { steps: FINE_STEPS, firm: 4.0, ..run });
+            ease(&mut threads, self.points as usize, &Run { steps: EASE_STEPS, ..run });
         }
         let shift = match &surface {
             Surface::Plane { height, .. } => DVec3::new(0.0, -0.5 * height * count, 0.0),

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-pub(super) use self::thread::{State, Thread, settle};
+pub(super) use self::thread::{State, Thread, ease, settle};
 use self::{drawn::drawn_points, sheet::Sheet};
 use super::{
     super::revolution::Revolution,

@@ -110,6 +110,36 @@ fn a_hat_keeps_its_yarns_apart_and_its_form() {
 }
 
 #[test]
+fn yarns_do_not_fold_into_themselves_where_a_brim_is_turned_up() {
+    // As scenes/beanie.toml has it, in diameters, with half of the stitches.
+    let chart = Chart::parse(&["24: k2 p2", "8: k"]).unwrap();
+    let profile = [
+        (31.0, 26.0),
+        (31.0, 9.0),
+        (30.9, 3.0),
+        (30.1, 1.0),
+        (28.3, 0.2),
+        (26.5, 1.0),
+        (25.7, 3.0),
+        (25.7, 30.0),
+        (25.7, 60.0),
+    ];
+    let form = Form::Revolution(profile.map(|(r, y)| DVec2::new(r, y)).into());
+    let brim = Knit { rows: chart.rows(), chart, form, ..knit("stockinette", 48, 1) };
+    let strands = brim.strands(1.0).unwrap();
+    // How far a yarn turns beyond what its radius allows: there its inner side runs backwards.
+    let folds = strands.iter().flat_map(|s| {
+        s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
+            let (a, b) = (w[1] - w[0], w[2] - w[1]);
+            *fold = (*fold + a.angle_between(b) - (a.length() + b.length())).max(0.0);
+            Some(*fold)
+        })
+    });
+    let deepest = folds.fold(0.0, f64::max);
+    assert!(deepest < 0.5, "{deepest}");
+}
+
+#[test]
 fn rows_share_the_lean_that_decreases_make() {
     // A row of decreases takes a tenth of the stitches: evenly spaced, those beside them would jump by half a stitch.
     let chart = Chart::parse(&["6: k", "k8 k2tog", "6: k"]).unwrap();

@@ -199,3 +199,36 @@ pub(in super::super) fn settle(threads: &mut [Thread], run: &Run) {
         threads[k].points[i] = *p;
     }
 }
+
+/// Relaxes what still folds into itself, with a quarter of a stitch on either side of it; all else is at rest meanwhile.
+/// `per_stitch` is the number of points in a stitch.
+pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, run: &Run) {
+    // How far a yarn may turn beyond what its radius allows, in radians; plies are seen to break at five times that.
+    const FOLD: f64 = 0.1;
+    const ROUNDS: usize = 8;
+    for _ in 0..ROUNDS {
+        let mut found = false;
+        let states: Vec<Vec<State>> = threads.iter().map(|t| t.state.clone()).collect();
+        for (t, own) in threads.iter_mut().zip(&states) {
+            t.state.iter_mut().filter(|s| **s == State::Move).for_each(|s| *s = State::Rest);
+            let n = t.points.len();
+            let mut fold: f64 = 0.0;
+            for (i, w) in t.points.windows(3).enumerate() {
+                let (a, b) = (w[1] - w[0], w[2] - w[1]);
+                fold = (fold + a.angle_between(b) - (a.length() + b.length())).max(0.0);
+                if fold > FOLD {
+                    let near = i.saturating_sub(per_stitch / 4)..(i + 3 + per_stitch / 4).min(n);
+                    t.state[near.clone()].copy_from_slice(&own[near]);
+                    found = true;
+                }
+            }
+        }
+        if found {
+            settle(threads, run);
+        }
+        threads.iter_mut().zip(states).for_each(|(t, own)| t.state = own);
+        if !found {
+            return;
+        }
+    }
+}
