@@ -26,6 +26,10 @@ pub enum Edges {
 
 /// Points of a turn of the weft.
 const TURN: usize = 8;
+/// How far a selvedge's warp is from the last one, and how far the weft's ends reach beyond it, in distances from a warp's middle
+/// to that of a weft upon it. Yarns that pass between two warps from one side to the other need 1.73 of them.
+const BESIDE: f64 = 1.9;
+const STUB: f64 = 0.7;
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
 
@@ -70,7 +74,8 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<P
     let flat = cloth.weave.sized();
     let nodes = cloth.cell.nodes;
     let reach = radius[0] + radius[1];
-    let edge = 0.5 * cloth.size(0) + 0.5 * cloth.cell.spacing[0].max(2.2 * radius[0]);
+    let spacing = cloth.cell.spacing[0];
+    let edge = 0.5 * (cloth.size(0) - spacing) + spacing.max(BESIDE * reach);
     // The two warps: straight, round.
     let last = cloth.count[0];
     for (sign, index, place) in [(-1.0, last, -0.5), (1.0, last + 1, last as f32 + 0.5)] {
@@ -94,18 +99,18 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<P
         }
         if i == 0 {
             let first = row[0];
-            let start = DVec3::new(-edge - 2.0 * reach, first.0.y, reach);
+            let start = DVec3::new(-edge - STUB * reach, first.0.y, reach);
             let over = DVec3::new(-edge, first.0.y, reach);
             way.extend([start, over].map(|p| (p, radius[1], DVec3::Z, [-0.5, first.3[1]])));
-            join(&mut way, first, nodes, false);
+            join(&mut way, first, row[1].0 - first.0, nodes);
         }
         way.extend(row);
         let from = *way.last().expect("a row has points");
         let place = if out > 0.0 { last as f32 + 0.5 } else { -0.5 };
         let Some(next) = wefts.get(i + 1) else {
             let over = DVec3::new(out * edge, from.0.y, reach);
-            join(&mut way, (over, radius[1], DVec3::Z, [place, from.3[1]]), nodes, true);
-            let end = DVec3::new(out * (edge + 2.0 * reach), from.0.y, reach);
+            join(&mut way, (over, radius[1], DVec3::Z, [place, from.3[1]]), out * DVec3::X, nodes);
+            let end = DVec3::new(out * (edge + STUB * reach), from.0.y, reach);
             way.push((over, radius[1], DVec3::Z, [place, from.3[1]]));
             way.push((end, radius[1], DVec3::Z, [place, from.3[1]]));
             break;
@@ -113,7 +118,10 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<P
         let mut there = points(next);
         there.drain(..nodes / 2);
         there.truncate(there.len() - nodes / 2);
-        let to = if out > 0.0 { there[there.len() - 1] } else { there[0] };
+        if out > 0.0 {
+            there.reverse();
+        }
+        let (to, onwards) = (there[0], there[1].0 - there[0].0);
         let turn = |k: usize| {
             let angle = PI * (k as f64 / TURN as f64 - 0.5);
             let share = 0.5 + 0.5 * angle.sin();
@@ -124,25 +132,25 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<P
             );
             (p, radius[1], DVec3::Z, [place, if 2 * k < TURN { from.3[1] } else { to.3[1] }])
         };
-        join(&mut way, turn(0), nodes, true);
+        join(&mut way, turn(0), out * DVec3::X, nodes);
         way.extend((0..=TURN).map(turn));
-        join(&mut way, to, nodes, false);
+        join(&mut way, to, onwards, nodes);
     }
     warps.push(from_points(StrandKind::Weft, 0, &way, flat));
     warps
 }
 
-/// Leads the way to `to`, smoothly and level at both ends, without `to` itself: next to the outermost warp, which is at
-/// the end or at the start of the way, it is already or still on its side.
-fn join(way: &mut Vec<Point>, to: Point, nodes: usize, outwards: bool) {
-    let Some(&from) = way.last() else { return };
+/// Leads the way on to `to`, without it, and arrives in the direction `onwards`.
+fn join(way: &mut Vec<Point>, to: Point, onwards: DVec3, nodes: usize) {
+    let [.., before, from] = way[..] else { return };
     let steps = nodes.max(2);
+    let length = from.0.distance(to.0);
+    let [a, b] = [from.0 - before.0, onwards].map(|d| d.normalize_or_zero() * length);
     for k in 1..steps {
         let s = k as f64 / steps as f64;
-        let eased = if outwards { (s / 0.55).min(1.0) } else { ((s - 0.45) / 0.55).max(0.0) };
-        let height = 0.5 - 0.5 * (PI * eased).cos();
-        let mut p = from.0.lerp(to.0, s);
-        p.z = from.0.z + height * (to.0.z - from.0.z);
+        let t = 1.0 - s;
+        // Hermite's cubic.
+        let p = t * t * ((1.0 + 2.0 * s) * from.0 + s * a) + s * s * ((1.0 + 2.0 * t) * to.0 - t * b);
         let coordinates = if s < 0.5 { from.3 } else { to.3 };
         way.push((p, from.1 + s * (to.1 - from.1), from.2.lerp(to.2, s), coordinates));
     }

@@ -206,6 +206,26 @@ fn selvedges_make_one_weft_of_all() {
 }
 
 #[test]
+fn wefts_turn_without_folding_into_themselves() {
+    for name in NAMES {
+        let weave = Weave { edges: Edges::Selvedge, ..weave(name) };
+        let made = weave.strands().unwrap();
+        let weft = made.iter().find(|s| s.kind == StrandKind::Weft).unwrap();
+        // How far it turns beyond what its radius allows, in radians, beyond the outermost crossings.
+        let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
+            let (a, b) = (w[1] - w[0], w[2] - w[1]);
+            let allowed = 0.5 * (a.length() + b.length()) / weave.weft_radius;
+            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { (*fold + a.angle_between(b) - allowed).max(0.0) };
+            Some(*fold)
+        });
+        let deepest = fold.fold(0.0, f64::max);
+        // Under the loops of terry wefts go up and down as steeply all along.
+        let most = if *name == "terry" { 0.8 } else { 0.5 };
+        assert!(deepest < most, "{name}: {deepest}");
+    }
+}
+
+#[test]
 fn hems_hide_the_ends_of_warps() {
     let weave = Weave { edges: Edges::Finished, wefts: Extent::Yarns(20), ..weave("plain") };
     let cloth = weave.relax().unwrap();
