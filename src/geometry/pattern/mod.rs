@@ -2,9 +2,10 @@
 //!
 //! [`draft`] and [`weave`] make woven cloth, [`chart`] and [`knit`] knitted cloth, flat, as a tube or on a surface of
 //! [`revolution`], or as a [`tile`] that is laid elsewhere; `rods` relaxes yarns as elastic rods, `relax` lets those of a
-//! tile push each other apart until they touch, and [`overlap`] measures what is left.
+//! tile push each other apart until they touch, `bend` tells where a yarn folds, and [`overlap`] measures what is left.
 //! Nothing here draws a random number: the same description gives the same curves to the bit.
 
+mod bend;
 pub mod chart;
 mod contact;
 pub mod draft;

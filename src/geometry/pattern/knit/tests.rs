@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 
 use super::{
     super::{
+        bend::folded,
         chart::PATTERNS,
         overlap::{Overlap, overlap},
     },
@@ -127,11 +128,9 @@ fn yarns_do_not_fold_into_themselves_where_a_brim_is_turned_up() {
     let form = Form::Revolution(profile.map(|(r, y)| DVec2::new(r, y)).into());
     let brim = Knit { rows: chart.rows(), chart, form, ..knit("stockinette", 48, 1) };
     let strands = brim.strands(1.0).unwrap();
-    // How far a yarn turns beyond what its radius allows: there its inner side runs backwards.
     let folds = strands.iter().flat_map(|s| {
         s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            let (a, b) = (w[1] - w[0], w[2] - w[1]);
-            *fold = (*fold + a.angle_between(b) - (a.length() + b.length())).max(0.0);
+            *fold = folded(*fold, w, 0.5);
             Some(*fold)
         })
     });

@@ -1,5 +1,5 @@
 use super::{
-    super::{draft::NAMES, overlap::overlap},
+    super::{bend::folded, draft::NAMES, overlap::overlap},
     *,
 };
 use crate::geometry::curve::Curve;
@@ -211,11 +211,9 @@ fn wefts_turn_without_folding_into_themselves() {
         let weave = Weave { edges: Edges::Selvedge, ..weave(name) };
         let made = weave.strands().unwrap();
         let weft = made.iter().find(|s| s.kind == StrandKind::Weft).unwrap();
-        // How far it turns beyond what its radius allows, in radians, beyond the outermost crossings.
+        // Beyond the outermost crossings.
         let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
-            let (a, b) = (w[1] - w[0], w[2] - w[1]);
-            let allowed = 0.5 * (a.length() + b.length()) / weave.weft_radius;
-            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { (*fold + a.angle_between(b) - allowed).max(0.0) };
+            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, weave.weft_radius) };
             Some(*fold)
         });
         let deepest = fold.fold(0.0, f64::max);

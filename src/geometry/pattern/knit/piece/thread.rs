@@ -5,7 +5,10 @@ use std::collections::HashSet;
 use glam::{DVec3, IVec3};
 
 use super::super::{
-    super::rods::{Rods, Run, Strand},
+    super::{
+        bend::folded,
+        rods::{Rods, Run, Strand},
+    },
     shape::spaced,
 };
 use crate::geometry::spline::through_points;
@@ -206,29 +209,30 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, run: &Ru
     // How far a yarn may turn beyond what its radius allows, in radians; plies are seen to break at five times that.
     const FOLD: f64 = 0.1;
     const ROUNDS: usize = 8;
+    let reach = per_stitch / 4;
     for _ in 0..ROUNDS {
-        let mut found = false;
-        let states: Vec<Vec<State>> = threads.iter().map(|t| t.state.clone()).collect();
-        for (t, own) in threads.iter_mut().zip(&states) {
-            t.state.iter_mut().filter(|s| **s == State::Move).for_each(|s| *s = State::Rest);
-            let n = t.points.len();
-            let mut fold: f64 = 0.0;
-            for (i, w) in t.points.windows(3).enumerate() {
-                let (a, b) = (w[1] - w[0], w[2] - w[1]);
-                fold = (fold + a.angle_between(b) - (a.length() + b.length())).max(0.0);
-                if fold > FOLD {
-                    let near = i.saturating_sub(per_stitch / 4)..(i + 3 + per_stitch / 4).min(n);
-                    t.state[near.clone()].copy_from_slice(&own[near]);
-                    found = true;
-                }
-            }
-        }
-        if found {
-            settle(threads, run);
-        }
-        threads.iter_mut().zip(states).for_each(|(t, own)| t.state = own);
-        if !found {
+        let folds: Vec<Vec<usize>> = threads
+            .iter()
+            .map(|t| {
+                let along = t.points.windows(3).scan(0.0, |fold, w| {
+                    *fold = folded(*fold, w, 0.5);
+                    Some(*fold)
+                });
+                along.enumerate().filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
+            })
+            .collect();
+        if folds.iter().all(Vec::is_empty) {
             return;
         }
+        let states: Vec<Vec<State>> = threads.iter().map(|t| t.state.clone()).collect();
+        for ((t, own), folds) in threads.iter_mut().zip(&states).zip(folds) {
+            t.state.iter_mut().filter(|s| **s == State::Move).for_each(|s| *s = State::Rest);
+            for i in folds {
+                let near = i.saturating_sub(reach)..(i + 3 + reach).min(own.len());
+                t.state[near.clone()].copy_from_slice(&own[near]);
+            }
+        }
+        settle(threads, run);
+        threads.iter_mut().zip(states).for_each(|(t, own)| t.state = own);
     }
 }
