@@ -64,6 +64,27 @@ fn yarns_plies_and_fibers_are_the_same_cloth() {
     assert!(number(&fiber, "mean_bounces") > 3.0 * number(&yarn, "mean_bounces"), "{}", fiber.stats);
 }
 
+/// Light that is scattered many times in a yarn that is pressed flat leaves through its broad sides.
+#[test]
+fn pressed_yarns_are_as_bright_as_their_fibers() {
+    let (_directory, path) = weave(40, "");
+    let cloth = [
+        r#"fabric=[{yarn="y", source={type="weave", edges="live", warps=5, wefts=5, flatten=1.5}}]"#,
+        "fiber.silk.r=0",
+        "fiber.silk.tt=0",
+        "fiber.silk.d=[0.3,0.6,0.9]",
+    ]
+    .map(|set| ["--set", set]);
+    let picture = |mode: &str, spp: &str| {
+        let mut args = cloth.concat();
+        args.extend(["--mode", mode, "--spp", spp]);
+        picture(&path, &args).mean()
+    };
+    for (yarn, fiber) in picture("yarn", "64").into_iter().zip(picture("fiber", "32")) {
+        assert!((yarn / fiber - 1.0).abs() < 0.06, "{yarn} and {fiber}");
+    }
+}
+
 #[test]
 fn memory_is_told_before_it_is_taken() {
     let (directory, path) = weave(150, "");

@@ -199,6 +199,12 @@ impl<'a> Section<'a> {
         self.pressed.map_or(1.0, |pressed| pressed.stretch.sqrt())
     }
 
+    /// How much of the round section's radius a unit of the ray passes where it enters, in the section: 1 if that is not pressed.
+    #[inline]
+    pub fn rounded(&self) -> f32 {
+        self.pressed.map_or(1.0, |pressed| pressed.round(Vec2::X).length())
+    }
+
     /// How thick fibres are there over those of the round section, in radii of the yarn.
     #[inline]
     pub fn thinness(&self) -> f32 {

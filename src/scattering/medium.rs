@@ -123,8 +123,10 @@ pub(crate) struct PlyOptics {
     pub mirrored_kappa: Rgb,
     /// As above.
     pub mirrored_factor: Rgb,
-    /// Of that light: the share that leaves as a matt cylinder would send it off; the rest leaves evenly.
-    pub lean: Rgb,
+    /// The ply's radius in free paths of that light.
+    pub thickness: Rgb,
+    /// What [`Self::lean`] of an endlessly thick ply would be.
+    pub most_lean: Rgb,
     /// Whether R is so much narrower than TT that what met no TT on its way is told from what did.
     pub sharp: bool,
     /// Of light that goes on in chains: TT events per expected fibre.
@@ -221,11 +223,7 @@ impl PlyOptics {
         };
         let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
         let (beta_tt_squared, beta_n) = ((material.beta_tt * material.beta_tt) as f32, material.beta_n as f32);
-        let lean = |c: usize| {
-            let t = radius_optical(c);
-            (calibrated::LEAN * t / (t + calibrated::LEAN_HALF) * (1.0 - calibrated::LEAN_ALBEDO * albedo(c)))
-                .clamp(0.0, 1.0)
-        };
+        let most_lean = |c: usize| calibrated::LEAN * (1.0 - calibrated::LEAN_ALBEDO * albedo(c));
         Self {
             gaps,
             chain_share: f as f32,
@@ -241,7 +239,8 @@ impl PlyOptics {
             mirrored: per_channel(&mirrored),
             mirrored_kappa,
             mirrored_factor: normalisation(mirrored_kappa),
-            lean: per_channel(&lean),
+            thickness: per_channel(&radius_optical),
+            most_lean: per_channel(&most_lean),
             sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
             events: per_channel(&events),
             untouched: per_channel(&untouched),
@@ -278,6 +277,14 @@ impl PlyOptics {
         let beyond = (after - Rgb::splat(self.gaps.dead_zone)).max(Rgb::ZERO);
         let untouched = into * (-(self.untouched * beyond)).exp();
         (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
+    }
+
+    /// Of light that is scattered on in the ply: the share that leaves as a matt cylinder would send it off; the rest leaves
+    /// evenly. `thicker`: how much thicker the ply is where the camera looks through it than a round one.
+    #[inline]
+    pub(crate) fn lean(&self, thicker: f32) -> Rgb {
+        let t = self.thickness * thicker;
+        (self.most_lean * t / (t + Rgb::splat(calibrated::LEAN_HALF as f32))).min(Rgb::ONE)
     }
 
     /// [`Self::leaves_from`] at a square distance from the axis, as a share of that of the outermost fibres.

@@ -47,6 +47,12 @@ impl Inside {
         v.x * self.x + v.y * self.y + v.z * self.z
     }
 
+    /// The short axis of the section there, in the section's frame, and how it is pressed; nothing where it is round.
+    #[inline]
+    pub fn short_axis(&self) -> Option<(Vec3A, Pressed)> {
+        self.pressed.map(|pressed| (self.out(pressed.axis.extend(0.0).into()), pressed))
+    }
+
     /// A vector of the section's frame across the yarn there.
     #[inline]
     pub(super) fn across(&self, v: Vec3A) -> Vec2 {

@@ -45,6 +45,8 @@ pub(super) struct Node {
     pub(super) weight: Rgb,
     /// Of light that meets another fibre after this one: the share that leaves the ply at last.
     pub(super) leaves: Rgb,
+    /// Of light that leaves the ply and meets a fibre of another one: the share that leaves the yarn at last.
+    pub(super) leaves_again: Rgb,
     /// A direction drawn from the lobes.
     pub(super) drawn: Drawn,
 }
@@ -126,8 +128,12 @@ impl Node {
         let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
         let weight = throughput * amplitude;
         let core = view.yarn.occluder().shape().plies[spot.ply].core_radius;
-        let along = (crossing.foot - spot.depth) * view.section.cos;
+        let along = (crossing.foot - spot.depth) * view.section.cos * view.section.rounded();
         let leaves = optics.leaves_at((crossing.offset * crossing.offset + along * along) / (core * core));
+        // A flat section has more surface for its fibres: the chance to escape at each meeting is so much higher, and what
+        // leaves against what is lost.
+        let girth = spot.inside.short_axis().map_or(1.0, |(_, pressed)| pressed.girth());
+        let out_of_flat = |leaves: Rgb| leaves * girth / (leaves * (girth - 1.0) + 1.0);
         let (untouched, events) = optics.touched(before, Rgb::splat(SAMPLING_WIDENING));
         let lobes =
             [optics.single_r * (Rgb::ONE - untouched), optics.single_r * untouched, optics.single_tt, optics.single_d];
@@ -146,7 +152,8 @@ impl Node {
             ],
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
-            leaves,
+            leaves: out_of_flat(leaves),
+            leaves_again: out_of_flat(optics.leaves_again),
             drawn: Drawn { direction: Vec3A::ZERO, value: NodeValue::NOTHING, escape: 0.0 },
         }
     }
