@@ -8,7 +8,6 @@ use glam::{DVec3, Vec3A};
 use yarnray::{
     cloth::{Cloth, scatterer},
     geometry::{
-        pattern::straight,
         ray::Ray,
         section::{Crossings, Section},
     },
@@ -16,6 +15,7 @@ use yarnray::{
         Rgb,
         sampler::{Sampler, Stream},
     },
+    pattern::straight,
     scattering::fiber::FiberMaterial,
     scene::{Fabric, Model, Scene, SceneBuilder, Yarn},
     trace::{HitPlace, World},

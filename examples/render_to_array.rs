@@ -7,9 +7,9 @@ use std::{error::Error, sync::atomic::AtomicBool};
 use glam::DVec3;
 use yarnray::{
     cloth::Cloth,
-    geometry::pattern::straight,
     light::{AreaLight, Environment, Light, Shape},
     math::Rgb,
+    pattern::straight,
     render,
     scattering::fiber::FiberMaterial,
     scene::{Fabric, SceneBuilder, Yarn},

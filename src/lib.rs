@@ -19,7 +19,7 @@
 //! the run      --report, plan------------------>  statistics, metadata                  --cli-->  screen
 //! ```
 //! A program needs few of them: [`scene`] (a [`scene::SceneBuilder`], or [`scene::load`] for files), [`cloth::Cloth`] and
-//! [`render`] make a picture; [`geometry::curve_file`] and [`geometry::pattern`] read and make curves; [`image`] reads
+//! [`render`] make a picture; [`files::curve_file`] and [`pattern`] read and make curves; [`image`] reads
 //! pictures and compares them; [`experiment::goniometer`] measures yarns. What is not for others is not public.
 //!
 //! Only one thing looks back: during traversal Embree asks a filter whether a ray meets a ply or slips through. The
@@ -29,7 +29,10 @@
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
 //! * [`ffi`]: Embree, OpenImageIO, Open Image Denoise and the heap behind a safe face; the only `unsafe` code.
 //! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
-//! * [`geometry`]: shapes, no light: curves and their files, frames along yarns, plies in the cross-section.
+//! * [`geometry`]: shapes, no light: curves, frames along yarns, plies in the cross-section, fibres in plies.
+//! * [`pattern`]: cloth made without files: charts are knitted, drafts are woven, yarns relax until they touch.
+//! * [`files`]: curves and meshes in files: curve formats, OBJ, USD and Alembic.
+//! * [`garment`]: such cloth laid on a garment's mesh, stitch by stitch, and sewn.
 //! * [`trace`]: rays against curves and meshes, no light.
 //! * [`scattering`]: light at one crossing; pure functions, no rays, no files. [`light`]: light sources.
 //! * [`scene`]: what the user asked for. [`cloth`]: its curves by mode, their models, and what a hit scatters by.
@@ -57,13 +60,16 @@ pub mod cli;
 pub mod cloth;
 pub mod experiment;
 pub(crate) mod ffi;
+pub mod files;
 pub mod film;
+pub(crate) mod garment;
 pub mod geometry;
 pub mod image;
 pub(crate) mod input;
 pub(crate) mod integrator;
 pub mod light;
 pub mod math;
+pub mod pattern;
 pub(crate) mod plan;
 pub mod render;
 pub(crate) mod report;

@@ -2,7 +2,7 @@
 
 use std::{io::Write as _, path::PathBuf};
 
-use crate::geometry::pattern::{
+use crate::pattern::{
     chart::Chart,
     knit::{Edges, Form, Knit, Rims},
     tile::Tile,

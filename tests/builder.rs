@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use yarnray::{
-    geometry::pattern::straight,
     light::{AreaLight, Environment, Light, Shape},
     math::Rgb,
+    pattern::straight,
     scattering::fiber::FiberMaterial,
     scene::{
         CurveKind, Fabric, SceneBuilder, Yarn,

@@ -10,7 +10,7 @@ use std::{
     sync::LazyLock,
 };
 
-use yarnray::geometry::pattern::{chart::PATTERNS, draft::NAMES};
+use yarnray::pattern::{chart::PATTERNS, draft::NAMES};
 
 use crate::support::{SWATCH, directory, program, project, write, yarnray};
 

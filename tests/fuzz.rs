@@ -3,11 +3,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use yarnray::{
-    geometry::{
-        curve::CurveSet,
-        curve_file::{self, Format, ReadOptions},
-        pattern::{chart::Chart, knitspeak, straight, wif},
-    },
+    files::curve_file::{self, Format, ReadOptions},
+    geometry::curve::CurveSet,
+    pattern::{chart::Chart, knitspeak, straight, wif},
     scene::load::{LoadOptions, load},
 };
 

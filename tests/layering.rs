@@ -8,16 +8,19 @@ use std::{
 use crate::support::project;
 
 /// Every room from the ground up, and exactly the rooms that it uses. `main.rs` and `lib.rs` are the roof.
-const ROOMS: [(&str, &[&str]); 17] = [
+const ROOMS: [(&str, &[&str]); 20] = [
     ("ffi", &[]),
     ("math", &[]),
     ("image", &["ffi", "math"]),
     ("input", &[]),
     ("geometry", &["math"]),
+    ("pattern", &["geometry", "math"]),
+    ("files", &["geometry", "math", "pattern"]),
+    ("garment", &["files", "geometry", "math", "pattern"]),
     ("trace", &["ffi", "geometry"]),
     ("scattering", &["geometry", "math"]),
     ("light", &["math"]),
-    ("scene", &["geometry", "image", "input", "light", "math", "scattering"]),
+    ("scene", &["files", "garment", "geometry", "image", "input", "light", "math", "pattern", "scattering"]),
     ("cloth", &["geometry", "scattering", "scene", "trace"]),
     ("film", &["math", "scattering", "scene"]),
     ("integrator", &["cloth", "film", "geometry", "light", "math", "scattering", "scene", "trace"]),
@@ -30,7 +33,21 @@ const ROOMS: [(&str, &[&str]); 17] = [
     ),
     (
         "cli",
-        &["cloth", "experiment", "ffi", "geometry", "image", "input", "plan", "render", "report", "scene", "trace"],
+        &[
+            "cloth",
+            "experiment",
+            "ffi",
+            "files",
+            "geometry",
+            "image",
+            "input",
+            "pattern",
+            "plan",
+            "render",
+            "report",
+            "scene",
+            "trace",
+        ],
     ),
 ];
 

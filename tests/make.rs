@@ -1,6 +1,6 @@
 //! `make` and what `info` says of what it made.
 
-use yarnray::geometry::curve_file::{self, ReadOptions};
+use yarnray::files::curve_file::{self, ReadOptions};
 
 use crate::support::{directory, listing, project, write, yarnray};
 

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use yarnray::geometry::curve_file::{Format, ReadOptions, parse};
+use yarnray::files::curve_file::{Format, ReadOptions, parse};
 
 fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else { return };

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use yarnray::geometry::pattern::wif::{WifUse, parse};
+use yarnray::pattern::wif::{WifUse, parse};
 
 fuzz_target!(|data: &[u8]| {
     if let Ok(file) = parse(data) {

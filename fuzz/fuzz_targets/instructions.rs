@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use yarnray::geometry::pattern::{chart::Chart, knitspeak::chart_rows};
+use yarnray::pattern::{chart::Chart, knitspeak::chart_rows};
 
 fuzz_target!(|data: &[u8]| {
     let Some((stitches, text)) = data.split_first() else { return };

@@ -4,7 +4,7 @@
 use std::io::Write as _;
 
 use libfuzzer_sys::fuzz_target;
-use yarnray::geometry::stage::{PrimPattern, Stage};
+use yarnray::files::stage::{PrimPattern, Stage};
 
 fuzz_target!(|data: &[u8]| {
     let extension = if data.starts_with(b"Ogawa") {

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use yarnray::geometry::curve_file::{ReadOptions, read};
+use yarnray::files::curve_file::{ReadOptions, read};
 
 fuzz_target!(|data: &[u8]| {
     let mut parts = data.splitn(2, |&byte| byte == 0);

@@ -12,10 +12,12 @@ use super::{
     make::{refuse_unknown, write_curves},
     positive,
 };
-use crate::geometry::{
-    curve::{Basis, CurveSet},
-    curve_file::{self, ReadOptions},
-    stage::PrimPattern,
+use crate::{
+    files::{
+        curve_file::{self, ReadOptions},
+        stage::PrimPattern,
+    },
+    geometry::curve::{Basis, CurveSet},
 };
 
 const EXAMPLES: &str = "Examples:

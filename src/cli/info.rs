@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, positive, terminal::print};
 use crate::{
     cloth::{self, Estimate},
+    files::curve_file::{self, ReadOptions},
     geometry::{
         curve::{Basis, Curve, CurveSet},
-        curve_file::{self, ReadOptions},
-        pattern::overlap::{Overlap, TOLERATED, overlap},
+        overlap::{Overlap, TOLERATED, overlap},
         proposal::{self, Proposal},
     },
     plan::{Feature, Memory, Plan},

@@ -16,18 +16,18 @@ use super::{
     log, positive,
 };
 use crate::{
+    files::curve_file,
     geometry::{
         curve::{Curve, CurveSet},
-        curve_file,
-        pattern::{
-            PatternStrand, StrandKind,
-            draft::{Draft, DraftError},
-            overlap::overlap,
-            weave::{self, Extent, Impossible, Measures, Weave},
-            wif::{self, WifUse, WovenWif},
-        },
+        overlap::overlap,
     },
     image::output,
+    pattern::{
+        PatternStrand, StrandKind,
+        draft::{Draft, DraftError},
+        weave::{self, Extent, Impossible, Measures, Weave},
+        wif::{self, WifUse, WovenWif},
+    },
     scene::Yarn,
 };
 

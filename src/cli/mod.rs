@@ -30,7 +30,7 @@ use crate::{
     cloth::BuildError,
     experiment::{converge::ConvergeError, table3::BenchError},
     ffi::heap,
-    geometry::pattern::overlap::{self, Overlap},
+    geometry::overlap::{self, Overlap},
     image::output,
     input::document::Value,
     plan,

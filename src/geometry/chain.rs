@@ -12,20 +12,20 @@ use super::{
 };
 
 /// A curve as a chain of segments that can be evaluated.
-pub(super) struct Chain {
-    pub(super) basis: Basis,
-    pub(super) points: Vec<DVec4>,
+pub(crate) struct Chain {
+    pub(crate) basis: Basis,
+    pub(crate) points: Vec<DVec4>,
 }
 
 impl Chain {
     /// Adds the points that the ends need: closed curves repeat theirs, open Catmull-Rom curves reach their end
     /// points (a mirrored point beyond), B-splines with too few points repeat their ends.
-    pub(super) fn new(curve: &Curve, radii: &[f64]) -> Self {
+    pub(crate) fn new(curve: &Curve, radii: &[f64]) -> Self {
         Self::at_time(curve, radii, &curve.points)
     }
 
     /// The chain of the same curve while its points are elsewhere.
-    pub(super) fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
+    pub(crate) fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
         assert_eq!(points.len(), curve.points.len(), "a curve has as many points at all times");
         let all = points.iter().zip(radii).map(|(p, &r)| p.extend(r));
         // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
@@ -57,23 +57,23 @@ impl Chain {
         Self { basis: curve.basis, points }
     }
 
-    pub(super) fn segments(&self) -> usize {
+    pub(crate) fn segments(&self) -> usize {
         self.points.len() - 3
     }
 
     /// The four control points of a segment.
     #[inline]
-    pub(super) fn points_of(&self, segment: usize) -> &[DVec4; 4] {
+    pub(crate) fn points_of(&self, segment: usize) -> &[DVec4; 4] {
         self.points[segment..].first_chunk().expect("a segment has four points")
     }
 
-    pub(super) fn at(&self, segment: usize, u: f64) -> SplinePoint {
+    pub(crate) fn at(&self, segment: usize, u: f64) -> SplinePoint {
         let p = &self.points[segment..segment + 4];
         evaluate(self.basis, [p[0], p[1], p[2], p[3]], u)
     }
 
     /// A chain in the wanted basis through places of this one; the last of a closed one is the first again.
-    pub(super) fn through(&self, knots: &[(usize, f64)], closed: bool, basis: Basis) -> Self {
+    pub(crate) fn through(&self, knots: &[(usize, f64)], closed: bool, basis: Basis) -> Self {
         let knots: Vec<DVec4> = knots.iter().map(|&(segment, u)| self.at(segment, u).at).collect();
         let distinct = if closed { &knots[..knots.len() - 1] } else { &knots[..] };
         if basis != Basis::BSpline {
@@ -101,7 +101,7 @@ impl Chain {
     }
 
     /// The curve that makes this chain, without radii.
-    pub(super) fn curve(&self, closed: bool) -> Curve {
+    pub(crate) fn curve(&self, closed: bool) -> Curve {
         let points = self.points.iter().map(|p| p.truncate());
         let added = if closed { [1, 2] } else { [usize::from(self.basis != Basis::BSpline); 2] };
         let points = points.take(self.points.len() - added[1]).skip(added[0]).collect();
@@ -109,7 +109,7 @@ impl Chain {
     }
 
     /// Arc length from the chain's start to each of its knots.
-    pub(super) fn lengths(&self) -> Vec<f64> {
+    pub(crate) fn lengths(&self) -> Vec<f64> {
         let nodes = GAUSS.map(|(u, weight)| (Weights::new(self.basis, u), weight));
         let length_of = |segment: usize| {
             let p = self.points_of(segment);
@@ -132,7 +132,7 @@ impl Chain {
 }
 
 /// Nodes and weights on 0..1 of Gauss's quadrature with four points, exact to the seventh power.
-pub(super) const GAUSS: [(f64, f64); 4] = [
+pub(crate) const GAUSS: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
     (0.330_009_478_207_571_87, 0.326_072_577_431_273_1),
     (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
@@ -144,13 +144,13 @@ const PARALLEL: usize = 4096;
 
 /// How a chain is resampled.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fit {
+pub(crate) struct Fit {
     /// The basis wanted.
-    pub(super) basis: Basis,
+    pub(crate) basis: Basis,
     /// How far from the old chain it may lie.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
     /// The longest segment.
-    pub(super) longest: f64,
+    pub(crate) longest: f64,
 }
 
 /// A place of a chain by the way to it: its segment, and where in it. Given `lengths` to the chain's knots.
@@ -177,7 +177,7 @@ const AROUND: usize = 8;
 
 /// Places on the chain (segment, and where in it) at equal arc length, as few as keep the curve through them within the
 /// tolerance of the old one; `None` if that takes the chain's own points.
-pub(super) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) -> Option<Vec<(usize, f64)>> {
+pub(crate) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) -> Option<Vec<(usize, f64)>> {
     let total = lengths[lengths.len() - 1];
     let longest = fit.longest.max(total * 1e-7);
     let fewest = if closed { 4 } else { 1 };
@@ -226,7 +226,7 @@ pub(super) fn resample(chain: &Chain, lengths: &[f64], closed: bool, fit: &Fit) 
 }
 
 /// The material index nearest to the middle of each segment: of `chain` itself, or of one made through places of it.
-pub(super) fn nearest_indices(
+pub(crate) fn nearest_indices(
     curve: &Curve,
     material_indices: &[u16],
     chain: &Chain,
@@ -259,7 +259,7 @@ fn starts_among_points(curve: &Curve, chain: &Chain, knots: Option<&[(usize, f64
 }
 
 /// Texture coordinates where each segment of a resampled curve starts and ends, from those of the given points.
-pub(super) fn uvs_of_segments(
+pub(crate) fn uvs_of_segments(
     curve: &Curve,
     uvs: &[Vec2],
     chain: &Chain,
@@ -279,7 +279,7 @@ const FORGOTTEN: usize = 28;
 /// ends: one for each knot, and one beyond each end.
 ///
 /// Control points c obey `(c[i-1] + 4 c[i] + c[i+1]) / 6 = knot[i]`; the tridiagonal system is solved in one sweep each way.
-pub(super) fn spline_through<V>(knots: impl ExactSizeIterator<Item = V>) -> Vec<V>
+pub(crate) fn spline_through<V>(knots: impl ExactSizeIterator<Item = V>) -> Vec<V>
 where
     V: Copy + Sub<Output = V> + Mul<f64, Output = V>,
 {

@@ -1,24 +1,20 @@
-//! Shapes, no light: yarn curves and their files, frames along them, plies in the cross-section.
+//! Shapes, no light: yarn curves, frames along them, plies in the cross-section, fibres in plies.
 
-mod chain;
+pub(crate) mod chain;
+pub(crate) mod contact;
 pub mod curve;
-pub mod curve_file;
 pub(crate) mod density;
 pub mod fiber;
-pub(crate) mod garment;
 pub mod mesh;
-pub(crate) mod obj;
 pub(crate) mod occluder;
-pub mod pattern;
+pub mod overlap;
 pub(crate) mod proposal;
 pub mod ray;
 pub mod section;
 pub(crate) mod segment_uvs;
-mod spline;
-pub mod stage;
+pub(crate) mod spline;
 pub mod strand;
 pub(crate) mod tube;
-pub(crate) mod unreadable;
 pub(crate) mod walk;
 pub(crate) mod way;
 pub mod yarn;

@@ -2,10 +2,8 @@
 
 use glam::DVec3;
 
-use super::{
-    curve::{Curve, CurveSet},
-    pattern::overlap::{Overlap, overlap},
-};
+use super::curve::{Curve, CurveSet};
+use super::overlap::{Overlap, overlap};
 
 /// Share of the length that may overlap at the radius that is proposed: models of cloth are made to touch, not to be
 /// without any overlap.
@@ -118,7 +116,7 @@ pub(crate) fn sizes(set: &CurveSet) -> Vec<(&'static str, DVec3)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pattern::{chart::Chart, knit};
+    use crate::pattern::{chart::Chart, knit};
 
     /// Cloth of a known radius, as a file that does not tell it, in metres.
     #[test]

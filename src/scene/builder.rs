@@ -29,7 +29,7 @@ use crate::{
 ///
 /// ```
 /// use yarnray::{
-///     geometry::pattern::{draft::Draft, weave::Weave},
+///     pattern::{draft::Draft, weave::Weave},
 ///     scattering::fiber::FiberMaterial,
 ///     scene::{Fabric, SceneBuilder, Yarn},
 /// };

@@ -6,7 +6,7 @@ use glam::DVec2;
 use super::{EXAMPLES, Output, RADIUS, write};
 use crate::{
     cli::{Failure, log, positive},
-    geometry::pattern::{
+    pattern::{
         MAX_POINTS,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes},

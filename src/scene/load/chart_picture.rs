@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::{Context, Reader, color::hex};
-use crate::{geometry::pattern::chart::Chart, image, math::srgb::srgb_to_linear};
+use crate::{image, math::srgb::srgb_to_linear, pattern::chart::Chart};
 
 /// A colour of the palette and what it stands for.
 struct Symbol {

@@ -23,10 +23,7 @@ use super::{
     tint::{Tint, tint},
     yarns::Library,
 };
-use crate::{
-    geometry::{garment::Tension, pattern::StrandKind},
-    input::diagnostic::Span,
-};
+use crate::{garment::Tension, input::diagnostic::Span, pattern::StrandKind};
 
 /// The colour of each stitch by rows, from 0, and the yarn in the library that each colour is.
 pub(super) type StitchColors = (Vec<Vec<u16>>, Vec<usize>);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-use crate::{geometry::pattern::StrandKind, math::srgb::srgb_to_linear};
+use crate::{math::srgb::srgb_to_linear, pattern::StrandKind};
 
 /// Colours of a fabric's yarns.
 #[derive(Default)]

@@ -2,8 +2,8 @@
 
 use super::{Context, Range, Reader, garment};
 use crate::{
-    geometry::pattern::knit::{Form, Knit, Sizes},
     input::diagnostic::Span,
+    pattern::knit::{Form, Knit, Sizes},
 };
 
 /// Sizes with the place where they were written.

@@ -14,11 +14,11 @@ use super::{
     stages::Stages,
 };
 use crate::{
-    geometry::{
-        mesh::Mesh,
+    files::{
         obj,
         stage::{self, PolygonMesh, PrimPattern, Stage},
     },
+    geometry::mesh::Mesh,
     image::texture::Texture,
     input::diagnostic::Span,
     math::Rgb,

@@ -40,7 +40,7 @@ use super::{
     defaults,
     view::CameraSetup,
 };
-use crate::geometry::{curve_file, unreadable::in_words};
+use crate::files::{curve_file, unreadable::in_words};
 use crate::input::{
     diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},

@@ -9,19 +9,16 @@ use super::{
     knit_size::GivenSizes,
 };
 use crate::{
-    geometry::{
-        curve::Curve,
-        pattern::{
-            MAX_POINTS,
-            chart::{Chart, ChartError, PATTERNS},
-            knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Work},
-            knitspeak,
-            overlap::overlap,
-        },
-    },
+    geometry::{curve::Curve, overlap::overlap},
     input::{
         diagnostic::{Span, unknown_name},
         document::Value,
+    },
+    pattern::{
+        MAX_POINTS,
+        chart::{Chart, ChartError, PATTERNS},
+        knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Work},
+        knitspeak,
     },
 };
 

@@ -9,11 +9,13 @@ use super::{
     mesh::polygons,
     sequence::Times,
 };
-use crate::geometry::{
+use crate::{
+    files::{
+        obj,
+        stage::{self, PolygonMesh, PrimPattern},
+    },
     garment::{GarmentError, GarmentMesh},
-    mesh::Mesh,
-    obj,
-    stage::{self, PolygonMesh, PrimPattern},
+    geometry::mesh::Mesh,
 };
 
 /// A mesh between two frames.

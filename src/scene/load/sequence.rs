@@ -16,10 +16,7 @@ use super::{
     Context,
     cloth::{CurveFile, Detail},
 };
-use crate::{
-    geometry::{curve::Curve, stage},
-    input::diagnostic::Span,
-};
+use crate::{files::stage, geometry::curve::Curve, input::diagnostic::Span};
 
 /// Curves with their radii, millimetres.
 type Curves = Vec<(Curve, Vec<f64>)>;

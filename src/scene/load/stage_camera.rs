@@ -12,7 +12,7 @@ use super::{
     },
     Context, Reader, motion,
 };
-use crate::geometry::stage::{Stage, StageCamera, StageError};
+use crate::files::stage::{Stage, StageCamera, StageError};
 
 /// Frames around the shutter's time of which the camera's place is known: its way between them is smooth.
 const FRAMES_AROUND: i64 = 3;

@@ -7,7 +7,7 @@ use std::{
     rc::Rc,
 };
 
-use crate::geometry::stage::{Stage, StageError};
+use crate::files::stage::{Stage, StageError};
 
 /// Those that are open.
 #[derive(Default)]

@@ -2,19 +2,17 @@
 
 use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
 use crate::{
-    geometry::{
-        curve::Curve,
-        pattern::{
-            PatternStrand, StrandKind,
-            draft::{Draft, DraftError, Threads},
-            weave::{self, Edges, Extent, Impossible, Measures, Weave},
-            wif::{self, WifUse, WovenWif},
-        },
-        unreadable::in_words,
-    },
+    files::unreadable::in_words,
+    geometry::curve::Curve,
     input::{
         diagnostic::Span,
         document::{Node, Value},
+    },
+    pattern::{
+        PatternStrand, StrandKind,
+        draft::{Draft, DraftError, Threads},
+        weave::{self, Edges, Extent, Impossible, Measures, Weave},
+        wif::{self, WifUse, WovenWif},
     },
 };
 

@@ -19,13 +19,13 @@ use super::{
     CurveFile, Detail, FabricKeys, FabricPlan, KindName, Source, Up,
 };
 use crate::{
-    geometry::{
-        curve::{Basis, Curve, CurveSet},
+    files::{
         curve_file::{self, CurveFileError, ReadOptions},
-        pattern::straight,
         stage,
     },
+    geometry::curve::{Basis, Curve, CurveSet},
     math::sampler::Stream,
+    pattern::straight,
 };
 
 /// Columns that a yarn counts where nothing is known of its cloth.

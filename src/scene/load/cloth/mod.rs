@@ -17,10 +17,7 @@ use super::{
     weave::{self, WeavePlan},
     yarns::Library,
 };
-use crate::{
-    geometry::{curve::Basis, curve_file::ReadOptions},
-    input::diagnostic::Span,
-};
+use crate::{files::curve_file::ReadOptions, geometry::curve::Basis, input::diagnostic::Span};
 
 /// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
 const SHOWN_CELLS: [u32; 2] = [6, 6];

@@ -3,10 +3,8 @@
 use glam::Vec2;
 
 use crate::{
-    geometry::{
-        curve::Curve,
-        pattern::{PatternStrand, StrandKind},
-    },
+    geometry::curve::Curve,
+    pattern::{PatternStrand, StrandKind},
     scene::Fabric,
 };
 

@@ -12,8 +12,9 @@ use super::{
     variation::{SHADES, Variation, shine},
 };
 use crate::{
-    geometry::{curve::Curve, pattern::StrandKind},
+    geometry::curve::Curve,
     math::sampler::{Stream, hash2},
+    pattern::StrandKind,
     scene::Yarn,
 };
 

@@ -18,10 +18,12 @@ use super::{
     },
     GarmentPlan, Pattern, Rule,
 };
-use crate::geometry::{
-    curve::{Basis, Curve},
+use crate::{
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
-    mesh::Mesh,
+    geometry::{
+        curve::{Basis, Curve},
+        mesh::Mesh,
+    },
 };
 
 /// For each rule its colours where each is a yarn of its own, and the yarns in the library that they are.

@@ -15,19 +15,16 @@ use super::{
     weave,
 };
 use crate::{
-    geometry::{
-        curve_file,
-        garment::SeamKind,
-        pattern::{
-            chart::Chart,
-            draft::Draft,
-            knit::{self, Edges, Form, Knit},
-            tile::Tile,
-            weave::{Impossible, Weave},
-        },
-        stage::PrimPattern,
-    },
+    files::{curve_file, stage::PrimPattern},
+    garment::SeamKind,
     input::diagnostic::{Span, unknown_name},
+    pattern::{
+        chart::Chart,
+        draft::Draft,
+        knit::{self, Edges, Form, Knit},
+        tile::Tile,
+        weave::{Impossible, Weave},
+    },
 };
 
 /// Control points of a stitch unless asked otherwise.

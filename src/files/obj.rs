@@ -1,0 +1,165 @@
+//! Triangle meshes from Wavefront OBJ files.
+
+use std::{
+    cell::Cell,
+    fmt,
+    fs::File,
+    io::{self, BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec2, DVec3};
+use tobj::LoadError;
+
+use crate::{files::unreadable::in_words, geometry::mesh::Mesh};
+
+/// The largest file that is read.
+const MAX_BYTES: u64 = 1 << 31;
+
+/// Why a mesh could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct MeshError {
+    path: PathBuf,
+    /// Counted from 1; 0 where no line is at fault.
+    line: usize,
+    reason: String,
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            0 => write!(f, "{}: {}", self.path.display(), self.reason),
+            line => write!(f, "{}:{line}: {}", self.path.display(), self.reason),
+        }
+    }
+}
+
+impl std::error::Error for MeshError {}
+
+/// Counts the lines that a parser has taken, so that its error has a place.
+struct Counting<'a, R> {
+    inner: R,
+    lines: &'a Cell<usize>,
+}
+
+impl<R: BufRead> Read for Counting<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.inner.read(buffer)
+    }
+}
+
+impl<R: BufRead> BufRead for Counting<'_, R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.inner.fill_buf()
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.inner.consume(amount);
+    }
+
+    fn read_line(&mut self, line: &mut String) -> io::Result<usize> {
+        self.lines.set(self.lines.get() + 1);
+        self.inner.read_line(line)
+    }
+}
+
+/// Reads all faces of a file as one mesh; polygons become fans, materials and lines are left aside. Where some faces
+/// lack normals or texture coordinates, all go without.
+///
+/// # Errors
+/// What is wrong with the file, and in which line.
+pub(crate) fn read(path: &Path) -> Result<Mesh, MeshError> {
+    let fail = |line: usize, reason: String| MeshError { path: path.into(), line, reason };
+    let file = File::open(path).map_err(|e| fail(0, in_words(&e)))?;
+    let meta = file.metadata().map_err(|e| fail(0, in_words(&e)))?;
+    if !meta.is_file() {
+        return Err(fail(0, "not a file".to_owned()));
+    }
+    if meta.len() > MAX_BYTES {
+        return Err(fail(0, format!("{} bytes; at most {MAX_BYTES} are read", meta.len())));
+    }
+    parse(BufReader::new(file)).map_err(|(line, reason)| fail(line, reason))
+}
+
+fn parse(reader: impl BufRead) -> Result<Mesh, (usize, String)> {
+    let lines = Cell::new(0);
+    let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
+    let mut reader = Counting { inner: reader, lines: &lines };
+    // Materials of the file are not asked for: the scene names its own.
+    let (models, _) =
+        tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).map_err(|error| match error {
+            // Faces are put together when an object ends: the line is no longer known.
+            LoadError::FaceVertexOutOfBounds
+            | LoadError::FaceTexCoordOutOfBounds
+            | LoadError::FaceNormalOutOfBounds
+            | LoadError::FaceColorOutOfBounds => (0, format!("{error}: a face names what the file does not have")),
+            _ => (lines.get(), format!("{error}; is this an OBJ file?")),
+        })?;
+    let meshes: Vec<tobj::Mesh> = models.into_iter().map(|m| m.mesh).filter(|m| !m.indices.is_empty()).collect();
+    if meshes.is_empty() {
+        return Err((0, "there are no faces in it".to_owned()));
+    }
+    let normals = meshes.iter().all(|m| m.normals.len() == m.positions.len());
+    let uvs = meshes.iter().all(|m| m.texcoords.len() / 2 == m.positions.len() / 3);
+    let mut mesh = Mesh::default();
+    for part in meshes {
+        let first = mesh.points.len() as u64;
+        if first + (part.positions.len() / 3) as u64 > u64::from(u32::MAX) {
+            return Err((0, "more than 2^32 points".to_owned()));
+        }
+        let vector = |v: &[f32]| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
+        mesh.points.extend(part.positions.chunks_exact(3).map(vector));
+        if normals {
+            mesh.normals.extend(part.normals.chunks_exact(3).map(|n| vector(n).normalize_or(DVec3::Y)));
+        }
+        if uvs {
+            mesh.uvs.extend(part.texcoords.chunks_exact(2).map(|t| DVec2::new(f64::from(t[0]), f64::from(t[1]))));
+        }
+        mesh.triangles.extend(part.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| i + first as u32)));
+    }
+    if let Some(point) = mesh.points.iter().position(|p| !p.is_finite()) {
+        return Err((0, format!("point {point} is not finite")));
+    }
+    if mesh.uvs.iter().any(|uv| !uv.is_finite()) {
+        return Err((0, "a texture coordinate is not finite".to_owned()));
+    }
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Mesh, (usize, String)> {
+        parse(text.as_bytes())
+    }
+
+    #[test]
+    fn faces_of_all_forms_are_read() {
+        let quad = "# a quad\no one\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+        let mesh = parsed(quad).unwrap();
+        assert_eq!((mesh.points.len(), mesh.triangles.len()), (4, 2));
+        assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
+        let full = "v 0 0 0\nv 2 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 5\nf 1/1/1 2/2/1 -1/-1/-1\n";
+        let mesh = parsed(full).unwrap();
+        assert_eq!(mesh.normals[2], DVec3::Z);
+        assert_eq!((mesh.uvs[1], mesh.points[1]), (DVec2::X, DVec3::new(2.0, 0.0, 0.0)));
+        // Two objects, one of which has normals: none has.
+        let mixed = format!("{full}o two\nf 1 2 3\n");
+        let mesh = parsed(&mixed).unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.normals.len(), mesh.uvs.len()), (2, 0, 0));
+        assert!(mesh.triangles.iter().flatten().all(|&i| (i as usize) < mesh.points.len()));
+    }
+
+    #[test]
+    fn mistakes_are_placed() {
+        assert_eq!(parsed("v 0 0 0\nv 1 zero 0\n").unwrap_err().0, 2);
+        assert!(parsed("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 9\n").unwrap_err().1.contains("does not have"));
+        assert_eq!(parsed("v 0 0 0\nf 1 2 x\n").unwrap_err().0, 2);
+        assert!(parsed("").unwrap_err().1.contains("no faces"));
+        assert!(parsed("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap_err().1.contains("finite"));
+        assert!(parsed("\u{0}\u{1}garbage").is_err());
+        let missing = read(Path::new("/nowhere/at/all.obj")).unwrap_err();
+        assert_eq!(missing.to_string(), "/nowhere/at/all.obj: no such file");
+    }
+}

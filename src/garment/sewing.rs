@@ -1,0 +1,260 @@
+//! What is at the borders of panels: how much cloth is left out or turned in, and which yarns run along.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3, IVec3};
+use rayon::prelude::*;
+
+use super::{
+    Options,
+    edges::{Edging, Finish, SeamKind, Way, ways},
+    fold::{Fold, Folds},
+    lattice::{Division, Lattice},
+    lay::{CUT_END, turn},
+    strain::Shapes,
+    surface::{BorderEdge, Pose},
+};
+use crate::{math::special::smooth_step, pattern::StrandKind};
+
+/// An overlock seam takes about so much of each panel, mm, in whole stitches, which are so many at most.
+const TAKEN: f64 = 3.0;
+const MOST_TAKEN: f64 = 6.0;
+/// Radius of an overlock machine's threads, mm.
+const THREAD: f64 = 0.1;
+/// Length of its stitches, mm.
+const STEP: f64 = 2.5;
+/// Over a body cloth comes down from a seam within so many times its height.
+const SLOPE: f64 = 3.0;
+
+/// One cloth at borders.
+struct Trim {
+    stitch: DVec2,
+    repeat: [u32; 2],
+    knitted: bool,
+    diameter: f64,
+    free: DVec2,
+    sewn: [[DVec2; 2]; SeamKind::COUNT],
+    folds: Folds,
+    /// How far turns reach beyond what is turned in, mm.
+    turn: f64,
+}
+
+/// All seams and edges of a garment.
+pub(super) struct Sewing {
+    trims: Vec<Trim>,
+    cloth: Vec<usize>,
+    /// The seam at each edge of each panel's border.
+    seams: Vec<Vec<SeamKind>>,
+}
+
+impl Trim {
+    fn new(stitch: DVec2, repeat: [u32; 2], knitted: bool, shapes: &Shapes, pressed: bool) -> Self {
+        let d = shapes.diameter;
+        let mut free = DVec2::ZERO;
+        for axis in 0..2 {
+            // Sideways loops reach beyond their line; at its ends lines turn. Half a yarn is left to the border itself, and
+            // under a chain some more.
+            let beyond = shapes.reach[axis] * stitch[axis];
+            let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
+            free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
+        }
+        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, pressed));
+        // Edges that only meet: as far as yarns reach, and half a yarn.
+        let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
+        let meets = |beyond: DVec2| match knitted {
+            // Rows turn to the wrong side.
+            true => DVec2::new(0.56 * d, beyond.y * stitch.y + 0.51 * d),
+            false => ends + 0.51 * d,
+        };
+        let sewn = SeamKind::ALL.map(|kind| match &folds[kind as usize] {
+            None => shapes.beyond.map(meets),
+            Some(fold) => [-turned_in(kind, fold, stitch, d); 2],
+        });
+        Self { stitch, repeat, knitted, diameter: d, free, sewn, folds, turn: turn(stitch.y, d) }
+    }
+}
+
+/// How much cloth goes on beyond a seam: whole stitches are behind what is seen.
+fn turned_in(kind: SeamKind, fold: &Fold, stitch: DVec2, diameter: f64) -> DVec2 {
+    let wanted = match kind {
+        SeamKind::Overlock => (TAKEN / stitch).min(DVec2::splat(MOST_TAKEN)),
+        // A stitch, or two rows.
+        _ => 3.4 * diameter / stitch,
+    };
+    let least = fold.upright() / stitch + 0.3;
+    wanted.max(least).ceil() * stitch - fold.upright()
+}
+
+impl Sewing {
+    pub(super) fn new(options: &Options, shapes: &[Shapes], borders: &[Vec<BorderEdge>], cloth: &[usize]) -> Self {
+        let trim = |(cloth, shapes): (&super::Cloth, &Shapes)| {
+            let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
+            Trim::new(cloth.tile.stitch(), cloth.tile.counts, knitted, shapes, options.pressed)
+        };
+        let kind = |panel: usize, edge: &BorderEdge| {
+            let other = edge.sewn_to.map_or(cloth[panel], |(other, _)| cloth[other as usize]);
+            let [first, last] = [cloth[panel].min(other), cloth[panel].max(other)];
+            options.cloths[last].seam.or(options.cloths[first].seam).unwrap_or(options.seam)
+        };
+        let of_panel = |(panel, border): (usize, &Vec<BorderEdge>)| border.iter().map(|e| kind(panel, e)).collect();
+        Self {
+            trims: options.cloths.iter().zip(shapes).map(trim).collect(),
+            cloth: cloth.to_vec(),
+            seams: borders.iter().enumerate().map(of_panel).collect(),
+        }
+    }
+
+    /// How a cloth is turned in.
+    pub(super) fn folds(&self, cloth: usize) -> &Folds {
+        &self.trims[cloth].folds
+    }
+
+    /// How far each fine point of the sewn mesh is kept from a body's skin, mm: no less than `least`, and by seams as much as
+    /// what is turned in takes. Empty where that is nowhere more.
+    pub(super) fn clearances(&self, pose: &Pose, borders: &[Vec<BorderEdge>], least: f64) -> Vec<f32> {
+        let mut seams: Vec<(DVec3, f64, f64)> = Vec::new();
+        for (panel, (border, kinds)) in borders.iter().zip(&self.seams).enumerate() {
+            let trim = &self.trims[self.cloth[panel]];
+            for (edge, kind) in border.iter().zip(kinds) {
+                let Some(fold) = trim.folds[*kind as usize].filter(|_| edge.sewn_to.is_some()) else { continue };
+                let over = -trim.sewn[*kind as usize][0].min_element();
+                let depth = fold.depth(over) + 1.4 * trim.diameter;
+                seams.extend(edge.vertices.map(|v| (pose.vertex(v).0, depth, over + fold.begin())));
+            }
+        }
+        let widest = seams.iter().map(|s| s.2 + SLOPE * s.1).fold(0.0, f64::max);
+        if widest <= 0.0 {
+            return Vec::new();
+        }
+        let cell = |p: DVec3| (p / widest).floor().as_ivec3();
+        let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
+        for (i, seam) in seams.iter().enumerate() {
+            cells.entry(cell(seam.0).to_array()).or_default().push(i);
+        }
+        let of = |p: &DVec3| {
+            let around = (0..27).map(|k| cell(*p) + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
+            let near = around.filter_map(|c| cells.get(&c.to_array())).flatten();
+            let wanted = near.map(|&i| {
+                let (at, depth, wide) = seams[i];
+                depth + (least - depth) * smooth_step((p.distance(at) - wide) / (SLOPE * depth))
+            });
+            wanted.fold(least, f64::max) as f32
+        };
+        pose.points().par_iter().with_min_len(1024).map(of).collect()
+    }
+
+    /// How a panel is divided for its cloth.
+    pub(super) fn division(&self, panel: usize) -> Division<'_> {
+        let trim = &self.trims[self.cloth[panel]];
+        let begin = trim.folds.iter().flatten().map(Fold::begin).fold(0.0, f64::max);
+        Division {
+            stitch: trim.stitch,
+            repeat: trim.repeat,
+            free: trim.free,
+            sewn: trim.sewn,
+            seams: &self.seams[panel],
+            round: trim.knitted,
+            bent: begin + 2.0 * trim.stitch.max_element()
+                - trim.sewn.iter().map(|s| s[0].min_element()).fold(0.0, f64::min),
+        }
+    }
+
+    /// What runs along the edges of all panels, as they lie in the first frame.
+    pub(super) fn edgings(&self, first: &Pose, borders: &[Vec<BorderEdge>], lattices: &[Lattice]) -> Vec<Edging> {
+        let mut free = Vec::new();
+        let mut sewn = Vec::new();
+        for (panel, border) in borders.iter().enumerate() {
+            for (i, edge) in border.iter().enumerate() {
+                match edge.sewn_to {
+                    None => free.push((edge.vertices, panel as u32, None)),
+                    // Each seam once; what is knitted in the round has none.
+                    Some((other, _)) => {
+                        let kind = self.seams[panel][i];
+                        if edge.is_first(panel as u32, i)
+                            && kind != SeamKind::None
+                            && !(other == panel as u32 && lattices[panel].ring)
+                        {
+                            sewn.push((edge.vertices, panel as u32, Some(other)));
+                        }
+                    }
+                }
+            }
+        }
+        let mut out = Vec::new();
+        for way in ways(&free) {
+            let cloth = self.cloth[way.panel as usize];
+            let Trim { stitch, knitted, diameter: d, .. } = &self.trims[cloth];
+            let finish = if *knitted {
+                Finish::Chain { link: stitch.x.max(2.9 * d), radius: 0.5 * d }
+            } else {
+                Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
+            };
+            out.push(Edging::new(way, finish, cloth, first));
+        }
+        // Ways of a seam keep to one pair of panels.
+        let mut pairs: Vec<(u32, Option<u32>)> = sewn.iter().map(|s| (s.1, s.2)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        for pair in pairs {
+            let own: Vec<_> = sewn.iter().filter(|s| (s.1, s.2) == pair).copied().collect();
+            let Some(other) = pair.1 else { continue };
+            let joins = |e: &&BorderEdge| e.sewn_to.is_some_and(|(panel, _)| panel == other);
+            let kind = borders[pair.0 as usize].iter().position(|e| joins(&e)).map(|i| self.seams[pair.0 as usize][i]);
+            let kind = kind.unwrap_or(SeamKind::None);
+            let over = [(pair.0, other), (other, pair.0)].map(|(panel, mate)| self.over(kind, panel, mate, borders));
+            for way in ways(&own) {
+                self.sew(kind, way, (other, over), first, &mut out);
+            }
+        }
+        out
+    }
+
+    /// How much of a panel is turned in where it is sewn to another, in the mean, mm.
+    fn over(&self, kind: SeamKind, panel: u32, mate: u32, borders: &[Vec<BorderEdge>]) -> f64 {
+        let sewn = self.trims[self.cloth[panel as usize]].sewn[kind as usize][0];
+        let own = borders[panel as usize].iter().filter(|e| e.sewn_to.is_some_and(|(panel, _)| panel == mate));
+        let across = own.map(|e| (e.ends[1] - e.ends[0]).normalize_or(DVec2::X).abs());
+        let (sum, count) = across.fold((0.0, 0), |(sum, n), d| (sum - d.y * sewn.x - d.x * sewn.y, n + 1));
+        sum / f64::from(count.max(1))
+    }
+
+    /// The yarns of one seam to another panel; so much is turned in on both sides, mm.
+    fn sew(&self, kind: SeamKind, way: Way, (other, over): (u32, [f64; 2]), first: &Pose, out: &mut Vec<Edging>) {
+        let cloth = self.cloth[way.panel as usize];
+        let trims = [cloth, self.cloth[other as usize]].map(|c| &self.trims[c]);
+        let sides = [0, 1].map(|side| (trims[side], over[side]));
+        let (own, d) = (trims[0], trims[0].diameter);
+        let fold = |trim: &Trim| trim.folds[kind as usize];
+        match kind {
+            SeamKind::None => {}
+            SeamKind::Mattress => {
+                let radius = 0.3 * d;
+                let hook = |(trim, over)| fold(trim).map_or([radius, 0.0], |f| f.before(-0.75 * over, radius));
+                let finish =
+                    Finish::Mattress { step: (2.0 * own.stitch.y).max(8.0 * radius), radius, hooks: sides.map(hook) };
+                out.push(Edging::new(way, finish, cloth, first));
+            }
+            SeamKind::Overlock => {
+                let Some(own_fold) = fold(own) else { return };
+                let radius = THREAD.clamp(0.15 * d, 0.35 * d);
+                let step = STEP.max(12.0 * radius);
+                let line = |(trim, over): (&Trim, f64)| {
+                    fold(trim).map_or([d, 0.0], |f| f.behind(0.35 * f.upright() - 0.3 * over, radius))
+                };
+                let edge = |(trim, over): (&Trim, f64)| {
+                    let beyond = over + trim.turn + trim.diameter + 2.0 * radius;
+                    fold(trim).map_or([d, 0.0], |f| f.behind(-beyond, radius))
+                };
+                let (line, edge) = (sides.map(line), sides.map(edge));
+                // Both edges are as deep as the deeper one.
+                let depth = edge[0][1].min(edge[1][1]);
+                out.push(Edging::new(way.clone(), Finish::Needle { step, radius, line, fold: own_fold }, cloth, first));
+                for (k, side) in [(0, 1.0), (1, -1.0)] {
+                    let finish =
+                        Finish::Looper { step, radius, line: line[k], edge: [edge[k][0], depth], side, fold: own_fold };
+                    out.push(Edging::new(way.clone(), finish, cloth, first));
+                }
+            }
+        }
+    }
+}

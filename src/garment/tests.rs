@@ -1,0 +1,352 @@
+mod floats;
+mod seams;
+
+use std::fmt::Write;
+
+use glam::DVec2;
+
+use super::*;
+use crate::{
+    geometry::{
+        curve::{Basis, Curve},
+        overlap::{Overlap, overlap},
+    },
+    pattern::{draft::Draft, weave::Weave},
+    testing::stockinette,
+};
+
+fn woven() -> Tile {
+    let spacing = Some(2.5);
+    let plain = Weave::of(Draft::named("plain").unwrap(), 0.5);
+    let weave = Weave { warp_spacing: spacing, weft_spacing: spacing, crimp: Some(0.5), ..plain };
+    Tile::of_weave(&weave).unwrap()
+}
+
+fn options(tile: Tile) -> Options {
+    Options {
+        unit_mm: 1.0,
+        uv_mm: None,
+        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12, seam: None }],
+        seam: SeamKind::Mattress,
+        tension: None,
+        coordinates: true,
+        pressed: false,
+        near: None,
+    }
+}
+
+/// A grid of quads over texture coordinates of `n` x `m` cells of `size` mm from (left, 0), placed in space by `at`.
+fn sheet(text: &mut String, group: &str, n: usize, m: usize, size: f64, left: f64, at: &dyn Fn(f64, f64) -> DVec3) {
+    let first = text.lines().filter(|l| l.starts_with("v ")).count() + 1;
+    for j in 0..=m {
+        for i in 0..=n {
+            let (u, v) = (i as f64 * size, j as f64 * size);
+            let p = at(u, v);
+            writeln!(text, "v {} {} {}\nvt {} {v}", p.x, p.y, p.z, left + u).unwrap();
+        }
+    }
+    writeln!(text, "g {group}").unwrap();
+    for j in 0..m {
+        for i in 0..n {
+            let a = first + j * (n + 1) + i;
+            let [b, c, d] = [a + 1, a + n + 2, a + n + 1];
+            writeln!(text, "f {a}/{a} {b}/{b} {c}/{c} {d}/{d}").unwrap();
+        }
+    }
+}
+
+fn square() -> GarmentMesh {
+    let mut text = String::new();
+    sheet(&mut text, "square", 10, 10, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    GarmentMesh::parse(&text).unwrap()
+}
+
+fn laid(mesh: &GarmentMesh, options: Options) -> (Report, Vec<LaidYarn>) {
+    let garment = Garment::new(mesh, options).unwrap();
+    let yarns = garment.lay(mesh, &[mesh], &[], &[], &mut Vec::new()).unwrap();
+    (garment.report().clone(), yarns.into_iter().flatten().flatten().collect())
+}
+
+fn overlapping(yarns: &[LaidYarn]) -> f64 {
+    let found = run_into_each_other(yarns);
+    eprintln!("{found:?}");
+    found.share
+}
+
+fn run_into_each_other(yarns: &[LaidYarn]) -> Overlap {
+    let curves: Vec<(Curve, Vec<f64>)> = yarns
+        .iter()
+        .map(|y| {
+            let points = y.points.clone();
+            let radii = vec![y.radius; points.len()];
+            (Curve { basis: Basis::BSpline, closed: y.closed, points, radii: None, flattening: None }, radii)
+        })
+        .collect();
+    overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap()
+}
+
+/// The parts of yarns whose control points lie within, as yarns of their own.
+fn within(yarns: &[LaidYarn], inside: &dyn Fn(DVec3) -> bool) -> Vec<LaidYarn> {
+    let parts = |yarn: &LaidYarn| -> Vec<LaidYarn> {
+        let runs = yarn.points.chunk_by(|a, b| inside(*a) == inside(*b));
+        let part = |points: &[DVec3]| LaidYarn { points: points.to_vec(), closed: false, ..yarn.clone() };
+        runs.filter(|run| run.len() > 3 && inside(run[0])).map(part).collect()
+    };
+    yarns.iter().flat_map(parts).collect()
+}
+
+#[test]
+fn a_flat_square_holds_its_stitches_within_its_border() {
+    for tile in [stockinette(), woven()] {
+        let stitch = tile.stitch();
+        let (report, yarns) = laid(&square(), options(tile));
+        let wanted = 100.0 * 100.0 / stitch.element_product();
+        let found = report.all_stitches() as f64;
+        assert!(found < wanted && found > 0.85 * wanted, "{found} of {wanted}");
+        for yarn in &yarns {
+            assert_eq!(yarn.coordinates.len(), yarn.points.len());
+            // Where its segments join: control points of tight bends lie further out than the yarn.
+            for w in yarn.points.windows(3) {
+                let p = (w[0] + 4.0 * w[1] + w[2]) / 6.0;
+                let out = (DVec2::splat(50.0) - p.truncate()).abs().max_element() - 50.0 + yarn.radius;
+                assert!(out < 2.5 * yarn.radius, "{p} is {out} out");
+                assert!(p.z.abs() < 6.0, "{p}");
+            }
+        }
+        // At finished edges, where chains and hems go through the cloth: 10 to 11.3 % measured.
+        assert!(overlapping(&yarns) < 0.12);
+        assert!((report.uv_mm - 1.0).abs() < 1e-9 && (report.ratio.p50 - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn warps_are_threads_of_their_own_and_wefts_turn_at_selvedges() {
+    let (_, yarns) = laid(&square(), options(woven()));
+    let warps: Vec<&LaidYarn> = yarns.iter().filter(|y| y.kind == StrandKind::Warp).collect();
+    let wefts = yarns.iter().filter(|y| y.kind == StrandKind::Weft).count();
+    assert!(warps.len() > 35 && wefts == 1, "{} {wefts}", warps.len());
+    for warp in warps {
+        // From edge to edge, aside by no more than it bends.
+        let (x, y) = (warp.points.iter().map(|p| p.x), warp.points.iter().map(|p| p.y));
+        let extent = |v: &mut dyn Iterator<Item = f64>| {
+            let (low, high) = v.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+            high - low
+        };
+        let (across, up) = (extent(&mut x.into_iter()), extent(&mut y.into_iter()));
+        assert!(across < 2.0 && up > 95.0, "{across} {up}");
+    }
+    // Where they were cut to be sewn, wefts end as well.
+    let [first, ..] = seams::sewn(&woven(), 0, SeamKind::Overlock);
+    assert!(first.iter().filter(|y| y.kind == StrandKind::Weft).count() > 10);
+}
+
+#[test]
+fn a_part_is_laid_as_in_the_whole() {
+    let (all, whole) = laid(&square(), options(stockinette()));
+    let near = Some((DVec3::new(50.0, 50.0, 0.0), 20.0));
+    let (part, yarns) = laid(&square(), Options { near, ..options(stockinette()) });
+    let share = part.all_stitches() as f64 / all.all_stitches() as f64;
+    assert!((share - 0.126).abs() < 0.02, "{share}");
+    // In the middle every point of the one is one of the other.
+    let middle = |yarns: &[LaidYarn]| -> Vec<DVec3> {
+        let points = yarns.iter().flat_map(|y| y.points.clone());
+        points.filter(|p| p.distance(DVec3::new(50.0, 50.0, 0.0)) < 14.0).collect()
+    };
+    let (one, other) = (middle(&whole), middle(&yarns));
+    assert!(one.len() == other.len() && one.len() > 500, "{} {}", one.len(), other.len());
+    assert!(other.iter().all(|p| one.contains(p)));
+    let nowhere = Options { near: Some((DVec3::splat(900.0), 20.0)), ..options(stockinette()) };
+    assert!(Garment::new(&square(), nowhere).err().unwrap().problem.contains("no stitch lies within 20.000 mm"));
+}
+
+#[test]
+fn rows_are_few_yarns_and_long() {
+    let (report, yarns) = laid(&square(), options(stockinette()));
+    // One yarn to and fro, and the chain around.
+    assert!(yarns.len() <= 3, "{}", yarns.len());
+    let longest = yarns.iter().map(|y| y.points.len()).max().unwrap();
+    assert!(longest as u64 >= 12 * report.all_stitches());
+}
+
+/// A tube of 240 mm around.
+fn tube() -> GarmentMesh {
+    let mut text = String::new();
+    let at = |u: f64, v: f64| {
+        let (sin, cos) = (u.rem_euclid(240.0) / TUBE).sin_cos();
+        DVec3::new(TUBE * sin, v, TUBE * cos)
+    };
+    sheet(&mut text, "tube", 24, 6, 10.0, 0.0, &at);
+    GarmentMesh::parse(&text).unwrap()
+}
+
+const TUBE: f64 = 240.0 / std::f64::consts::TAU;
+
+#[test]
+fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
+    let (report, yarns) = laid(&tube(), options(stockinette()));
+    let rounds: Vec<&LaidYarn> = yarns.iter().filter(|y| y.closed).collect();
+    assert!(rounds.len() > 15, "{} of {}", rounds.len(), yarns.len());
+    assert_eq!(report.all_stitches() % 60, 0, "{}", report.all_stitches());
+    // On the round surface, not on its chords.
+    for yarn in &rounds {
+        for p in &yarn.points {
+            let off = (p.x.hypot(p.z) - TUBE).abs();
+            assert!(off < 2.2, "{p}: {off}");
+        }
+    }
+    assert!(overlapping(&yarns) < 0.12);
+}
+
+#[test]
+fn a_woven_tube_is_sewn() {
+    let sewn = Options { seam: SeamKind::Overlock, ..options(woven()) };
+    let (_, yarns) = laid(&tube(), sewn);
+    let wefts: Vec<&LaidYarn> = yarns.iter().filter(|y| y.kind == StrandKind::Weft).collect();
+    // Each pick is a thread of its own, cut where it is turned in.
+    assert!(wefts.len() > 18 && wefts.iter().all(|y| !y.closed), "{}", wefts.len());
+    let inwards = |y: &&&LaidYarn| y.points.iter().any(|p| p.x.hypot(p.z) < TUBE - 2.0);
+    assert_eq!(wefts.iter().filter(inwards).count(), wefts.len());
+    // A needle's thread and two loopers', from edge to edge.
+    let threads = yarns.iter().filter(|y| y.radius < 0.2 && !y.closed).collect::<Vec<_>>();
+    assert_eq!(threads.len(), 3);
+}
+
+#[test]
+fn frames_keep_their_yarns_and_errors_name_what_differs() {
+    let still = square();
+    let mut moved = still.clone();
+    for p in &mut moved.points {
+        *p = DVec3::new(p.x, p.y, p.z + 0.002 * p.x * p.x);
+    }
+    let garment = Garment::new(&still, options(stockinette())).unwrap();
+    let frames = garment.lay(&still, &[&still, &moved], &[], &[], &mut Vec::new()).unwrap();
+    for (a, b) in frames[0].iter().flatten().zip(frames[1].iter().flatten()) {
+        assert_eq!((a.points.len(), a.closed), (b.points.len(), b.closed));
+        for (p, q) in a.points.iter().zip(&b.points) {
+            // Loops follow the cloth: a point of a yarn stays over its place of the panel.
+            assert!((q.z - p.z - 0.002 * p.x * p.x).abs() < 4.0, "{p} {q}");
+        }
+    }
+    let mut other = still.clone();
+    other.faces.pop();
+    let (frame, problem) = garment.lay(&still, &[&still, &other], &[], &[], &mut Vec::new()).unwrap_err();
+    assert!(frame == 1 && problem.contains("triangles"), "{problem}");
+}
+
+#[test]
+fn yarns_are_the_same_on_any_number_of_threads() {
+    let lay = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let tension = Some(Tension { seed: 7, spread: 0.05 });
+            laid(&square(), Options { tension, ..options(stockinette()) }).1
+        })
+    };
+    let (one, three) = (lay(1), lay(3));
+    assert_eq!(one.len(), three.len());
+    for (a, b) in one.iter().zip(&three) {
+        assert_eq!(a.points, b.points);
+    }
+}
+
+#[test]
+fn a_body_keeps_yarns_out() {
+    let body = Mesh::sphere(60.0, 64);
+    let mut text = String::new();
+    // A cap that dips into the ball.
+    let at = |u: f64, v: f64| {
+        DVec3::new(u - 30.0, v - 30.0, (60.0_f64.powi(2) - (u - 30.0).powi(2) - (v - 30.0).powi(2)).sqrt() - 1.0)
+    };
+    sheet(&mut text, "cap", 12, 12, 5.0, 0.0, &at);
+    let mesh = GarmentMesh::parse(&text).unwrap();
+    let garment = Garment::new(&mesh, Options { seam: SeamKind::None, ..options(stockinette()) }).unwrap();
+    let mut notes = Vec::new();
+    let yarns = garment.lay(&mesh, &[&mesh], &[&body], &[], &mut notes).unwrap();
+    assert!(notes.iter().any(|n| n.contains("out of the body")), "{notes:?}");
+    for yarn in yarns.iter().flatten().flatten() {
+        for p in &yarn.points {
+            assert!(p.length() > 60.0 + 0.3 * yarn.radius, "{p}: {}", p.length() - 60.0);
+        }
+    }
+}
+
+#[test]
+fn patterns_choose_names() {
+    for (pattern, name, fits) in [
+        ("rib_*", "rib_neck", true),
+        ("rib_*", "ribs", false),
+        ("*", "", true),
+        ("?ib*k", "rib_neck", true),
+        ("front", "front", true),
+        ("front", "front2", false),
+        ("*a*b", "xaxbxb", true),
+    ] {
+        assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
+    }
+    let cloths = vec![
+        options(stockinette()).cloths.remove(0),
+        Cloth { group: Some("nobody".into()), ..options(stockinette()).cloths.remove(0) },
+    ];
+    let error = Garment::new(&square(), Options { cloths, ..options(stockinette()) }).err().unwrap();
+    assert!(error.problem.contains("nobody") && error.hint.contains("square"), "{error:?}");
+}
+
+#[test]
+fn what_cannot_be_laid_is_said() {
+    let fine = options(stockinette().scaled(1e-3));
+    let error = Garment::new(&square(), fine).err().unwrap();
+    assert!(error.problem.contains("stitches of"), "{error:?}");
+    let mut text = String::new();
+    sheet(&mut text, "once", 10, 10, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    // A panel that is folded over itself in its texture coordinates: a strip that winds on.
+    let mut wound = String::new();
+    let n = 120;
+    for i in 0..=n {
+        let angle = 1.5 * std::f64::consts::TAU * f64::from(i) / f64::from(n);
+        for radius in [40.0, 80.0] {
+            let (sin, cos) = angle.sin_cos();
+            writeln!(
+                wound,
+                "v {} {} {}\nvt {} {}",
+                radius * cos,
+                radius * sin,
+                3.0 * angle,
+                radius * cos,
+                radius * sin
+            )
+            .unwrap();
+        }
+    }
+    wound.push_str("g spiral\n");
+    for i in 0..n {
+        let a = 2 * i + 1;
+        writeln!(wound, "f {a}/{a} {1}/{1} {2}/{2} {0}/{0}", a + 2, a + 1, a + 3).unwrap();
+    }
+    let mesh = GarmentMesh::parse(&wound).unwrap();
+    let error = Garment::new(&mesh, options(stockinette())).err().unwrap();
+    assert!(error.problem.contains("`spiral` overlaps itself") && error.line > 0, "{error:?}");
+    assert!(Garment::new(&GarmentMesh::parse(&text).unwrap(), options(stockinette())).is_ok());
+    // A band of 85 m that lies on the diagonal: its stitches are few, those of the box around it are not.
+    let n = 50;
+    let mut band = String::new();
+    for i in 0..=n {
+        let along = 60_000.0 * f64::from(i) / f64::from(n);
+        for side in [-3.0, 3.0] {
+            let (u, v) = (along - side, along + side);
+            writeln!(band, "v {u} {v} 0\nvt {u} {v}").unwrap();
+        }
+    }
+    band.push_str("g band\n");
+    for i in 0..n {
+        let a = 2 * i + 1;
+        writeln!(band, "f {0}/{0} {2}/{2} {3}/{3} {1}/{1}", a, a + 1, a + 2, a + 3).unwrap();
+    }
+    let band = GarmentMesh::parse(&band).unwrap();
+    let error = Garment::new(&band, options(stockinette())).err().unwrap();
+    assert!(error.problem.contains("`band` lies askew") && error.line > 0, "{error:?}");
+    // Stages have transforms in double precision.
+    let mut huge = square();
+    huge.points[0] = DVec3::splat(1e200);
+    let error = Garment::new(&huge, options(stockinette())).err().unwrap();
+    assert!(error.problem.contains("area is no number"), "{error:?}");
+}

@@ -1,0 +1,541 @@
+//! Knitting charts: rows of steps, written as knitters write them, and the stitches that come of them.
+//!
+//! A chart is a list of rows from the cast-on edge upwards, each written from left to right as seen from the right side:
+//!
+//! | step | what it makes |
+//! |---|---|
+//! | `k`, `k4`, `p`, `p2` | knit and purl stitches |
+//! | `ktbl`, `ptbl` | the same through the back of the loop, which twists it |
+//! | `k2tog`, `ssk`, `p2tog`, `ssp` | one stitch of two; the left one of the two on top (leans right), or the right one (leans left) |
+//! | `k3tog`, `sssk`, `p3tog`, `cdd` | one stitch of three; the left, the right or the middle one on top |
+//! | `yo` | a stitch of none: an eyelet |
+//! | `m1l`, `m1r` | a stitch out of the strand between two stitches of the row below, twisted to the left or the right |
+//! | `kfb` | two stitches of one |
+//! | `sl`, `sl2`, `slwyif`, `miss` | a stitch that is slipped: the yarn passes behind it, or in front (`slwyif`) |
+//! | `tuck` | a stitch that is slipped with a yarn over, to be worked together with it: brioche is made of these |
+//! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
+//! | `t3f`, `t3b` | the same with purl stitches behind |
+//! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
+//! | `-`, `-4` | stitches that stay on the needle: a short row turns beside them, and the next row begins there |
+//! | `ds` | a double stitch: slipped with the yarn pulled over the needle; the first plain stitch after such a turn is one by itself |
+//! | `mb`, `bobble` | five loops out of one stitch (`k yo k yo k`), turn, five purled, turn, all of them knitted together |
+//!
+//! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
+
+use std::{fmt, sync::Arc};
+
+/// Which of several stitches worked together is on top.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Top {
+    /// The left one: it leans to the right.
+    Left,
+    /// The right one.
+    Right,
+    /// The middle one, and it stands upright.
+    Middle,
+}
+
+/// One step of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// A stitch drawn through one of the row below.
+    Plain {
+        /// Whether the new loop goes to the back.
+        purl: bool,
+        /// Whether it is worked through the back of the loop below, which twists that.
+        twisted: bool,
+    },
+    /// Several stitches become one.
+    Together {
+        /// How many, 2 or 3.
+        take: u8,
+        /// As in [`Step::Plain`].
+        purl: bool,
+        /// Which is on top.
+        top: Top,
+    },
+    /// One stitch becomes two.
+    FrontBack,
+    /// A stitch out of nothing.
+    YarnOver,
+    /// A stitch out of the strand between two of the row below, twisted.
+    MakeOne {
+        /// Whether its left leg is on top: it leans to the left.
+        left: bool,
+    },
+    /// A stitch that is not worked.
+    Slip {
+        /// Whether the yarn passes in front of it.
+        front: bool,
+    },
+    /// A stitch that is not worked, with a yarn over.
+    Tuck,
+    /// Stitches that change places with others.
+    Cable {
+        /// How many pass in front.
+        front: u8,
+        /// How many pass behind.
+        back: u8,
+        /// Whether those in front move to the left.
+        left: bool,
+        /// Whether those behind are purled.
+        purl: bool,
+    },
+    /// Five loops out of one stitch, five more on the way back, and one through all of them.
+    Bobble,
+    /// A stitch that stays on the needle: the yarn turns before it comes to it.
+    Unworked,
+}
+
+impl Step {
+    /// Stitches of the row below that it takes, and stitches that it makes.
+    pub fn takes_and_makes(self) -> (u32, u32) {
+        match self {
+            Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble | Self::Unworked => (1, 1),
+            Self::Together { take, .. } => (take.into(), 1),
+            Self::FrontBack => (1, 2),
+            Self::YarnOver | Self::MakeOne { .. } => (0, 1),
+            Self::Cable { front, back, .. } => (u32::from(front) + u32::from(back), u32::from(front) + u32::from(back)),
+        }
+    }
+}
+
+/// What the yarn does at a stitch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Act {
+    /// A loop is drawn through those below.
+    Draw,
+    /// A loop is laid over the needle.
+    Over,
+    /// The stitch below stays as it is; the yarn passes in front or behind.
+    Pass {
+        /// Whether in front.
+        front: bool,
+    },
+    /// The stitch below stays, and a loop is laid over the needle beside it.
+    Tuck,
+    /// A loop is drawn through the strand below, which is lifted and twisted.
+    Lift {
+        /// Whether the left leg of the twisted strand is on top.
+        left: bool,
+    },
+    /// A bobble grows out of the stitch below; one loop is left of it.
+    Bobble,
+    /// The stitch below stays as it is, and no yarn comes there.
+    Unworked,
+    /// The stitch below stays, and the yarn that has turned there is pulled over the needle: a double stitch.
+    Double,
+}
+
+/// A stitch: what it is made of in the row below, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stitch {
+    /// What the yarn does.
+    pub act: Act,
+    /// Whether the loop goes to the back.
+    pub purl: bool,
+    /// Whether it twists what it is drawn through.
+    pub twisted: bool,
+    /// The first stitch of the row below that it takes; of a yarn over or a lifted strand the stitch to its right.
+    pub first_parent: u32,
+    /// How many it takes: 0 of a yarn over or a lifted strand.
+    pub parents: u8,
+    /// Of several, which is on top.
+    pub top: Top,
+    /// Where stitches pass each other, 1 for those in front and -1 for those behind; else 0.
+    pub layer: i8,
+}
+
+/// Rows of a knit, from the cast-on edge.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chart {
+    rows: Vec<Row>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Row {
+    /// Shared by all rows that one line stands for.
+    steps: Arc<[Step]>,
+    /// The line of the description it came from, from 0.
+    line: usize,
+}
+
+/// What is wrong with a chart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChartError {
+    /// The line of the description, from 0, if it is about one.
+    pub line: Option<usize>,
+    /// What is wrong.
+    pub problem: String,
+    /// What to do.
+    pub hint: String,
+}
+
+impl fmt::Display for ChartError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", self.problem, self.hint)
+    }
+}
+
+impl std::error::Error for ChartError {}
+
+impl ChartError {
+    pub(super) fn new(line: Option<usize>, problem: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { line, problem: problem.into(), hint: hint.into() }
+    }
+}
+
+/// Patterns with a name, and their rows.
+pub const PATTERNS: [(&str, &[&str]); 20] = [
+    ("stockinette", &["k"]),
+    ("reverse-stockinette", &["p"]),
+    ("twisted-stockinette", &["ktbl"]),
+    ("garter", &["k", "p"]),
+    ("rib1x1", &["k p"]),
+    ("rib2x2", &["k2 p2"]),
+    ("seed", &["k p", "p k"]),
+    ("moss", &["2: k p", "2: p k"]),
+    ("double-moss", &["2: k2 p2", "2: p2 k2"]),
+    ("basketweave", &["4: k4 p4", "4: p4 k4"]),
+    ("brioche", &["k tuck", "tuck p"]),
+    ("half-cardigan", &["k tuck", "k p"]),
+    ("slip-stitch", &["k sl", "k", "sl k", "k"]),
+    ("cable", &["3: p2 k4 p2", "p2 c4f p2", "2: p2 k4 p2"]),
+    ("braid", &["p2 c4f k2 p2", "p2 k6 p2", "p2 k2 c4b p2", "p2 k6 p2"]),
+    ("honeycomb", &["3: k8", "c4b c4f", "3: k8", "c4f c4b"]),
+    ("basket-cable", &["3: k12", "k2 c4f c4f k2", "3: k12", "c4b c4b c4b"]),
+    ("eyelet", &["3: k6", "k2 k2tog yo k2", "2: k6"]),
+    ("lace", &["k6", "yo ssk k k2tog yo k", "k6", "k yo cdd yo k2"]),
+    ("feather-and-fan", &["k", "k2tog k2tog k2tog yo k yo k yo k yo k yo k yo k k2tog k2tog k2tog", "k", "p"]),
+];
+
+/// Most rows and most steps of a row that a chart may have.
+const MOST_ROWS: usize = 20_000;
+const MOST_STEPS: usize = 20_000;
+/// Most stitches in a cable.
+pub(super) const WIDEST_CABLE: u8 = 24;
+/// How far from what is asked a number of stitches is looked for that a chart fits.
+const LARGEST_STEP_ASIDE: usize = 200;
+const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
+                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, -, ds, with spaces between them";
+
+impl Chart {
+    /// A pattern by its name.
+    pub fn named(name: &str) -> Option<Self> {
+        let (_, rows) = PATTERNS.iter().find(|(n, _)| *n == name)?;
+        Self::parse(rows).ok()
+    }
+
+    /// Reads the rows of a chart, from the bottom upwards.
+    ///
+    /// ```
+    /// use yarnray::pattern::chart::Chart;
+    ///
+    /// let lace = Chart::parse(&["k6", "k2tog yo k2 yo ssk"]).unwrap();
+    /// // Twelve stitches, and every row keeps them: two decreases, two yarn-overs.
+    /// let rows = lace.work(12, 4, 1000).unwrap();
+    /// assert!(rows.iter().all(|row| row.len() == 12));
+    /// ```
+    ///
+    /// # Errors
+    /// A step that is none, or too many of them.
+    pub fn parse(lines: &[impl AsRef<str>]) -> Result<Self, ChartError> {
+        let mut rows = Vec::new();
+        for (line, text) in lines.iter().enumerate() {
+            let text = text.as_ref();
+            let (count, steps) = match text.split_once(':') {
+                Some((count, steps)) => match count.trim().parse::<usize>() {
+                    Ok(n) if (1..=MOST_ROWS).contains(&n) => (n, steps),
+                    _ => {
+                        let problem = format!("expected a number of rows before the colon, found \"{}\"", count.trim());
+                        return Err(ChartError::new(Some(line), problem, "as in \"12: k2 p2\""));
+                    }
+                },
+                None => (1, text),
+            };
+            let steps = Arc::from(parse_steps(steps, line)?);
+            if rows.len() + count > MOST_ROWS {
+                let problem = format!("more than {MOST_ROWS} rows");
+                return Err(ChartError::new(Some(line), problem, "rows repeat by themselves"));
+            }
+            rows.extend(std::iter::repeat_n(Row { steps, line }, count));
+        }
+        if rows.is_empty() {
+            return Err(ChartError::new(None, "a chart without rows", "as in rows = [\"k2 p2\"]"));
+        }
+        Ok(Self { rows })
+    }
+
+    /// How many stitches steps make that are written as in a row.
+    ///
+    /// # Errors
+    /// A step that is none.
+    pub fn stitches_of(steps: &str) -> Result<u32, ChartError> {
+        Ok(parse_steps(steps, 0)?.iter().map(|step| step.takes_and_makes().1).sum())
+    }
+
+    /// Number of rows before they repeat.
+    pub fn rows(&self) -> u32 {
+        self.rows.len() as u32
+    }
+
+    /// The smallest width that all rows fit a whole number of times, if every row makes as many stitches as it takes
+    /// and the width is at most `most`.
+    pub fn even_width(&self, most: u32) -> Option<u32> {
+        let mut width = 1_u32;
+        for row in &self.rows {
+            let (takes, makes) = row.takes_and_makes();
+            if takes != makes || row.is_short() {
+                return None;
+            }
+            width = width.checked_mul(takes / common_divisor(width, takes))?;
+            if width > most {
+                return None;
+            }
+        }
+        Some(width)
+    }
+
+    /// The line of the description that a row of the knit, from 0, came from.
+    pub(super) fn line_of(&self, row: usize) -> usize {
+        self.rows[row % self.rows.len()].line
+    }
+
+    /// Whether rows may be cut anywhere: each stitch is made of one.
+    pub fn is_plain(&self) -> bool {
+        self.rows.iter().all(Row::is_plain)
+    }
+
+    /// The first row, from 0, that has more stitches than it finds in rows of so many, and how many it has: the rest of it is
+    /// left out.
+    pub fn cut_short(&self, cast_on: u32, widths: &[u32]) -> Option<(usize, u32)> {
+        let found = std::iter::once(cast_on).chain(widths.iter().copied());
+        let rows = self.rows.iter().cycle().zip(found).take(widths.len()).enumerate();
+        let mut rows = rows.map(|(r, (row, found))| (r, row.takes_and_makes().0, found));
+        rows.find(|(_, takes, found)| takes > found).map(|(r, takes, _)| (r, takes))
+    }
+
+    /// The next numbers of stitches to cast on, fewer and more, that `rows` rows fit; empty if none is near.
+    fn counts_that_fit(&self, cast_on: u32, rows: u32) -> String {
+        // Each row is counted once, for it may be long and be tried often.
+        let all: Vec<Fit> = self.rows.iter().map(Row::fit).collect();
+        let next = |found: u32, fit: &Fit| u32::try_from(fit.made_of(found)?).ok();
+        let fits = |&count: &u32| all.iter().cycle().take(rows as usize).try_fold(count, next).is_some();
+        let fewer = (1..cast_on).rev().take(LARGEST_STEP_ASIDE).find(fits);
+        let more = (cast_on + 1..).take(LARGEST_STEP_ASIDE).find(fits);
+        [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// Knits `rows` rows onto `cast_on` stitches.
+    ///
+    /// # Errors
+    /// A row that does not fit the stitches it finds, or more than `most` stitches in all.
+    pub fn work(&self, cast_on: u32, rows: u32, most: u64) -> Result<Vec<Vec<Stitch>>, ChartError> {
+        let mut out: Vec<Vec<Stitch>> = Vec::new();
+        let (mut found, mut total) = (cast_on, 0_u64);
+        for r in 0..rows {
+            let row = &self.rows[r as usize % self.rows.len()];
+            let fit = row.fit();
+            let Some(made) = fit.made_of(found) else {
+                let (does, hint) = match fit.short {
+                    true => ("is written for", "a short row says what becomes of every stitch"),
+                    false => (
+                        "repeats over",
+                        "the number of stitches must be a multiple of what a row with shaping or cables takes",
+                    ),
+                };
+                let problem = format!("row {} {does} {} stitches, but finds {found}", r + 1, fit.takes);
+                let counts = self.counts_that_fit(cast_on, rows);
+                let hint = if counts.is_empty() { hint.to_owned() } else { format!("{hint}: cast on {counts}") };
+                return Err(ChartError::new(Some(row.line), problem, hint));
+            };
+            total += made;
+            if total > most {
+                let problem = format!("more than {most} stitches by row {}", r + 1);
+                return Err(ChartError::new(Some(row.line), problem, "fewer stitches, rows or increases"));
+            }
+            let stitches = row.work(found, made as usize);
+            found = stitches.len() as u32;
+            out.push(stitches);
+        }
+        Ok(out)
+    }
+}
+
+fn common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
+}
+
+/// What a row asks of the number of stitches that it finds.
+struct Fit {
+    takes: u32,
+    makes: u32,
+    /// Whether it may be cut anywhere.
+    plain: bool,
+    /// Whether some stitches stay unworked: it is written once over the whole width.
+    short: bool,
+}
+
+impl Fit {
+    /// How many stitches the row makes of those that it finds; `None` where it does not fit them.
+    fn made_of(&self, found: u32) -> Option<u64> {
+        match found.checked_rem(self.takes)? {
+            _ if self.short => (found == self.takes).then_some(self.makes.into()),
+            0 => Some(u64::from(found / self.takes) * u64::from(self.makes)),
+            _ => self.plain.then_some(found.into()),
+        }
+    }
+}
+
+impl Row {
+    fn fit(&self) -> Fit {
+        let (takes, makes) = self.takes_and_makes();
+        Fit { takes, makes, plain: self.is_plain(), short: self.is_short() }
+    }
+
+    fn takes_and_makes(&self) -> (u32, u32) {
+        self.steps.iter().map(|s| s.takes_and_makes()).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+    }
+
+    /// Each stitch on its own: may be cut anywhere.
+    fn is_plain(&self) -> bool {
+        self.steps.iter().all(|s| s.takes_and_makes() == (1, 1)) && !self.is_short()
+    }
+
+    /// Whether some of its stitches stay unworked.
+    fn is_short(&self) -> bool {
+        self.steps.contains(&Step::Unworked)
+    }
+
+    fn work(&self, found: u32, made: usize) -> Vec<Stitch> {
+        let mut out = Vec::with_capacity(made);
+        let mut at = 0_u32;
+        for step in self.steps.iter().cycle() {
+            let (takes, _) = step.takes_and_makes();
+            if out.len() >= made && at >= found {
+                break;
+            }
+            let plain = Stitch {
+                act: Act::Draw,
+                purl: false,
+                twisted: false,
+                first_parent: at,
+                parents: 1,
+                top: Top::Left,
+                layer: 0,
+            };
+            match *step {
+                Step::Plain { purl, twisted } => out.push(Stitch { purl, twisted, ..plain }),
+                Step::Together { take, purl, top } => out.push(Stitch { purl, parents: take, top, ..plain }),
+                Step::FrontBack => out.extend([plain, plain]),
+                Step::YarnOver => out.push(Stitch { act: Act::Over, parents: 0, ..plain }),
+                Step::MakeOne { left } => out.push(Stitch { act: Act::Lift { left }, parents: 0, ..plain }),
+                Step::Slip { front } => out.push(Stitch { act: Act::Pass { front }, ..plain }),
+                Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
+                Step::Bobble => out.push(Stitch { act: Act::Bobble, ..plain }),
+                Step::Unworked => out.push(Stitch { act: Act::Unworked, ..plain }),
+                Step::Cable { front, back, left, purl } => {
+                    let (front, back) = (u32::from(front), u32::from(back));
+                    let ahead = |i| Stitch { first_parent: at + if left { back } else { 0 } + i, layer: 1, ..plain };
+                    let behind =
+                        |i| Stitch { purl, first_parent: at + if left { 0 } else { front } + i, layer: -1, ..plain };
+                    if left {
+                        out.extend((0..front).map(ahead));
+                        out.extend((0..back).map(behind));
+                    } else {
+                        out.extend((0..back).map(behind));
+                        out.extend((0..front).map(ahead));
+                    }
+                }
+            }
+            at += takes;
+        }
+        out
+    }
+}
+
+fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartError> {
+    let mut steps = Vec::new();
+    for token in text.split([' ', ',', '\t']).filter(|t| !t.is_empty()) {
+        let (count, step) = parse_step(token).ok_or_else(|| {
+            let shown: String = token.chars().take(20).collect();
+            ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), STEPS)
+        })?;
+        if steps.len() + count > MOST_STEPS {
+            return Err(ChartError::new(Some(line), format!("more than {MOST_STEPS} steps in a row"), "steps repeat"));
+        }
+        steps.extend(std::iter::repeat_n(step, count));
+    }
+    if steps.iter().all(|s| s.takes_and_makes().0 == 0) {
+        return Err(ChartError::new(Some(line), "a row that takes no stitch of the row below", STEPS));
+    }
+    Ok(steps)
+}
+
+fn parse_step(token: &str) -> Option<(usize, Step)> {
+    let plain = |purl, twisted| Step::Plain { purl, twisted };
+    let together = |take, purl, top| Step::Together { take, purl, top };
+    let named = match token {
+        "k2tog" => together(2, false, Top::Left),
+        "ssk" | "skp" => together(2, false, Top::Right),
+        "p2tog" => together(2, true, Top::Left),
+        "ssp" => together(2, true, Top::Right),
+        "k3tog" => together(3, false, Top::Left),
+        "sssk" | "sk2p" => together(3, false, Top::Right),
+        "p3tog" => together(3, true, Top::Left),
+        "cdd" | "s2kp" => together(3, false, Top::Middle),
+        "kfb" => Step::FrontBack,
+        "yo" => Step::YarnOver,
+        "m1l" | "m1" => Step::MakeOne { left: true },
+        "m1r" => Step::MakeOne { left: false },
+        "mb" | "bobble" => Step::Bobble,
+        _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
+    };
+    Some((1, named))
+}
+
+/// Steps that may be counted: `k4`, `sl2`, `ktbl3`.
+fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usize, Step)> {
+    let word = token.trim_end_matches(|c: char| c.is_ascii_digit());
+    let step = match word {
+        "k" | "brk" => plain(false, false),
+        "p" | "brp" => plain(true, false),
+        "ktbl" => plain(false, true),
+        "ptbl" => plain(true, true),
+        "sl" | "slwyib" | "miss" => Step::Slip { front: false },
+        "slwyif" => Step::Slip { front: true },
+        "tuck" | "sl1yo" | "ds" => Step::Tuck,
+        "-" => Step::Unworked,
+        _ => return None,
+    };
+    let digits = &token[word.len()..];
+    let count = if digits.is_empty() { 1 } else { digits.parse().ok().filter(|n| (1..=MOST_STEPS).contains(n))? };
+    Some((count, step))
+}
+
+/// `c4f`, `t3b`, `2/1lc`, `2/2rpc`.
+fn parse_cable(token: &str) -> Option<Step> {
+    let cable = |front: u8, back: u8, left, purl| {
+        let fits = front > 0 && back > 0 && front.checked_add(back)? <= WIDEST_CABLE;
+        fits.then_some(Step::Cable { front, back, left, purl })
+    };
+    if let Some((front, rest)) = token.split_once('/') {
+        let word = rest.trim_start_matches(|c: char| c.is_ascii_digit());
+        let back = rest[..rest.len() - word.len()].parse().ok()?;
+        let (left, purl) = match word {
+            "lc" => (true, false),
+            "rc" => (false, false),
+            "lpc" => (true, true),
+            "rpc" => (false, true),
+            _ => return None,
+        };
+        return cable(front.parse().ok()?, back, left, purl);
+    }
+    let purl = token.starts_with('t');
+    let left = token.ends_with('f');
+    let size: u8 = token.strip_prefix(['c', 't'])?.strip_suffix(['f', 'b'])?.parse().ok()?;
+    cable(size.div_ceil(2), size / 2, left, purl)
+}
+
+#[cfg(test)]
+mod tests;

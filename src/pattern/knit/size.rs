@@ -1,0 +1,221 @@
+//! How large a knit is to be: a gauge, a width or circumference and a height, which count its stitches and rows.
+
+use std::f64::consts::TAU;
+
+use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
+use crate::pattern::revolution::Revolution;
+
+/// Sizes that a knit was given, mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sizes {
+    /// Width and height of a stitch, by the gauge.
+    pub stitch: Option<[f64; 2]>,
+    /// Width of a flat piece.
+    pub width: Option<f64>,
+    /// Way round a tube.
+    pub circumference: Option<f64>,
+    /// From the cast-on edge to the last row.
+    pub height: Option<f64>,
+    /// Whether stitches and rows are counted too.
+    pub counted: [bool; 2],
+}
+
+/// A size that does not fit the rest.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Misfit {
+    /// The option at fault, as in a scene; none where yarn and gauge do not fit.
+    pub key: Option<&'static str>,
+    /// What is wrong.
+    pub problem: String,
+    /// What would fit.
+    pub hint: String,
+}
+
+/// The shortest yarn of a stitch, and the narrowest stitch, in diameters: beyond them yarns would lie inside each other.
+const SHORTEST: f64 = 11.0;
+const NARROWEST: f64 = 1.5;
+const LOWEST: f64 = 0.9;
+/// Yarn of a firm stitch.
+const FIRM: f64 = 14.0;
+/// Most stitches or rows.
+const MOST: f64 = 1e6;
+
+impl Sizes {
+    /// What is given twice, or is no size of such a form. `measured` says whether the width and the height of a stitch are
+    /// given in yarn diameters, `spelled` how an option is named.
+    pub fn clashes(
+        &self,
+        form: Option<&Form>,
+        measured: [bool; 2],
+        spelled: impl Fn(&'static str) -> String,
+    ) -> Vec<Misfit> {
+        let mut found = Vec::new();
+        let mut wrong = |key: &'static str, problem: String, hint: &str| {
+            found.push(Misfit { key: Some(key), problem, hint: hint.to_owned() });
+        };
+        let sizes = [
+            ("width", self.width.is_some()),
+            ("height", self.height.is_some()),
+            ("circumference", self.circumference.is_some()),
+            ("gauge", self.stitch.is_some()),
+        ];
+        let given = |key: &str| sizes.iter().any(|(k, given)| *k == key && *given);
+        match form {
+            Some(Form::Tube) if given("width") => {
+                let hint = format!("{} is the way round it", spelled("circumference"));
+                wrong("width", "a tube has no width".to_owned(), &hint);
+            }
+            Some(Form::Flat) if given("circumference") => {
+                let hint = format!("{}, or a tube by {}", spelled("width"), spelled("form"));
+                wrong("circumference", "a flat piece has no circumference".to_owned(), &hint);
+            }
+            Some(Form::Revolution(_)) => {
+                for (key, _) in sizes.iter().filter(|(_, given)| *given) {
+                    let problem = format!("the profile says how large the piece is, not {}", spelled(key));
+                    wrong(key, problem, "give one of them");
+                }
+            }
+            _ => {}
+        }
+        for (key, _) in ["stitch_width", "row_height"].into_iter().zip(measured).filter(|k| k.1 && given("gauge")) {
+            let problem = format!("{} and {} are given", spelled(key), spelled("gauge"));
+            wrong(key, problem, "both say how large a stitch is: keep one");
+        }
+        for (k, keys) in [["width", "circumference"], ["height", "height"]].iter().enumerate() {
+            if let Some(key) = keys.iter().find(|key| self.counted[k] && given("gauge") && given(key)) {
+                let count = spelled(["stitches", "rows"][k]);
+                let problem = format!("{}, {count} and {} are given", spelled(key), spelled("gauge"));
+                wrong(key, problem, "two of them give the third");
+            }
+        }
+        found
+    }
+
+    /// The knit with counts and stitches that make it so large, knitted of yarn of a diameter (mm).
+    ///
+    /// # Errors
+    /// What cannot be knitted of such yarn is told, with what would fit.
+    pub fn apply(&self, knit: &Knit, diameter: f64) -> Result<Knit, Misfit> {
+        let mut knit = knit.clone();
+        if let Some([width, height]) = self.stitch {
+            (knit.stitch_width, knit.row_height) = (Some(width / diameter), Some(height / diameter));
+        }
+        let [width, height] = [self.across().map(|w| w.0), self.height].map(|size| size.map(|mm| mm / diameter));
+        // A size and a count give the stitch.
+        if let (Some(width), true) = (width, self.counted[0]) {
+            knit.stitch_width = Some(width / f64::from(knit.stitches));
+        }
+        if let (Some(height), true) = (height, self.counted[1]) {
+            knit.row_height = Some(height / f64::from(knit.rows));
+        }
+        self.check(&knit, diameter)?;
+        let open = [width.filter(|_| !self.counted[0]), height.filter(|_| !self.counted[1])];
+        if open != [None, None] {
+            let stitch = knit.gauge();
+            let count = |size: f64, own: f64, of: u32| {
+                let of = f64::from(of.max(1));
+                ((size / own / of).round().clamp(1.0, (MOST / of).max(1.0)) * of) as u32
+            };
+            // Whole repeats, where rows do not fit otherwise or must close to a ring or a tile.
+            let whole = knit.form != Form::Flat || !knit.chart.is_plain() || knit.edges == Edges::Tile;
+            let wide = knit.chart.even_width(10_000).filter(|_| whole).unwrap_or(1);
+            let high = if knit.edges == Edges::Tile { knit.chart.rows() } else { 1 };
+            if let Some(width) = open[0] {
+                knit.stitches = count(width, stitch[0], wide);
+            }
+            if let Some(height) = open[1] {
+                knit.rows = count(height, stitch[1], high);
+            }
+            if knit.form != Form::Flat {
+                knit.stitches = knit.stitches.max(3);
+            }
+        }
+        Ok(knit)
+    }
+
+    /// Width of the piece or the way round it, with its name.
+    fn across(&self) -> Option<(f64, &'static str)> {
+        self.width.map(|w| (w, "width")).or(self.circumference.map(|c| (c, "circumference")))
+    }
+
+    /// Whether yarn of this thickness can be knitted so.
+    fn check(&self, knit: &Knit, d: f64) -> Result<(), Misfit> {
+        match (knit.stitch_width, knit.row_height) {
+            (Some(width), Some(height)) => fits_stitch(width, height, d)?,
+            (Some(width), None) if width < NARROWEST => {
+                let (size, key) = self.across().unwrap_or((width * f64::from(knit.stitches) * d, "width"));
+                let most = (size / (3.0 * d)).floor();
+                return Err(Misfit {
+                    key: None,
+                    problem: format!(
+                        "{} stitches on a {key} of {size:.1} mm are {width:.2} yarn diameters wide",
+                        knit.stitches
+                    ),
+                    hint: format!("about {most} stitches fit yarn {d:.3} mm thick"),
+                });
+            }
+            _ => {}
+        }
+        match &knit.form {
+            Form::Revolution(profile) => fits_profile(knit, &Revolution::new(profile), d),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether yarn of a diameter `d` (mm) makes stitches so wide and high, in diameters.
+fn fits_stitch(width: f64, height: f64, d: f64) -> Result<(), Misfit> {
+    let length = (STITCHES_PER_SQUARE * width * height).sqrt();
+    if length >= SHORTEST && width >= NARROWEST {
+        return Ok(());
+    }
+    let [across, up] = [width, height].map(|s| 100.0 / (s * d));
+    let radius = 0.5 * d * (length / FIRM).min(width / 3.0);
+    let by = (FIRM / length).max(3.0 / width);
+    let problem = format!(
+        "a gauge of {across:.1} x {up:.1} in 10 cm is too dense for yarn {d:.3} mm thick: a stitch of {:.3} x {:.3} mm takes \
+         {length:.1} diameters of yarn",
+        width * d,
+        height * d
+    );
+    let hint = format!("at most {:.1} x {:.1}, or yarn of a radius of {radius:.3}", across / by, up / by);
+    Err(Misfit { key: None, problem, hint })
+}
+
+/// Whether the rows of a knit fit the surface that they are spread over.
+fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit> {
+    // A chart that does not fit is told by who knits it.
+    let Ok(widths) = knit.widths() else { return Ok(()) };
+    let height = surface.length() / widths.len() as f64;
+    let of_row = |(row, count): (usize, &u32)| {
+        let round = TAU * surface.radius((row as f64 + 0.5) * height);
+        (round / f64::from(*count) / d, row, round, *count)
+    };
+    let tightest = widths.iter().enumerate().map(of_row).min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((width, row, round, count)) = tightest.filter(|t| t.0 < NARROWEST) {
+        let most = (round / (3.0 * d)).floor().max(1.0);
+        let radius = 0.5 * d * width / 3.0;
+        return Err(Misfit {
+            key: None,
+            problem: format!(
+                "{count} stitches of row {} on a circumference of {round:.1} mm are {width:.2} yarn diameters wide",
+                row + 1
+            ),
+            hint: format!("about {most} stitches there, or yarn of a radius of {radius:.3} mm"),
+        });
+    }
+    if height < LOWEST * d {
+        let most = (surface.length() / (2.2 * d)).floor();
+        return Err(Misfit {
+            key: None,
+            problem: format!(
+                "{} rows on a profile {:.1} mm long are {:.2} yarn diameters high",
+                knit.rows,
+                surface.length(),
+                height / d
+            ),
+            hint: format!("about {most} rows fit yarn {d:.3} mm thick"),
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,192 @@
+//! Which segments may touch in the steps to come.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::{ALONG, APART, CHUNK, MARGIN, Neighbour, Rods, Work};
+use crate::geometry::contact::{PointGrid, Walk, nearest};
+
+/// Segments by their middles, with the images that a periodic cell has of them.
+struct Middles {
+    /// Of the segments, and after them of their images; within the cell if there is one.
+    points: Vec<DVec3>,
+    /// For each of them the segment, and by how many periods its image is moved.
+    images: Vec<(u32, [i8; 2])>,
+    /// The cell in which each segment lies; empty without a period.
+    own_cells: Vec<[i32; 2]>,
+}
+
+/// Where each segment is on its strand.
+struct OnStrands {
+    /// How far along it.
+    along: Vec<f64>,
+    /// The strand's number.
+    strand: Vec<u32>,
+    /// Length of each strand.
+    lengths: Vec<f64>,
+}
+
+/// All that tells which segments may touch.
+struct Search<'a> {
+    rods: &'a Rods,
+    has: &'a [bool],
+    edges: &'a [DVec3],
+    halves: &'a [f64],
+    /// The longest segment, but for few.
+    longest: f64,
+    middles: &'a Middles,
+    grid: &'a PointGrid,
+    on_strands: OnStrands,
+}
+
+impl Rods {
+    /// Finds what may touch in the steps to come.
+    pub(super) fn search(&self, has: &[bool], work: &mut Work) {
+        let n = self.points.len();
+        self.edges(&mut work.edges);
+        let edges = &work.edges;
+        let halves: Vec<f64> = edges.iter().map(|e| 0.5 * e.length()).collect();
+        // One that is stretched must not make all cells wide.
+        let longest =
+            2.0 * halves.iter().copied().fold(0.05, f64::max).min(1.5 * halves.iter().sum::<f64>() / n as f64);
+        let reach = APART + MARGIN + longest;
+        let middles = self.middles(edges, reach);
+        let grid = PointGrid::new(&middles.points, reach, None);
+        let on_strands = self.on_strands();
+        let search =
+            Search { rods: self, has, edges, halves: &halves, longest, middles: &middles, grid: &grid, on_strands };
+        let chunks: Vec<(Vec<u32>, Vec<Neighbour>)> = (0..n.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|c| {
+                let mut walk = if self.period.is_some() { grid.walk() } else { grid.walk_ahead() };
+                let mut found = Vec::new();
+                let counts = (c * CHUNK..((c + 1) * CHUNK).min(n))
+                    .map(|i| {
+                        let before = found.len();
+                        search.around(i, &mut found, &mut walk);
+                        (found.len() - before) as u32
+                    })
+                    .collect();
+                (counts, found)
+            })
+            .collect();
+        work.starts.clear();
+        work.starts.push(0);
+        work.neighbours.clear();
+        let mut sum = 0;
+        for (counts, found) in chunks {
+            for count in counts {
+                sum += count;
+                work.starts.push(sum);
+            }
+            work.neighbours.extend(found);
+        }
+    }
+
+    /// Whether both ends of a segment stay where they are.
+    fn stays(&self, i: usize) -> bool {
+        self.fixed.get(i..i + 2).is_some_and(|ends| ends[0] && ends[1])
+    }
+
+    /// Middles of segments, with those of images that are within `reach` of the cell.
+    fn middles(&self, edges: &[DVec3], reach: f64) -> Middles {
+        let n = self.points.len();
+        let mut points = Vec::with_capacity(n);
+        let mut images: Vec<(u32, [i8; 2])> = Vec::with_capacity(n);
+        let mut own_cells = vec![[0_i32; 2]; if self.period.is_some() { n } else { 0 }];
+        for i in 0..n {
+            let mut middle = self.points[i] + 0.5 * edges[i];
+            if let Some(period) = self.period {
+                let cell = (middle.truncate() / period).floor();
+                own_cells[i] = [cell.x as i32, cell.y as i32];
+                middle -= (cell * period).extend(0.0);
+            }
+            points.push(middle);
+            images.push((i as u32, [0, 0]));
+        }
+        if let Some(period) = self.period {
+            let around = (DVec2::splat(reach) / period).ceil().as_ivec2();
+            let all = (-around.y..=around.y).flat_map(|y| (-around.x..=around.x).map(move |x| (x, y)));
+            for (x, y) in all.filter(|cell| *cell != (0, 0)) {
+                let by = DVec2::new(f64::from(x), f64::from(y)) * period;
+                for i in 0..n {
+                    let at = points[i].truncate() + by;
+                    if at.cmpgt(DVec2::splat(-reach)).all() && at.cmplt(period + reach).all() {
+                        points.push(points[i] + by.extend(0.0));
+                        images.push((i as u32, [x as i8, y as i8]));
+                    }
+                }
+            }
+        }
+        Middles { points, images, own_cells }
+    }
+
+    fn on_strands(&self) -> OnStrands {
+        let n = self.points.len();
+        let (mut along, mut strand) = (vec![0.0; n], vec![0_u32; n]);
+        let mut lengths = Vec::with_capacity(self.strands.len());
+        for (k, s) in self.strands.iter().enumerate() {
+            let mut sum = 0.0;
+            for i in s.start..s.start + s.count {
+                along[i] = sum;
+                strand[i] = k as u32;
+                sum += self.rest[i];
+            }
+            lengths.push(sum);
+        }
+        OnStrands { along, strand, lengths }
+    }
+}
+
+impl Search<'_> {
+    /// What segment `i` may touch: each pair once.
+    fn around(&self, i: usize, found: &mut Vec<Neighbour>, walk: &mut Walk<'_>) {
+        let Self { has, edges, halves, middles, .. } = self;
+        if !has[i] {
+            return;
+        }
+        let touch = APART + MARGIN;
+        let periodic = self.rods.period.is_some();
+        let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
+        let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
+        // Most of what cells hold is too far away: that is told of many at once.
+        walk.within(i, middle, touch + half + 0.5 * self.longest, |near| {
+            let (j, mut cells) = middles.images[near.index as usize];
+            let j = j as usize;
+            // Each pair once. (Images do not lie in the grid as what they are of does.)
+            let both = periodic || self.grid.share_cell(i, near.index as usize);
+            if both && (j < i || (j == i && cells <= [0, 0])) {
+                return;
+            }
+            let widest = touch + half + halves[j];
+            let apart = near.at.distance_squared(middle) > widest * widest || (stays && self.rods.stays(j));
+            if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
+                return;
+            }
+            let half_j = 0.5 * edges[j];
+            let between = nearest(p0, p1, near.at - half_j, near.at + half_j).between.length();
+            if between > touch {
+                return;
+            }
+            if periodic {
+                let own = middles.own_cells[i].iter().zip(&middles.own_cells[j]);
+                cells.iter_mut().zip(own).for_each(|(cell, (a, b))| *cell += (a - b) as i8);
+            }
+            found.push(Neighbour { segment: j as u32, cells, gap: (between - APART) as f32 });
+        });
+    }
+
+    /// Whether two segments, `away` from each other, are near along the yarn and in space: the same piece of it. (A yarn's
+    /// image next door is near in space alone, unless the period is shorter than this.)
+    #[inline]
+    fn same_piece(&self, i: usize, j: usize, away: DVec3) -> bool {
+        let OnStrands { along, strand, lengths } = &self.on_strands;
+        if strand[i] != strand[j] {
+            return false;
+        }
+        let strand = strand[i] as usize;
+        let by = (along[j] - along[i]).abs();
+        let by = if self.rods.strands[strand].jump.is_some() { by.min(lengths[strand] - by) } else { by };
+        by < ALONG && away.length() < by + self.halves[i] + self.halves[j]
+    }
+}

@@ -1,0 +1,368 @@
+use super::{
+    super::{bend::folded, draft::NAMES},
+    *,
+};
+use crate::geometry::{curve::Curve, overlap::overlap};
+
+fn weave(draft: &str) -> Weave {
+    let (warps, wefts) = (Extent::Yarns(12), Extent::Yarns(10));
+    Weave { warps, wefts, ..Weave::of(Draft::named(draft).unwrap(), 1.0) }
+}
+
+/// Whether the warp is above the weft where both cross, seen from above: at the nearest pair of their points in plan.
+fn warp_is_above(strands: &[PatternStrand], place: [f32; 2]) -> bool {
+    let near = |kind: StrandKind, index: f32| {
+        let strand = strands.iter().find(|s| s.kind == kind && s.index == index as u32).unwrap();
+        let points = strand.curve.points.iter().zip(&strand.coordinates);
+        points.filter(|(_, c)| (c[0] - place[0]).hypot(c[1] - place[1]) < 0.8).map(|(p, _)| *p).collect::<Vec<_>>()
+    };
+    let (warp, weft) = (near(StrandKind::Warp, place[0]), near(StrandKind::Weft, place[1]));
+    let pairs = warp.iter().flat_map(|p| weft.iter().map(move |q| (p, q)));
+    let (p, q) = pairs
+        .min_by(|a, b| {
+            let apart = |(p, q): (&DVec3, &DVec3)| p.truncate().distance(q.truncate());
+            apart(*a).total_cmp(&apart(*b))
+        })
+        .unwrap();
+    p.z > q.z
+}
+
+#[test]
+fn the_draft_says_what_lies_on_top() {
+    for name in NAMES {
+        let weave = weave(name);
+        let cloth = weave.relax().unwrap();
+        let strands = cloth.ground();
+        for (i, j) in (0..10_u32).flat_map(|i| (0..12_u32).map(move |j| (i, j))) {
+            let above = warp_is_above(&strands, [j as f32 + 0.5, i as f32 + 0.5]);
+            assert_eq!(above, weave.draft.warp_over(i as usize, j as usize), "{name}: weft {i}, warp {j}");
+        }
+    }
+}
+
+#[test]
+fn yarns_touch_and_hardly_run_into_each_other() {
+    for name in NAMES {
+        let weave = weave(name);
+        let cloth = weave.relax().unwrap();
+        let [deepest, share] = cloth.cell.overlap(weave.options().unit());
+        // Twined warps, the ridges of a honeycomb and wefts that are held in the same places press hardest.
+        let (most, depth) = match *name {
+            "leno" => (0.06, 0.3),
+            "honeycomb" | "honeycomb 10" | "corduroy" => (MOST_OVERLAP, 0.6),
+            _ => (MOST_OVERLAP, 0.35),
+        };
+        assert!(share < most && deepest < depth, "{name}: {deepest} of a diameter, {share} of the surface");
+        // The table of docs/cloth.md.
+        let Measures { spacing: [p, q], crimp: [c, d], see_through, .. } = cloth.measures();
+        let percent = [c, d, see_through, share].map(|x| format!("{:.1}", 100.0 * x));
+        let [c, d, see_through, share] = percent;
+        eprintln!("| {name} | {:.2} x {:.2} | {c}, {d} | {see_through} | {share}, {deepest:.2} |", p / 2.0, q / 2.0);
+    }
+}
+
+#[test]
+fn sections_keep_their_area_and_are_not_upright() {
+    let weave = Weave { weft_radius: 0.6, ..weave("satin 5") };
+    for strand in weave.strands().unwrap() {
+        let radius = if strand.kind == StrandKind::Warp { 1.0 } else { 0.6_f64 };
+        let (radii, flattening) = (strand.curve.radii.unwrap(), strand.curve.flattening.unwrap());
+        for (half, short) in radii.iter().zip(&flattening) {
+            let ratio = short.length();
+            assert!(ratio <= 1.0 && ratio > 0.2, "{ratio}");
+            assert!((half * half * ratio / (radius * radius) - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn round_plain_weave_jams_where_peirce_says() {
+    // He has 1.73 diameters and a cover of 0.82; ours is pressed a little closer, and yarns do not give way.
+    let weave = Weave { flatten: 1.0, crimp: Some(0.5), ..weave("plain") };
+    let Measures { spacing, see_through, .. } = weave.relax().unwrap().measures();
+    for spacing in spacing {
+        assert!((1.62..1.8).contains(&(spacing / 2.0)), "{spacing}");
+    }
+    assert!((0.8..0.88).contains(&(1.0 - see_through)), "{see_through}");
+}
+
+#[test]
+fn crimps_share_the_sum_of_both_heights() {
+    let heights = |crimp: f64| {
+        let weave = Weave { flatten: 1.0, crimp: Some(crimp), ..weave("plain") };
+        let cell = weave.relax().unwrap().cell;
+        [0, 1].map(|side| cell.yarns[side].iter().flatten().fold(0.0f64, |h, n| h.max(n.height)))
+    };
+    let [even, stiff_weft, stiff_warp] = [0.5, 0.9, 0.1].map(heights);
+    for [warp, weft] in [even, stiff_weft, stiff_warp] {
+        assert!((warp + weft - 2.0).abs() < 0.12, "{warp} {weft}");
+    }
+    assert!((even[0] - even[1]).abs() < 0.02);
+    assert!(stiff_weft[0] > 1.3 && stiff_warp[1] > 1.3, "{stiff_weft:?} {stiff_warp:?}");
+}
+
+#[test]
+fn closed_weaves_are_closed() {
+    for (name, most) in
+        [("plain", 0.08), ("twill 2/2", 0.08), ("satin 5", 0.01), ("satin 8", 0.01), ("double cloth", 0.01)]
+    {
+        let see_through = weave(name).relax().unwrap().measures().see_through;
+        assert!(see_through < most, "{name}: {see_through}");
+    }
+}
+
+#[test]
+fn warps_of_a_basket_draw_together() {
+    let weave = weave("basket 2");
+    let cell = weave.relax().unwrap().cell;
+    let mean =
+        |yarn: usize| cell.yarns[0][yarn].iter().map(|n| n.aside).sum::<f64>() / cell.yarns[0][yarn].len() as f64;
+    let within = cell.spacing[0] + mean(1) - mean(0);
+    let between = cell.spacing[0] + mean(2) - mean(1);
+    assert!(between > 1.2 * within, "{within} {between}");
+}
+
+#[test]
+fn spacings_and_cover_are_kept() {
+    let given = Weave { warp_spacing: Some(4.0), weft_spacing: Some(5.0), ..weave("plain") };
+    assert_eq!(given.relax().unwrap().measures().spacing, [4.0, 5.0]);
+    for cover in [0.7, 0.9] {
+        let weave = Weave { cover: Some(cover), ..weave("plain") };
+        let see_through = weave.relax().unwrap().measures().see_through;
+        assert!((1.0 - see_through - cover).abs() < 0.02, "{cover} {see_through}");
+    }
+    let sparse = Weave { cover: Some(1.0), ..weave("plain") };
+    assert!(matches!(sparse.relax(), Err(Impossible::TooMuchCover { most }) if most > 0.9), "{:?}", sparse.relax());
+}
+
+#[test]
+fn too_little_room_is_refused() {
+    let tight = Weave { warp_spacing: Some(2.2), weft_spacing: Some(2.2), ..weave("plain") };
+    let Err(Impossible::TooTight { warp: true, least }) = tight.relax() else { panic!("accepted") };
+    assert!((3.2..3.7).contains(&least), "{least}");
+}
+
+#[test]
+fn cloth_is_as_large_as_it_is_asked_to_be() {
+    let weave = Weave { warps: Extent::Length(50.0), wefts: Extent::Length(30.0), ..weave("twill 2/1") };
+    let cloth = weave.relax().unwrap();
+    let measures = cloth.measures();
+    assert!(
+        (measures.size[0] - 50.0).abs() < measures.spacing[0] && (measures.size[1] - 30.0).abs() < measures.spacing[1]
+    );
+    let strands = cloth.strands();
+    assert_eq!(strands.len() as u32, cloth.count()[0] + cloth.count()[1]);
+    // Yarns end at the edges of the cloth and nowhere else, and are as long as is said.
+    let mut length = [0.0; 2];
+    for strand in &strands {
+        let side = usize::from(strand.kind == StrandKind::Weft);
+        length[side] += strand.curve.polygon_length();
+        let half = 0.5 * measures.size[1 - side];
+        let along = |p: &DVec3| if side == 0 { p.y } else { p.x };
+        let (first, last) = (&strand.curve.points[0], strand.curve.points.last().unwrap());
+        assert!((along(first) + half).abs() < 1e-9 && (along(last) - half).abs() < 1e-9);
+        assert_eq!(strand.coordinates.len(), strand.curve.points.len());
+    }
+    for side in 0..2 {
+        assert!((length[side] / measures.length[side] - 1.0).abs() < 0.02, "{length:?} {measures:?}");
+    }
+    let many = Weave { warps: Extent::Yarns(1_000_000), wefts: Extent::Yarns(1_000_000), ..weave };
+    assert!(matches!(many.relax(), Err(Impossible::TooLarge)));
+}
+
+#[test]
+fn pairs_of_a_leno_are_twined() {
+    let strands = weave("leno").strands().unwrap();
+    let (crossing, straight) = (&strands[4], &strands[5]);
+    let aside = |k: usize| crossing.curve.points[k].x - straight.curve.points[k].x;
+    // Over one weft on one side of its neighbour, over the next on the other, below it between them.
+    let weft = |i: usize| POINTS as usize / 2 + i * POINTS as usize;
+    for i in 2..7 {
+        assert!(aside(weft(i)) * aside(weft(i + 1)) < 0.0, "{} {}", aside(weft(i)), aside(weft(i + 1)));
+        let between = weft(i) + POINTS as usize / 2;
+        assert!(crossing.curve.points[between].z < straight.curve.points[between].z);
+    }
+}
+
+#[test]
+fn selvedges_make_one_weft_of_all() {
+    let weave = Weave { edges: Edges::Selvedge, ..weave("twill 2/2") };
+    let strands = weave.strands().unwrap();
+    let wefts: Vec<_> = strands.iter().filter(|s| s.kind == StrandKind::Weft).collect();
+    assert_eq!((wefts.len(), strands.len()), (1, 12 + 2 + 1));
+    // It goes around the outermost warps: there is no end of it but two, both outside.
+    let way = &wefts[0].curve.points;
+    let edge = strands[13].curve.points[0].x;
+    assert!(way[0].x < -edge && way[way.len() - 1].x.abs() > edge);
+    for warp in [&strands[12], &strands[13]] {
+        let x = warp.curve.points[0].x;
+        let nearest = way.iter().map(|p| (p.x - x).hypot(p.z)).fold(f64::MAX, f64::min);
+        assert!((1.7..2.2).contains(&nearest), "{nearest}");
+        let out = way.iter().filter(|p| p.x.abs() > edge + 1.9).count();
+        assert!(out >= 9, "{out} points of turns");
+    }
+    let steps = way.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
+    assert!(steps < 4.5, "a jump of {steps}");
+}
+
+#[test]
+fn wefts_turn_without_folding_into_themselves() {
+    for name in NAMES {
+        let weave = Weave { edges: Edges::Selvedge, ..weave(name) };
+        let made = weave.strands().unwrap();
+        let weft = made.iter().find(|s| s.kind == StrandKind::Weft).unwrap();
+        // Beyond the outermost crossings.
+        let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
+            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, weave.weft_radius) };
+            Some(*fold)
+        });
+        let deepest = fold.fold(0.0, f64::max);
+        // Under the loops of terry wefts go up and down as steeply all along.
+        let most = if *name == "terry" { 0.8 } else { 0.5 };
+        assert!(deepest < most, "{name}: {deepest}");
+    }
+}
+
+#[test]
+fn hems_hide_the_ends_of_warps() {
+    let weave = Weave { edges: Edges::Finished, wefts: Extent::Yarns(20), ..weave("plain") };
+    let cloth = weave.relax().unwrap();
+    let Measures { thickness, size, .. } = cloth.measures();
+    let strands = cloth.strands();
+    for warp in strands.iter().filter(|s| s.kind == StrandKind::Warp) {
+        let points = &warp.curve.points;
+        for end in [points[0], points[points.len() - 1]] {
+            assert!(end.y.abs() < 0.5 * size[1] && end.z < 0.0 && end.z > -2.6 * thickness, "{end}");
+        }
+        let outermost = points.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
+        assert!((outermost - 0.5 * size[1] - 1.5 * thickness).abs() < 0.3 * thickness, "{outermost} {size:?}");
+        let lengths = points.windows(2).map(|w| w[0].distance(w[1]));
+        assert!(lengths.fold(0.0, f64::max) < 2.0, "points stay together");
+    }
+}
+
+#[test]
+fn fringes_are_as_long_as_they_are_asked_to_be() {
+    let weave = Weave { edges: Edges::Fringe(20.0), ..weave("plain") };
+    let cloth = weave.relax().unwrap();
+    let half = 0.5 * cloth.measures().size[1];
+    for warp in cloth.strands().iter().filter(|s| s.kind == StrandKind::Warp).take(12) {
+        let (first, last) = (warp.curve.points[0].y, warp.curve.points.last().unwrap().y);
+        for end in [-first, last] {
+            assert!((end - half - 20.0).abs() < 2.0, "{end}");
+        }
+    }
+}
+
+#[test]
+fn pile_is_made_in_pieces_of_any_size() {
+    for (name, sizes) in [("terry", 1..9), ("velvet", 1..5), ("corduroy", 1..7)] {
+        for n in sizes {
+            let weave = Weave { warps: Extent::Yarns(n), wefts: Extent::Yarns(9 - n), ..weave(name) };
+            let strands = weave.relax().unwrap().strands();
+            assert!(strands.iter().all(|s| s.curve.points.iter().all(|p| p.is_finite())), "{name} {n}");
+        }
+    }
+}
+
+/// Once its floats are cut, what is left of a corduroy must cover what they did.
+#[test]
+fn corduroy_has_more_picks_than_ends() {
+    let cloth = weave("corduroy");
+    let Measures { spacing: [p, q], see_through, .. } = cloth.relax().unwrap().measures();
+    // Radii are 1: picks lie closer than side by side.
+    assert!(p > 2.4 * q && q < 2.0 && see_through < 0.01, "{p} {q} {see_through}");
+}
+
+#[test]
+fn pile_stands_as_high_as_it_is_asked_to() {
+    for (name, kind, cut) in
+        [("terry", StrandKind::Warp, false), ("velvet", StrandKind::Warp, true), ("corduroy", StrandKind::Weft, true)]
+    {
+        let weave = weave(name);
+        let cloth = weave.relax().unwrap();
+        let ground = cloth.measures().thickness;
+        let strands = cloth.strands();
+        let top = |s: &PatternStrand| s.curve.points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+        let highest = strands.iter().map(top).fold(f64::MIN, f64::max);
+        assert_eq!(weave.pile_height, if cut { 8.0 } else { 16.0 }, "{name}: radii of its yarn");
+        assert!((highest - weave.pile_height).abs() < 0.5 * ground + 2.0, "{name}: {highest}");
+        // Tufts are held in the cloth and end above it; loops are one yarn.
+        let standing: Vec<_> = strands.iter().filter(|s| s.kind == kind && top(s) > 5.0).collect();
+        assert!(standing.len() > if cut { 10 } else { 2 }, "{name}: {}", standing.len());
+        for strand in standing {
+            let points = &strand.curve.points;
+            let lowest = points.iter().map(|p| p.z).fold(f64::MAX, f64::min);
+            assert!(lowest < 1.5, "{name}: held at {lowest}");
+            let (first, last) = (points[0].z, points[points.len() - 1].z);
+            assert_eq!(cut, first > 4.0 && last > 4.0, "{name}: ends at {first} and {last}");
+            let longest = points.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
+            assert!(longest < 3.5, "{name}: a jump of {longest}");
+        }
+    }
+}
+
+/// Every fourth warp is twice as thick and has more room.
+#[test]
+fn threads_of_several_kinds_have_their_own_thickness_and_room() {
+    let thickness = vec![0.8, 0.8, 1.6, 0.8];
+    let spacing = vec![0.8, 1.0, 1.4, 0.8];
+    let threads = [Threads { thickness, spacing }, Threads::default()];
+    let warps = Extent::Yarns(8);
+    let piece = Weave { threads, warps, warp_spacing: Some(4.0), ..Weave::of(Draft::named("twill 2/2").unwrap(), 1.0) };
+    let cloth = piece.relax().unwrap();
+    let strands = cloth.strands();
+    let warps: Vec<&PatternStrand> = strands.iter().filter(|s| s.kind == StrandKind::Warp).collect();
+    let mean_x = |s: &PatternStrand| s.curve.points.iter().map(|p| p.x).sum::<f64>() / s.curve.points.len() as f64;
+    let gaps: Vec<f64> = warps.windows(2).map(|pair| mean_x(pair[1]) - mean_x(pair[0])).collect();
+    // Neighbours slide aside, repeats do not.
+    assert!((gaps[..4].iter().sum::<f64>() - 16.0).abs() < 1e-6 && (gaps[0] - gaps[4]).abs() < 1e-6, "{gaps:?}");
+    // Beside the thick one there is more room, as the reed has it.
+    assert!(gaps[1].min(gaps[2]) > 1.2 * gaps[0].max(gaps[3]), "{gaps:?}");
+    // Equal area: half the width times half the height.
+    for (warp, want) in warps.iter().zip([0.8, 0.8, 1.6, 0.8]) {
+        let (wide, axes) = (warp.curve.radii.as_ref().unwrap(), warp.curve.flattening.as_ref().unwrap());
+        let round = (wide[9] * wide[9] * axes[9].length()).sqrt();
+        assert!((round - want).abs() < 0.01, "{round} for {want}");
+    }
+    assert!((cloth.measures().size[0] - 32.0).abs() < 1e-9);
+    let overlap = cloth.cell.overlap(piece.options().unit());
+    assert!(overlap[1] < 0.03, "{overlap:?}");
+}
+
+/// Yarns do not coincide in the folds of a hem, and cloth that is lower than two hems has none.
+#[test]
+fn hems_have_room_or_are_left_out() {
+    let made = |wefts: u32| {
+        let sides = [Extent::Yarns(12), Extent::Yarns(wefts)];
+        let weave = Weave { edges: Edges::Finished, warps: sides[0], wefts: sides[1], ..weave("plain") };
+        let strands = weave.relax().unwrap().strands();
+        let curves: Vec<(Curve, Vec<f64>)> = strands
+            .into_iter()
+            .map(|s| {
+                let radii = s.curve.radii.clone().unwrap_or_else(|| vec![1.0; s.curve.points.len()]);
+                (s.curve, radii)
+            })
+            .collect();
+        let low = curves.iter().flat_map(|(c, _)| &c.points).map(|p| p.z).fold(0.0, f64::min);
+        (overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap(), low)
+    };
+    let (high, folded) = made(20);
+    assert!(high.nearest > 0.4 && folded < -5.0, "{high:?}, {folded}");
+    let (small, flat) = made(5);
+    assert!(small.nearest > 0.4 && flat > -3.0, "{small:?}, {flat}");
+}
+
+/// A distance given in another unit would have each yarn meet thousands of others.
+#[test]
+fn hopeless_spacings_are_refused_before_anything_is_relaxed() {
+    for (given, cover) in [([Some(2e-3), None], None), ([None, Some(1e-12)], Some(0.7)), ([Some(0.3), Some(3.0)], None)]
+    {
+        let [warp_spacing, weft_spacing] = given;
+        let cloth = Weave { warp_spacing, weft_spacing, cover, ..weave("satin 8") };
+        match cloth.relax() {
+            Err(Impossible::TooTight { warp, least }) => assert!(warp == given[0].is_some() && least > 1.0, "{least}"),
+            other => panic!("{given:?}: {:?}", other.map(|c| c.measures())),
+        }
+    }
+}
