@@ -241,6 +241,14 @@ impl Loops {
         }
     }
 
+    /// How far across from its column what a yarn does is, in stitches: layers are half a stitch apart.
+    pub(in super::super) fn aside(&self, visit: &Visit) -> f64 {
+        match visit {
+            Visit::Loop(i) => -0.25 * self.loops[*i as usize].side,
+            Visit::Pass { .. } | Visit::Float { .. } | Visit::Through { .. } => 0.0,
+        }
+    }
+
     pub(in super::super) fn has_bobbles(&self) -> bool {
         self.bobbles
     }

@@ -188,15 +188,19 @@ impl Laying<'_> {
     /// `front` says whether a row ends and the next one begins in the front layer.
     fn wind(&self, all: &mut Thread, row: i32, [from, to]: [Place; 2], own: Thread, side: f64, front: [bool; 2]) {
         // In stitches, and in diameters from what they go around.
-        const BULGE: f64 = 0.45;
+        const BULGE: f64 = 0.2;
         const AROUND: f64 = 0.56;
+        let edge = 0.5 * side * self.loops.wide as f64;
         let begin = if front[0] { 0.0 } else { PI };
         let turn = if front[0] == front[1] { TAU } else { PI };
         let line = (0..=64).map(|k| {
             let t = f64::from(k) / 64.0;
             let (sin, cos) = (PI * t).sin_cos();
             let up = from.up + (to.up - from.up) * 0.5 * (1.0 - cos);
-            let middle = self.surface.place(row, &Place { at: from.at + side * BULGE * sin, up, out: 0.0 });
+            // Layers end half a stitch apart, and their yarns have one middle.
+            let aside = (from.at - edge) * (1.0 - t) + (to.at - edge) * t;
+            let at = edge + side * BULGE * sin + aside * (1.0 - sin);
+            let middle = self.surface.place(row, &Place { at, up, out: 0.0 });
             let angle = begin + turn * smooth_step(t);
             let end = from.out.abs() + (to.out.abs() - from.out.abs()) * t;
             let radius = end + (AROUND - end) * sin * sin;
@@ -316,7 +320,8 @@ impl Laying<'_> {
             (Some((cell, r)), Surface::Plane { width, height }) => {
                 let n = self.loops.wide as f64;
                 let layer = self.loops.layer_of(&course.visits[k].1);
-                let left = DVec3::new(-0.5 * n * width, f64::from(row) * height - r as f64 * height, layer);
+                let aside = self.loops.aside(&course.visits[k].1);
+                let left = DVec3::new((aside - 0.5 * n) * width, f64::from(row) * height - r as f64 * height, layer);
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
                     let grid = [g[0], g[1] - r as f32 + row as f32];

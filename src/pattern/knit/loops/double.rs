@@ -39,31 +39,23 @@ impl Loops {
         loops
     }
 
-    /// Takes the stitches of both layers from beside each other to behind each other.
+    /// Takes the stitches of both layers from beside each other to two layers, half a stitch apart across as on the needles.
     fn part(&mut self) {
         self.wide /= 2;
-        let (scale, stitch) = if self.border.turns { (1.0, 1.0 / self.wide as f64) } else { (0.5, 1.0) };
+        let scale = if self.border.turns { 1.0 } else { 0.5 };
         for course in &mut self.courses {
             for (column, visit) in &mut course.visits {
                 let Visit::Loop(i) = visit else { continue };
                 let own = &mut self.loops[*i as usize];
                 own.at *= scale;
+                own.foot = own.at;
                 if course.row < self.rows {
                     own.side = if *column % 2 == 0 { 1.0 } else { -1.0 };
                     *column /= 2;
                 }
-                match course.row {
-                    -1 => (own.twist, own.yarn) = (0.0, ZIGZAG),
-                    _ => own.at += 0.25 * stitch * own.side,
+                if course.row < 0 {
+                    (own.twist, own.yarn) = (0.0, ZIGZAG);
                 }
-                own.foot = own.at;
-            }
-        }
-        // The first row leans from the edge, where loops of both layers are beside each other.
-        for i in 0..self.loops.len() {
-            let own = &self.loops[i];
-            if let (0, Some(&parent)) = (own.row, own.parents.first()) {
-                self.loops[i].foot = 0.5 * (own.at + self.loops[parent as usize].at);
             }
         }
     }

@@ -100,7 +100,10 @@ impl<'a> Laying<'a> {
                 let up = if cell.high > 1 { row + share } else { self.loops.within(course.row, at, share) };
                 Place { at, up, out }
             }
-            _ => Place { at: p.x / width - 0.5 * self.loops.wide as f64, up: row + p.y / height - r as f64, out },
+            (_, visit) => {
+                let at = p.x / width - 0.5 * self.loops.wide as f64 + self.loops.aside(&visit);
+                Place { at, up: row + p.y / height - r as f64, out }
+            }
         }
     }
 
