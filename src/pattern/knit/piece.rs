@@ -14,6 +14,7 @@ pub(super) use self::thread::{State, Thread, ease, settle};
 use self::{drawn::drawn_points, sheet::Sheet};
 use super::{
     super::revolution::Revolution,
+    STITCH_WIDTH, YARN_PER_STITCH,
     cell::Cell,
     colors::{Hold, Stretch, Way},
     loops::{Course, Loop, Loops, Visit},
@@ -117,7 +118,7 @@ impl Laying<'_> {
                 Some((_, place)) if self.is_inside(row, c, backwards) => {
                     self.link(&mut all, place, from, own, backwards)
                 }
-                _ => all.join(own, self.turn(row, &from, backwards)),
+                _ => all.turn(own, self.turn(row, &from, backwards)),
             }
             here = Some((row, to));
         }
@@ -156,13 +157,14 @@ impl Laying<'_> {
         }
     }
 
-    /// How far a yarn bulges where it turns before it goes through a row: beside a stitch that stays on the needle hardly.
-    fn turn(&self, row: i32, from: &Place, backwards: bool) -> DVec3 {
-        const BULGE: f64 = 0.45;
-        const BESIDE: f64 = 0.35;
+    /// How far a yarn bulges where it turns before it goes through a row, and how much of its length it keeps: at a side it is
+    /// drawn in, beside a stitch that stays on the needle not.
+    fn turn(&self, row: i32, from: &Place, backwards: bool) -> (DVec3, f64) {
+        const SIDE: (f64, f64) = (0.2, 0.6);
+        const BESIDE: (f64, f64) = (0.35, 1.0);
         let inside = 0.5 * self.loops.wide as f64 - from.at.abs() > 0.75;
-        let bulge = if inside && matches!(self.surface, Surface::Bent(_)) { BESIDE } else { BULGE };
-        self.surface.directions(row, from)[0] * self.side(backwards) * bulge
+        let (bulge, taut) = if inside && matches!(self.surface, Surface::Bent(_)) { BESIDE } else { SIDE };
+        (self.surface.directions(row, from)[0] * self.side(backwards) * bulge, taut)
     }
 
     /// Whether a field of a row begins beside another one, for a yarn that comes from the row below.
@@ -209,7 +211,7 @@ impl Laying<'_> {
         });
         all.go_on(&line.collect::<Vec<_>>());
         all.pop();
-        all.join(own, DVec3::ZERO);
+        all.join(own);
     }
 
     /// A yarn turns where its field ends: behind the cloth, around the neighbour's yarn, which turns half way up and half
@@ -233,7 +235,7 @@ impl Laying<'_> {
         let line = (0..=8 * (knots.len() - 1)).map(|k| through_points(&knots, k / 8, (k % 8) as f64 / 8.0));
         all.go_on(&line.collect::<Vec<_>>());
         all.pop();
-        all.join(own, DVec3::ZERO);
+        all.join(own);
     }
 
     /// A yarn goes on some rows higher: up the side of a flat piece, inside of a tube.
@@ -253,7 +255,7 @@ impl Laying<'_> {
         all.go_on(&line.collect::<Vec<_>>());
         // The row begins with the last of these.
         all.pop();
-        all.join(own, DVec3::ZERO);
+        all.join(own);
     }
 
     /// The end of a yarn that neither casts on nor binds off: from the edge of the row back behind it, or between two layers.
@@ -281,17 +283,28 @@ impl Laying<'_> {
 
     /// A yarn's way along a row, from left to right.
     fn row(&self, c: usize, pieces: &[Piece]) -> Thread {
+        // What is left of a side stitch's yarn: there it is pulled from one side only.
+        const DRAWN_IN: f64 = 0.87;
         let course = &self.loops.courses[c];
         let round = self.loops.border.turns;
         let finished = self.loops.border.finished;
         let (low, high) = (EDGE as i32 - 1, self.loops.rows - EDGE as i32 + 1);
         let mut own = Thread::default();
         let count = course.visits.len();
+        // Whether it begins and ends at the sides, and not beside another field.
+        let flat = matches!(self.surface, Surface::Plane { .. });
+        let fields = &self.loops.courses[self.courses_of(course.row)];
+        let ends = [course.first == 0, fields.iter().all(|f| f.first <= course.first)].map(|end| flat && end);
         for (k, piece) in pieces.iter().enumerate() {
             let side = !round && (k < EDGE || k + EDGE >= count);
             let begins = round && !course.holds.is_empty() && (k == 0 || k + 1 == count);
             let edge = side || begins || (finished && (course.row <= low || course.row >= high)) || course.is_mixed(k);
+            let from = own.rest.len();
             self.lay(course, k, piece, edge, &mut own);
+            let is_last = (k == 0 && ends[0]) || (k + 1 == count && ends[1]);
+            let drawn = if is_last { DRAWN_IN } else { 1.0 };
+            let taut = drawn * self.rim(course.row, count);
+            own.rest[from..].iter_mut().for_each(|rest| *rest *= taut);
         }
         if let (Some(piece), Some(end)) = (pieces.last(), pieces.last().and_then(|p| p.places.last())) {
             // The end of a row, where it is not the beginning of the next.
@@ -300,6 +313,20 @@ impl Laying<'_> {
             }
         }
         own
+    }
+
+    /// Share of its yarn that a cast-on or bound-off row of so many stitches has, 1 in other rows: it is as wide as what it
+    /// holds, and ribs draw together.
+    fn rim(&self, row: i32, count: usize) -> f64 {
+        // Yarn in a stitch of plain knit over its width, and how much of a chain's goes along the edge.
+        const WALE: f64 = YARN_PER_STITCH / STITCH_WIDTH;
+        const ALONG: f64 = 0.73;
+        if (0..self.loops.rows).contains(&row) || self.loops.is_double() {
+            return 1.0;
+        }
+        let across = self.surface.across(&Place { at: 0.0, up: f64::from(row.clamp(0, self.loops.rows)), out: 0.0 });
+        let width = if self.loops.border.turns { across / count as f64 } else { across };
+        1.0 - ALONG * (1.0 - width * WALE / self.yarn).clamp(0.0, 0.5)
     }
 
     fn lay(&self, course: &Course, k: usize, piece: &Piece, edge: bool, out: &mut Thread) {

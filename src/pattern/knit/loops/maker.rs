@@ -258,7 +258,10 @@ impl<'a> Maker<'a> {
             let j = if backwards { n - 1 - k } else { k };
             let bound = j * together..(j + 1) * together;
             let at = self.middles[last][bound.clone()].iter().sum::<f64>() / together as f64;
-            let own = self.push(Loop { sign: 1.0, ..Loop::laid(row, at) });
+            // In pattern: wales of purl, as of a rib, are purled. Above a single row of it the next one is as good as any.
+            let is_purled = |r: usize| self.rows[r].get(j).is_some_and(|s| s.purl && s.act == Act::Draw);
+            let purl = together == 1 && (last.saturating_sub(1)..=last).all(is_purled);
+            let own = self.push(Loop { sign: if purl { -1.0 } else { 1.0 }, ..Loop::laid(row, at) });
             let mut content: Vec<(u32, i32)> = before.map(|b| (b, 0)).into_iter().collect();
             bound.for_each(|j| self.content(last, j, 0, &mut content));
             self.link(own, &content, row, false);

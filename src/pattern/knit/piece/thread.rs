@@ -56,34 +56,41 @@ impl Thread {
         self.rest.push(0.0);
     }
 
-    /// Goes on with another row; where it turns, it bulges so far.
-    pub(super) fn join(&mut self, mut next: Self, turn: DVec3) {
-        if let (Some(&from), Some(&to)) = (self.points.last(), next.points.first()) {
-            if turn != DVec3::ZERO {
-                let (a, b) = (from + turn, to + turn);
-                let at = |k: u32| {
-                    let t = f64::from(k) / 32.0;
-                    let u = 1.0 - t;
-                    from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t)
-                };
-                self.go_on(&(0..=32).map(at).collect::<Vec<_>>());
-                // The row begins with the last of these.
+    /// Goes on with another row.
+    pub(super) fn join(&mut self, mut next: Self) {
+        if let (Some(&from), Some(&to)) = (self.points.last(), next.points.first())
+            && let Some(last) = self.rest.last_mut()
+            && *last == 0.0
+        {
+            *last = from.distance(to).max(0.1);
+            if *last > LONGEST {
+                // Along a long segment its neighbours would count as other strands.
+                self.go_on(&[from, to]);
                 self.pop();
-            } else if let Some(last) = self.rest.last_mut()
-                && *last == 0.0
-            {
-                *last = from.distance(to).max(0.1);
-                if *last > LONGEST {
-                    // Along a long segment its neighbours would count as other strands.
-                    self.go_on(&[from, to]);
-                    self.pop();
-                }
             }
         }
         self.points.append(&mut next.points);
         self.rest.append(&mut next.rest);
         self.grid.append(&mut next.grid);
         self.state.append(&mut next.state);
+    }
+
+    /// Turns and goes on with another row: it bulges so far, and is drawn taut to a share of its length.
+    pub(super) fn turn(&mut self, next: Self, (bulge, taut): (DVec3, f64)) {
+        if let (Some(&from), Some(&to), true) = (self.points.last(), next.points.first(), bulge != DVec3::ZERO) {
+            let (a, b) = (from + bulge, to + bulge);
+            let at = |k: u32| {
+                let t = f64::from(k) / 32.0;
+                let u = 1.0 - t;
+                from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t)
+            };
+            let first = self.rest.len() - 1;
+            self.go_on(&(0..=32).map(at).collect::<Vec<_>>());
+            self.rest[first..].iter_mut().for_each(|rest| *rest *= taut);
+            // The row begins with the last of these.
+            self.pop();
+        }
+        self.join(next);
     }
 
     /// Goes on along a line that begins where it ends.
@@ -108,7 +115,7 @@ impl Thread {
         own.go_on(line);
         own.reverse();
         own.pop();
-        own.join(std::mem::take(self), DVec3::ZERO);
+        own.join(std::mem::take(self));
         *self = own;
     }
 
