@@ -306,6 +306,11 @@ impl Chart {
         self.rows.iter().all(Row::is_plain)
     }
 
+    /// Whether any stitch is tucked.
+    pub(super) fn has_tucks(&self) -> bool {
+        self.rows.iter().any(|row| row.steps.contains(&Step::Tuck))
+    }
+
     /// The first row, from 0, that has more stitches than it finds in rows of so many, and how many it has: the rest of it is
     /// left out.
     pub fn cut_short(&self, cast_on: u32, widths: &[u32]) -> Option<(usize, u32)> {

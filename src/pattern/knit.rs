@@ -286,6 +286,20 @@ impl Knit {
         let mut rows =
             self.chart.work(self.stitches, self.rows, MAX_POINTS / (self.layers() * u64::from(self.points)).max(1))?;
         short_rows::turned(&mut rows, self)?;
+        if self.has_tucks() {
+            // Beyond the last stitch nothing holds a yarn over: without it these make a chain along the side.
+            for r in 0..rows.len() {
+                for side in [0, rows[r].len().saturating_sub(1)] {
+                    let stitch = |row: &Vec<Stitch>| row.get(side).copied();
+                    let is_drawn = |s: &Stitch| s.act == Act::Draw;
+                    if rows[r].len() > 2 && rows[r][side].act == Act::Tuck {
+                        let worked = rows[r..].iter().chain(rows[..r].iter().rev()).filter_map(stitch).find(is_drawn);
+                        // The yarn passes where the chain is not seen.
+                        rows[r][side].act = Act::Pass { front: worked.is_some_and(|s| s.purl) };
+                    }
+                }
+            }
+        }
         if self.has_slipped_sides() {
             let right = short_rows::from_right(&rows, self.is_finished());
             // Rows begin on the left and on the right by turns. The first one holds the cast-on edge.
@@ -305,6 +319,11 @@ impl Knit {
 
     fn has_slipped_sides(&self) -> bool {
         self.edges == Edges::Slipped && self.form == Form::Flat
+    }
+
+    /// Whether a flat piece with sides has tucks, which come to them.
+    fn has_tucks(&self) -> bool {
+        self.is_finished() && self.form == Form::Flat && self.chart.has_tucks()
     }
 
     fn is_double(&self) -> bool {
@@ -409,7 +428,7 @@ impl Knit {
             back: back.as_ref(),
             even,
             own_cells: cell.is_some(),
-            slipped: self.has_slipped_sides(),
+            slipped: self.has_slipped_sides() || self.has_tucks(),
             yarn: self.yarn(size),
             points,
         };

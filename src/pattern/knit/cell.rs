@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     super::{
-        chart::{Chart, Stitch},
+        chart::{Act, Chart, Stitch},
         rods::{APART, Rods, Run, Strand},
     },
     loops::{Border, Loops, Visit},
@@ -17,6 +17,9 @@ use crate::geometry::spline::catmull_rom;
 /// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
 /// up, open a little under it, plain knit hardly.
 const BLOCKING: DVec2 = DVec2::new(0.03, 0.015);
+/// The same for each share of the stitches that are tucked. These rods slide where wool holds: tucks would draw the yarn of
+/// the loops beside them into the width, and rows down, unless loops are pulled up.
+const DRAWN_UP: DVec2 = DVec2::new(-0.06, 0.34);
 /// Points of a stitch while a cell finds its form; as many as are asked for after that.
 const COARSE: u32 = 12;
 /// A loop that is laid longer than so many of them has more points.
@@ -33,6 +36,8 @@ pub(super) struct Cell {
     /// How wide and high it is.
     pub(super) period: DVec2,
     pub(super) rods: Rods,
+    /// Pull on it across and along while it relaxes.
+    pull: DVec2,
     /// The first point of each visit of each course, and behind them the end of the course.
     pub(super) visits: Vec<Vec<usize>>,
     /// Wale and course of each point.
@@ -77,11 +82,14 @@ impl Cell {
         let scale = yarn / 13.9;
         let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale * loops.room()));
         let period = start * DVec2::new(wide.into(), high.into());
+        let tucks = rows.iter().flatten().filter(|s| s.act == Act::Tuck).count();
+        let pull = BLOCKING + DRAWN_UP * (tucks as f64 / f64::from((wide * high).max(1)));
         let mut cell = Self {
             wide,
             high,
             period,
             rods: Rods { period: Some(period), ..Rods::default() },
+            pull: pull.max(DVec2::ZERO),
             visits: Vec::new(),
             grid: Vec::new(),
         };
@@ -114,7 +122,7 @@ impl Cell {
         let free = size.map(|s| s.is_none());
         // The many strands of a bobble begin close to each other.
         let (growing, thin) = if loops.has_bobbles() { (STEPS[0] / 3, 0.3) } else { (STEPS[0] / 5, 0.5) };
-        let run = Run { steps: STEPS[0], growing, thin, free, load: BLOCKING, firm: 1.0, calm: 0.01 };
+        let run = Run { steps: STEPS[0], growing, thin, free, load: self.pull, firm: 1.0, calm: 0.01 };
         self.rods.relax(&run);
         self.refine(points);
         let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };

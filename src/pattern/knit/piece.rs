@@ -72,7 +72,7 @@ pub(super) struct Laying<'a> {
     pub(super) even: bool,
     /// Whether cells are of the chart's own rows; else of knit and purl stitches that stand where others may.
     pub(super) own_cells: bool,
-    /// Whether the first stitch of each row is slipped, which the chart's cells do not know.
+    /// Whether first and last stitches are slipped, which the chart's cells do not know.
     pub(super) slipped: bool,
     /// Length of yarn in a stitch, and its points.
     pub(super) yarn: f64,

@@ -13,7 +13,7 @@ use super::{
 
 /// Yarn of what is no whole loop, in shares of a stitch's.
 const OVER: f64 = 0.8;
-const TUCKED: f64 = 0.75;
+const TUCKED: f64 = 0.68;
 pub(super) const LIFTED: f64 = 0.6;
 const DOUBLED: f64 = 0.48;
 const CAST_ON: f64 = 0.82;

@@ -285,6 +285,8 @@ fn yarns_do_not_pass_each_other_in_pieces() {
     for (name, piece) in [
         ("flat", knit("stockinette", 8, 6)),
         ("cable", knit("cable", 8, 6)),
+        ("brioche", knit("brioche", 10, 8)),
+        ("half-cardigan", knit("half-cardigan", 10, 8)),
         ("tube", tube),
         ("hat", hat(24)),
         ("shaped", shaped),
@@ -361,6 +363,16 @@ fn pieces_are_drawn_through_each_other_from_edge_to_edge() {
         let passes = passed(|| drop(piece.strands(1.0).unwrap()));
         let undrawn = undrawn(&piece);
         assert!(passes == 0 && undrawn.is_empty(), "{pattern} {form:?}: {passes} passes, {undrawn:?}");
+    }
+}
+
+#[test]
+fn tucks_leave_chains_at_the_sides() {
+    let stitches = yarn_of_stitches(&knit("brioche", 10, 8), true);
+    for r in [0, 2, 4] {
+        let ring = [&stitches[&(r, 0)][..], &stitches[&(r, 1)][..1]].concat();
+        let through = |r: i32| threaded(&ring, &stitches[&(r, 0)][..stitches[&(r, 0)].len() / 2]);
+        assert_eq!((through(r + 1), through(r + 2)), (0, 1), "row {r}");
     }
 }
 
