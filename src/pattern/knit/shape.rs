@@ -123,6 +123,10 @@ impl Loops {
                     0.0 => (0.0, 0.0),
                     // A bobble begins as any other loop.
                     sign if l.bobble => (reach, -sign * DEPTH),
+                    // What closes two layers crosses the back one where its loops lean to the front ones.
+                    sign if self.is_double() && l.side == 0.0 => {
+                        (reach, self.layer(l, 0.0) - sign * self.foot_depth(l))
+                    }
                     sign => (reach + 0.12 * stack, self.layer(l, 0.0) - sign * self.foot_depth(l)),
                 };
                 let behind = if l.is_lifted() { -l.layer } else { l.sign };
@@ -229,6 +233,7 @@ impl Loops {
         let bound = own.held == Some(own.row);
         let held = own.held.unwrap_or(own.row + 1);
         let drawn = self.is_drawn(own);
+        let bound_off = self.border.finished && held == self.rows;
         let head_up = |at: f64| match drawn {
             true => self.ring(at) + rims::BEYOND,
             false => self.up_at(held, at) + self.reach() + if bound { 0.5 } else { 0.0 },
@@ -269,7 +274,9 @@ impl Loops {
                 false => mix(if own.bobble { CLOSING } else { 1.0 }, spread),
             };
             let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * wide * turned;
-            let moved = swap.map_or(upper, |s| s.moved(head));
+            // Layers that are bound off together are beside each other before what closes them comes through.
+            let lean = if own.side != 0.0 && bound_off { smooth_step((head - 0.2) / 0.4) } else { upper };
+            let moved = swap.map_or(lean, |s| s.moved(head));
             let at = foot.at
                 + (head_at - foot.at) * moved
                 + step * across
