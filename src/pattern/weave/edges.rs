@@ -1,14 +1,15 @@
 //! How woven cloth ends: cut, with selvedges, with a fringe, or hemmed.
 //!
-//! At a selvedge the weft turns around a warp of its own (a floating selvedge: over it on the way out, under it on the way
-//! back), so that one yarn runs through all wefts. A hem is a piece of cloth at the bottom and at the top that is folded
+//! At a selvedge the weft turns around the outermost warp, over it on one way and under it on the other, so that one yarn
+//! runs through all wefts. Only a plain weave holds each turn by itself; other cloth is woven plain over some more warps at its
+//! sides. A hem is a piece of cloth at the bottom and at the top that is folded
 //! to the back twice, its cut edge inside.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{Cloth, PatternStrand, StrandKind, strand};
+use super::{Cloth, Draft, PatternStrand, StrandKind, Threads, UnitCell, Weave, strand};
 use crate::math::{sampler::hash2, special::smooth_step};
 
 /// How the cloth ends.
@@ -25,10 +26,16 @@ pub enum Edges {
 }
 
 /// Points of a turn of the weft.
-const TURN: usize = 8;
-/// How far a selvedge's warp is from the last one, and how far the weft's ends reach beyond it, in distances from a warp's middle
-/// to that of a weft upon it. Yarns that pass between two warps from one side to the other need 1.73 of them.
-const BESIDE: f64 = 1.9;
+const TURN: usize = 12;
+/// Warps that a selvedge adds at each side.
+const ENDS: u32 = 3;
+/// Distance of picks, in diameters, below which two lie in one shed of a selvedge.
+const RIB: f64 = 1.42;
+/// Distance of a selvedge's warps over that at which they jam.
+const SLACK: f64 = 1.05;
+/// How far a turn's middle reaches out from that of the outermost warp, in distances of yarns that touch.
+const BESIDE: f64 = 1.02;
+/// How far the weft's ends stand out, of that.
 const STUB: f64 = 0.7;
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
@@ -67,77 +74,175 @@ pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
     (length / spacing).floor() as u32
 }
 
-/// Joins all wefts into one that turns around two more warps, one at each side.
-pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>) -> Vec<PatternStrand> {
+/// Joins all wefts into one. Where the draft itself does not hold each turn, some warps at both sides are woven plain instead,
+/// or as a rib of two picks where picks are too close for that. They are as close as these picks let them be, and as many
+/// of the cloth's own are left out as stood in their place.
+pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32) -> Vec<PatternStrand> {
     let (mut warps, wefts): (Vec<_>, Vec<_>) = strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-    let radius = [cloth.weave.warp_radius, cloth.weave.weft_radius];
     let flat = cloth.weave.sized();
     let nodes = cloth.cell.nodes;
-    let reach = radius[0] + radius[1];
-    let spacing = cloth.cell.spacing[0];
-    let edge = 0.5 * (cloth.size(0) - spacing) + spacing.max(BESIDE * reach);
-    // The two warps: straight, round.
-    let last = cloth.count[0];
-    for (sign, index, place) in [(-1.0, last, -0.5), (1.0, last + 1, last as f32 + 0.5)] {
-        let like = points(&warps[0]);
-        let straight: Vec<Point> = like
-            .iter()
-            .map(|(p, _, _, c)| (DVec3::new(sign * edge, p.y, 0.0), radius[0], DVec3::Z, [place, c[1]]))
-            .collect();
-        warps.push(from_points(StrandKind::Warp, index, &straight, flat));
+    let firm = holds_its_turns(cloth);
+    let taken = if firm { 0 } else { taken(cloth) };
+    let weaves = [false, true].map(|right| edge_weave(cloth, right, taken, hem));
+    let edges = [0, 1].map(|side| Edge::new(cloth, &weaves[side], side == 1, taken));
+    if !firm {
+        warps.retain(|s| (taken..cloth.count[0] - taken).contains(&s.index));
+        warps.extend(edges.iter().flat_map(|edge| (0..ENDS).map(|i| edge.warp(i, hem))));
     }
+    // From crossing to crossing, from the left.
+    let inner = |strand: &PatternStrand| {
+        let points = points(strand);
+        let off = nodes / 2 + taken as usize * nodes;
+        points[off..points.len() - off].to_vec()
+    };
+    let row = |i: usize| {
+        if firm {
+            return inner(&wefts[i]);
+        }
+        let mut parts = [edges[0].weft(i as u32, hem), inner(&wefts[i]), edges[1].weft(i as u32, hem)].into_iter();
+        let mut way = parts.next().unwrap_or_default();
+        for part in parts {
+            let onwards = if part.len() > 1 { part[1].0 - part[0].0 } else { DVec3::X };
+            join(&mut way, part[0], onwards, nodes);
+            way.extend(part);
+        }
+        way
+    };
     // The weft, from the bottom left on.
+    let outermost = if firm { &cloth.cell } else { &edges[0].cloth.cell };
+    let widest = outermost.yarns[0].iter().flatten().map(|node| node.axes[0]).fold(0.0, f64::max);
+    let beside = BESIDE * (widest + cloth.weave.weft_radius);
+    let stub = |last: Point, out: f64| (last.0 + DVec3::X * (out * STUB * beside), last.1, last.2, last.3);
     let mut way: Vec<Point> = Vec::new();
-    for (i, weft) in wefts.iter().enumerate() {
-        let mut row = points(weft);
-        // Up to the last crossing on both sides.
-        row.drain(..nodes / 2);
-        row.truncate(row.len() - nodes / 2);
+    for i in 0..wefts.len() {
+        let mut row = row(i);
         let out = if i % 2 == 0 { 1.0 } else { -1.0 };
         if out < 0.0 {
             row.reverse();
         }
-        if i == 0 {
-            let first = row[0];
-            let start = DVec3::new(-edge - STUB * reach, first.0.y, reach);
-            let over = DVec3::new(-edge, first.0.y, reach);
-            way.extend([start, over].map(|p| (p, radius[1], DVec3::Z, [-0.5, first.3[1]])));
-            join(&mut way, first, row[1].0 - first.0, nodes);
+        match way.last() {
+            Some(&from) => turn(&mut way, from, row[0], -out * beside, cloth.weave.weft_radius),
+            None => way.push(stub(row[0], -1.0)),
         }
         way.extend(row);
-        let from = *way.last().expect("a row has points");
-        let place = if out > 0.0 { last as f32 + 0.5 } else { -0.5 };
-        let Some(next) = wefts.get(i + 1) else {
-            let over = DVec3::new(out * edge, from.0.y, reach);
-            join(&mut way, (over, radius[1], DVec3::Z, [place, from.3[1]]), out * DVec3::X, nodes);
-            let end = DVec3::new(out * (edge + STUB * reach), from.0.y, reach);
-            way.push((over, radius[1], DVec3::Z, [place, from.3[1]]));
-            way.push((end, radius[1], DVec3::Z, [place, from.3[1]]));
-            break;
-        };
-        let mut there = points(next);
-        there.drain(..nodes / 2);
-        there.truncate(there.len() - nodes / 2);
-        if out > 0.0 {
-            there.reverse();
+        if i + 1 == wefts.len() {
+            way.push(stub(way[way.len() - 1], out));
         }
-        let (to, onwards) = (there[0], there[1].0 - there[0].0);
-        let turn = |k: usize| {
-            let angle = PI * (k as f64 / TURN as f64 - 0.5);
-            let share = 0.5 + 0.5 * angle.sin();
-            let p = DVec3::new(
-                out * (edge + reach * angle.cos()),
-                from.0.y + share * (to.0.y - from.0.y),
-                -reach * angle.sin(),
-            );
-            (p, radius[1], DVec3::Z, [place, if 2 * k < TURN { from.3[1] } else { to.3[1] }])
-        };
-        join(&mut way, turn(0), out * DVec3::X, nodes);
-        way.extend((0..=TURN).map(turn));
-        join(&mut way, to, onwards, nodes);
     }
     warps.push(from_points(StrandKind::Weft, 0, &way, flat));
     warps
+}
+
+/// Around the outermost warp from one pick to the next, without both: half an ellipse that reaches out by `out`.
+fn turn(way: &mut Vec<Point>, from: Point, to: Point, out: f64, radius: f64) {
+    let (middle, half) = (0.5 * (from.0 + to.0), 0.5 * (to.0 - from.0));
+    // Round, so that any axis across the turn will do.
+    let axis = DVec3::X.cross(half).normalize_or(DVec3::Z);
+    way.extend((1..TURN).map(|k| {
+        let (sin, cos) = (PI * k as f64 / TURN as f64).sin_cos();
+        let p = middle - cos * half + out * sin * DVec3::X;
+        (p, radius, axis, if 2 * k < TURN { from.3 } else { to.3 })
+    }));
+}
+
+/// Whether both outermost warps change sides after each pick, as those of a plain weave.
+fn holds_its_turns(cloth: &Cloth<'_>) -> bool {
+    let draft = &cloth.weave.draft;
+    let changes = |warp: usize| (0..draft.wefts()).all(|i| draft.warp_over(i, warp) != draft.warp_over(i + 1, warp));
+    draft.layers() == 1
+        && !draft.twines()
+        && draft.pile().is_none()
+        && draft.wefts() > 1
+        && changes(0)
+        && changes(cloth.count[0] as usize - 1)
+}
+
+/// Warps of each side in whose place selvedges are, so that the cloth stays as wide; at least one is left between them.
+fn taken(cloth: &Cloth<'_>) -> u32 {
+    let spacing = edge_weave(cloth, true, 0, 0).warp_spacing.unwrap_or(cloth.cell.spacing[0]);
+    let taken = (f64::from(ENDS) * spacing / cloth.cell.spacing[0]).round() as u32;
+    taken.min((cloth.count[0] - 1) / 2)
+}
+
+/// The weave of a selvedge beside the warps that are not `taken`, with the picks of the cloth. `hem` picks come before the first.
+fn edge_weave(cloth: &Cloth<'_>, right: bool, taken: u32, hem: u32) -> Weave {
+    let weave = cloth.weave;
+    let pick = cloth.cell.spacing[1];
+    let rib = pick < RIB * (weave.warp_radius + weave.weft_radius);
+    // The weft turns right after even picks, left after odd ones; there the sheds of a rib must change.
+    let first = hem as usize + usize::from(right);
+    let draft = |inverted| Draft::selvedge(if rib { 2 } else { 1 }, first, inverted);
+    // Most yarns change sides where the cloth begins: floats end there.
+    let (own, beside) = if right { (0, cloth.count[0] - 1 - taken) } else { (ENDS as usize - 1, taken) };
+    let changes = |draft: &Draft| {
+        let rows = 0..(4 * weave.draft.wefts()).min(1024);
+        rows.filter(|&i| draft.warp_over(i, own) != weave.draft.warp_over(i, beside as usize)).count()
+    };
+    let [straight, inverted] = [false, true].map(draft);
+    let draft = if changes(&straight) < changes(&inverted) { inverted } else { straight };
+    let picks = Threads { thickness: Vec::new(), spacing: weave.threads[1].spacing.clone() };
+    let free = Weave {
+        draft,
+        warp_spacing: None,
+        weft_spacing: Some(pick),
+        cover: None,
+        crimp: None,
+        threads: [Threads::default(), picks],
+        ..weave.clone()
+    };
+    let spacing = UnitCell::relax(&free.draft, &free.options()).spacing[0];
+    Weave { warp_spacing: Some(SLACK * spacing), ..free }
+}
+
+/// The warps of a selvedge and their part of the wefts.
+struct Edge<'a> {
+    cloth: Cloth<'a>,
+    /// Thickness of wefts over the mean, in turns.
+    thickness: &'a [f64],
+    /// Along x, and in numbers of warps.
+    shift: (f64, i64),
+}
+
+impl<'a> Edge<'a> {
+    fn new(body: &Cloth<'a>, weave: &'a Weave, right: bool, taken: u32) -> Self {
+        let cell = UnitCell::relax(&weave.draft, &weave.options());
+        let spacing = cell.spacing[0];
+        let cloth = Cloth { weave, cell, count: [ENDS, body.count[1]] };
+        let last = i64::from(if right { body.count[0] - 1 - taken } else { taken });
+        let thickness = &body.weave.threads[0].thickness;
+        let thicker = thickness.get(last.rem_euclid(thickness.len().max(1) as i64) as usize).map_or(0.0, |t| t - 1.0);
+        let beside = spacing + thicker.max(0.0) * weave.warp_radius;
+        let out = beside + 0.5 * f64::from(ENDS - 1) * spacing;
+        let at = body.position(0, last as f64 + 0.5);
+        let first = if right { last + 1 } else { last - i64::from(ENDS) };
+        let shift = (if right { at + out } else { at - out }, first);
+        Self { cloth, thickness: &body.weave.threads[1].thickness, shift }
+    }
+
+    fn moved(&self, strand: &PatternStrand, thickness: f64) -> Vec<Point> {
+        let moved = |(p, radius, axis, [x, y]): Point| {
+            (p + DVec3::X * self.shift.0, radius * thickness, axis, [x + self.shift.1 as f32, y])
+        };
+        points(strand).into_iter().map(moved).collect()
+    }
+
+    fn warp(&self, number: u32, hem: u32) -> PatternStrand {
+        let strand = self.cloth.strand(0, number, hem);
+        let index = (self.shift.1 + i64::from(number)).max(0) as u32;
+        from_points(StrandKind::Warp, index, &self.moved(&strand, 1.0), self.cloth.weave.sized())
+    }
+
+    /// From the first crossing to the last.
+    fn weft(&self, index: u32, hem: u32) -> Vec<Point> {
+        let number = i64::from(index) - i64::from(hem);
+        let count = self.thickness.len().max(1) as i64;
+        let thickness = self.thickness.get(number.rem_euclid(count) as usize).copied().unwrap_or(1.0);
+        let mut points = self.moved(&self.cloth.strand(1, index, hem), thickness);
+        let half = self.cloth.cell.nodes / 2;
+        points.drain(..half);
+        points.truncate(points.len() - half);
+        points
+    }
 }
 
 /// Leads the way on to `to`, without it, and arrives in the direction `onwards`.

@@ -351,11 +351,11 @@ impl Cloth<'_> {
         };
         let diameter = self.weave.warp_radius + self.weave.weft_radius;
         let mut strands = pile::settle(strands(0).chain(strands(1)).collect(), diameter);
+        if edges != Edges::Live {
+            strands = edges::selvedges(self, strands, hem);
+        }
         if let Edges::Fringe(length) = edges {
             edges::fringe(self, &mut strands, length);
-        }
-        if edges != Edges::Live {
-            strands = edges::selvedges(self, strands);
         }
         if edges == Edges::Finished {
             edges::hem(&mut strands, 0.5 * size[1], thickness);
