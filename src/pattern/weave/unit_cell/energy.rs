@@ -15,6 +15,10 @@ const SECTION: f64 = 20.0;
 const ROUND: f64 = 2000.0;
 /// Resistance to spacings below what fills the reed.
 const WALL: f64 = 200.0;
+/// Distance of wefts over that of warps, or the other way round, from which on one side hides the other.
+const DENSE: f64 = 1.99;
+/// Distance of such a side's yarns over that at which they lie side by side.
+const CLOSE: f64 = 0.9;
 /// A yarn's node in the vector of variables: `[aside, height, ln(width / round)]`.
 pub(super) const PER_NODE: usize = 3;
 
@@ -83,6 +87,15 @@ impl<'a> Energy<'a> {
             densest: [0, 1].map(|side| full(draft, options, side) / unit),
             gear: 0.5 / (total as f64).sqrt(),
         };
+        let floats = |sett: &f64| !(1.0 / DENSE..DENSE).contains(sett) && draft.pile().is_none();
+        // What is round does not give way.
+        if let Some(sett) = energy.sett.filter(floats).filter(|_| options.aspect != [1.0; 2]) {
+            // Ends of a satin are set so close that they hide where one of them dips: the wall would keep them apart.
+            let side = usize::from(sett < 1.0);
+            let close = CLOSE * energy.densest[side];
+            energy.fixed = [1.0, sett].map(|share| Some(share * if side == 0 { close } else { close / sett }));
+            energy.sett = None;
+        }
         if draft.twines() {
             // An open cloth: warps in pairs, hardly flattened, and room for a warp to pass between wefts.
             let [warp, weft] = energy.radius;
