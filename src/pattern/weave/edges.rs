@@ -110,8 +110,9 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
     };
     // The weft, from the bottom left on.
     let outermost = if firm { &cloth.cell } else { &edges[0].cloth.cell };
-    let widest = outermost.yarns[0].iter().flatten().map(|node| node.axes[0]).fold(0.0, f64::max);
-    let beside = BESIDE * (widest + cloth.weave.weft_radius);
+    let widths: Vec<f64> = outermost.yarns[0].iter().flatten().map(|node| node.axes[0]).collect();
+    let wide = widths.iter().sum::<f64>() / widths.len().max(1) as f64;
+    let beside = BESIDE * (wide + cloth.weave.weft_radius);
     let stub = |last: Point, out: f64| (last.0 + DVec3::X * (out * STUB * beside), last.1, last.2, last.3);
     let mut way: Vec<Point> = Vec::new();
     for i in 0..wefts.len() {
