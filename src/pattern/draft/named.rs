@@ -149,11 +149,16 @@ fn double_cloth() -> Draft {
     Draft { layers: 2, ..draft }
 }
 
-/// Terry of three picks: every other warp makes loops, on the face and on the back in turns.
+/// Terry of three picks: between two ends of the ground one makes loops on the face and one on the back.
 fn terry() -> Draft {
-    let rows = [[true, true, false, false], [true, false, false, true], [false, true, true, false]];
-    let draft = Draft::from_fn(4, 3, |i, j| rows[i][j]);
-    Draft { pile: Some(Pile { side: 0, yarns: vec![(1, false), (3, true)], cut: false }), ..draft }
+    let rows = [
+        [true, true, false, false, true, false],
+        [true, false, true, false, false, true],
+        [false, true, false, true, true, false],
+    ];
+    let draft = Draft::from_fn(6, 3, |i, j| rows[i][j]);
+    let yarns = vec![(1, false), (2, true), (4, false), (5, true)];
+    Draft { pile: Some(Pile { side: 0, yarns, cut: false }), ..draft }
 }
 
 /// Plain ground; every other warp is held below every other weft and cut between.
@@ -162,10 +167,10 @@ fn velvet() -> Draft {
     Draft { pile: Some(Pile { side: 0, yarns: vec![(1, false), (3, false)], cut: true }), ..draft }
 }
 
-/// Plain ground; two wefts after each ground weft float over five warps, are each held by one, with another between them, and
-/// cut between: wales stand where they are held.
+/// Plain ground; two wefts after each ground weft float over three warps, are each held by one, the second by the neighbour of
+/// the first's, and cut between: wales stand where they are held.
 fn corduroy() -> Draft {
-    let draft = Draft::from_fn(6, 6, |i, j| if i % 3 == 0 { (i / 3 + j) % 2 == 0 } else { j == 2 * (i % 3 - 1) });
+    let draft = Draft::from_fn(4, 6, |i, j| if i % 3 == 0 { (i / 3 + j) % 2 == 0 } else { j == i % 3 - 1 });
     let yarns = [1, 2, 4, 5].map(|i| (i, false)).to_vec();
     Draft { pile: Some(Pile { side: 1, yarns, cut: true }), ..draft }
 }

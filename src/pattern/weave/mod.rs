@@ -110,10 +110,9 @@ pub const YARNS: u32 = 20;
 pub const FRINGE: f64 = 24.0;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
 pub const FLATTEN: f64 = 1.5;
-/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut; loops, which
-/// fall over, are twice as high.
+/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut, five as loops.
 pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
-    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
+    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 5.0 } else { 4.0 };
     2.0 * diameters * radius
 }
 
@@ -122,11 +121,13 @@ pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
 const MOST_OVERLAP: f64 = 0.03;
 /// Share of the distance at which yarns lie side by side below which no draft has room.
 const HOPELESS: f64 = 0.2;
-/// Distance of wefts over that of warps where wefts are cut: corduroys have two and a half picks to an end and more, so that the
-/// ground is closed when the floats are gone.
-const CUT_SETT: f64 = 0.4;
+/// Distance of wefts over that of warps where wefts are cut: corduroys have two picks to an end and more, so that the ground is
+/// closed when the floats are gone.
+const CUT_SETT: f64 = 0.5;
 /// How much harder such cloth is beaten up than other: its wefts slide over each other.
 const CUT_BEAT: f64 = 40.0;
+/// The same of terry, whose picks are beaten up three at once.
+const LOOP_BEAT: f64 = 3.0;
 
 /// Woven cloth in equilibrium, ready to be repeated.
 #[derive(Clone, Debug)]
@@ -176,7 +177,11 @@ impl Weave {
 
     fn options(&self) -> CellOptions {
         let [p, q] = [self.warp_radius, self.weft_radius].map(|r| r * r);
-        let cut = self.draft.cut_wefts();
+        let beat = match self.draft.pile() {
+            Some(_) if self.draft.cut_wefts() => CUT_BEAT * BEAT,
+            Some(pile) if !pile.cut => LOOP_BEAT * BEAT,
+            _ => BEAT,
+        };
         CellOptions {
             radius: [self.warp_radius, self.weft_radius],
             aspect: [self.flatten; 2],
@@ -186,7 +191,7 @@ impl Weave {
             // Under pressure the crimp of equal yarns would all go into one of them.
             sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)))
                 .then(|| sett(&self.draft)),
-            beat: if cut { CUT_BEAT * BEAT } else { BEAT },
+            beat,
             nodes: self.points as usize,
             thickness: [0, 1].map(|side| self.threads[side].thickness.clone()),
         }

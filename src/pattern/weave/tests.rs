@@ -186,23 +186,45 @@ fn pairs_of_a_leno_are_twined() {
 
 #[test]
 fn selvedges_make_one_weft_of_all() {
-    let weave = Weave { edges: Edges::Selvedge, ..weave("twill 2/2") };
-    let strands = weave.strands().unwrap();
-    let wefts: Vec<_> = strands.iter().filter(|s| s.kind == StrandKind::Weft).collect();
-    assert_eq!((wefts.len(), strands.len()), (1, 12 + 2 + 1));
-    // It goes around the outermost warps: there is no end of it but two, both outside.
-    let way = &wefts[0].curve.points;
-    let edge = strands[13].curve.points[0].x;
-    assert!(way[0].x < -edge && way[way.len() - 1].x.abs() > edge);
-    for warp in [&strands[12], &strands[13]] {
-        let x = warp.curve.points[0].x;
-        let nearest = way.iter().map(|p| (p.x - x).hypot(p.z)).fold(f64::MAX, f64::min);
-        assert!((1.7..2.2).contains(&nearest), "{nearest}");
-        let out = way.iter().filter(|p| p.x.abs() > edge + 1.9).count();
-        assert!(out >= 9, "{out} points of turns");
+    for name in NAMES.iter().filter(|name| **name != "corduroy") {
+        let weave = Weave { edges: Edges::Selvedge, ..weave(name) };
+        let strands = weave.strands().unwrap();
+        let wefts: Vec<_> = strands.iter().filter(|s| s.kind == StrandKind::Weft).collect();
+        assert_eq!(wefts.len(), 1, "{name}");
+        let way = &wefts[0].curve.points;
+        let mean_x = |s: &PatternStrand| s.curve.points.iter().map(|p| p.x).sum::<f64>() / s.curve.points.len() as f64;
+        // Tufts are not as long as the cloth.
+        let height = way[way.len() - 1].y - way[0].y;
+        let long = |s: &&PatternStrand| s.curve.points[s.curve.points.len() - 1].y - s.curve.points[0].y > 0.9 * height;
+        let warps: Vec<_> = strands.iter().filter(|s| s.kind == StrandKind::Warp).filter(long).collect();
+        let mut beyond = Vec::new();
+        for out in [-1.0, 1.0] {
+            let outermost = warps.iter().max_by(|a, b| (out * mean_x(a)).total_cmp(&(out * mean_x(b)))).unwrap();
+            let edge = out * mean_x(outermost);
+            // A turn is what lies beyond the middle of the outermost warp, but for the ends of the weft.
+            let outside: Vec<usize> = (1..way.len() - 1).filter(|&i| out * way[i].x > edge + 0.02).collect();
+            let turns = outside.chunk_by(|a, b| a + 1 == *b).filter(|turn| turn.len() > 4);
+            let mut count = 0;
+            for turn in turns {
+                let near = |y: f64| {
+                    let points = outermost.curve.points.iter();
+                    points.min_by(|p, q| (p.y - y).abs().total_cmp(&(q.y - y).abs())).unwrap()
+                };
+                let above = [turn[0] - 1, turn[turn.len() - 1] + 1].map(|i| way[i].z > near(way[i].y).z);
+                assert_ne!(above[0], above[1], "{name}: a turn that no warp holds");
+                let middle = way[turn[turn.len() / 2]];
+                let warp = near(middle.y);
+                let away = (middle.x - warp.x).hypot(middle.z - warp.z);
+                // Radii are 1: snug, and not into the warp.
+                assert!((1.85..2.75).contains(&away), "{name}: {away}");
+                count += 1;
+            }
+            beyond.push(count);
+        }
+        assert_eq!(beyond, [4, 5], "{name}: turns on the left and on the right of ten picks");
+        let steps = way.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
+        assert!(steps < 2.0, "{name}: a jump of {steps}");
     }
-    let steps = way.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
-    assert!(steps < 4.5, "a jump of {steps}");
 }
 
 #[test]
@@ -271,7 +293,7 @@ fn corduroy_has_more_picks_than_ends() {
     let cloth = weave("corduroy");
     let Measures { spacing: [p, q], see_through, .. } = cloth.relax().unwrap().measures();
     // Radii are 1: picks lie closer than side by side.
-    assert!(p > 2.4 * q && q < 2.0 && see_through < 0.01, "{p} {q} {see_through}");
+    assert!(p > 1.9 * q && q < 2.0 && see_through < 0.01, "{p} {q} {see_through}");
 }
 
 #[test]
@@ -285,7 +307,7 @@ fn pile_stands_as_high_as_it_is_asked_to() {
         let strands = cloth.strands();
         let top = |s: &PatternStrand| s.curve.points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
         let highest = strands.iter().map(top).fold(f64::MIN, f64::max);
-        assert_eq!(weave.pile_height, if cut { 8.0 } else { 16.0 }, "{name}: radii of its yarn");
+        assert_eq!(weave.pile_height, if cut { 8.0 } else { 10.0 }, "{name}: radii of its yarn");
         assert!((highest - weave.pile_height).abs() < 0.5 * ground + 2.0, "{name}: {highest}");
         // Tufts are held in the cloth and end above it; loops are one yarn.
         let standing: Vec<_> = strands.iter().filter(|s| s.kind == kind && top(s) > 5.0).collect();
@@ -295,7 +317,7 @@ fn pile_stands_as_high_as_it_is_asked_to() {
             let lowest = points.iter().map(|p| p.z).fold(f64::MAX, f64::min);
             assert!(lowest < 1.5, "{name}: held at {lowest}");
             let (first, last) = (points[0].z, points[points.len() - 1].z);
-            assert_eq!(cut, first > 4.0 && last > 4.0, "{name}: ends at {first} and {last}");
+            assert_eq!(cut, first > 3.0 && last > 3.0, "{name}: ends at {first} and {last}");
             let longest = points.windows(2).map(|w| w[0].distance(w[1])).fold(0.0, f64::max);
             assert!(longest < 3.5, "{name}: a jump of {longest}");
         }
