@@ -251,6 +251,7 @@ impl Knit {
                 kind: StrandKind::Course,
                 index: r as u32,
                 coordinates,
+                share: 1.0,
             }
         };
         let strands: Vec<_> = (0..self.rows as usize).map(row).collect();
@@ -462,6 +463,7 @@ impl Knit {
             kind: StrandKind::Course,
             index: index as u32,
             coordinates: thread.grid,
+            share: 1.0,
         };
         let strands = threads.into_iter().enumerate().map(strand).collect();
         let colors = ways.iter().map(|w| w.color).collect();

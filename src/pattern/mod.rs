@@ -52,9 +52,16 @@ pub struct PatternStrand {
     /// Where each control point of the curve is in the cloth's own grid: wale and course of a knit, warp and weft of a
     /// weave. Stitch or crossing i spans i to i + 1, and its centre is at i + 1/2.
     pub coordinates: Vec<[f32; 2]>,
+    /// Of how much of a yarn's section it is: 1, but for the strands that a cut tuft opens into.
+    pub share: f64,
 }
 
 impl PatternStrand {
+    /// Length of yarn that it takes, in the curve's unit.
+    pub fn yarn_length(&self) -> f64 {
+        self.share * self.curve.polygon_length()
+    }
+
     /// With the smoothest curve through the same points, a B-spline. Embree meets it sooner than a Catmull-Rom curve, it
     /// has no jumps of curvature where segments join, and so fewer points follow it.
     pub fn smooth(mut self) -> Self {
@@ -112,6 +119,7 @@ mod tests {
                 kind: StrandKind::Course,
                 index: 0,
                 coordinates: (0..12).map(|i| [i as f32, 0.5]).collect(),
+                share: 1.0,
             };
             let smooth = strand.smooth();
             let count = smooth.curve.points.len();

@@ -84,7 +84,7 @@ impl Draft {
     /// The side of a cloth: every warp changes sides after so many picks, neighbours against each other. `first` picks of
     /// the first shed are gone.
     pub(super) fn selvedge(picks: usize, first: usize, inverted: bool) -> Self {
-        Self::from_fn(2, 2 * picks, |weft, warp| (((weft + first) / picks + warp) % 2 == 0) != inverted)
+        Self::from_fn(2, 2 * picks, |weft, warp| ((weft + first) / picks + warp).is_multiple_of(2) != inverted)
     }
 
     /// What a loom weaves: the shaft of each warp from the left, the shafts that each treadle raises, and the treadle of

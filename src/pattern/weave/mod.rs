@@ -425,5 +425,6 @@ fn strand(kind: StrandKind, index: u32, points: impl Iterator<Item = (DVec3, [f3
         kind,
         index,
         coordinates,
+        share: 1.0,
     }
 }

@@ -74,6 +74,7 @@ impl Tuft {
         }
         let last = way.len() - 1;
         let thin = 1.0 / f64::from(ACROSS);
+        let strands = bundle();
         let random = |what: u32| f64::from(hash2(self.seed, what) >> 8) / f64::from(1u32 << 23) - 1.0;
         let turned = DVec2::from_angle(PI * random(0));
         // Where it is on a leg, which of them, and from 0 to 1 at the tip.
@@ -108,9 +109,10 @@ impl Tuft {
             let places: Vec<Point> = (0..=last).map(place).collect();
             let mut made = from_points(strand.kind, strand.index, &places, flat);
             made.curve.radii = Some(places.iter().map(|p| p.1).collect());
+            made.share = strand.share / strands.len() as f64;
             made
         };
-        bundle().into_iter().enumerate().map(one).collect()
+        strands.iter().copied().enumerate().map(one).collect()
     }
 }
 

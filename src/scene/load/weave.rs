@@ -53,7 +53,7 @@ impl WeavePlan {
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     cloth.strands().into_iter().partition(|s| s.kind == StrandKind::Warp);
                 let length =
-                    [&warps, &wefts].map(|side| side.iter().map(|s| s.curve.polygon_length()).sum::<f64>() / 1000.0);
+                    [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
                 let sides = [warps, wefts].map(|side| FabricCoordinates::of(side, cloth.count()));
                 return Some(Woven { origin, sides });
