@@ -83,9 +83,9 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
     let nodes = cloth.cell.nodes;
     let firm = holds_its_turns(cloth);
     let taken = if firm { 0 } else { taken(cloth) };
-    let weaves = [false, true].map(|right| edge_weave(cloth, right, taken, hem));
-    let edges = [0, 1].map(|side| Edge::new(cloth, &weaves[side], side == 1, taken));
-    if !firm {
+    let weaves = (!firm).then(|| [false, true].map(|right| edge_weave(cloth, right, taken, hem)));
+    let edges = weaves.as_ref().map(|weaves| [0, 1].map(|side| Edge::new(cloth, &weaves[side], side == 1, taken)));
+    if let Some(edges) = &edges {
         warps.retain(|s| (taken..cloth.count[0] - taken).contains(&s.index));
         warps.extend(edges.iter().flat_map(|edge| (0..ENDS).map(|i| edge.warp(i, hem))));
     }
@@ -96,9 +96,7 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
         points[off..points.len() - off].to_vec()
     };
     let row = |i: usize| {
-        if firm {
-            return inner(&wefts[i]);
-        }
+        let Some(edges) = &edges else { return inner(&wefts[i]) };
         let mut parts = [edges[0].weft(i as u32, hem), inner(&wefts[i]), edges[1].weft(i as u32, hem)].into_iter();
         let mut way = parts.next().unwrap_or_default();
         for part in parts {
@@ -109,7 +107,7 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
         way
     };
     // The weft, from the bottom left on.
-    let outermost = if firm { &cloth.cell } else { &edges[0].cloth.cell };
+    let outermost = edges.as_ref().map_or(&cloth.cell, |edges| &edges[0].cloth.cell);
     let widths: Vec<f64> = outermost.yarns[0].iter().flatten().map(|node| node.axes[0]).collect();
     let wide = widths.iter().sum::<f64>() / widths.len().max(1) as f64;
     let beside = BESIDE * (wide + cloth.weave.weft_radius);
