@@ -97,8 +97,14 @@ impl Arc {
             return Self { from, to, ..*self };
         }
         let to_circle = |p: Vec2| Vec2::new(p.dot(ply.direction), ply.direction.perp_dot(p)) * ply.stretch;
-        let [from, to, slope, square, cube] = [from, to, self.slope, self.square, self.cube].map(to_circle);
-        Self { from, to, slope, square, cube, off: self.off * ply.stretch.max_element() }
+        Self {
+            from: to_circle(from),
+            to: to_circle(to),
+            slope: to_circle(self.slope),
+            square: to_circle(self.square),
+            cube: to_circle(self.cube),
+            off: self.off * ply.stretch.max_element(),
+        }
     }
 
     #[inline]

@@ -25,7 +25,7 @@ use crate::{
     },
     light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
-    scattering::{LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
+    scattering::{Arrival, LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
     scene::{CurveKind, Fabric, Ground, Layers, Material, Scene},
     trace::{Hit, SurfacePlace, YarnGeometry},
 };
@@ -347,7 +347,8 @@ impl<'a> Integrator<'a> {
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
         let mut stream = path.sampler.even_stream();
-        let vertex = yarn.vertex(section, &scratch.crossings, unscattered, path.throughput, u, &mut stream);
+        let arrival = Arrival { throughput: path.throughput, lit: !self.lights.is_empty() };
+        let vertex = yarn.vertex(section, &scratch.crossings, unscattered, arrival, u, &mut stream);
 
         let node = section.point_on_ray(vertex.node_start());
         let u_start = stream.next();

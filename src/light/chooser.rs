@@ -22,6 +22,11 @@ impl<'a> LightChooser<'a> {
         self.lights.iter().position(|one| std::ptr::eq(*one, light))
     }
 
+    /// Whether there is none to choose: what light there is only paths find.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
     /// Draws a light for the place `at` by `u` in [0, 1), with the chance that it had; `None` if none gives anything.
     #[inline]
     pub fn choose(&self, at: Vec3A, mut u: f32) -> Option<(&'a Light, f32)> {

@@ -27,6 +27,9 @@ const SOBOL_SETS: u32 = 24;
 /// The crate's sequence has 2^16 points; longer renders go on with another scrambling.
 const SOBOL_LENGTH: u32 = 1 << 16;
 
+/// The even numbers of a stream.
+const EVEN: usize = 8;
+
 /// The numbers of one sample of one pixel: Owen-scrambled Sobol points in sets of four dimensions.
 ///
 /// ```
@@ -73,14 +76,15 @@ impl Sampler {
     #[inline]
     pub fn stream(&self, key: u32) -> Stream {
         let state = hash2(self.pixel ^ key.wrapping_mul(0x85eb_ca6b), self.index);
-        Stream { state, weyl: 0, even: [0.0; 4], used: 4 }
+        Stream { state, weyl: 0, even: [0.0; EVEN], used: EVEN }
     }
 
-    /// A stream of which the first four numbers are [`Self::next4`], for what must be even over a pixel's samples.
+    /// A stream of which the first eight numbers are two of [`Self::next4`], for what must be even over a pixel's samples.
     #[inline]
     pub fn even_stream(&mut self) -> Stream {
-        let even = self.next4();
-        Stream { even, used: 0, ..self.stream(self.position()) }
+        let [a, b, c, d] = self.next4();
+        let [e, f, g, h] = self.next4();
+        Stream { even: [a, b, c, d, e, f, g, h], used: 0, ..self.stream(self.position()) }
     }
 
     /// Which set of four numbers comes next: a key for [`Self::stream`] that differs at each vertex of a path.
@@ -94,7 +98,7 @@ impl Sampler {
 pub struct Stream {
     state: u32,
     weyl: u32,
-    even: [f32; 4],
+    even: [f32; EVEN],
     /// How many of `even` are gone.
     used: usize,
 }
@@ -102,7 +106,7 @@ pub struct Stream {
 impl Stream {
     /// A stream of its own for a number.
     pub fn new(key: u32) -> Self {
-        Self { state: hash(key ^ 0xa511_e9b3), weyl: 0, even: [0.0; 4], used: 4 }
+        Self { state: hash(key ^ 0xa511_e9b3), weyl: 0, even: [0.0; EVEN], used: EVEN }
     }
 
     /// The next number in [0, 1).
@@ -115,6 +119,20 @@ impl Stream {
         }
         self.weyl = self.weyl.wrapping_add(0x9e37_79b9);
         unit(hash(self.state ^ self.weyl))
+    }
+
+    /// A stream of its own that begins with the next four even numbers of this one, as far as it has them: what takes an unknown
+    /// number of them leaves the rest to others.
+    #[inline]
+    pub fn branch(&mut self) -> Self {
+        let used = self.used;
+        self.used = (used + 4).min(EVEN);
+        let mut branch = Self { used: EVEN, even: [0.0; EVEN], ..self.fork() };
+        for number in (used..self.used).rev() {
+            branch.used -= 1;
+            branch.even[branch.used] = self.even[number];
+        }
+        branch
     }
 
     /// A stream of its own, plain random and independent of what this one still gives.

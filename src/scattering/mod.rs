@@ -87,6 +87,22 @@ impl AddAssign for LobeValues {
     }
 }
 
+/// A path that comes to a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Its weight so far.
+    pub throughput: Rgb,
+    /// Whether light may be sampled at the vertex too. Where only the path itself finds light, less has to be known of F.
+    pub lit: bool,
+}
+
+impl From<Rgb> for Arrival {
+    /// A path of this weight, where light may be sampled.
+    fn from(throughput: Rgb) -> Self {
+        Self { throughput, lit: true }
+    }
+}
+
 /// Light that arrives from one direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Direct {

@@ -3,7 +3,7 @@
 use glam::Vec3A;
 
 use super::{
-    Continuation, Direct,
+    Arrival, Continuation, Direct,
     aggregated::{AggregatedYarn, Vertex},
     lobes::{ChordVertex, ChordYarn},
 };
@@ -13,7 +13,7 @@ use crate::{
         section::{Crossings, PlyCrossing, Section},
         yarn::YarnShape,
     },
-    math::{Rgb, sampler::Stream},
+    math::sampler::Stream,
 };
 
 /// A yarn with one of the models.
@@ -67,16 +67,16 @@ impl YarnScatterer {
         section: &'a Section<'a>,
         crossings: &Crossings,
         unscattered: f32,
-        throughput: Rgb,
+        arrival: impl Into<Arrival>,
         u: [f32; 4],
         stream: &mut Stream,
     ) -> YarnVertex<'a> {
         match self {
             Self::Aggregated(yarn) => {
-                YarnVertex::Aggregated(Vertex::new(yarn, section, crossings, unscattered, throughput, u, stream))
+                YarnVertex::Aggregated(Vertex::new(yarn, section, crossings, unscattered, arrival, u, stream))
             }
             Self::Chord(yarn) => {
-                YarnVertex::Chord(ChordVertex::new(yarn, section, crossings, unscattered, throughput, u, stream))
+                YarnVertex::Chord(ChordVertex::new(yarn, section, crossings, unscattered, arrival, u, stream))
             }
         }
     }

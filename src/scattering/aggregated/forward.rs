@@ -26,8 +26,9 @@ use crate::{
 const FORWARD_TAIL: f32 = 1e-4;
 /// Fibres to which light is followed one by one. What meets more goes on along a straight way, in one wider lobe.
 const FOLLOWED: usize = 4;
-/// Light is followed no farther once it is so much less than what the first fibre passes on.
-const TOO_LITTLE: f32 = 1e-3;
+/// Below such a share of what the first fibre passes on, light is followed farther by chance only: where light is sampled at
+/// the vertex, and where it is not. There the way on is one draw in either case, and costs no noise; here less of it is seen.
+const LITTLE: [f32; 2] = [0.25, 1.0];
 /// The most stretches of plies that are told apart on a way out.
 const STRETCHES: usize = 16;
 
@@ -153,7 +154,7 @@ impl Forward {
         crossings: &Crossings,
         unscattered: f32,
         gain: Rgb,
-        weight: Rgb,
+        (weight, lit): (Rgb, bool),
         stream: &mut Stream,
     ) -> Option<Self> {
         let (first, met) = first_fiber(crossings, unscattered, stream.next())?;
@@ -162,24 +163,39 @@ impl Forward {
             return None;
         }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
-        Some(Self::follow(view, Fiber::new(view, spot, view.camera, Rgb::ONE), gain, weight, stream))
+        let fiber = Fiber::new(view, spot, view.camera, Rgb::ONE);
+        let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
+        Some(Self::follow(view, fiber, gain, weight, little, stream))
     }
 
-    /// Follows light from a fibre to the next, and so on, until it is out.
+    /// Follows light from a fibre to the next, and so on, until it is out or ends by chance, which it may where `little` is passed on.
     #[inline]
-    pub(super) fn follow(view: &View<'_>, first: Fiber, gain: Rgb, weight: Rgb, stream: &mut Stream) -> Self {
+    pub(super) fn follow(
+        view: &View<'_>,
+        first: Fiber,
+        gain: Rgb,
+        weight: Rgb,
+        little: f32,
+        stream: &mut Stream,
+    ) -> Self {
         let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
-        let least = TOO_LITTLE * (first.passed * weight).max_channel();
         let mut next = Some(first);
-        while let Some(fiber) = next.filter(|fiber| (fiber.passed * weight).max_channel() >= least) {
+        while let Some(mut fiber) = next {
+            let keep = (fiber.passed * weight).max_channel() / little;
+            if keep < 1.0 {
+                if stream.next() >= keep {
+                    break;
+                }
+                fiber.passed /= keep;
+            }
             forward.fibers.push(fiber);
+            // Of light that goes on so much is left where it meets the next one.
+            let left = stream.next();
             let way = fiber.way(view, fiber.direction(&fiber.width, stream));
             let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
             let ahead = fiber.follow_way(view, &way, |stretch| {
                 let _ = stretches.try_push(stretch);
             });
-            // Of light that goes this way so much is left where it meets the next one.
-            let left = stream.next();
             if left < ahead.through {
                 let (lobe, around) = fiber.lobe(&fiber.width, way.w);
                 forward.drawn = Drawn::new(way.w, &forward.alone(view, &fiber, lobe, around, &ahead));

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use glam::Vec3A;
 
-use super::{Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
+use super::{Arrival, Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
 use crate::{
     geometry::{
         occluder::{Occluder, Transparency},
@@ -35,7 +35,7 @@ use crate::{
 use backward::Backward;
 use chain::ChainEnd;
 use forward::Forward;
-use single::Node;
+use single::LateNode;
 
 mod backward;
 mod chain;
@@ -105,15 +105,21 @@ impl<'a> View<'a> {
         Self { yarn, section, camera }
     }
 
-    /// The place in a ply before which the share `x` of the fibres on the chord lies.
+    /// The depth in a ply before which the share `x` of the fibres on the chord lies.
+    #[inline]
+    fn depth(&self, crossing: &PlyCrossing, x: f32) -> f32 {
+        if self.yarn.plain {
+            crossing.enter + (crossing.exit - crossing.enter) * x
+        } else {
+            (crossing.foot - crossing.chord.place(x) / self.section.cos).max(0.0)
+        }
+    }
+
+    /// The place there.
     #[inline]
     fn spot(&self, crossing: &PlyCrossing, x: f32) -> Spot {
         let Self { yarn, section, .. } = self;
-        let depth = if yarn.plain {
-            crossing.enter + (crossing.exit - crossing.enter) * x
-        } else {
-            (crossing.foot - crossing.chord.place(x) / section.cos).max(0.0)
-        };
+        let depth = self.depth(crossing, x);
         let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
         Spot::new(self, crossing.ply, depth, inside)
     }
@@ -142,31 +148,32 @@ impl Spot {
 pub struct Vertex<'a> {
     view: View<'a>,
     forward: Option<Forward>,
-    node: Option<Node>,
+    node: LateNode,
     backward: Backward,
 }
 
 impl<'a> Vertex<'a> {
-    /// Draws the first fibre and the node. `throughput` is the path's weight so far; `unscattered` is
-    /// [`Occluder::transparency`] of `crossings`, which the caller has already decided against: all values here are
-    /// over 1 - `unscattered`.
+    /// Draws the first fibre and the node. `unscattered` is [`Occluder::transparency`] of `crossings`, which the caller has
+    /// already decided against: all values here are over 1 - `unscattered`.
     #[inline]
     pub fn new(
         yarn: &'a AggregatedYarn,
         section: &'a Section<'a>,
         crossings: &Crossings,
         unscattered: f32,
-        throughput: Rgb,
+        arrival: impl Into<Arrival>,
         u: [f32; 4],
         stream: &mut Stream,
     ) -> Self {
         let view = View::new(yarn, section);
+        let Arrival { throughput, lit } = arrival.into();
         let weight = throughput.max(Rgb::splat(1e-20));
         let end = ChainEnd::draw(yarn, crossings, weight, u[0], u[1]);
         let gain = end.as_ref().map_or(Rgb::ZERO, |end| end.gain);
-        let forward = Forward::draw(&view, crossings, unscattered, gain, weight, stream);
+        // Each has even numbers of its own: F takes an unknown number of them.
+        let forward = Forward::draw(&view, crossings, unscattered, gain, (weight, lit), &mut stream.branch());
         let kept = forward.as_ref().map_or(Rgb::ONE, |f| Rgb::ONE - f.drawn.share);
-        let node = end.and_then(|end| Node::draw(&view, &end, kept, weight, [u[2], u[3]], stream));
+        let node = LateNode::new(end, kept, weight, [u[2], u[3]], stream.branch());
         Self { view, forward, node, backward: Backward::later(stream) }
     }
 
@@ -189,7 +196,7 @@ impl<'a> Vertex<'a> {
             });
             forward_part = lobes.f.mean();
         }
-        if let Some(node) = &self.node {
+        if let Some(node) = self.node.get(&self.view) {
             let at_node = 1.0 - self.forward_chance();
             let value = node.toward(&self.view, w);
             let weight = mis_weight(light_pdf, at_node * node.escape_chance(value.clear) * value.pdf);
@@ -224,7 +231,7 @@ impl<'a> Vertex<'a> {
                 start: self.forward_start(),
             });
         }
-        let node = self.node.as_ref()?;
+        let node = self.node.get(&self.view)?;
         let at_node = 1.0 - forward_chance;
         let again = (u[0] - forward_chance) / at_node;
         let start = self.node_start();
@@ -243,7 +250,7 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of the node's lobes and of B leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
-        self.node.as_ref().map_or(0.0, |n| n.spot.depth)
+        self.node.end().map_or(0.0, |end| self.view.depth(&end.crossing, end.x))
     }
 
     /// Depth from which light of F leaves: that of the first fibre.

@@ -1,6 +1,9 @@
 //! Lobes R, TT and D: light that ends its chain at a node and leaves from there (docs/model.md, section 6).
 
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::{
+    cell::OnceCell,
+    f32::consts::{FRAC_1_PI, TAU},
+};
 
 use glam::{Vec2, Vec3A};
 
@@ -49,6 +52,40 @@ pub(super) struct Node {
     pub(super) leaves_again: Rgb,
     /// A direction drawn from the lobes.
     pub(super) drawn: Drawn,
+}
+
+/// The node of a vertex, drawn when first asked for: a path that goes on as F asks for none unless light is sampled there.
+#[derive(Clone, Debug)]
+pub(super) struct LateNode {
+    end: Option<ChainEnd>,
+    /// The share of light that ends its chain at all.
+    kept: Rgb,
+    /// The path's weight.
+    weight: Rgb,
+    u: [f32; 2],
+    stream: Stream,
+    node: OnceCell<Option<Node>>,
+}
+
+impl LateNode {
+    /// Nothing yet, of the arguments of [`Node::draw`].
+    #[inline]
+    pub(super) fn new(end: Option<ChainEnd>, kept: Rgb, weight: Rgb, u: [f32; 2], stream: Stream) -> Self {
+        Self { end, kept, weight, u, stream, node: OnceCell::new() }
+    }
+
+    /// Where its chain ends, if any light leaves from there.
+    #[inline]
+    pub(super) fn end(&self) -> Option<&ChainEnd> {
+        self.end.as_ref()
+    }
+
+    /// The node, always the same one.
+    #[inline]
+    pub(super) fn get(&self, view: &View<'_>) -> Option<&Node> {
+        let draw = || Node::draw(view, self.end.as_ref()?, self.kept, self.weight, self.u, &mut self.stream.clone());
+        self.node.get_or_init(draw).as_ref()
+    }
 }
 
 /// A direction of the node's lobes, their value there (with the way out), and the chance to escape.

@@ -10,6 +10,7 @@ use glam::Vec2;
 use super::{
     backward::{Lobe, off_a_matt_cylinder},
     forward::More,
+    single::Node,
     *,
 };
 use crate::{
@@ -225,9 +226,10 @@ fn white_by_different_ways() -> FiberMaterial {
 
 #[test]
 fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
-    for (case, pressed) in cases() {
+    for (index, (case, pressed)) in cases().enumerate() {
         for (m, slack) in [(lossless(), 0.003), (white_by_different_ways(), 0.01)] {
             let (yarn, section) = build(case, pressed, &m);
+            let arrival = Arrival { throughput: Rgb::ONE, lit: index % 2 == 0 };
             let mut crossings = Crossings::new();
             section.crossings(yarn.occluder().shape(), &mut crossings);
             if crossings.is_empty() {
@@ -240,7 +242,7 @@ fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
             let n = 30_000;
             for _ in 0..n {
                 let u = [0; 4].map(|_| stream.next());
-                let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
+                let vertex = Vertex::new(&yarn, &section, &crossings, t0, arrival, u, &mut stream);
                 let u = [0; 3].map(|_| stream.next());
                 let weight = vertex.sample(u, &mut stream).map_or(Rgb::ZERO, |c| c.weight);
                 for (c, w) in weight.to_array().into_iter().enumerate() {
@@ -262,8 +264,9 @@ fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
 #[test]
 fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_nothing() {
     for (index, (case, pressed)) in cases().enumerate() {
-        for (white, m) in [(true, lossless()), (false, silk())] {
+        for (white, m, lit) in [(true, lossless(), true), (false, silk(), true), (false, silk(), false)] {
             let (yarn, section) = build(case, pressed, &m);
+            let arrival = Arrival { throughput: Rgb::ONE, lit };
             let mut crossings = Crossings::new();
             section.crossings(yarn.occluder().shape(), &mut crossings);
             let t0 = yarn.occluder().transparency(&crossings);
@@ -273,7 +276,7 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
             let (mut both, mut both_square) = (0f64, 0f64);
             for _ in 0..n {
                 let u = [0; 4].map(|_| stream.next());
-                let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
+                let vertex = Vertex::new(&yarn, &section, &crossings, t0, arrival, u, &mut stream);
                 let u = [0; 3].map(|_| stream.next());
                 let weight = vertex.sample(u, &mut stream).map_or(Rgb::ZERO, |c| c.weight);
                 largest = largest.max(weight.max_channel());
@@ -364,7 +367,7 @@ fn densities_match(pressed: Option<Pressed>) {
     };
     let n = 200_000;
     let mut stream = Stream::new(77);
-    let (view, node, forward) = (&vertex.view, vertex.node.as_ref().unwrap(), vertex.forward.as_ref().unwrap());
+    let (view, node, forward) = (&vertex.view, vertex.node.get(&vertex.view).unwrap(), vertex.forward.as_ref().unwrap());
     // F hangs on the fibres that light met: what leaves from the first, and what others bend were that the last, after a
     // direction that is the same for all samples.
     let first = forward.fibers[0];
@@ -377,7 +380,7 @@ fn densities_match(pressed: Option<Pressed>) {
     let mut counts = [[0f64; 96]; 3];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
-        let again = Forward::follow(view, first, forward.gain, forward.weight, &mut stream);
+        let again = Forward::follow(view, first, forward.gain, forward.weight, 0.0, &mut stream);
         if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
             counts[0][cell(again.drawn.direction)] += 1.0;
         }

@@ -9,7 +9,7 @@ use crate::{
     geometry::section::{PlyCrossing, Section},
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
     scattering::{
-        Continuation, Direct, LobeValues,
+        Arrival, Continuation, Direct, LobeValues,
         kernel::{DIFFUSE, MIN_VARIANCE, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
         mis_weight,
@@ -40,7 +40,7 @@ pub struct ChordVertex<'a> {
 }
 
 impl<'a> ChordVertex<'a> {
-    /// `throughput` is the path's weight so far; `unscattered` is [`Occluder::transparency`](crate::geometry::occluder::Occluder::transparency) of `crossings`, which the
+    /// `unscattered` is [`Occluder::transparency`](crate::geometry::occluder::Occluder::transparency) of `crossings`, which the
     /// caller has already decided against: all values here are over 1 - `unscattered`. `u` and the stream are those of
     /// [`Vertex::new`](crate::scattering::aggregated::Vertex::new), of which these models need one number.
     #[inline]
@@ -49,7 +49,7 @@ impl<'a> ChordVertex<'a> {
         section: &Section<'_>,
         crossings: &[PlyCrossing],
         unscattered: f32,
-        throughput: Rgb,
+        arrival: impl Into<Arrival>,
         u: [f32; 4],
         _stream: &mut Stream,
     ) -> Self {
@@ -77,7 +77,7 @@ impl<'a> ChordVertex<'a> {
         let scaled = |e: [f64; 3]| Rgb::from(e.map(|e| e * over));
         let energy =
             LobeValues { r: scaled(out.r), tt: Rgb::ZERO, d: scaled(out.d), f: scaled(out.f), b: scaled(out.b) };
-        let weight = throughput.max(Rgb::splat(1e-20));
+        let weight = arrival.into().throughput.max(Rgb::splat(1e-20));
         let variance = |v: [f64; 3]| Rgb::from(v).max(Rgb::splat(MIN_VARIANCE));
 
         // Where the camera's ray first meets a fibre: the light of R, D and B leaves from there.
