@@ -278,7 +278,7 @@ impl<'a> Section<'a> {
             visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos });
         };
         if self.ends == [f32::NEG_INFINITY, f32::INFINITY]
-            && let Some(way) = from.way_out(shift, direction)
+            && let Some(way) = from.way_out(self, shift, direction)
         {
             return way::passages::<false>(&way, shape, pass);
         }

@@ -4,9 +4,8 @@ use glam::{Vec2, Vec3A};
 
 use super::{
     Section,
-    march::{LEAST_LEFT, LIGHT, angle},
-    neighbourhood::Unbent,
-    unrotate,
+    march::{LEAST_LEFT, LIGHT},
+    neighbourhood::{Neighbourhood, Unbent},
 };
 use crate::geometry::{
     way::Station,
@@ -83,44 +82,33 @@ impl Inside {
     /// The two stations of a way out from `shift` beside this point in a direction `w` of the section's frame: `None` unless it
     /// turns and bends little.
     #[inline]
-    pub(super) fn way_out(&self, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
-        if self.pressed.is_some() {
-            return None;
-        }
+    pub(super) fn way_out(&self, section: &Section<'_>, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
+        let real = self.pressed.map_or(self.at, |pressed| pressed.real(self.at));
         let advance = w.dot(self.z) / self.straightness;
-        let from = Bowed {
-            at: self.at + self.across(shift),
-            slope: self.across(w),
-            advance,
-            straightness: self.straightness,
-            bend: self.bend,
-        };
+        let straightness = self.straightness;
+        let from =
+            Bowed { at: real + self.across(shift), slope: self.across(w), advance, straightness, bend: self.bend };
         let depth = from.to_surface();
         let to = from.ahead(depth)?;
-        let turned = self.turn * to.travel;
+        let turning = self.turn.abs() + if self.pressed.is_some() { section.pressed_turn.abs() } else { 0.0 };
+        let turned = turning * to.travel;
         if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT {
             return None;
         }
-        let phase = angle(turned);
-        let unwound = |at: Vec2, slope: Vec2, advance: f32| slope - self.turn * advance * at.perp();
-        let straightness = self.straightness;
-        let start = Station {
-            depth: 0.0,
-            at: from.at,
-            slope: unwound(from.at, from.slope, advance),
+        let start = Unbent { at: from.at, slope: from.slope, travel: 0.0, advance, straightness, lean: 0.0, cos: 1.0 };
+        let end = Unbent { straightness, ..to };
+        let about = Neighbourhood {
+            place: None,
             travel: self.travel,
-            advance,
-            straightness,
+            bend: self.bend,
+            phase: Vec2::X,
+            turn: self.turn,
+            pressed: self.pressed,
+            pressed_turn: section.pressed_turn,
+            turning: 0.0,
+            bowing: 0.0,
         };
-        let end = Station {
-            depth,
-            at: unrotate(to.at, phase),
-            slope: unrotate(unwound(to.at, to.slope, to.advance), phase),
-            travel: self.travel + to.travel,
-            advance: to.advance,
-            straightness,
-        };
-        Some([start, end])
+        Some([about.unwind(&start, 0.0).station, about.unwind(&end, depth).station])
     }
 }
 

@@ -441,13 +441,20 @@ fn short_ways_out_are_those_that_are_followed() {
     for i in 0..2000 {
         let shape = touching_yarn(1 + i % 4, 60, 0.4, f64::from(next(-0.5, 0.5)), -0.4);
         let bend = Vec2::from_angle(next(0.0, std::f32::consts::TAU)) * next(0.0, 0.6);
-        let place = YarnFrame { curvature: bend.extend(0.0).into(), ..place() };
-        let section = section_of(&place, next(-0.8, 0.8), next(0.0, std::f32::consts::TAU), next(-0.9, 0.9));
+        let flattening = Vec2::from_angle(next(0.0, std::f32::consts::TAU)) * next(0.3, 0.9);
+        let flattening = if i % 2 == 0 { ROUND } else { flattening };
+        let place = YarnFrame { curvature: bend.extend(0.0).into(), flattening, ..place() };
+        let mut section = section_of(&place, next(-0.8, 0.8), next(0.0, std::f32::consts::TAU), next(-0.9, 0.9));
+        section.pressed_turn = next(-0.2, 0.2);
         let depth = next(0.1, 0.9) * section.enter;
+        if section.pressed.is_some_and(|pressed| pressed.round(section.point(depth).truncate()).length() > 1.0) {
+            // Beside what is pressed flat.
+            continue;
+        }
         let from = section.inside(&shape, section.point(depth), depth * section.direction().z);
         let z = next(-0.98, 0.98);
         let w: Vec3A = (Vec2::from_angle(next(0.0, std::f32::consts::TAU)) * (1.0 - z * z).sqrt()).extend(z).into();
-        let Some(way) = from.way_out(Vec3A::ZERO, w) else { continue };
+        let Some(way) = from.way_out(&section, Vec3A::ZERO, w) else { continue };
         short += 1;
         let line = Line { start: from.point, direction: w, reach: LOOK };
         let mut near = section.neighbourhood(section.turn(&shape), 0.0, LOOK);
