@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3A};
 use super::{
     super::{
         LobeValues,
-        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
+        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
     },
     Spot, View,
@@ -41,7 +41,7 @@ pub(super) struct Node {
     /// Weight of an event here, before any albedo.
     pub(super) amplitude: Rgb,
     /// For sampling: widths of R that met TT on its way and of R that did not, and of TT.
-    kappa: [f32; 3],
+    kappa: Rgb,
     /// Chances of these, and of D.
     chance: [f32; 4],
     /// Throughput times amplitude and albedo: what decides between escape and B.
@@ -144,7 +144,7 @@ impl Node {
         // what lies in the way of the azimuth makes most of the noise under a wide light.
         let [u_azimuth, u_lobe] = [stream.next(), stream.next()];
         let lobe = choose(node.chance, u_lobe);
-        let sin = match node.kappa.get(lobe) {
+        let sin = match node.kappa.to_array().get(lobe) {
             Some(kappa) => sample_sine(*kappa, node.sin, node.cos, u, stream),
             None => sample_sine_diffuse(u),
         };
@@ -162,7 +162,6 @@ impl Node {
         let spot = view.spot(crossing, x);
         let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
         let before = crossing.fibers * x;
-        let kappa = |variance: f32| kappa_of_variance(Rgb::splat(variance)).to_array()[0];
         let weight = throughput * amplitude;
         let core = view.yarn.occluder().shape().plies[spot.ply].core_radius;
         let along = (crossing.foot - spot.depth) * view.section.cos * view.section.rounded();
@@ -182,11 +181,11 @@ impl Node {
             cos: (1.0 - sin * sin).sqrt(),
             before,
             amplitude,
-            kappa: [
-                kappa(optics.beta_r_squared + events.max_channel() * beta_tt),
-                kappa(optics.beta_r_squared),
-                kappa((1.0 + (optics.events * (before + SAMPLING_WIDENING)).max_channel()) * beta_tt),
-            ],
+            kappa: kappa_of_variance(Rgb::from([
+                optics.beta_r_squared + events.max_channel() * beta_tt,
+                optics.beta_r_squared,
+                (1.0 + (optics.events * (before + SAMPLING_WIDENING)).max_channel()) * beta_tt,
+            ])),
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
             leaves: out_of_flat(leaves),
@@ -210,6 +209,8 @@ impl Node {
         let even = cos * (0.5 * FRAC_1_PI);
         let scale = self.amplitude * clear * even;
         let [p_touched, p_untouched, p_tt, p_d] = self.chance;
+        // What is drawn from, for all three widths at once.
+        let [touched, single, bent] = kernel(self.kappa, at).to_array();
         let mut value = NodeValue {
             r: Rgb::ZERO,
             tt: Rgb::ZERO,
@@ -222,18 +223,17 @@ impl Node {
         let (untouched, events) = optics.touched(self.before, after);
         if p_touched > 0.0 {
             r += (Rgb::ONE - untouched) * kernel(kappa_of_variance(events * beta_tt + optics.beta_r_squared), at);
-            value.pdf += p_touched * kernel_scalar(self.kappa[0], at);
+            value.pdf += p_touched * touched;
         }
         if p_untouched > 0.0 {
-            let m = kernel_scalar(self.kappa[1], at);
-            r += untouched * m;
-            value.pdf += p_untouched * m;
+            r += untouched * single;
+            value.pdf += p_untouched * single;
         }
         value.r = optics.single_r * scale * r;
         if p_tt > 0.0 {
             let m = kernel(kappa_of_variance((optics.events * (after + self.before) + 1.0) * beta_tt), at);
             value.tt = optics.single_tt * scale * m;
-            value.pdf += p_tt * kernel_scalar(self.kappa[2], at);
+            value.pdf += p_tt * bent;
         }
         value.pdf *= even;
         value

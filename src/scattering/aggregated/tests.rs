@@ -367,7 +367,8 @@ fn densities_match(pressed: Option<Pressed>) {
     };
     let n = 200_000;
     let mut stream = Stream::new(77);
-    let (view, node, forward) = (&vertex.view, vertex.node.get(&vertex.view).unwrap(), vertex.forward.as_ref().unwrap());
+    let (view, node, forward) =
+        (&vertex.view, vertex.node.get(&vertex.view).unwrap(), vertex.forward.as_ref().unwrap());
     // F hangs on the fibres that light met: what leaves from the first, and what others bend were that the last, after a
     // direction that is the same for all samples.
     let first = forward.fibers[0];
