@@ -276,11 +276,22 @@ impl Knit {
         match &self.colors {
             Some(colors) if colors.work == Work::DoubleKnit => Loops::double(rows, border, backwards, colors),
             colors => {
-                let mut loops = Loops::bound_off(rows, self.stitches as usize, border, backwards);
+                let mut loops =
+                    Loops::bound_off(rows, self.stitches as usize, border, backwards, self.next(rows).as_deref());
                 colors.iter().for_each(|colors| loops.dye(colors));
                 loops
             }
         }
+    }
+
+    /// The row that would come above the last one, of a chart that repeats, where each of its stitches is drawn through one
+    /// of that row: what is bound off goes on in the pattern.
+    fn next(&self, rows: &[Vec<Stitch>]) -> Option<Vec<Stitch>> {
+        let bound_off = self.is_finished() && self.rims.top == Closing::BoundOff && self.repeat().is_some();
+        let last = rows.last().filter(|_| bound_off)?;
+        let next = self.chart.work(self.stitches, self.rows + 1, u64::MAX).ok()?.pop()?;
+        let is_plain = |s: &Stitch| s.act == Act::Draw && s.parents == 1 && s.layer == 0 && !s.twisted;
+        (next.len() == last.len() && next.iter().all(is_plain)).then_some(next)
     }
 
     fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {

@@ -144,6 +144,8 @@ pub(in super::super) struct Loops {
     bobbles: bool,
     /// How far each layer of a cloth of two is from the middle between them, in yarn diameters; 0 where there is one.
     pub(in super::super) apart: f64,
+    /// Whether the last row is of wales of knit and of purl that the next one would go on.
+    pub(in super::super) ribbed: bool,
 }
 
 /// What is beside the last stitch of a row, above the last row and below the first one.
@@ -179,20 +181,31 @@ impl Loops {
     /// The loops of rows from the first one upwards.
     pub(in super::super) fn new(rows: &[Vec<Stitch>], cast_on: usize, border: Border) -> Self {
         let backwards = border.round.is_none() && rows.len() % 2 == 1;
-        Self::bound_off(rows, cast_on, border, backwards)
+        Self::bound_off(rows, cast_on, border, backwards, None)
     }
 
-    /// The same, with the side from which a finished piece is bound off.
-    pub(in super::super) fn bound_off(rows: &[Vec<Stitch>], cast_on: usize, border: Border, backwards: bool) -> Self {
+    /// The same, with the side from which a finished piece is bound off, and the row of plain stitches that would come next:
+    /// it is bound off in its pattern.
+    pub(in super::super) fn bound_off(
+        rows: &[Vec<Stitch>],
+        cast_on: usize,
+        border: Border,
+        backwards: bool,
+        next: Option<&[Stitch]>,
+    ) -> Self {
         let mut maker = Maker::new(rows, cast_on, border);
         maker.positions();
         maker.draw();
         match border.rims.top {
             _ if !border.finished => {}
-            Closing::BoundOff => maker.bind_off(backwards, 1),
+            Closing::BoundOff => maker.bind_off(backwards, 1, next),
             Closing::Drawn => maker.draw_together(),
         }
-        maker.finish()
+        // Wales of both kinds that go on to the edge fold.
+        let purls = |row: &[Stitch]| row.iter().map(|s| s.purl).collect::<Vec<_>>();
+        let goes_on = |next: &[Stitch]| rows.last().is_some_and(|last| purls(last) == purls(next));
+        let is_mixed = |next: &[Stitch]| next.iter().any(|s| s.purl != next[0].purl);
+        Self { ribbed: next.is_some_and(|next| goes_on(next) && is_mixed(next)), ..maker.finish() }
     }
 
     /// How far up a row is, in mean rows from the first one.

@@ -31,7 +31,7 @@ impl Loops {
         maker.positions();
         maker.draw();
         if border.finished {
-            maker.bind_off(backwards, 2);
+            maker.bind_off(backwards, 2, None);
         }
         let mut loops = maker.finish();
         loops.part();

@@ -248,7 +248,8 @@ impl<'a> Maker<'a> {
     }
 
     /// Each stitch of the last row, or so many `together`, is drawn through and the one before it laid over what comes out.
-    pub(super) fn bind_off(&mut self, backwards: bool, together: usize) {
+    /// `next` is the row that would come above it, if that is known.
+    pub(super) fn bind_off(&mut self, backwards: bool, together: usize, next: Option<&[Stitch]>) {
         let last = self.rows.len() - 1;
         let row = self.rows.len() as i32;
         let n = self.rows[last].len() / together;
@@ -258,9 +259,12 @@ impl<'a> Maker<'a> {
             let j = if backwards { n - 1 - k } else { k };
             let bound = j * together..(j + 1) * together;
             let at = self.middles[last][bound.clone()].iter().sum::<f64>() / together as f64;
-            // In pattern: wales of purl, as of a rib, are purled. Above a single row of it the next one is as good as any.
+            // In pattern: as the next row has it, or wales of purl, as of a rib, are purled.
             let is_purled = |r: usize| self.rows[r].get(j).is_some_and(|s| s.purl && s.act == Act::Draw);
-            let purl = together == 1 && (last.saturating_sub(1)..=last).all(is_purled);
+            let purl = match next.and_then(|next| next.get(j)) {
+                Some(stitch) => stitch.purl,
+                None => together == 1 && (last.saturating_sub(1)..=last).all(is_purled),
+            };
             let own = self.push(Loop { sign: if purl { -1.0 } else { 1.0 }, ..Loop::laid(row, at) });
             let mut content: Vec<(u32, i32)> = before.map(|b| (b, 0)).into_iter().collect();
             bound.for_each(|j| self.content(last, j, 0, &mut content));
@@ -370,6 +374,7 @@ impl<'a> Maker<'a> {
             levels,
             bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
             apart: 0.0,
+            ribbed: false,
         }
     }
 }

@@ -38,7 +38,7 @@ fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
     let rims = piece.rims;
     let border = Border { round: None, stacked: false, turns: false, finished: true, rims, mirrored };
     let backwards = piece.ways(&rows, mirrored)[0].rows.iter().any(|s| s.row == rows.len() as i32 && s.backwards);
-    let loops = Loops::bound_off(&rows, piece.stitches as usize, border, backwards);
+    let loops = Loops::bound_off(&rows, piece.stitches as usize, border, backwards, None);
     let mut place = BTreeMap::new();
     for course in &loops.courses {
         for (column, visit) in &course.visits {

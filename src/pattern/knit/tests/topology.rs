@@ -366,6 +366,51 @@ fn pieces_are_drawn_through_each_other_from_edge_to_edge() {
     }
 }
 
+/// How often the bind-off passes each loop of the last row, away from the sides, on the way to its own loop there and on the way
+/// from it.
+fn bound_off(piece: &Knit) -> Vec<[i32; 2]> {
+    let (last, stitches) = (piece.rows as i32 - 1, yarn_of_stitches(piece, true));
+    let of = |r: i32, k: i32| stitches[&(r, k)].as_slice();
+    let held = |k: i32| {
+        let ring = [of(last, k), &of(last, k + 1)[..1]].concat();
+        let [before, own, after] = [k - 1, k, k + 1].map(|k| of(last + 1, k));
+        let half = own.len() / 2;
+        let to = [&before[before.len() / 2..], &own[..=half]].concat();
+        let from = [&own[half..], &after[..=after.len() / 2]].concat();
+        [threaded(&ring, &to), threaded(&ring, &from)]
+    };
+    (2..piece.stitches as i32 - 2).map(held).collect()
+}
+
+#[test]
+fn the_bind_off_holds_each_loop_of_the_last_row() {
+    for (pattern, form, stitches) in [
+        ("stockinette", Form::Flat, 10),
+        ("rib1x1", Form::Flat, 12),
+        ("rib2x2", Form::Flat, 16),
+        ("seed", Form::Flat, 12),
+        ("garter", Form::Flat, 10),
+        ("stockinette", Form::Tube, 24),
+        ("rib1x1", Form::Tube, 32),
+        ("rib2x2", Form::Tube, 32),
+        ("seed", Form::Tube, 24),
+    ] {
+        for rows in [6, 7] {
+            let piece = Knit { form: form.clone(), ..knit(pattern, stitches, rows) };
+            let next = piece.chart.work(stitches, rows + 1, 1000).unwrap().pop().unwrap();
+            let mut held = Vec::new();
+            let passes = passed(|| held = bound_off(&piece));
+            // To the front through a knit stitch, to the back through a purl one.
+            let sign = |k: usize| if next[k + 2].purl { -1 } else { 1 };
+            let wrong: Vec<usize> = (0..held.len()).filter(|&k| held[k] != [sign(k), -sign(k)]).collect();
+            assert!(
+                passes == 0 && wrong.is_empty(),
+                "{pattern} {form:?} {rows}: {passes} passes, {wrong:?} of {held:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn tucks_leave_chains_at_the_sides() {
     let stitches = yarn_of_stitches(&knit("brioche", 10, 8), true);
