@@ -121,8 +121,8 @@ pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
 const MOST_OVERLAP: f64 = 0.03;
 /// Share of the distance at which yarns lie side by side below which no draft has room.
 const HOPELESS: f64 = 0.2;
-/// Distance of wefts over that of warps where wefts are cut: corduroys have two picks to an end and more, so that the ground is
-/// closed when the floats are gone.
+/// Distance of wefts over that of warps where wefts are cut: two picks to an end, so that the ground is closed when the floats
+/// are gone.
 const CUT_SETT: f64 = 0.5;
 /// How much harder such cloth is beaten up than other: its wefts slide over each other.
 const CUT_BEAT: f64 = 40.0;
