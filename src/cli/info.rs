@@ -400,9 +400,13 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     let what = match fabric.kind {
         CurveKind::Yarn(yarn) => {
             let yarn = &scene.yarns[yarn];
+            let tufts = match fabric.tufts {
+                [0, _] => String::new(),
+                [tufts, strands] => format!("and {tufts} cut tufts ({strands} strands) "),
+            };
             match yarn.plies.len() {
-                1 => format!("yarns of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
-                plies => format!("yarns of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
+                1 => format!("yarns {tufts}of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
+                plies => format!("yarns {tufts}of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
             }
         }
         CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
@@ -410,7 +414,7 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     format!(
         "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
         fabric.origin,
-        fabric.curves.len(),
+        fabric.curves.len() - fabric.tufts[1],
         length(fabric) / 1000.0,
         fabric.control_points(),
         estimate.segments

@@ -272,6 +272,7 @@ impl Fabric {
             panels: Vec::new(),
             from_file: false,
             kind,
+            tufts: [0; 2],
             motion: FabricMotion::default(),
             variants: Vec::new(),
             material_indices: Vec::new(),

@@ -229,6 +229,8 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         origin: _,
         panels: _,
         from_file: _,
+        // They are among the curves.
+        tufts: _,
         kind,
         curves,
         motion,

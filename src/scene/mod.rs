@@ -265,6 +265,8 @@ pub struct Fabric {
     pub from_file: bool,
     /// What they are.
     pub kind: CurveKind,
+    /// Of woven pile: how many of its yarns are cut tufts, and how many of its curves are the strands that these open into.
+    pub tufts: [usize; 2],
     /// Curves and their radii, millimetres, about the scene's middle. None are left in a render: its yarns are made of them.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.

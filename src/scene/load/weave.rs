@@ -37,6 +37,8 @@ pub(super) struct Woven {
     pub(super) origin: String,
     /// Warps and wefts, with their places.
     pub(super) sides: [(Vec<Curve>, FabricCoordinates); 2],
+    /// Of each: how many cut tufts there are, and how many curves are strands of them.
+    pub(super) tufts: [[usize; 2]; 2],
 }
 
 impl WeavePlan {
@@ -55,8 +57,12 @@ impl WeavePlan {
                 let length =
                     [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
+                let tufts = [&warps, &wefts].map(|side| {
+                    let strands = || side.iter().filter(|s| s.share < 1.0);
+                    [strands().map(|s| s.share).sum::<f64>().round() as usize, strands().count()]
+                });
                 let sides = [warps, wefts].map(|side| FabricCoordinates::of(side, cloth.count()));
-                return Some(Woven { origin, sides });
+                return Some(Woven { origin, sides, tufts });
             }
             Err(Impossible::TooTight { warp, least }) => {
                 let (key, least) = (if warp { "warp_spacing" } else { "weft_spacing" }, least / context.unit);

@@ -38,6 +38,8 @@ struct Made {
     panels: Vec<(usize, String)>,
     from_file: bool,
     kind: CurveKind,
+    /// How many cut tufts there are, and how many curves are strands of them.
+    tufts: [usize; 2],
     curves: Vec<(Curve, Vec<f64>)>,
     /// Where their points are in the cloth, if that is known.
     coordinates: Option<FabricCoordinates>,
@@ -62,6 +64,7 @@ impl Made {
             panels: Vec::new(),
             from_file: false,
             kind,
+            tufts: [0; 2],
             curves,
             coordinates,
             color: None,
@@ -155,7 +158,7 @@ impl<'a> Base<'a> {
 
     /// Warp and weft: apart if they are of different yarns.
     fn weave(&self, plan: &WeavePlan) -> Option<Vec<Made>> {
-        let Woven { origin, sides } = plan.make(self.context)?;
+        let Woven { origin, sides, tufts } = plan.make(self.context)?;
         let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
         let weft = self.named_or_own(plan.weft_yarn.as_deref())?;
         let [warp_radius, weft_radius] = plan.radii();
@@ -164,11 +167,12 @@ impl<'a> Base<'a> {
         if weft == self.kind {
             warps.extend(wefts);
             coordinates.join(weft_coordinates);
-            return Some(vec![Made { dyes: dyes(), ..Made::new(origin, self.kind, warps, Some(coordinates)) }]);
+            let tufts = [0, 1].map(|k| tufts[0][k] + tufts[1][k]);
+            return Some(vec![Made { tufts, dyes: dyes(), ..Made::new(origin, self.kind, warps, Some(coordinates)) }]);
         }
         let warp = Made::new(format!("warp of {origin}"), self.kind, warps, Some(coordinates));
         let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
-        Some(vec![Made { dyes: dyes(), ..warp }, Made { dyes: dyes(), ..weft }])
+        Some(vec![Made { tufts: tufts[0], dyes: dyes(), ..warp }, Made { tufts: tufts[1], dyes: dyes(), ..weft }])
     }
 
     /// The curves of a file, with radii of their own if they may keep them.
@@ -226,7 +230,7 @@ impl Made {
         context: &Context<'_>,
         library: &Library,
     ) -> Option<Fabric> {
-        let Self { origin, panels, from_file, kind, curves, coordinates, color, dyes, motion, exact } = self;
+        let Self { origin, panels, from_file, kind, tufts, curves, coordinates, color, dyes, motion, exact } = self;
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -239,6 +243,7 @@ impl Made {
             panels,
             from_file,
             kind,
+            tufts,
             curves,
             motion,
             variants: Vec::new(),
