@@ -82,8 +82,10 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
     let flat = cloth.weave.sized();
     let nodes = cloth.cell.nodes;
     let firm = holds_its_turns(cloth);
-    let taken = if firm { 0 } else { taken(cloth) };
-    let weaves = (!firm).then(|| [false, true].map(|right| edge_weave(cloth, right, taken, hem)));
+    // Both sides are as wide: theirs is one weave, begun elsewhere.
+    let spacing = if firm { 0.0 } else { edge_spacing(cloth) };
+    let taken = if firm { 0 } else { taken(cloth, spacing) };
+    let weaves = (!firm).then(|| [false, true].map(|right| edge_weave(cloth, right, taken, hem, spacing)));
     let edges = weaves.as_ref().map(|weaves| [0, 1].map(|side| Edge::new(cloth, &weaves[side], side == 1, taken)));
     if let Some(edges) = &edges {
         warps.retain(|s| (taken..cloth.count[0] - taken).contains(&s.index));
@@ -157,20 +159,42 @@ fn holds_its_turns(cloth: &Cloth<'_>) -> bool {
 }
 
 /// Warps of each side in whose place selvedges are, so that the cloth stays as wide; at least one is left between them.
-fn taken(cloth: &Cloth<'_>) -> u32 {
-    let spacing = edge_weave(cloth, true, 0, 0).warp_spacing.unwrap_or(cloth.cell.spacing[0]);
+fn taken(cloth: &Cloth<'_>, spacing: f64) -> u32 {
     let taken = (f64::from(ENDS) * spacing / cloth.cell.spacing[0]).round() as u32;
     taken.min((cloth.count[0] - 1) / 2)
 }
 
-/// The weave of a selvedge beside the warps that are not `taken`, with the picks of the cloth. `hem` picks come before the first.
-fn edge_weave(cloth: &Cloth<'_>, right: bool, taken: u32, hem: u32) -> Weave {
+/// Whether picks are so close that two lie in one shed of a selvedge.
+fn is_rib(cloth: &Cloth<'_>) -> bool {
+    cloth.cell.spacing[1] < RIB * (cloth.weave.warp_radius + cloth.weave.weft_radius)
+}
+
+/// A weave of the cloth's yarns with its picks.
+fn with_picks(cloth: &Cloth<'_>, draft: Draft, warp_spacing: Option<f64>) -> Weave {
+    let picks = Threads { thickness: Vec::new(), spacing: cloth.weave.threads[1].spacing.clone() };
+    Weave {
+        draft,
+        warp_spacing,
+        weft_spacing: Some(cloth.cell.spacing[1]),
+        cover: None,
+        crimp: None,
+        threads: [Threads::default(), picks],
+        ..cloth.weave.clone()
+    }
+}
+
+/// Distance of the warps of a selvedge: a little more than that at which they jam.
+fn edge_spacing(cloth: &Cloth<'_>) -> f64 {
+    let jammed = with_picks(cloth, Draft::selvedge(if is_rib(cloth) { 2 } else { 1 }, 1, false), None);
+    SLACK * UnitCell::relax(&jammed.draft, &jammed.options()).spacing[0]
+}
+
+/// The weave of a selvedge beside the warps that are not `taken`, its own `spacing` apart. `hem` picks come before the first.
+fn edge_weave(cloth: &Cloth<'_>, right: bool, taken: u32, hem: u32, spacing: f64) -> Weave {
     let weave = cloth.weave;
-    let pick = cloth.cell.spacing[1];
-    let rib = pick < RIB * (weave.warp_radius + weave.weft_radius);
     // The weft turns right after even picks, left after odd ones; there the sheds of a rib must change.
     let first = hem as usize + usize::from(right);
-    let draft = |inverted| Draft::selvedge(if rib { 2 } else { 1 }, first, inverted);
+    let draft = |inverted| Draft::selvedge(if is_rib(cloth) { 2 } else { 1 }, first, inverted);
     // Most yarns change sides where the cloth begins: floats end there.
     let (own, beside) = if right { (0, cloth.count[0] - 1 - taken) } else { (ENDS as usize - 1, taken) };
     let changes = |draft: &Draft| {
@@ -179,18 +203,7 @@ fn edge_weave(cloth: &Cloth<'_>, right: bool, taken: u32, hem: u32) -> Weave {
     };
     let [straight, inverted] = [false, true].map(draft);
     let draft = if changes(&straight) < changes(&inverted) { inverted } else { straight };
-    let picks = Threads { thickness: Vec::new(), spacing: weave.threads[1].spacing.clone() };
-    let free = Weave {
-        draft,
-        warp_spacing: None,
-        weft_spacing: Some(pick),
-        cover: None,
-        crimp: None,
-        threads: [Threads::default(), picks],
-        ..weave.clone()
-    };
-    let spacing = UnitCell::relax(&free.draft, &free.options()).spacing[0];
-    Weave { warp_spacing: Some(SLACK * spacing), ..free }
+    with_picks(cloth, draft, Some(spacing))
 }
 
 /// The warps of a selvedge and their part of the wefts.
