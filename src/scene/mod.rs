@@ -513,12 +513,17 @@ pub fn bounds(fabrics: &[Fabric]) -> Option<(DVec3, DVec3)> {
     fabrics.par_iter().flat_map(|f| &f.curves).filter_map(of_curve).reduce_with(joined)
 }
 
-/// Moves curves by a transform whose scale is the same along all axes; radii grow with it.
+/// Moves curves by a transform whose scale is the same along all axes; radii grow with it, and short axes of pressed sections
+/// turn with it.
 pub fn transform_curves(curves: &mut [(Curve, Vec<f64>)], by: &DAffine3) {
     let scale = by.matrix3.x_axis.length();
     curves.par_iter_mut().for_each(|(curve, radii)| {
         for p in &mut curve.points {
             *p = by.transform_point3(*p);
+        }
+        // Their length is a ratio.
+        for axis in curve.flattening.iter_mut().flatten() {
+            *axis = by.transform_vector3(*axis) / scale;
         }
         if scale != 1.0 {
             for r in radii {
@@ -526,4 +531,28 @@ pub fn transform_curves(curves: &mut [(Curve, Vec<f64>)], by: &DAffine3) {
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    #[test]
+    fn short_axes_of_sections_turn_with_their_yarn() {
+        let points = vec![DVec3::ZERO, DVec3::X, 2.0 * DVec3::X];
+        let flattening = Some(vec![0.5 * DVec3::Z; 3]);
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
+        let mut curves = [(curve, vec![1.0; 3])];
+        // x becomes y, y becomes z and z becomes x.
+        let turn = DQuat::from_axis_angle(DVec3::ONE.normalize(), std::f64::consts::TAU / 3.0);
+        let by = DAffine3::from_scale_rotation_translation(DVec3::splat(3.0), turn, DVec3::new(4.0, 5.0, 6.0));
+        transform_curves(&mut curves, &by);
+        let [(curve, radii)] = &curves;
+        assert!(curve.points[1].abs_diff_eq(DVec3::new(4.0, 8.0, 6.0), 1e-12), "{}", curve.points[1]);
+        let axes = curve.flattening.as_ref().unwrap();
+        assert!(axes.iter().all(|axis| axis.abs_diff_eq(0.5 * DVec3::X, 1e-12)), "{axes:?}");
+        assert_eq!(*radii, [3.0; 3]);
+    }
 }
