@@ -168,18 +168,23 @@ mod tests {
     #[test]
     fn an_even_stream_spreads_its_first_numbers_over_the_samples() {
         let n = 64;
-        let mut taken = [[0; 64]; 6];
+        // Six numbers of a branch that begins behind the first one, and then those that are left.
+        let mut taken = [[0; 64]; 11];
         for i in 0..n {
             let mut sampler = Sampler::new(3, 17, 5, i);
             sampler.set = 9;
             let mut stream = sampler.even_stream();
-            for strata in &mut taken {
-                strata[(stream.next() * n as f32) as usize] += 1;
+            let first = stream.next();
+            let mut branch = stream.branch();
+            let later = (0..10).map(|k| if k < 6 { branch.next() } else { stream.next() });
+            for (strata, number) in taken.iter_mut().zip(std::iter::once(first).chain(later)) {
+                strata[(number * n as f32) as usize] += 1;
             }
-            assert_eq!(sampler.position(), 10, "the same numbers are not drawn again");
+            assert_eq!(sampler.position(), 11, "the same numbers are not drawn again");
         }
         for (number, strata) in taken.iter().enumerate() {
-            assert_eq!(strata.iter().all(|&count| count == 1), number < 4, "number {number}: {strata:?}");
+            let even = (0..5).contains(&number) || (7..10).contains(&number);
+            assert_eq!(strata.iter().all(|&count| count == 1), even, "number {number}: {strata:?}");
         }
     }
 
