@@ -365,7 +365,7 @@ fn overlap_in_words(o: &Overlap) -> String {
         return "no yarn comes near another".to_owned();
     }
     format!(
-        "{:.2} % of their length overlaps by more than {:.0} % of the diameter; centre lines come within {:.3} diameters",
+        "{:.2} % of their length overlaps by more than {:.0} % of the diameter; strands come within {:.3} diameters (they touch at 1)",
         100.0 * o.share,
         100.0 * overlap::TOLERATED,
         o.nearest
