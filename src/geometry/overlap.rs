@@ -44,6 +44,8 @@ struct Piece {
     radius: f64,
     /// Along the section's long axis; its square is the difference of both squared half axes. Zero where it is round.
     wider: DVec3,
+    /// Radius of the circle that has the section's area.
+    round: f64,
     curve: u32,
     /// Distance from the yarn's start to the middle.
     along: f64,
@@ -53,11 +55,6 @@ impl Piece {
     /// Half of the section's short axis.
     fn short(&self) -> f64 {
         (self.radius * self.radius - self.wider.length_squared()).max(0.0).sqrt()
-    }
-
-    /// Radius of the circle that has the section's area.
-    fn round(&self) -> f64 {
-        (self.radius * self.short()).sqrt()
     }
 
     fn is_round(&self) -> bool {
@@ -74,8 +71,8 @@ fn between_pressed(a: &Piece, b: &Piece, way: DVec3) -> f64 {
     const SETTLED: f64 = 1e-4;
     let (high_a, high_b) = (a.short().powi(2), b.short().powi(2));
     let reach = |high: f64, wider: DVec3, n: DVec3| (high * n.length_squared() + wider.dot(n).powi(2)).sqrt();
-    let both = a.round() + b.round();
-    let mut s = a.round() / both;
+    let both = a.round + b.round;
+    let mut s = a.round / both;
     for round in 1.. {
         // (1 - s) A + s B is `even` times the identity, and u u' + v v'.
         let even = ((1.0 - s) * high_a + s * high_b).max(1e-300);
@@ -135,7 +132,10 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
             let round = a.is_round() && b.is_round();
             // Farther than what was found already, however they lie: sections reach no farther than their radii.
             let least = (away - half - 0.5 * b.from.distance(b.to)) / both;
-            if if round { least > best } else { least > 1.0 && best < 1.0 } {
+            let rounds = a.round + b.round;
+            let nearest_pressed = |gap: f64| 1.0 + gap / rounds;
+            let hopeless = if round { least > best } else { nearest_pressed((least - 1.0) * both) > best };
+            if hopeless || best <= 0.0 {
                 return;
             }
             if a.curve == b.curve {
@@ -145,7 +145,12 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
                 }
             }
             let between = nearest(a.from, a.to, b.from, b.to).between;
-            best = best.min(if round { between.length() / both } else { between_pressed(a, b, between) });
+            let length = between.length();
+            if round {
+                best = best.min(length / both);
+            } else if nearest_pressed(length - both) <= best {
+                best = best.min(between_pressed(a, b, between));
+            }
         });
         best as f32
     };
@@ -196,14 +201,17 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
             let next = chain.at(segment, step as f64 / steps as f64).at;
             let way = next.truncate() - here.truncate();
             let (length, radius, u) = (way.length(), 0.5 * (here.w + next.w), (step as f64 - 0.5) / steps as f64);
-            out.push(Piece {
+            let wider = wider(segment, u, way, radius).unwrap_or(DVec3::ZERO);
+            let piece = Piece {
                 from: here.truncate(),
                 to: next.truncate(),
                 radius,
-                wider: wider(segment, u, way, radius).unwrap_or(DVec3::ZERO),
+                wider,
+                round: radius,
                 curve: index,
                 along: along + 0.5 * length,
-            });
+            };
+            out.push(Piece { round: (radius * piece.short()).sqrt(), ..piece });
             along += length;
             here = next;
             if out.len() > MOST_PIECES {
