@@ -7,6 +7,7 @@ use super::contact::{PointGrid, Walk, nearest};
 use crate::geometry::{
     chain::Chain,
     curve::{Basis, Curve},
+    yarn_frame::NEARLY_ROUND,
 };
 
 /// How far yarns run into each other. Diameters are those of round yarns with the same area.
@@ -30,8 +31,6 @@ pub const TOLERATED: f64 = 0.05;
 const ALONG: f64 = 2.0;
 /// Length of the pieces that are compared, in diameters.
 const PIECE: f64 = 0.35;
-/// A section whose axes differ by less is round.
-const NEARLY_ROUND: f64 = 0.9999;
 /// More pieces are not compared: 1.5 GB.
 const MOST_PIECES: usize = 1 << 24;
 
@@ -185,7 +184,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
         // An axis has no sign.
         let to = if from.dot(to) < 0.0 { -to } else { to };
         let ratio = from.length() + u * (to.length() - from.length());
-        if ratio > NEARLY_ROUND {
+        if ratio > f64::from(NEARLY_ROUND) {
             return None;
         }
         let long = along.cross(from.lerp(to, u)).try_normalize()?;

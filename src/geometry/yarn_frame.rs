@@ -31,7 +31,7 @@ pub struct YarnFrame {
 /// [`YarnFrame::flattening`] of a round yarn.
 pub const ROUND: Vec2 = Vec2::X;
 /// A section whose axes differ by less is round.
-const NEARLY_ROUND: f32 = 0.9999;
+pub(super) const NEARLY_ROUND: f32 = 0.9999;
 
 impl YarnFrame {
     /// The point of the world at `at` of the round section that this one was pressed from, in yarn radii along `normal`

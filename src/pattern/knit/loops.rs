@@ -202,8 +202,9 @@ impl Loops {
             Closing::Drawn => maker.draw_together(),
         }
         // Wales of both kinds that go on to the edge fold.
-        let purls = |row: &[Stitch]| row.iter().map(|s| s.purl).collect::<Vec<_>>();
-        let goes_on = |next: &[Stitch]| rows.last().is_some_and(|last| purls(last) == purls(next));
+        let goes_on = |next: &[Stitch]| {
+            rows.last().is_some_and(|last| last.iter().map(|s| s.purl).eq(next.iter().map(|s| s.purl)))
+        };
         let is_mixed = |next: &[Stitch]| next.iter().any(|s| s.purl != next[0].purl);
         Self { ribbed: next.is_some_and(|next| goes_on(next) && is_mixed(next)), ..maker.finish() }
     }

@@ -27,7 +27,7 @@ const FORWARD_TAIL: f32 = 1e-4;
 /// Fibres to which light is followed one by one. What meets more goes on along a straight way, in one wider lobe.
 const FOLLOWED: usize = 4;
 /// Below such a share of what the first fibre passes on, light is followed farther by chance only: where light is sampled at
-/// the vertex, and where it is not. There the way on is one draw in either case, and costs no noise; here less of it is seen.
+/// the vertex, which sees all of F, and where it is not. There a path takes one way on whether F ends before or is not chosen.
 const LITTLE: [f32; 2] = [0.25, 1.0];
 /// The most stretches of plies that are told apart on a way out.
 const STRETCHES: usize = 16;

@@ -252,10 +252,10 @@ impl<'a> Laying<'a> {
             let mut own = pieces[c].clone();
             for (k, ((_, visit), piece)) in course.visits.iter().zip(&mut own).enumerate() {
                 let Visit::Loop(i) = visit else { continue };
-                let through_last = self.through_last(course, k, piece);
                 let own_side = self.loops.loops[*i as usize].side;
                 let field = fields.iter().find(|(layer, _)| *layer == own_side);
                 let (true, Some((_, [heads, feet, legs]))) = (is_closed(visit), field) else { continue };
+                let through_last = self.through_last(course, k, piece);
                 for (n, (place, grid)) in piece.places.iter_mut().zip(&piece.grid).enumerate() {
                     let below = heads.at(place.at);
                     let line = self.loops.up_at(course.row + 1, place.at);

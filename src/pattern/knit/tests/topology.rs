@@ -331,18 +331,24 @@ pub(super) fn stitches_of(piece: &Knit, made: &Knitted, yarn: usize, turns: bool
     stitches
 }
 
+/// How a loop's yarn passes the one that it is drawn through, on its way there and on its way back.
+fn held(stitches: &Stitches, (r, k): (i32, i32)) -> [i32; 2] {
+    let of = |r: i32, k: i32| stitches[&(r, k)].as_slice();
+    let ring = [of(r - 1, k), &of(r - 1, k + 1)[..1]].concat();
+    let [before, own, after] = [k - 1, k, k + 1].map(|k| of(r, k));
+    let half = own.len() / 2;
+    let to = [&before[before.len() / 2..], &own[..=half]].concat();
+    let from = [&own[half..], &after[..=after.len() / 2]].concat();
+    [threaded(&ring, &to), threaded(&ring, &from)]
+}
+
 /// Stitches that are not drawn through what the chart says, away from the sides.
 fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
     let (rows, stitches) = (piece.worked().unwrap(), yarn_of_stitches(piece, true));
     let is_drawn = |r: i32, k: i32| {
-        let [before, own, after] = [k - 1, k, k + 1].map(|k| stitches[&(r, k)].as_slice());
-        let ring = [&stitches[&(r - 1, k)][..], &stitches[&(r - 1, k + 1)][..1]].concat();
-        let half = own.len() / 2;
-        let to = [&before[before.len() / 2..], &own[..=half]].concat();
-        let from = [&own[half..], &after[..=after.len() / 2]].concat();
         // Cast-on loops are twisted.
         let sign = if rows[r as usize][k as usize].purl == (r > 0) { -1 } else { 1 };
-        [threaded(&ring, &to), threaded(&ring, &from)] == [sign, -sign]
+        held(&stitches, (r, k)) == [sign, -sign]
     };
     let all = (0..rows.len() as i32).flat_map(|r| (2..piece.stitches as i32 - 2).map(move |k| (r, k)));
     all.filter(|&(r, k)| !is_drawn(r, k)).collect()
@@ -366,20 +372,10 @@ fn pieces_are_drawn_through_each_other_from_edge_to_edge() {
     }
 }
 
-/// How often the bind-off passes each loop of the last row, away from the sides, on the way to its own loop there and on the way
-/// from it.
+/// How the bind-off passes each loop of the last row, away from the sides.
 fn bound_off(piece: &Knit) -> Vec<[i32; 2]> {
-    let (last, stitches) = (piece.rows as i32 - 1, yarn_of_stitches(piece, true));
-    let of = |r: i32, k: i32| stitches[&(r, k)].as_slice();
-    let held = |k: i32| {
-        let ring = [of(last, k), &of(last, k + 1)[..1]].concat();
-        let [before, own, after] = [k - 1, k, k + 1].map(|k| of(last + 1, k));
-        let half = own.len() / 2;
-        let to = [&before[before.len() / 2..], &own[..=half]].concat();
-        let from = [&own[half..], &after[..=after.len() / 2]].concat();
-        [threaded(&ring, &to), threaded(&ring, &from)]
-    };
-    (2..piece.stitches as i32 - 2).map(held).collect()
+    let stitches = yarn_of_stitches(piece, true);
+    (2..piece.stitches as i32 - 2).map(|k| held(&stitches, (piece.rows as i32, k))).collect()
 }
 
 #[test]
