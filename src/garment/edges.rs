@@ -179,6 +179,7 @@ pub(super) fn finish(poses: &[Pose], edgings: &[&Edging]) -> Vec<Vec<LaidYarn>> 
                     points,
                     closed: edging.way.closed,
                     radius,
+                    sections: Vec::new(),
                     kind: StrandKind::Course,
                     panel: edging.way.panel,
                     color: 0,

@@ -10,11 +10,12 @@ use super::{
     strain::{Shape, Shapes, Strain, UNSTRAINED},
 };
 use crate::{
+    geometry::curve::{Basis, Curve},
     math::{
         sampler::{Stream, hash2},
         warp::normal,
     },
-    pattern::StrandKind,
+    pattern::{StrandKind, tile::Section},
 };
 
 /// A yarn as it lies, a B-spline.
@@ -24,8 +25,10 @@ pub(crate) struct LaidYarn {
     pub points: Vec<DVec3>,
     /// Whether the last is followed by the first.
     pub closed: bool,
-    /// Outer radius, mm.
+    /// Outer radius where it is round, mm.
     pub radius: f64,
+    /// Its section at each control point; empty if it is round everywhere.
+    pub sections: Vec<Section>,
     /// What it is in the cloth.
     pub kind: StrandKind,
     /// On which panel it lies; a seam's is one of both.
@@ -34,6 +37,20 @@ pub(crate) struct LaidYarn {
     pub color: u16,
     /// At each control point its stitch and row from the panel's lower left corner; empty where it was not asked for.
     pub coordinates: Vec<[f32; 2]>,
+}
+
+impl LaidYarn {
+    /// It as a curve, with half of its section's longer axis at each control point.
+    pub(crate) fn into_curve(self) -> (Curve, Vec<f64>) {
+        let Self { points, closed, radius, sections, .. } = self;
+        let curve = |points, flattening| Curve { basis: Basis::BSpline, closed, points, radii: None, flattening };
+        if sections.is_empty() {
+            let radii = vec![radius; points.len()];
+            return (curve(points, None), radii);
+        }
+        let (axes, widths) = sections.iter().map(|s| (s.short_axis, s.half_width)).unzip();
+        (curve(points, Some(axes)), widths)
+    }
 }
 
 /// How loops differ from stitch to stitch and from row to row.
@@ -104,8 +121,10 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
         if axis == 0 && !lattice.ring { (repeat - (n % repeat) / 2) % repeat } else { 0 }
     });
     let lanes = Lanes::new(shapes, lattice);
-    let frames = sheets.iter().map(|sheet| {
+    let frames = sheets.iter().enumerate().map(|(frame, sheet)| {
         let one = |(axis, way): &(usize, Way)| {
+            let shape = shapes.of_line(*axis, way.runs[0].line + shift[1 - *axis]);
+            let pressed = shape.is_some_and(|shape| !shape.sections.is_empty());
             let mut layer = Layer {
                 sheet,
                 shapes,
@@ -114,6 +133,8 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
                 tension: laying.tension,
                 axis: *axis,
                 out: Vec::new(),
+                // They move with the yarn: one frame tells them.
+                sections: (pressed && frame == 0).then(Vec::new),
                 places: laying.coordinates.then(Vec::new),
             };
             let (closed, shape) = (way.runs[0].ring, layer.shape(way.runs[0].line));
@@ -122,6 +143,7 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
                 points: layer.out,
                 closed,
                 radius: shape.radius,
+                sections: layer.sections.unwrap_or_default(),
                 kind: shape.kind,
                 panel: lattice.panel,
                 color: way.color,
@@ -175,6 +197,7 @@ struct Layer<'a> {
     tension: Option<Tension>,
     axis: usize,
     out: Vec<DVec3>,
+    sections: Option<Vec<Section>>,
     places: Option<Vec<[f32; 2]>>,
 }
 
@@ -184,9 +207,21 @@ impl<'a> Layer<'a> {
         shape.expect("a tile has a yarn for each of its lines")
     }
 
-    /// A place in stitches across, rows up, mm out.
-    fn push(&mut self, p: Vec3, run: &Run) {
-        self.out.push(self.sheet.place(p).as_dvec3());
+    /// A place in stitches across, rows up, mm out, of control point k of stitch s.
+    fn push(&mut self, p: Vec3, run: &Run, (s, k): (usize, usize)) {
+        let at = self.sheet.place(p).as_dvec3();
+        self.out.push(at);
+        if self.sections.is_some() {
+            let shape = self.shape(run.line);
+            let stitch = s + self.shift[self.axis];
+            let Section { half_width, short_axis } = shape.section(stitch % self.shapes.counts[self.axis], k);
+            // Where the axis points to on the cloth as it lies, a part of the yarn's width away.
+            let [x, y] = self.sheet.lattice.stitch.to_array();
+            let step = (0.25 * half_width * short_axis / DVec3::new(x, y, 1.0)).as_vec3();
+            let there = self.sheet.place(p + step).as_dvec3();
+            let short_axis = (there - at).normalize_or(DVec3::Y) * short_axis.length();
+            self.sections.get_or_insert_default().push(Section { half_width, short_axis });
+        }
         if let Some(places) = &mut self.places {
             // Colours are by stitches of the panel: what reaches over the border is of the last one.
             let mut place = [p.x, p.y];
@@ -233,7 +268,7 @@ impl<'a> Layer<'a> {
         // The end of a run's last stitch is the start of one that is not there.
         let far_end = |layer: &mut Self, strain| {
             let place = layer.corner(run.line, run.last, strand, strain);
-            layer.push(place, run);
+            layer.push(place, run, (run.last, 0));
         };
         if run.backwards {
             far_end(self, here);
@@ -245,7 +280,7 @@ impl<'a> Layer<'a> {
             for k in 0..if floats.is_some() { FLOATING.len() } else { per_stitch } {
                 if let Some(strand) = floats {
                     let place = self.float(run, s, k, strand);
-                    self.push(place, run);
+                    self.push(place, run, (s, k));
                     continue;
                 }
                 // Strain changes evenly from the middle of a stitch to that of the next.
@@ -254,7 +289,7 @@ impl<'a> Layer<'a> {
                 let mixed = [0, 1, 2].map(|a| here[a] + share * (other[a] - here[a]));
                 let k = if run.backwards { per_stitch - 1 - k } else { k };
                 let place = self.place(run.line, s, k, mixed) + self.led(run.line, s, k, strand);
-                self.push(place, run);
+                self.push(place, run, (s, k));
             }
             (before, here) = (here, next);
         }
@@ -337,7 +372,7 @@ impl<'a> Layer<'a> {
             let mut p = from.lerp(to, share);
             p[self.axis] += bulge * out;
             p.z -= deep * out;
-            self.push(p, run);
+            self.push(p, run, (run.end(), 0));
         }
     }
 
@@ -373,9 +408,9 @@ impl<'a> Layer<'a> {
         };
         let places: Vec<Vec3> = way.iter().copied().map(place).collect();
         if first {
-            places.into_iter().rev().for_each(|p| self.push(p, run));
+            places.into_iter().rev().for_each(|p| self.push(p, run, (corner, 0)));
         } else {
-            places.into_iter().for_each(|p| self.push(p, run));
+            places.into_iter().for_each(|p| self.push(p, run, (corner, 0)));
         }
     }
 }

@@ -276,6 +276,11 @@ impl Garment {
         self.shapes[cloth].strands.iter().map(|s| s.kind).collect()
     }
 
+    /// Whether yarns of a cloth are pressed flat.
+    pub(crate) fn is_pressed(&self, cloth: usize) -> bool {
+        self.shapes[cloth].strands.iter().any(|s| !s.sections.is_empty())
+    }
+
     /// Lays the yarns in some frames, which have the first one's topology: the same yarns with the same points in each.
     /// Bodies are as many as frames, or none. `stranded` says for each cloth whose colours are yarns of their own which
     /// those are; of what is beyond its end none are. Notes tell what had to be moved.

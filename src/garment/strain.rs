@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::pattern::{
     StrandKind,
-    tile::{Tile, TileStrand},
+    tile::{Section, Tile, TileStrand},
 };
 
 use super::mesh::GarmentError;
@@ -57,9 +57,16 @@ pub(super) struct Shape {
     /// For each node all control points, shears of the same stretches side by side: stitches across and rows up from the
     /// tile's corner, mm out.
     control: Vec<Vec3>,
+    /// The section of each control point of a tile, the same at all strains: across, up and out; empty if it is round.
+    pub(super) sections: Vec<Section>,
 }
 
 impl Shape {
+    /// The section of control point k of a stitch of the tile.
+    pub(super) fn section(&self, stitch: usize, k: usize) -> Section {
+        self.sections[(stitch * self.per_stitch + k) % self.count]
+    }
+
     /// Along which axis of the panel it goes.
     pub(super) fn axis(&self) -> usize {
         usize::from(self.kind == StrandKind::Warp)
@@ -119,7 +126,8 @@ impl Shapes {
                 };
                 let control = pulled.iter().flat_map(|t| t.as_ref().map_or_else(|| as_cut.clone(), moved)).collect();
                 let index = strand.index as usize;
-                Shape { kind: strand.kind, index, radius: strand.radius, per_stitch, count, control }
+                let sections = strand.sections_at(&places);
+                Shape { kind: strand.kind, index, radius: strand.radius, per_stitch, count, control, sections }
             })
             .collect();
         let mut reach = DVec2::ZERO;

@@ -7,10 +7,7 @@ use glam::DVec2;
 
 use super::*;
 use crate::{
-    geometry::{
-        curve::{Basis, Curve},
-        overlap::{Overlap, overlap},
-    },
+    geometry::overlap::{Overlap, overlap},
     pattern::{draft::Draft, weave::Weave},
     testing::stockinette,
 };
@@ -74,23 +71,25 @@ fn overlapping(yarns: &[LaidYarn]) -> f64 {
 }
 
 fn run_into_each_other(yarns: &[LaidYarn]) -> Overlap {
-    let curves: Vec<(Curve, Vec<f64>)> = yarns
-        .iter()
-        .map(|y| {
-            let points = y.points.clone();
-            let radii = vec![y.radius; points.len()];
-            (Curve { basis: Basis::BSpline, closed: y.closed, points, radii: None, flattening: None }, radii)
-        })
-        .collect();
+    let curves: Vec<_> = yarns.iter().map(|y| y.clone().into_curve()).collect();
     overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap()
 }
 
 /// The parts of yarns whose control points lie within, as yarns of their own.
 fn within(yarns: &[LaidYarn], inside: &dyn Fn(DVec3) -> bool) -> Vec<LaidYarn> {
     let parts = |yarn: &LaidYarn| -> Vec<LaidYarn> {
-        let runs = yarn.points.chunk_by(|a, b| inside(*a) == inside(*b));
-        let part = |points: &[DVec3]| LaidYarn { points: points.to_vec(), closed: false, ..yarn.clone() };
-        runs.filter(|run| run.len() > 3 && inside(run[0])).map(part).collect()
+        let mut end = 0;
+        let runs = yarn.points.chunk_by(|a, b| inside(*a) == inside(*b)).map(|run| {
+            end += run.len();
+            end - run.len()..end
+        });
+        let part = |run: std::ops::Range<usize>| LaidYarn {
+            points: yarn.points[run.clone()].to_vec(),
+            sections: yarn.sections.get(run).unwrap_or_default().to_vec(),
+            closed: false,
+            ..yarn.clone()
+        };
+        runs.filter(|run| run.len() > 3 && inside(yarn.points[run.start])).map(part).collect()
     };
     yarns.iter().flat_map(parts).collect()
 }
@@ -349,4 +348,42 @@ fn what_cannot_be_laid_is_said() {
     huge.points[0] = DVec3::splat(1e200);
     let error = Garment::new(&huge, options(stockinette())).err().unwrap();
     assert!(error.problem.contains("area is no number"), "{error:?}");
+}
+
+#[test]
+fn woven_yarns_lie_as_flat_as_in_their_tile() {
+    let tile = woven();
+    let [least, most] = tile.strands.iter().flat_map(|s| &s.sections).fold([f64::MAX, 0.0], |[l, m], s| {
+        let ratio = s.short_axis.length();
+        [l.min(ratio), m.max(ratio)]
+    });
+    assert!(least < 0.7 && most < 0.9, "{least} {most}");
+    // On a half round, whose normal is known everywhere.
+    let radius = 50.0;
+    let mut text = String::new();
+    sheet(&mut text, "arc", 15, 10, 10.0, 0.0, &|u, v| {
+        let angle = u / radius;
+        DVec3::new(radius * angle.sin(), v, radius * angle.cos())
+    });
+    let mesh = GarmentMesh::parse(&text).unwrap();
+    let (_, yarns) = laid(&mesh, options(tile));
+    let pressed: Vec<&LaidYarn> = yarns.iter().filter(|y| !y.sections.is_empty()).collect();
+    assert!(pressed.len() > 50, "{}", pressed.len());
+    for yarn in pressed {
+        assert_eq!(yarn.sections.len(), yarn.points.len());
+        for (at, section) in yarn.points.iter().zip(&yarn.sections) {
+            let ratio = section.short_axis.length();
+            assert!((least - 1e-6..=most + 1e-6).contains(&ratio), "{ratio}");
+            // Its area is the round yarn's; widths at control points lie a little beyond those of the spline.
+            let area = section.half_width.powi(2) * ratio;
+            assert!((area / yarn.radius.powi(2) - 1.0).abs() < 0.1, "{area}");
+            // It stands on the cloth but for the yarn's own slope.
+            let normal = DVec3::new(at.x, 0.0, at.z).normalize();
+            assert!(section.short_axis.dot(normal) > 0.75 * ratio, "{section:?} {normal}");
+        }
+    }
+    // Away from what finishes its edges.
+    let inside = |p: DVec3| (p.y - 50.0).abs() < 40.0 && (p.x.atan2(p.z) - 1.5).abs() < 1.2;
+    let inner = within(&yarns, &inside);
+    assert!(inner.len() > 50 && overlapping(&inner) < 0.01, "{}", inner.len());
 }

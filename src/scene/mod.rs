@@ -291,11 +291,18 @@ pub struct Fabric {
     pub longest_segment: f64,
 }
 
-/// What is known of curves that a render has taken.
+/// What is known of curves that a fabric does not hold: a render has taken them, or a survey has not made them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Taken {
     points: usize,
     pressed: bool,
+}
+
+impl Taken {
+    /// Of curves that a survey does not make, whose points are told elsewhere.
+    pub(crate) fn not_made(pressed: bool) -> Self {
+        Self { points: 0, pressed }
+    }
 }
 
 /// The points of a fabric's curves at other times: for each time, for each curve, millimetres.

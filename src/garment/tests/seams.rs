@@ -1,7 +1,7 @@
 //! Panels that are sewn together.
 
 use super::*;
-use crate::geometry::spline::evaluate;
+use crate::geometry::{curve::Basis, spline::evaluate};
 
 /// Two panels that meet at 80 mm along an axis, sewn: the yarns of each panel, and those of the seam.
 pub(super) fn sewn(tile: &Tile, axis: usize, seam: SeamKind) -> [Vec<LaidYarn>; 3] {
@@ -174,15 +174,16 @@ fn slanting_seams_meet_as_straight_ones_do() {
     let mut wrong = Vec::new();
     // Edges that only meet are straight: where they slant rows end in steps.
     for kind in [SeamKind::Mattress, SeamKind::Overlock] {
-        // Measured: up to 0.32 and 0.03 of the yarn within 8 mm overlaps; straight 0.13 and 0.
-        for (tile, name, most) in [(stockinette(), "knit", 0.35), (woven(), "woven", 0.04)] {
+        // Measured: up to 0.32 and 0.06 of the yarn within 8 mm overlaps, by 7 % where it is woven; straight 0.13 and 0.04.
+        for (tile, name, most) in [(stockinette(), "knit", 0.35), (woven(), "woven", 0.07)] {
             for (lean, turn) in [(0.0, 0.0), (15.0, 0.0), (30.0, 0.0), (45.0, 0.0), (20.0, 35.0)] {
                 let seam = Leaning { lean: f64::to_radians(lean), turn: f64::to_radians(turn) };
                 let [first, second, threads] = seam.sewn(&tile, kind);
                 assert!(!threads.is_empty());
                 let [least, furthest] = seam.distances([&first, &second], &tile);
-                let cloth = run_into_each_other(&[first, second].concat()).share;
-                let told = format!("{kind:?} {name} {lean} {turn}: {least:.2} to {furthest:.2}, {cloth:.3}");
+                let cloth = run_into_each_other(&[first.clone(), second.clone()].concat()).share;
+                let sewn = run_into_each_other(&[first, second, threads].concat()).share;
+                let told = format!("{kind:?} {name} {lean} {turn}: {least:.2} to {furthest:.2}, {cloth:.3}, {sewn:.3}");
                 eprintln!("{told}");
                 if least < 0.95 || furthest > 2.0 || cloth > most {
                     wrong.push(told);

@@ -41,6 +41,8 @@ struct Made {
     /// How many cut tufts there are, and how many curves are strands of them.
     tufts: [usize; 2],
     curves: Vec<(Curve, Vec<f64>)>,
+    /// What is known of curves that are not made.
+    taken: Taken,
     /// Where their points are in the cloth, if that is known.
     coordinates: Option<FabricCoordinates>,
     /// Their colours, if they are not the fabric's.
@@ -66,6 +68,7 @@ impl Made {
             kind,
             tufts: [0; 2],
             curves,
+            taken: Taken::default(),
             coordinates,
             color: None,
             dyes: None,
@@ -99,7 +102,7 @@ impl FabricPlan {
                         let kind = base.named_or_own(panel.yarn.as_deref())?;
                         let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
                         let (color, motion, panels) = (panel.color, panel.motion, panel.panels);
-                        Some(Made { color, motion, panels, exact: true, ..made })
+                        Some(Made { color, motion, panels, taken: panel.taken, exact: true, ..made })
                     })
                     .collect::<Option<Vec<Made>>>()?
             }
@@ -230,7 +233,8 @@ impl Made {
         context: &Context<'_>,
         library: &Library,
     ) -> Option<Fabric> {
-        let Self { origin, panels, from_file, kind, tufts, curves, coordinates, color, dyes, motion, exact } = self;
+        let Self { origin, panels, from_file, kind, tufts, curves, taken, coordinates, color, dyes, motion, exact } =
+            self;
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -249,7 +253,7 @@ impl Made {
             variants: Vec::new(),
             material_indices: Vec::new(),
             uvs: Vec::new(),
-            taken: Taken::default(),
+            taken,
             phases,
             seed: keys.seed,
             basis: detail.basis.unwrap_or(of_file),

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        super::{FabricMotion, GarmentFacts},
+        super::{FabricMotion, GarmentFacts, Taken},
         Context,
         cloth::Detail,
         color::{ColorPlan, FabricCoordinates},
@@ -20,10 +20,7 @@ use super::{
 };
 use crate::{
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
-    geometry::{
-        curve::{Basis, Curve},
-        mesh::Mesh,
-    },
+    geometry::{curve::Curve, mesh::Mesh},
 };
 
 /// For each rule its colours where each is a yarn of its own, and the yarns in the library that they are.
@@ -36,6 +33,8 @@ pub(in crate::scene::load) struct MadePanels {
     pub(in crate::scene::load) yarn: Option<String>,
     pub(in crate::scene::load) color: Option<ColorPlan>,
     pub(in crate::scene::load) curves: Vec<(Curve, Vec<f64>)>,
+    /// What is known of curves that a survey leaves out.
+    pub(in crate::scene::load) taken: Taken,
     /// From which of the curves on they lie on the panel of a name.
     pub(in crate::scene::load) panels: Vec<(usize, String)>,
     pub(in crate::scene::load) coordinates: FabricCoordinates,
@@ -267,6 +266,7 @@ impl GarmentPlan {
                 yarn: rule.yarn,
                 color: rule.color,
                 curves: Vec::new(),
+                taken: Taken::not_made(garment.is_pressed(i)),
                 panels: Vec::new(),
                 coordinates: FabricCoordinates::laid(Vec::new(), garment.kinds(i), extent, stitch),
                 motion: FabricMotion { later: vec![Vec::new(); shown - 1], ..FabricMotion::default() },
@@ -311,11 +311,10 @@ impl GarmentPlan {
                 if own.is_empty() { own } else { yarns.iter().map(|y| own[usize::from(y.color)]).collect() };
             let curves = yarns
                 .into_iter()
-                .map(|LaidYarn { points, closed, radius, kind, coordinates, .. }| {
-                    kinds.push(kind);
-                    places.push(coordinates);
-                    let radii = vec![radius; points.len()];
-                    (Curve { basis: Basis::BSpline, closed, points, radii: None, flattening: None }, radii)
+                .map(|mut yarn| {
+                    kinds.push(yarn.kind);
+                    places.push(std::mem::take(&mut yarn.coordinates));
+                    yarn.into_curve()
                 })
                 .collect();
             out.push(MadePanels {
@@ -323,6 +322,7 @@ impl GarmentPlan {
                 yarn: rule.yarn,
                 color: rule.color,
                 curves,
+                taken: Taken::default(),
                 panels,
                 coordinates: FabricCoordinates::laid(places, kinds, extents[i], sizes[i].as_vec2().to_array())
                     .with_yarns(own),

@@ -23,7 +23,7 @@ use crate::{
         draft::Draft,
         knit::{self, Edges, Form, Knit},
         tile::Tile,
-        weave::{Impossible, Weave},
+        weave::{FLATTEN, Impossible, Weave},
     },
 };
 
@@ -40,7 +40,7 @@ const LOOSEST: f64 = 30.0;
 #[derive(Clone)]
 enum Pattern {
     Knit { chart: Chart, yarn_per_stitch: Option<f64>, stranding: Option<Stranding> },
-    Weave { draft: Draft, crimp: f64 },
+    Weave { draft: Draft, crimp: Option<f64>, flatten: f64 },
     File(PathBuf),
 }
 
@@ -202,9 +202,10 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
             chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, stranding }))
         }
         Some(1) => {
-            let crimp = table.f64_or("crimp", 0.5, Range::UNIT);
+            let crimp = table.f64("crimp", Range::UNIT);
+            let flatten = table.f64_or("flatten", FLATTEN, Range::between(1.0, 4.0));
             let (name, drafted) = weave::draft(&table, context);
-            drafted.map(|d| (name, Pattern::Weave { draft: d.draft, crimp }))
+            drafted.map(|d| (name, Pattern::Weave { draft: d.draft, crimp, flatten }))
         }
         Some(2) => {
             let path = table.required_string("path");
@@ -279,10 +280,10 @@ impl ClothPlan {
                     Err(error) => tell(error.problem, &error.hint),
                 }
             }
-            Pattern::Weave { draft, crimp } => {
+            Pattern::Weave { draft, crimp, flatten } => {
                 let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
                 let own = Weave::of(draft.clone(), radius);
-                let weave = Weave { warp_spacing, weft_spacing, crimp: Some(*crimp), ..own };
+                let weave = Weave { warp_spacing, weft_spacing, crimp: *crimp, flatten: *flatten, ..own };
                 match Tile::of_weave(&weave) {
                     Ok(tile) => Some(tile),
                     Err(Impossible::TooTight { warp, least }) => {
