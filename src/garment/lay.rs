@@ -365,13 +365,25 @@ impl<'a> Layer<'a> {
         let deep = if sewn { 1.5 * d } else { 0.0 } + d * layer as f32;
         let from = self.corner(run.line, run.end(), strand, UNSTRAINED);
         let to = self.corner(next.line, next.start(), beside, UNSTRAINED);
-        let ends = [0.12 / rows as f32, 1.0 - 0.12 / rows as f32];
+        let near = 0.12 / rows as f32;
         let between = (1..2 * rows).map(|i| i as f32 / (2 * rows) as f32);
-        for share in std::iter::once(ends[0]).chain(between).chain([ends[1]]) {
-            let out = if ends.contains(&share) { 0.62 } else { 1.0 };
+        let shares = std::iter::once(near).chain(between).chain([1.0 - near]);
+        // Where the next row ends further out the yarn goes there behind it and turns; from where it ends further in, back.
+        let further = (next.start() as f32 - run.end() as f32) * outward;
+        let aside = |i: f32| from[self.axis] + (to[self.axis] - from[self.axis]) * i / further.abs();
+        let steps = (1..further.abs() as usize).map(|i| i as f32);
+        let outermost = if further > 0.0 { to } else { from }[self.axis];
+        let round = shares.map(|share| {
+            let out = if share == near || share == 1.0 - near { 0.62 } else { 1.0 };
+            (share, outermost + bulge * out, deep * out)
+        });
+        let passing = steps.map(|i| (if further > 0.0 { near } else { 1.0 - near }, aside(i), deep.max(d)));
+        let places: Vec<(f32, f32, f32)> =
+            if further > 0.0 { passing.chain(round).collect() } else { round.chain(passing).collect() };
+        for (share, along, deep) in places {
             let mut p = from.lerp(to, share);
-            p[self.axis] += bulge * out;
-            p.z -= deep * out;
+            p[self.axis] = along;
+            p.z -= deep;
             self.push(p, run, (run.end(), 0));
         }
     }

@@ -61,13 +61,13 @@ impl Trim {
         let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, pressed));
         // Edges that only meet: as far as yarns reach, and half a yarn.
         let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
-        let meets = |beyond: DVec2| match knitted {
-            // Rows turn to the wrong side.
-            true => DVec2::new(0.56 * d, beyond.y * stitch.y + 0.51 * d),
+        let meets = match knitted {
+            // Rows turn to the wrong side; first rows are knitted on: their feet go into the heads of the last ones.
+            true => DVec2::new(0.56 * d, 0.0),
             false => ends + 0.51 * d,
         };
         let sewn = SeamKind::ALL.map(|kind| match &folds[kind as usize] {
-            None => shapes.beyond.map(meets),
+            None => [meets; 2],
             Some(fold) => [-turned_in(kind, fold, stitch, d); 2],
         });
         Self { stitch, repeat, knitted, diameter: d, free, sewn, folds, turn: turn(stitch.y, d) }

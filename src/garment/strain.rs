@@ -40,8 +40,6 @@ pub(super) struct Shapes {
     pub(super) diameter: f64,
     /// Between which heights the middles of yarns lie, mm.
     pub(super) heights: [f64; 2],
-    /// How far they lie beyond their rows and columns, below (to the left) and above (to the right), in stitches.
-    pub(super) beyond: [DVec2; 2],
 }
 
 /// One yarn of [`Shapes`].
@@ -137,20 +135,11 @@ impl Shapes {
             let beyond = shape.control.iter().map(|p| (own(p) - 1.0).max(-own(p))).fold(0.0, f64::max);
             reach[across] = reach[across].max(beyond);
         }
-        let (mut heights, mut beyond) = ([f64::INFINITY, f64::NEG_INFINITY], [DVec2::ZERO; 2]);
-        for shape in &strands {
-            let across = 1 - shape.axis();
-            for p in shape.joins() {
-                heights = [heights[0].min(p.z), heights[1].max(p.z)];
-                let own = p[across] - shape.index as f64;
-                beyond[0][across] = beyond[0][across].max(-own);
-                beyond[1][across] = beyond[1][across].max(own - 1.0);
-            }
-        }
+        let joins = || strands.iter().flat_map(Shape::joins);
+        let heights = joins().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.z), h.max(p.z)]);
         Ok(Self {
             counts,
             heights,
-            beyond,
             strands,
             nodes: nodes.map(|n| n.into_iter().map(|v| v as f32).collect()),
             reach,
