@@ -4,17 +4,19 @@
 //! Rendering", SIGGRAPH 2016: a distribution over the section, a helix, migration towards the axis and back, all on
 //! elliptical plies that wind around the yarn ([`Placement::Measured`]); or the packing that the aggregated model
 //! assumes, discs that do not overlap, even over the section ([`Placement::Regular`]), so that an error of the model can
-//! be told from a difference of the geometry. Fibres that leave the ply are in [`flyaway`].
+//! be told from a difference of the geometry. Where a section is pressed flat the discs of that packing give way to each other.
+//! Fibres that leave the ply are in [`flyaway`].
 //!
 //! Everything is a function of (seed, yarn, ply, fibre). A fibre of a closed yarn begins and ends at the seam, where the
 //! yarn is cut: fibres of real yarn end too.
 
 pub mod flyaway;
 pub mod packing;
+mod yielding;
 
 use std::{f64::consts::TAU, sync::OnceLock};
 
-use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
+use glam::{DMat2, DVec2, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -24,14 +26,16 @@ use super::{
     strand::Strands,
     tube::{Tubes, spline_through},
     yarn::{PlyParameters, PlyShape, YarnShape},
-    yarn_frame::YarnFrame,
+    yarn_frame::{Pressed, YarnFrame},
 };
 use crate::math::sampler::{Stream, hash2};
+use yielding::{Ellipse, Yielding};
 
 /// Where the fibres of a ply lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placement {
-    /// Discs that do not overlap, at random and even over the ply; rigid along it.
+    /// Discs that do not overlap, at random and even over the ply; rigid along it where its section is a circle, and giving
+    /// way to each other where it is not.
     Regular,
     /// As measured by Zhao et al. 2016.
     Measured(Distribution),
@@ -57,6 +61,8 @@ pub struct Distribution {
 pub const TOLERANCE: f64 = 0.02;
 /// Largest turn of a fibre or ply between two points, radians: beyond, the spline's error is no longer of fourth order.
 const LARGEST_TURN: f64 = 0.8;
+/// The same of a fibre against a section that is not a circle: where fibres give way to each other, they do so within less.
+const LARGEST_TURN_IN_ELLIPSE: f64 = 0.4;
 
 /// Places of a yarn by the way to them: what the curves wound around it are made from.
 struct Guide<'a> {
@@ -158,7 +164,13 @@ impl<'a> Plies<'a> {
             .map(|(p, s)| {
                 let tolerance = TOLERANCE * p.fiber_radius;
                 let own = f64::from(s.fiber_rate).abs().max(f64::from(shape.ply_rate - s.fiber_rate).abs());
-                step_for(own, p.radius, tolerance).min(step_for(f64::from(shape.ply_rate), p.distance, tolerance))
+                let helices =
+                    step_for(own, p.radius, tolerance).min(step_for(f64::from(shape.ply_rate), p.distance, tolerance));
+                // Against the yarn's short axis, and against the ply's.
+                let pressed = if strands.flattened() { f64::from(s.fiber_rate).abs() } else { 0.0 };
+                let elliptical =
+                    if s.stretch == Vec2::ONE { 0.0 } else { f64::from(s.fiber_rate - shape.ply_rate).abs() };
+                helices.min(LARGEST_TURN_IN_ELLIPSE / pressed.max(elliptical).max(1e-9))
             })
             .fold(f64::MAX, f64::min);
         Self { strands, plies, shape, longest_step, steps: OnceLock::new(), seed }
@@ -224,6 +236,14 @@ impl<'a> Plies<'a> {
             Placement::Regular => packing::hard_discs(parameters.fibers, parameters.fiber_radius / core, &mut stream),
             Placement::Measured(_) => Vec::new(),
         };
+        // On the circle that the ply's section becomes; then in the ply's own axes, then in the yarn's.
+        let turned = |along: f64| DVec2::from_angle(start + own_rate * along);
+        let knot = |along: f64, place: &YarnFrame, at: DVec2| {
+            let axis = self.axis(place, shape);
+            let in_ply = turned(along).rotate(at) / shape.stretch.as_dvec2();
+            point(place, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
+        };
+        let yielding = self.yielding_knots(&places, ply, &regular, turned, knot);
         let mut knots = Vec::with_capacity(places.len());
         (0..parameters.fibers as usize)
             .map(|fiber| {
@@ -235,16 +255,65 @@ impl<'a> Plies<'a> {
                     Placement::Measured(d) => d.wanderer(core, parameters.fiber_radius, own_rate, &mut stream),
                 };
                 knots.clear();
-                knots.extend(places.iter().map(|(along, place)| {
-                    // On the circle that the ply's section becomes; then in the ply's own axes, then in the yarn's.
-                    let q = DVec2::from_angle(start + own_rate * along).rotate(wander(*along));
-                    let axis = self.axis(place, shape);
-                    let in_ply = q / shape.stretch.as_dvec2();
-                    point(place, axis * (f64::from(shape.distance) + in_ply.x) + axis.perp() * in_ply.y)
-                }));
+                if yielding.is_empty() {
+                    knots.extend(places.iter().map(|(along, place)| knot(*along, place, wander(*along))));
+                } else {
+                    knots.extend_from_slice(&yielding[fiber * places.len()..][..places.len()]);
+                }
                 spline_through(&knots, |step| places[step].1.round_radius() * radius)
             })
             .collect()
+    }
+
+    /// The knots of a ply's fibres, one fibre after the other, with `centres` in core radii that give way to each other where the
+    /// ply's section is not a circle; nothing where it is one everywhere. `turned` is by what a packing is turned so far along the
+    /// yarn, as (cos, sin), and `knot` the place of a fibre in a circle, by yarn radii from the ply's axis.
+    fn yielding_knots(
+        &self,
+        places: &[(f64, YarnFrame)],
+        ply: usize,
+        centres: &[DVec2],
+        turned: impl Fn(f64) -> DVec2,
+        knot: impl Fn(f64, &YarnFrame, DVec2) -> Vec3,
+    ) -> Vec<Vec3> {
+        let (parameters, shape) = (&self.plies[ply], &self.shape.plies[ply]);
+        let steps = places.len();
+        if centres.is_empty() {
+            return Vec::new();
+        }
+        let ellipses: Vec<Option<Ellipse>> = places.iter().map(|(_, place)| self.ellipse(place, shape)).collect();
+        let Some(flattest) = ellipses.iter().flatten().copied().reduce(Ellipse::flatter) else { return Vec::new() };
+        let yielding = Yielding::new(centres, parameters.fiber_radius / parameters.radius, &flattest);
+        let mut knots = vec![Vec3::ZERO; centres.len() * steps];
+        let mut at = Vec::with_capacity(centres.len());
+        for (step, ((along, place), ellipse)) in places.iter().zip(&ellipses).enumerate() {
+            let Some(ellipse) = ellipse else {
+                for (fiber, centre) in centres.iter().enumerate() {
+                    knots[fiber * steps + step] = knot(*along, place, f64::from(shape.core_radius) * *centre);
+                }
+                continue;
+            };
+            yielding.squeeze(turned(*along), ellipse, &mut at);
+            let middle = place.point(shape.distance * self.axis(place, shape).as_vec2());
+            let radius = place.round_radius() * shape.radius;
+            let across = place.tangent.cross(place.normal);
+            for (fiber, at) in at.iter().enumerate() {
+                let off = radius * at.as_vec2();
+                knots[fiber * steps + step] = (middle + off.x * place.normal + off.y * across).into();
+            }
+        }
+        knots
+    }
+
+    /// What the circle of a ply's section is at a place; `None` if it is a circle.
+    fn ellipse(&self, place: &YarnFrame, ply: &PlyShape) -> Option<Ellipse> {
+        let pressed = Pressed::new(place.flattening);
+        if pressed.is_none() && ply.stretch == Vec2::ONE {
+            return None;
+        }
+        let real = |at: DVec2| pressed.map_or(at, |pressed| pressed.real(at.as_vec2()).as_dvec2());
+        let (axis, stretch) = (self.axis(place, ply), ply.stretch.as_dvec2());
+        Ellipse::of(DMat2::from_cols(real(axis / stretch.x), real(axis.perp() / stretch.y)))
     }
 
     /// For each segment of so many curves along each yarn, the material index of the yarn's segment below it; nothing if

@@ -128,22 +128,22 @@ fn put_down(count: u32, diameter: f64, stream: &mut Stream) -> Option<Vec<DVec2>
 /// How often a disc is put down before it counts as finding no room.
 const TRIES: u32 = 2000;
 
-/// A grid of cells as wide as a disc.
-struct DiscGrid {
+/// A grid of cells as wide as a disc, over the unit disc.
+pub(super) struct DiscGrid {
     cells: Vec<Vec<u32>>,
     side: i32,
     inverse: f64,
 }
 
 impl DiscGrid {
-    fn new(discs: usize, diameter: f64) -> Self {
+    pub(super) fn new(discs: usize, diameter: f64) -> Self {
         // No finer than a few discs to a cell, however thin they are.
         let width = diameter.max(2.0 / (discs as f64).sqrt().max(1.0));
         let side = (2.0 / width).ceil() as i32 + 2;
         Self { cells: vec![Vec::new(); (side * side) as usize], side, inverse: 1.0 / width }
     }
 
-    fn add(&mut self, disc: u32, at: DVec2) {
+    pub(super) fn add(&mut self, disc: u32, at: DVec2) {
         let cell = self.cell(at);
         self.cells[cell].push(disc);
     }
@@ -158,7 +158,7 @@ impl DiscGrid {
         (y * self.side + x) as usize
     }
 
-    fn near(&self, at: DVec2) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn near(&self, at: DVec2) -> impl Iterator<Item = usize> + '_ {
         let (x, y) = self.place(at);
         let range = |v: i32| (v - 1).max(0)..=(v + 1).min(self.side - 1);
         range(y)

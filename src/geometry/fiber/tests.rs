@@ -235,6 +235,46 @@ fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
 }
 
 #[test]
+fn fibers_of_a_pressed_yarn_give_way_to_each_other() {
+    let shape = touching_yarn(3, 33, 0.5, 0.25, -0.3);
+    let parameters = plies(3, 33, 0.5, -0.3);
+    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
+    let options = StrandOptions {
+        basis: Basis::CatmullRom,
+        tolerance: 0.01,
+        longest_segment: 2.0,
+        ply_rate: f64::from(shape.ply_rate),
+        symmetry: 1.0,
+        phases: vec![0.0],
+    };
+    // Of all plies together: pairs for each fibre that lie in each other by more than 2 %, so far between two knots.
+    let deep = |ratio: f64, u: f32| {
+        let flattening = Some(vec![DVec3::Y * ratio; points.len()]);
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points: points.clone(), radii: None, flattening };
+        let strands = Strands::new(&[(curve, vec![1.0; 30])], &options);
+        let made = Plies::new(&strands, &parameters, &shape, 1);
+        let fibers: Vec<Tubes> = (0..3).map(|ply| made.fibers(ply, Placement::Regular).0).collect();
+        let steps = (fibers[0].segments().len() / 33) as u32;
+        let (mut pairs, mut all) = (0, 0);
+        for step in 0..steps {
+            let at = |tubes: &Tubes, fiber: u32| {
+                let place = tubes.place(fiber * steps + step, u);
+                (place.centre.truncate(), place.radius)
+            };
+            let places: Vec<_> = fibers.iter().flat_map(|f| (0..33).map(move |fiber| at(f, fiber))).collect();
+            for (i, a) in places.iter().enumerate() {
+                pairs += places[..i].iter().filter(|b| a.0.distance(b.0) < 0.98 * (a.1 + b.1)).count();
+            }
+            all += places.len();
+        }
+        pairs as f64 / all as f64
+    };
+    let found = [deep(1.0, 0.0), deep(1.0, 0.5), deep(0.6667, 0.0), deep(0.6667, 0.25), deep(0.6667, 0.5)];
+    // Squeezed together with their section, every second fibre would.
+    assert!(found[..3].iter().all(|&pairs| pairs < 0.002) && found[3..].iter().all(|&pairs| pairs < 0.04), "{found:?}");
+}
+
+#[test]
 fn the_same_seed_makes_the_same_fibers() {
     let shape = touching_yarn(2, 20, 0.3, 0.2, -0.3);
     let parameters = plies(2, 20, 0.3, -0.3);
