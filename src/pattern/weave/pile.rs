@@ -5,11 +5,12 @@
 //! twisted of, which spread until they meet those of its neighbours.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeSet, HashMap},
     f64::consts::{PI, TAU},
 };
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, IVec2};
+use rayon::prelude::*;
 
 use super::{
     super::{
@@ -178,11 +179,71 @@ pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStra
             }
         }
     }
-    let opened = |yarn: Standing| match yarn.tuft {
-        Some(tuft) => tuft.open(&yarn.strand, yarn.strand.curve.flattening.is_some()),
-        None => vec![yarn.strand],
-    };
-    yarns.into_iter().flat_map(opened).collect()
+    let mut strands = Vec::new();
+    let mut legs = Vec::new();
+    let mut room: f64 = 0.0;
+    for yarn in yarns {
+        let Some(tuft) = yarn.tuft else {
+            strands.push(yarn.strand);
+            continue;
+        };
+        let opened = tuft.open(&yarn.strand, yarn.strand.curve.flattening.is_some());
+        legs.extend((strands.len()..strands.len() + opened.len()).map(|strand| (strand, tuft.legs)));
+        room = room.max(4.0 * tuft.spread[0] * tuft.spread[1] / opened.len() as f64);
+        strands.extend(opened);
+    }
+    share_room(&mut strands, &legs, room);
+    strands
+}
+
+/// Lets strands, which open around the leg that they are of, find their places among those of all others: each has `room` of
+/// the plane, and pushes those away that are nearer than in the closest packing of such rooms. `legs` are strands with the
+/// points of their first leg and of their last; they bend from the ground up.
+fn share_room(strands: &mut [PatternStrand], legs: &[(usize, [usize; 2])], room: f64) {
+    /// In which tips come to rest.
+    const ROUNDS: usize = 80;
+    /// How far a tip goes from where it stood, at most, in distances of neighbours.
+    const FURTHEST: f64 = 2.5;
+    /// They press on each other, or cracks would stay where tufts stood apart.
+    const PRESSED: f64 = 1.15;
+    let distance = PRESSED * (2.0 / 3f64.sqrt() * room).sqrt();
+    // The last point of each leg, and the points below it.
+    let ends: Vec<(usize, usize, usize)> = legs
+        .iter()
+        .flat_map(|&(strand, [first, last])| {
+            [(strand, 0, first), (strand, strands[strand].curve.points.len() - 1, last)]
+        })
+        .filter(|(.., points)| *points > 0)
+        .collect();
+    let stood: Vec<DVec2> = ends.iter().map(|&(strand, tip, _)| strands[strand].curve.points[tip].truncate()).collect();
+    let mut tips = stood.clone();
+    for _ in 0..ROUNDS {
+        let cell = |p: DVec2| (p / distance).floor().as_ivec2();
+        let mut cells: HashMap<IVec2, Vec<usize>> = HashMap::new();
+        tips.iter().enumerate().for_each(|(i, p)| cells.entry(cell(*p)).or_default().push(i));
+        let pushed = |(i, p): (usize, &DVec2)| {
+            let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| IVec2::new(x, y)));
+            let near = around.filter_map(|by| cells.get(&(cell(*p) + by))).flatten().filter(|&&k| k != i);
+            let push: DVec2 = near
+                .map(|&k| {
+                    let off = *p - tips[k];
+                    let apart = off.length();
+                    if apart < distance { 0.5 * (distance - apart) * off.normalize_or(DVec2::X) } else { DVec2::ZERO }
+                })
+                .sum();
+            // Half of it: each is pushed by several.
+            stood[i] + (*p + 0.5 * push - stood[i]).clamp_length_max(FURTHEST * distance)
+        };
+        tips = tips.par_iter().enumerate().map(pushed).collect();
+    }
+    for ((&(strand, tip, points), from), to) in ends.iter().zip(&stood).zip(&tips) {
+        let way = &mut strands[strand].curve.points;
+        for k in 0..points {
+            let i = if tip == 0 { k } else { tip - k };
+            let s = 1.0 - k as f64 / points as f64;
+            way[i] += ((*to - *from) * s * s).extend(0.0);
+        }
+    }
 }
 
 /// Raises the floats of a pile yarn. It is held where it lies on the other side of the cloth.

@@ -1,3 +1,5 @@
+use glam::DVec2;
+
 use super::{
     super::{bend::folded, draft::NAMES},
     *,
@@ -322,6 +324,27 @@ fn pile_stands_as_high_as_it_is_asked_to() {
             assert!(longest < 3.5, "{name}: a jump of {longest}");
         }
     }
+}
+
+/// Strands of neighbouring tufts share the room between them: no crack shows where one tuft ends and the next begins.
+#[test]
+fn cut_pile_is_closed() {
+    let weave = Weave { warps: Extent::Yarns(24), wefts: Extent::Yarns(24), ..weave("velvet") };
+    let cloth = weave.relax().unwrap();
+    let [p, q] = cloth.measures().size.map(|size| 0.5 * size - 3.0);
+    let is_tuft = |s: &PatternStrand| s.curve.points.iter().any(|p| p.z > 5.0);
+    let tips: Vec<DVec2> = (cloth.strands().iter().filter(|s| is_tuft(s)))
+        .flat_map(|s| [s.curve.points[0], s.curve.points[s.curve.points.len() - 1]].map(DVec3::truncate))
+        .collect();
+    let inside = tips.iter().filter(|at| at.x.abs() < p && at.y.abs() < q).count();
+    let apart = (2.0 / 3f64.sqrt() * 4.0 * p * q / inside as f64).sqrt();
+    // The place furthest from all tips, in distances of tips that stand evenly: in triangles that is 0.58.
+    let widest = (0..400).fold(0.0, |widest: f64, i| {
+        let at = DVec2::new(p * (f64::from(i % 20) / 9.5 - 1.0), q * (f64::from(i / 20) / 9.5 - 1.0));
+        widest.max(tips.iter().map(|tip| tip.distance(at)).fold(f64::MAX, f64::min))
+    });
+    eprintln!("{} tips, {:.3}", tips.len(), widest / apart);
+    assert!(widest < 0.85 * apart, "{widest} of {apart}");
 }
 
 /// Every fourth warp is twice as thick and has more room.
