@@ -164,7 +164,7 @@ impl Prepared<'_> {
             all.extend(slots.map(|ply| wound.flyaways(ply, flyaways)));
         }
         if mode == Mode::Yarn {
-            let scatterers = material::of_yarns(yarn, &fabric.variants, model);
+            let scatterers = material::of_yarns(yarn, &fabric.variants, model, strands.mean_flattening().recip());
             all.push(Piece::of_yarns(index, 0, strands, scatterers));
         }
         all
@@ -209,7 +209,8 @@ impl Wound<'_> {
         let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply);
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
-        let scatterers = material::of_plies(self.yarn, self.variants, model, ply, alone);
+        let scatterers =
+            material::of_plies(self.yarn, self.variants, model, ply, (alone, self.plies.mean_flattening().recip()));
         Piece::of_yarns(self.index, ply, strands, scatterers)
     }
 

@@ -23,14 +23,14 @@ pub enum Scatterers {
     Fibers(PerVariant<FiberBcsdf>),
 }
 
-/// A yarn with one of the models.
+/// A round yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
-    of_shape(shape_for(yarn, model), &materials(yarn), model)
+    of_shape(shape_for(yarn, model, 1.0), &materials(yarn), model)
 }
 
-/// Whole yarns. Variants whose plies are the same share one shape.
-pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model) -> PerVariant<YarnScatterer> {
-    let own = |of: &Yarn| Arc::new(shape_for(of, model));
+/// Whole yarns, pressed to axes of `stretch` : 1 on the mean. Variants whose plies are the same share one shape.
+pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model, stretch: f64) -> PerVariant<YarnScatterer> {
+    let own = |of: &Yarn| Arc::new(shape_for(of, model, stretch));
     let shape = own(yarn);
     let scatterer = |of: &Yarn| {
         let alike = of.plies == yarn.plies && of.placement == yarn.placement;
@@ -39,16 +39,16 @@ pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model) -> PerVaria
     PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
 }
 
-/// One ply of a yarn as a yarn of its own, whose shape alone is given.
+/// One ply of a yarn that is pressed to axes of `stretch` : 1 as a yarn of its own, whose shape `alone` is given.
 pub(super) fn of_plies(
     yarn: &Yarn,
     variants: &[Yarn],
     model: Model,
     ply: usize,
-    alone: YarnShape,
+    (alone, stretch): (YarnShape, f64),
 ) -> PerVariant<YarnScatterer> {
     let shape = Arc::new(match model {
-        Model::Aggregated => alone.packed(&yarn.packings()[ply..=ply]),
+        Model::Aggregated => alone.packed(&yarn.packings(stretch)[ply..=ply]),
         _ => alone,
     });
     let scatterer = |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], model);
@@ -71,9 +71,9 @@ pub(super) fn occluders(yarns: &PerVariant<YarnScatterer>) -> PerVariant<Occlude
 }
 
 /// A yarn's shape with all that a model asks of it: only the aggregated one looks at how fibres lie.
-fn shape_for(yarn: &Yarn, model: Model) -> YarnShape {
+fn shape_for(yarn: &Yarn, model: Model, stretch: f64) -> YarnShape {
     match model {
-        Model::Aggregated => yarn.shape().packed(&yarn.packings()),
+        Model::Aggregated => yarn.shape().packed(&yarn.packings(stretch)),
         _ => yarn.shape(),
     }
 }

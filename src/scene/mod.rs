@@ -226,16 +226,18 @@ impl Yarn {
         YarnShape::new(&self.plies, self.ply_twist, self.tilted)
     }
 
-    /// How the fibres of each ply lie. Measured from fibres placed for it: some milliseconds.
-    pub fn packings(&self) -> Vec<PlyPacking> {
+    /// How the fibres of each ply lie where the yarn's section is pressed to axes of `stretch` : 1. Measured from fibres placed for
+    /// it: some milliseconds.
+    pub fn packings(&self, stretch: f64) -> Vec<PlyPacking> {
         let mut packings: Vec<PlyPacking> = Vec::with_capacity(self.plies.len());
         for (k, ply) in self.plies.iter().enumerate() {
             let alike = |p: &PlyParameters| {
-                [p.radius, p.fiber_radius, f64::from(p.fibers)] == [ply.radius, ply.fiber_radius, f64::from(ply.fibers)]
+                let of = |p: &PlyParameters| [p.radius, p.aspect, p.fiber_radius, f64::from(p.fibers)];
+                of(p) == of(ply)
             };
             let packing = match self.plies[..k].iter().position(alike) {
                 Some(same) => packings[same],
-                None => self.placement.packing_of(ply, self.known_packing),
+                None => self.placement.packing_of(ply, self.known_packing, stretch),
             };
             packings.push(packing);
         }

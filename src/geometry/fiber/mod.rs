@@ -412,8 +412,8 @@ fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
 
 impl Placement {
     /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.005 or so,
-    /// and the regularity to some hundredths.
-    pub fn packing_of(self, ply: &PlyParameters, known: KnownPacking) -> PlyPacking {
+    /// and the regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
+    pub fn packing_of(self, ply: &PlyParameters, known: KnownPacking, stretch: f64) -> PlyPacking {
         if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
             return PlyPacking { crowding, regularity };
         }
@@ -421,7 +421,7 @@ impl Placement {
         let fiber = ply.fiber_radius / core;
         let measured = match self {
             _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, regularity: 1.0 },
-            Self::Regular => packing::measured(ply.fibers, fiber),
+            Self::Regular => packing::measured(ply.fibers, fiber, stretch_of_both(stretch, ply.aspect.recip())),
             Self::Measured(distribution) => PlyPacking { crowding: distribution.crowding(fiber), regularity: 0.0 },
         };
         PlyPacking {
@@ -429,6 +429,16 @@ impl Placement {
             regularity: known.regularity.unwrap_or(measured.regularity),
         }
     }
+}
+
+/// Long over short axis of a circle that is pressed twice, to these: the mean over all angles between, of half the trace of what
+/// the square of the circle becomes, (s + 1/s) / 2 for each.
+fn stretch_of_both(a: f64, b: f64) -> f64 {
+    if b == 1.0 {
+        return a;
+    }
+    let half_trace = 0.25 * (a + a.recip()) * (b + b.recip());
+    half_trace + (half_trace * half_trace - 1.0).max(0.0).sqrt()
 }
 
 impl Distribution {

@@ -76,7 +76,7 @@ impl Ellipse {
     }
 
     /// Semi-axes of the ellipse in which the centres of fibres of a radius stay, in radii of the ply.
-    fn core(&self, fiber: f64) -> DVec2 {
+    pub(super) fn core(&self, fiber: f64) -> DVec2 {
         (DVec2::new(self.long, self.long.recip()) - fiber).max(DVec2::splat(LEAST_AXIS))
     }
 }
