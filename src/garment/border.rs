@@ -38,6 +38,9 @@ pub(super) struct NearSeam {
     pub(super) first: bool,
 }
 
+/// Sine of the angle to rows or wales up to which an edge does not slant.
+const LEVEL: f64 = 0.1;
+
 /// The nearest place of an edge, and how far along it is, from 0 to 1.
 fn on(edge: &BorderEdge, from: DVec2) -> (DVec2, f64) {
     let [a, b] = edge.ends;
@@ -101,7 +104,10 @@ impl Border {
         let Some(Edge { border, margin, .. }) = nearest(from, near.iter().copied()) else { return (from, false) };
         let mut at = on(border, from).0;
         if *margin < 0.0 {
-            at += (border.ends[1] - border.ends[0]).normalize_or(DVec2::X).perp() * *margin;
+            let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
+            // Where it slants what is turned in ends in steps: nobody sees them, and no stitch is drawn out for them.
+            let slants = d.x.abs().min(d.y.abs()) > LEVEL;
+            at = if slants { from } else { at + d.perp() * *margin };
         }
         for _ in 0..4 {
             for Edge { border, margin, .. } in near.iter().filter(|e| e.margin >= 0.0) {

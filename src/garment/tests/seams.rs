@@ -174,8 +174,8 @@ fn slanting_seams_meet_as_straight_ones_do() {
     let mut wrong = Vec::new();
     // Edges that only meet are straight: where they slant rows end in steps.
     for kind in [SeamKind::Mattress, SeamKind::Overlock] {
-        // Measured: up to 0.32 and 0.06 of the yarn within 8 mm overlaps, by 7 % where it is woven; straight 0.13 and 0.04.
-        for (tile, name, most) in [(stockinette(), "knit", 0.35), (woven(), "woven", 0.07)] {
+        // Measured: up to 0.18 and 0.04 of the yarn within 8 mm overlaps, by 7 % where it is woven; straight 0.10 and 0.04.
+        for (tile, name, most) in [(stockinette(), "knit", 0.2), (woven(), "woven", 0.04)] {
             for (lean, turn) in [(0.0, 0.0), (15.0, 0.0), (30.0, 0.0), (45.0, 0.0), (20.0, 35.0)] {
                 let seam = Leaning { lean: f64::to_radians(lean), turn: f64::to_radians(turn) };
                 let [first, second, threads] = seam.sewn(&tile, kind);
