@@ -123,8 +123,6 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
     let lanes = Lanes::new(shapes, lattice);
     let frames = sheets.iter().enumerate().map(|(frame, sheet)| {
         let one = |(axis, way): &(usize, Way)| {
-            let shape = shapes.of_line(*axis, way.runs[0].line + shift[1 - *axis]);
-            let pressed = shape.is_some_and(|shape| !shape.sections.is_empty());
             let mut layer = Layer {
                 sheet,
                 shapes,
@@ -133,11 +131,12 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
                 tension: laying.tension,
                 axis: *axis,
                 out: Vec::new(),
-                // They move with the yarn: one frame tells them.
-                sections: (pressed && frame == 0).then(Vec::new),
+                sections: None,
                 places: laying.coordinates.then(Vec::new),
             };
             let (closed, shape) = (way.runs[0].ring, layer.shape(way.runs[0].line));
+            // They move with the yarn: one frame tells them.
+            layer.sections = (frame == 0 && !shape.sections.is_empty()).then(Vec::new);
             layer.way(way);
             LaidYarn {
                 points: layer.out,
@@ -211,16 +210,15 @@ impl<'a> Layer<'a> {
     fn push(&mut self, p: Vec3, run: &Run, (s, k): (usize, usize)) {
         let at = self.sheet.place(p).as_dvec3();
         self.out.push(at);
-        if self.sections.is_some() {
-            let shape = self.shape(run.line);
-            let stitch = s + self.shift[self.axis];
-            let Section { half_width, short_axis } = shape.section(stitch % self.shapes.counts[self.axis], k);
+        let pressed = self.sections.is_some().then(|| self.shape(run.line));
+        if let (Some(sections), Some(shape)) = (&mut self.sections, pressed) {
+            let Section { half_width, short_axis } = shape.section(s + self.shift[self.axis], k);
             // Where the axis points to on the cloth as it lies, a part of the yarn's width away.
             let [x, y] = self.sheet.lattice.stitch.to_array();
             let step = (0.25 * half_width * short_axis / DVec3::new(x, y, 1.0)).as_vec3();
             let there = self.sheet.place(p + step).as_dvec3();
             let short_axis = (there - at).normalize_or(DVec3::Y) * short_axis.length();
-            self.sections.get_or_insert_default().push(Section { half_width, short_axis });
+            sections.push(Section { half_width, short_axis });
         }
         if let Some(places) = &mut self.places {
             // Colours are by stitches of the panel: what reaches over the border is of the last one.

@@ -60,7 +60,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The section of control point k of a stitch of the tile.
+    /// The section of control point k of a stitch, counted from the corner of a tile.
     pub(super) fn section(&self, stitch: usize, k: usize) -> Section {
         self.sections[(stitch * self.per_stitch + k) % self.count]
     }

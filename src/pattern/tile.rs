@@ -4,6 +4,7 @@
 //! yarns and nothing of where they came from.
 
 use glam::{DVec2, DVec3};
+use rstar::RTree;
 
 use super::{
     StrandKind,
@@ -244,15 +245,22 @@ impl Tile {
     /// How far apart the centre lines of a warp and a weft are where they press on each other, if yarns are pressed flat:
     /// as round yarns of that diameter do, they lie on each other.
     fn closest_crossing(&self) -> Option<f64> {
-        let of = |axis: usize| self.strands.iter().filter(move |s| s.step[axis] != 0 && !s.sections.is_empty());
-        // Distances across the tile's border count too.
-        let near = |a: &DVec3, b: &DVec3| {
-            let off = (*a - *b).truncate();
-            (off - self.period * (off / self.period).round()).extend(a.z - b.z).length()
+        let of = |axis: usize| {
+            let pressed = self.strands.iter().filter(move |s| s.step[axis] != 0 && !s.sections.is_empty());
+            pressed.flat_map(|s| &s.points)
         };
-        let pairs = of(0).flat_map(|weft| of(1).map(move |warp| (weft, warp)));
-        let distances = pairs
-            .flat_map(|(weft, warp)| weft.points.iter().flat_map(move |a| warp.points.iter().map(move |b| near(a, b))));
+        let inside = |p: DVec3| (p.truncate() - self.period * (p.truncate() / self.period).floor()).extend(p.z);
+        let warps = RTree::bulk_load(of(1).map(|p| inside(*p).to_array()).collect());
+        // Distances across the tile's border count too.
+        let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| DVec2::new(f64::from(x), f64::from(y))));
+        let shifts: Vec<DVec3> = around.map(|tiles| (tiles * self.period).extend(0.0)).collect();
+        let distances = of(0).flat_map(|p| {
+            let nearest = |shift: &DVec3| {
+                let at = inside(*p) + *shift;
+                Some(at.distance(DVec3::from_array(*warps.nearest_neighbor(&at.to_array())?)))
+            };
+            shifts.iter().filter_map(nearest).collect::<Vec<_>>()
+        });
         distances.reduce(f64::min)
     }
 

@@ -44,6 +44,22 @@ fn arch(shape: &YarnShape) -> Strands {
     Strands::new(&[(curve, vec![0.5; 40])], &options)
 }
 
+/// A straight yarn along z of radius 1 that is pressed along y, to axes of 1 : `ratio`.
+fn pressed(shape: &YarnShape, ratio: f64) -> Strands {
+    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
+    let flattening = Some(vec![DVec3::Y * ratio; points.len()]);
+    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
+    let options = StrandOptions {
+        basis: Basis::CatmullRom,
+        tolerance: 0.01,
+        longest_segment: 2.0,
+        ply_rate: f64::from(shape.ply_rate),
+        symmetry: 1.0,
+        phases: vec![0.0],
+    };
+    Strands::new(&[(curve, vec![1.0; 30])], &options)
+}
+
 /// Where a point lies in the section of the nearest place of a yarn: the place, and the point in yarn radii from it.
 fn locate(strands: &Strands, point: Vec3A) -> (YarnFrame, DVec2) {
     let place = strands
@@ -196,18 +212,7 @@ fn flyaways_are_as_many_and_reach_as_far_as_asked() {
 fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
     let shape = touching_yarn(3, 33, 0.3, 0.25, -0.3);
     let parameters = plies(3, 33, 0.3, -0.3);
-    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
-    let flattening = Some(vec![DVec3::Y * 0.5; points.len()]);
-    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
-    let options = StrandOptions {
-        basis: Basis::CatmullRom,
-        tolerance: 0.01,
-        longest_segment: 2.0,
-        ply_rate: f64::from(shape.ply_rate),
-        symmetry: 1.0,
-        phases: vec![0.0],
-    };
-    let strands = Strands::new(&[(curve, vec![1.0; 30])], &options);
+    let strands = pressed(&shape, 0.5);
     let made = Plies::new(&strands, &parameters, &shape, 1);
     let (mut wide, mut high) = (0.0f32, 0.0f32);
     for ply in 0..3 {
@@ -238,20 +243,9 @@ fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
 fn fibers_of_a_pressed_yarn_give_way_to_each_other() {
     let shape = touching_yarn(3, 33, 0.5, 0.25, -0.3);
     let parameters = plies(3, 33, 0.5, -0.3);
-    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
-    let options = StrandOptions {
-        basis: Basis::CatmullRom,
-        tolerance: 0.01,
-        longest_segment: 2.0,
-        ply_rate: f64::from(shape.ply_rate),
-        symmetry: 1.0,
-        phases: vec![0.0],
-    };
     // Of all plies together: pairs for each fibre that lie in each other by more than 2 %, so far between two knots.
     let deep = |ratio: f64, u: f32| {
-        let flattening = Some(vec![DVec3::Y * ratio; points.len()]);
-        let curve = Curve { basis: Basis::CatmullRom, closed: false, points: points.clone(), radii: None, flattening };
-        let strands = Strands::new(&[(curve, vec![1.0; 30])], &options);
+        let strands = pressed(&shape, ratio);
         let made = Plies::new(&strands, &parameters, &shape, 1);
         let fibers: Vec<Tubes> = (0..3).map(|ply| made.fibers(ply, Placement::Regular).0).collect();
         let steps = (fibers[0].segments().len() / 33) as u32;

@@ -206,6 +206,9 @@ fn share_room(strands: &mut [PatternStrand], legs: &[(usize, [usize; 2])], room:
     const FURTHEST: f64 = 2.5;
     /// They press on each other, or cracks would stay where tufts stood apart.
     const PRESSED: f64 = 1.15;
+    if legs.is_empty() {
+        return;
+    }
     let distance = PRESSED * (2.0 / 3f64.sqrt() * room).sqrt();
     // The last point of each leg, and the points below it.
     let ends: Vec<(usize, usize, usize)> = legs
