@@ -71,7 +71,7 @@ impl Draft {
         Err(DraftError { problem, hint })
     }
 
-    fn from_fn(warps: usize, wefts: usize, over: impl Fn(usize, usize) -> bool) -> Self {
+    pub(super) fn from_fn(warps: usize, wefts: usize, over: impl Fn(usize, usize) -> bool) -> Self {
         let over = (0..wefts).flat_map(|weft| (0..warps).map(move |warp| (weft, warp))).map(|(i, j)| over(i, j));
         Self { warps, over: over.collect(), layers: 1, crossing: false, pile: None }
     }

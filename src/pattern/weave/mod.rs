@@ -8,6 +8,7 @@ mod edges;
 mod intrusion;
 mod minimize;
 mod pile;
+mod selvedge;
 mod unit_cell;
 
 #[cfg(test)]
@@ -357,7 +358,7 @@ impl Cloth<'_> {
         let diameter = self.weave.warp_radius + self.weave.weft_radius;
         let mut strands = pile::settle(strands(0).chain(strands(1)).collect(), diameter);
         if edges != Edges::Live {
-            strands = edges::selvedges(self, strands, hem);
+            strands = selvedge::selvedges(self, strands, hem);
         }
         if let Edges::Fringe(length) = edges {
             edges::fringe(self, &mut strands, length);

@@ -229,6 +229,18 @@ fn selvedges_make_one_weft_of_all() {
     }
 }
 
+/// The warp that floats at a side is relaxed with those beside it, and wefts lie flat on it where they turn.
+#[test]
+fn yarns_have_room_at_selvedges() {
+    for name in ["plain", "twill 2/1", "twill 2/2", "satin 5", "basket 2", "huck"] {
+        let weave = Weave { edges: Edges::Selvedge, ..weave(name) };
+        let strands = weave.strands().unwrap();
+        let curves = strands.iter().map(|s| (&s.curve, s.curve.radii.as_deref().unwrap()));
+        let measured = overlap(curves).unwrap();
+        assert!(measured.share < 0.02 && measured.deepest < 0.08, "{name}: {measured:?}");
+    }
+}
+
 #[test]
 fn wefts_turn_without_folding_into_themselves() {
     for name in NAMES {

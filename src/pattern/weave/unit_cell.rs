@@ -17,7 +17,6 @@ use self::energy::Energy;
 use super::{
     super::draft::Draft,
     intrusion::{Section, intrusion},
-    minimize::minimize,
 };
 
 /// Distance of yarns, in half their width, at which the reed is full and they lie side by side: what presses harder makes
@@ -28,6 +27,10 @@ const FULL: f64 = 2.04;
 const LARGE: usize = 1024;
 /// Most ends and picks of that part.
 const PART: usize = 24;
+/// Most steps of a relaxation.
+const MOST_STEPS: usize = 700;
+/// The same where most is at rest when it begins.
+const STEPS_BESIDE: usize = 150;
 /// Force on each yarn that packs the cloth, unless spacings are given.
 pub(super) const BEAT: f64 = 1.0;
 
@@ -93,29 +96,34 @@ impl UnitCell {
         let mut energy = Energy::new(draft, options, unit);
         let begin = Self::first_spacing(draft, options).map(|s| s.map(|s| s / unit));
         let mut x = energy.start(begin);
-        let alike = energy.alike();
-        let mut free = vec![0.0; alike.iter().max().map_or(0, |m| m + 1)];
-        // Alike by what starts alike.
-        x.iter().zip(&alike).for_each(|(v, &i)| free[i] = *v);
         let rest = energy.rest;
         // Round yarns first find their places, then all give way.
-        for (flat, most) in [(0.0, 400), (1.0, 700)] {
-            energy.rest = rest.map(|r| flat * r);
-            let (mut full, mut by_full) = (vec![0.0; x.len()], vec![0.0; x.len()]);
-            let mut value = |free: &[f64], by_free: &mut [f64]| {
-                full.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
-                let value = energy.value(&full, &mut by_full);
-                by_free.fill(0.0);
-                by_full.iter().zip(&alike).for_each(|(g, &i)| by_free[i] += g);
-                value
-            };
-            minimize(&mut free, &mut value, 1e-3, 0.3, most);
-        }
-        x.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
+        energy.rest = [0.0; 2];
+        energy.minimize(&mut x, &[], 400);
+        energy.rest = rest;
+        energy.minimize(&mut x, &[], MOST_STEPS);
+        Self::of(&energy, &x, options)
+    }
+
+    /// Relaxes one repeat of which some nodes are known about: of a `[side, yarn, node]`, and whether it stays there.
+    pub(super) fn relax_beside(
+        draft: &Draft,
+        options: &CellOptions,
+        known: impl Fn([usize; 3]) -> Option<(Node, bool)>,
+    ) -> Self {
+        let energy = Energy::new(draft, options, options.unit());
+        let mut x = energy.start(None);
+        let held = energy.begin_at(&mut x, options.unit(), known);
+        energy.minimize(&mut x, &held, STEPS_BESIDE);
+        Self::of(&energy, &x, options)
+    }
+
+    fn of(energy: &Energy<'_>, x: &[f64], options: &CellOptions) -> Self {
+        let unit = options.unit();
         Self {
-            spacing: energy.spacing(&x).map(|s| s * unit),
+            spacing: energy.spacing(x).map(|s| s * unit),
             nodes: options.nodes,
-            yarns: [0, 1].map(|side| energy.nodes_of(side, &x, unit)),
+            yarns: [0, 1].map(|side| energy.nodes_of(side, x, unit)),
         }
     }
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    super::super::draft::Draft,
+    super::{super::draft::Draft, minimize::minimize},
     CellOptions, Node,
     contact::{Gradient, Spheroid},
     full,
@@ -149,6 +149,50 @@ impl<'a> Energy<'a> {
                 x[straight + 1] = -r;
             }
         }
+    }
+
+    /// Puts nodes that are known, in lengths of which `unit` is one here, where they are; all others are as flat as at rest.
+    /// Gives which variables stay.
+    pub(super) fn begin_at(
+        &self,
+        x: &mut [f64],
+        unit: f64,
+        known: impl Fn([usize; 3]) -> Option<(Node, bool)>,
+    ) -> Vec<bool> {
+        let mut held = vec![false; x.len()];
+        for side in 0..2 {
+            for (yarn, node) in (0..self.count[side]).flat_map(|y| (0..self.length(side)).map(move |n| (y, n))) {
+                let at = self.at(side, yarn, node);
+                x[at + 2] = self.rest[side];
+                if let Some((node, stays)) = known([side, yarn, node]) {
+                    x[at] = node.aside / unit;
+                    x[at + 1] = node.height / unit;
+                    x[at + 2] = (node.axes[0] / unit / self.round(side, yarn)).ln().max(0.0);
+                    held[at..at + PER_NODE].fill(stays);
+                }
+            }
+        }
+        held
+    }
+
+    /// Makes the energy least by at most so many steps, where what is alike stays alike and what is `held`, if anything, as it
+    /// is.
+    pub(super) fn minimize(&self, x: &mut [f64], held: &[bool], most: usize) {
+        let alike = if held.is_empty() { self.alike() } else { (0..x.len()).collect() };
+        let mut free = vec![0.0; alike.iter().max().map_or(0, |m| m + 1)];
+        // Alike by what starts alike.
+        x.iter().zip(&alike).for_each(|(v, &i)| free[i] = *v);
+        let (mut full, mut by_full) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+        let mut value = |free: &[f64], by_free: &mut [f64]| {
+            full.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
+            let value = self.value(&full, &mut by_full);
+            by_full.iter_mut().zip(held).filter(|(_, held)| **held).for_each(|(g, _)| *g = 0.0);
+            by_free.fill(0.0);
+            by_full.iter().zip(&alike).for_each(|(g, &i)| by_free[i] += g);
+            value
+        };
+        minimize(&mut free, &mut value, 1e-3, 0.3, most);
+        x.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
     }
 
     /// The nodes of the yarns of a side.
