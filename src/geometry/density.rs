@@ -46,16 +46,20 @@ pub struct ChordFibers {
 impl PlyShape {
     /// The expected fibres on an untwisted chord whose signed distance from the ply's axis is `offset` (yarn radii, in
     /// the circle of [`Self::radius`]); `length` is how much of that circle a unit of the line passes, 1 for round plies; `thin`
-    /// how thick fibres are along the line, over their radius, 1 where the yarn is not pressed flat.
+    /// how thick fibres are along the line, over their radius, 1 where the yarn is not pressed flat; `wide` how thick they are across the
+    /// line in that circle, over their radius there, 1 as well.
     ///
     /// Exact for the density above: the number of centres within a fibre's radius of the line. (The paper's Eq. 2,
     /// d l sqrt(n / pi), lacks a factor of 1.128 / sqrt(d) against counted fibres.)
     #[inline]
-    pub fn chord(&self, offset: f32, length: f32, thin: f32) -> ChordFibers {
-        let inverse = 1.0 / self.core_radius;
-        let upper = Segment::new((offset + self.fiber_radius) * inverse);
-        let lower = Segment::new((offset - self.fiber_radius) * inverse);
-        let count = self.fibers * FRAC_1_PI / length;
+    pub fn chord(&self, offset: f32, length: f32, thin: f32, wide: f32) -> ChordFibers {
+        // Centres keep as far from the rim as fibres are thick: across the line, and along it.
+        let half_width = (self.fiber_radius * wide).min(0.999 * self.radius);
+        let core = self.radius - half_width;
+        let inverse = 1.0 / core;
+        let upper = Segment::new((offset + half_width) * inverse);
+        let lower = Segment::new((offset - half_width) * inverse);
+        let count = self.fibers * FRAC_1_PI / (length * wide);
         let mut even = upper.area() - lower.area();
         let mut ring = 0.0;
         if self.crowding > 0.0 {
@@ -65,8 +69,9 @@ impl PlyShape {
             even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper.cubic() - lower.cubic());
         }
         // The line meets a fibre whose centre lies up to a fibre's radius beside it: half of that on the mean.
-        let beside = (offset.abs() - 0.5 * self.fiber_radius).max(0.0);
-        let half = (self.core_radius * self.core_radius - beside * beside).max(0.0).sqrt().max(0.5 * self.fiber_radius);
+        let beside = ((offset.abs() - 0.5 * half_width).max(0.0) * inverse).min(1.0);
+        let along = (self.radius - self.fiber_radius / wide).max(0.0);
+        let half = ((1.0 - beside * beside).sqrt() * along).max(0.5 * self.fiber_radius);
         let half = half / length;
         let zone = (2.0 * thin * self.fiber_radius).min(half);
         ChordFibers { even: (count * even).max(0.0), ring: (count * ring).max(0.0), half, zone }
@@ -184,7 +189,7 @@ mod tests {
                 let (mut sum, mut moment) = (0.0, 0.0);
                 for i in 0..n {
                     let y = -1.0 + 2.0 * (i as f32 + 0.5) / n as f32;
-                    let count = f64::from(ply.chord(y, 1.0, 1.0).total()) * 2.0 / f64::from(n);
+                    let count = f64::from(ply.chord(y, 1.0, 1.0, 1.0).total()) * 2.0 / f64::from(n);
                     sum += count;
                     moment += count * f64::from(y * y);
                 }
@@ -193,8 +198,24 @@ mod tests {
                 let (core, fiber) = (f64::from(ply.core_radius), f64::from(ply.fiber_radius));
                 let want = (1.0 + f64::from(crowding)) * core * core / 4.0 + fiber * fiber / 3.0;
                 assert!((moment / sum / want - 1.0).abs() < 2e-3, "{fibers} {crowding}: {} {want}", moment / sum);
-                assert_eq!(ply.chord(1.5, 1.0, 1.0).total(), 0.0);
+                assert_eq!(ply.chord(1.5, 1.0, 1.0, 1.0).total(), 0.0);
             }
+        }
+    }
+
+    #[test]
+    fn fibers_of_pressed_plies_keep_their_width_across_a_line() {
+        // Across the short axis of a section of 2 : 1, and across the long one.
+        for wide in [0.5f32.sqrt(), 2.0f32.sqrt()] {
+            let ply = ply(70, 0.5, 0.05);
+            let n = 40_000;
+            let chord = |i: i32| ply.chord((2.0 * (i as f32 + 0.5) / n as f32 - 1.0) * ply.radius, 1.0, 1.0, wide);
+            let sum: f64 = (0..n).map(|i| f64::from(chord(i).total() * ply.radius) * 2.0 / f64::from(n)).sum();
+            let want = 2.0 * f64::from(ply.fiber_radius) * 70.0;
+            assert!((sum / want - 1.0).abs() < 1e-3, "{sum} {want}");
+            // The outermost fibres touch the rim, however wide they are.
+            let at = |share: f32| ply.chord(ply.radius - share * wide * ply.fiber_radius, 1.0, 1.0, wide).total();
+            assert!(at(0.0) < 1e-3 && at(0.5) > 0.3 * at(1.0) && at(1.0) > 0.5, "{} {} {}", at(0.0), at(0.5), at(1.0));
         }
     }
 
@@ -204,7 +225,7 @@ mod tests {
             for (fibers, density) in [(1, 0.5), (25, 0.1), (70, 0.5)] {
                 let ply = ply(fibers, density, crowding);
                 for i in 0..=40 {
-                    let chord = ply.chord(0.025 * i as f32 * ply.radius, 1.3, 1.0);
+                    let chord = ply.chord(0.025 * i as f32 * ply.radius, 1.3, 1.0, 1.0);
                     if chord.total() < 1e-6 {
                         continue;
                     }

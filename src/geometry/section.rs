@@ -243,7 +243,7 @@ impl<'a> Section<'a> {
             }
             let Passage { enter, exit, offset, .. } = passage;
             let length = passage.speed / self.cos;
-            let chord = ply.chord(passage.offset, length, self.thinness());
+            let chord = ply.chord(passage.offset, length, self.thinness(), self.squeeze() / self.rounded());
             let gaps = PlyGaps::new(ply.dead_zone(&chord, passage.offset, length));
             let fibers =
                 chord.total() * passage.share / self.cos * self.fibers_over_chord(shape, index, &way, &enter, &exit);

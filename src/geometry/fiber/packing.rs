@@ -138,7 +138,7 @@ fn regularity(sections: &[Vec<DVec2>], radius: f64, crowding: f64, stretch: f64)
             let length = (root * reach(across(kind))) as f32;
             let off = |line: usize| {
                 let at = offset(line) as f32;
-                let chord = ply.chord(at, length, thin);
+                let chord = ply.chord(at, length, thin, reach(across(kind)).recip() as f32);
                 let gaps = PlyGaps::new(ply.dead_zone(&chord, at, length));
                 let passes = gaps.unscattered(chord.total() / thin);
                 f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / lines).sqrt()

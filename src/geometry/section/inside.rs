@@ -58,6 +58,16 @@ impl Inside {
         Vec2::new(v.dot(self.x), v.dot(self.y))
     }
 
+    /// How thick fibres are across a line in the direction `w` of the section's frame, over their radius, in the circle that a
+    /// pressed section was.
+    #[inline]
+    pub fn wide(&self, w: Vec3A) -> f32 {
+        self.pressed.map_or(1.0, |pressed| {
+            let across = self.across(w);
+            pressed.stretch.sqrt() * across.length() / pressed.round(across).length().max(1e-12)
+        })
+    }
+
     /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
     #[inline]
     pub fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize) -> Vec3A {

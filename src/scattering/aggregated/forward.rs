@@ -336,12 +336,12 @@ impl Fiber {
     #[inline]
     fn follow_way(&self, view: &View<'_>, way: &Way, mut visit: impl FnMut(Stretch)) -> Ahead {
         let (yarn, spot, thin) = (view.yarn, &self.spot, view.section.thinness());
-        let shape = yarn.occluder().shape();
+        let (shape, wide) = (yarn.occluder().shape(), spot.inside.wide(way.w));
         let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, fibers: 0.0 };
         view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
             let optics = &yarn.plies[ahead.ply];
             let gaps = &optics.gaps;
-            let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin);
+            let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
             let fibers = way.tilt * (chord.ahead(-ahead.foot) - if own { gaps.dead_zone } else { 0.0 }).max(0.0);
             let through = if own { (-gaps.rate * fibers).exp() } else { gaps.unscattered(fibers) };

@@ -264,6 +264,7 @@ impl Node {
         // Light that goes on is inside its own fibre first; light that turns back is not.
         let hole = thin * optics.fiber_chord * 0.5 * (1.0 - ahead.x);
         let lead = thin * optics.lead;
+        let wide = spot.inside.wide(w);
         // Straight on, no other fibre lies within its own chord; aside, others do, as the mean medium has it.
         let alone = (0.5 * (1.0 - ahead.x)).powi(STRAIGHT_ON);
         let mut own = Rgb::ZERO;
@@ -279,7 +280,7 @@ impl Node {
                 }
                 return;
             }
-            let chord = ply.chord(way.offset, way.length, thin);
+            let chord = ply.chord(way.offset, way.length, thin, wide);
             if way.ply == spot.ply {
                 let (from, to) = ((way.foot - chord.half).max(0.0), way.foot + chord.half);
                 if to > 0.0 {
