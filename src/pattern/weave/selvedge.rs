@@ -40,17 +40,15 @@ const STUB: f64 = 0.6;
 /// close for that; these are as close as the picks let them be, and as many of the cloth's own are left out as stood there.
 pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32) -> Vec<PatternStrand> {
     let (mut warps, wefts): (Vec<_>, Vec<_>) = strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-    let half = cloth.cell.nodes / 2;
-    let from_crossing_to_crossing = |way: Vec<Point>| way[half..way.len() - half].to_vec();
-    let woven = (!holds_its_turns(cloth)).then(|| Plan::of(cloth));
-    let weave = woven.as_ref().map(|plan| plan.weave(cloth, hem));
-    let sides = woven.zip(weave.as_ref()).map(|(plan, weave)| Sides::new(cloth, plan, weave, hem));
+    let plan = (!holds_its_turns(cloth)).then(|| Plan::of(cloth));
+    let weave = plan.as_ref().map(|plan| plan.weave(cloth, hem));
+    let sides = plan.zip(weave.as_ref()).map(|(plan, weave)| Sides::new(cloth, plan, weave, hem));
     if let Some(sides) = &sides {
         warps = sides.warps(warps);
     }
     let row = |i: usize| match &sides {
         Some(sides) => sides.weft(i as u32, &points(&wefts[i])),
-        None => from_crossing_to_crossing(points(&wefts[i])),
+        None => from_crossing_to_crossing(&points(&wefts[i]), 0, cloth.cell.nodes).to_vec(),
     };
     let outermost = outermost(&warps);
     let radius = cloth.weave.weft_radius;
@@ -75,6 +73,12 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
     warps
 }
 
+/// A weft without so many warps at both sides.
+fn from_crossing_to_crossing(way: &[Point], without: u32, nodes: usize) -> &[Point] {
+    let off = without as usize * nodes + nodes / 2;
+    &way[off..way.len() - off]
+}
+
 /// The warps farthest to the left and to the right, and to which side each is.
 fn outermost(warps: &[PatternStrand]) -> [(f64, Vec<Point>); 2] {
     // Pile yarns are cut into pieces.
@@ -89,7 +93,10 @@ fn outermost(warps: &[PatternStrand]) -> [(f64, Vec<Point>); 2] {
 
 /// How far out the middle of a weft that turns around a warp is at a height, from `x`.
 fn reach((out, warp): &(f64, Vec<Point>), x: f64, y: f64, radius: f64) -> f64 {
-    let nearest = warp.iter().min_by(|a, b| (a.0.y - y).abs().total_cmp(&(b.0.y - y).abs()));
+    // Warps go up.
+    let above = warp.partition_point(|p| p.0.y < y);
+    let around = &warp[above.saturating_sub(1)..warp.len().min(above + 1)];
+    let nearest = around.iter().min_by(|a, b| (a.0.y - y).abs().total_cmp(&(b.0.y - y).abs()));
     nearest.map_or(0.0, |p| p.0.x - x + out * BESIDE * (p.1.max(radius) + radius))
 }
 
@@ -353,22 +360,20 @@ impl<'a> Sides<'a> {
         let Plan { taken, ends, reach, .. } = self.plan;
         let strand = self.cloth.strand(1, index, self.hem);
         let nodes = self.cloth.cell.nodes;
-        // Of the cloth as it is, from crossing to crossing.
-        let off = (taken + GIVING.min(reach)) as usize * nodes + nodes / 2;
-        let middle = &body[off..body.len() - off];
+        let middle = from_crossing_to_crossing(body, taken + GIVING.min(reach), nodes);
         let [left, right] = [false, true].map(|right| Side { way: self.moved(right, &strand), right, sides: self });
         let [from, to] = [&left, &right].map(|side| side.x(side.sides.own(side.right, 0)));
         if reach > 0 {
-            let mut way = left.between(from, middle[0].0.x);
+            let mut way = left.part(from, middle[0].0.x);
             way.pop();
             way.extend(middle);
-            way.extend(&right.between(middle[middle.len() - 1].0.x, to)[1..]);
+            way.extend(&right.part(middle[middle.len() - 1].0.x, to)[1..]);
             return way;
         }
         let [inner_left, inner_right] = [&left, &right].map(|side| side.x(side.sides.own(side.right, ends - 1)));
-        let mut way = left.between(from, inner_left);
+        let mut way = left.part(from, inner_left);
         join(&mut way, middle, nodes);
-        join(&mut way, &right.between(inner_right, to), nodes);
+        join(&mut way, &right.part(inner_right, to), nodes);
         way
     }
 }
@@ -403,7 +408,7 @@ impl Side<'_> {
     }
 
     /// From one place to another, both of them too.
-    fn between(&self, from: f64, to: f64) -> Vec<Point> {
+    fn part(&self, from: f64, to: f64) -> Vec<Point> {
         let step = self.way[1].0.x - self.way[0].0.x;
         let inside = (from + 0.5 * step)..(to - 0.5 * step);
         let points = self.way.iter().copied().filter(|p| inside.contains(&p.0.x));
