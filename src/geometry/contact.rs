@@ -34,6 +34,8 @@ pub(crate) fn nearest(p0: DVec3, p1: DVec3, q0: DVec3, q1: DVec3) -> Nearest {
 pub(crate) struct PointGrid {
     /// Cells per period along x and y, where there is one.
     wrap: Option<[i32; 2]>,
+    /// Of a cell.
+    size: DVec3,
     /// Points by their cells; cells that follow each other along x do so here.
     entries: Vec<Entry>,
     /// Where each entry is, from `origin`: x, y and z by themselves, and some that are nowhere at the end.
@@ -70,6 +72,15 @@ fn cell(key: Key) -> [i32; 3] {
     [42, 21, 0].map(|shift| ((key >> shift) & 0x1f_ffff) as i32 - (1 << 20))
 }
 
+/// The cell that a point is in.
+fn key_of(point: DVec3, size: DVec3, wrap: Option<[i32; 2]>) -> Key {
+    let mut c = (point / size).floor().as_ivec3();
+    if let Some([nx, ny]) = wrap {
+        (c.x, c.y) = (c.x.rem_euclid(nx), c.y.rem_euclid(ny));
+    }
+    key([c.z, c.y, c.x])
+}
+
 impl PointGrid {
     /// Sorts points into cells at least `reach` wide, so that all within `reach` of a point are in the 27 cells around
     /// it. `period` must be at least three times `reach`.
@@ -79,13 +90,7 @@ impl PointGrid {
             (Some(p), Some([nx, ny])) => DVec3::new(p.x / f64::from(nx), p.y / f64::from(ny), reach),
             _ => DVec3::splat(reach),
         };
-        let key_of = |p: DVec3| {
-            let mut c = (p / size).floor().as_ivec3();
-            if let Some([nx, ny]) = wrap {
-                (c.x, c.y) = (c.x.rem_euclid(nx), c.y.rem_euclid(ny));
-            }
-            key([c.z, c.y, c.x])
-        };
+        let key_of = |p: DVec3| key_of(p, size, wrap);
         let mut order: Vec<(Key, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key_of(p), i as u32)).collect();
         order.par_sort_unstable();
         let mut cells: Vec<(Key, u32)> = Vec::new();
@@ -102,7 +107,7 @@ impl PointGrid {
         let nowhere = || std::iter::repeat_n(f32::INFINITY, LANES);
         let places = [0, 1, 2]
             .map(|axis| entries.iter().map(|entry| (entry.at - origin)[axis] as f32).chain(nowhere()).collect());
-        Self { wrap, entries, places, origin, cells, cell_of }
+        Self { wrap, size, entries, places, origin, cells, cell_of }
     }
 
     /// What finds neighbours: quickest of points that follow each other in space.
@@ -122,9 +127,9 @@ impl PointGrid {
     }
 
     /// The entries of the 27 cells around a cell, as few runs.
-    fn runs_around(&self, cell: u32, ahead: bool, runs: &mut Vec<Range<u32>>) {
+    fn runs_around(&self, cell: Key, ahead: bool, runs: &mut Vec<Range<u32>>) {
         runs.clear();
-        let [z, y, x] = self::cell(self.cells[cell as usize].0);
+        let [z, y, x] = self::cell(cell);
         let mut run = |z: i32, y: i32, from: i32, to: i32| {
             let first = self.cells.partition_point(|c| c.0 < key([z, y, from]));
             let after = first + self.cells[first..].iter().take_while(|c| c.0 <= key([z, y, to])).count();
@@ -163,14 +168,13 @@ pub(crate) struct Walk<'a> {
     grid: &'a PointGrid,
     ahead: bool,
     /// The cell last asked for, and the entries around it.
-    cell: Option<u32>,
+    cell: Option<Key>,
     runs: Vec<Range<u32>>,
 }
 
 impl<'a> Walk<'a> {
-    /// Finds the entries around a point's cell, unless they are those last asked for.
-    fn go_to(&mut self, point: usize) {
-        let cell = self.grid.cell_of[point];
+    /// Finds the entries around a cell, unless they are those last asked for.
+    fn go_to(&mut self, cell: Key) {
         if self.cell != Some(cell) {
             self.grid.runs_around(cell, self.ahead, &mut self.runs);
             self.cell = Some(cell);
@@ -179,15 +183,15 @@ impl<'a> Walk<'a> {
 
     /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
     pub(crate) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
-        self.go_to(point);
+        self.go_to(self.grid.cells[self.grid.cell_of[point] as usize].0);
         let entries = &self.grid.entries;
         self.runs.iter().flat_map(|run| &entries[run.start as usize..run.end as usize])
     }
 
-    /// Of the points around one, at `at`, those within a distance and some that are a little farther; in the same order. Of a
-    /// grid without a period.
-    pub(crate) fn within(&mut self, point: usize, at: DVec3, distance: f64, mut found: impl FnMut(&'a Entry)) {
-        self.go_to(point);
+    /// Of the points around a place, those within a distance and some that are a little farther; in the same order. Of a grid
+    /// without a period.
+    pub(crate) fn within(&mut self, at: DVec3, distance: f64, mut found: impl FnMut(&'a Entry)) {
+        self.go_to(key_of(at, self.grid.size, self.grid.wrap));
         let PointGrid { entries, places, origin, .. } = self.grid;
         let from = (at - *origin).as_vec3();
         let most = f32x8::splat((distance as f32 + ROUNDED * (from.length() + distance as f32)).powi(2));
@@ -271,7 +275,7 @@ mod tests {
             for (mut walk, mut all) in [(grid.walk(), grid.walk()), (grid.walk_ahead(), grid.walk_ahead())] {
                 for (i, p) in points.iter().enumerate() {
                     let mut found = Vec::new();
-                    walk.within(i, *p, 0.9, |e| found.push(e.index));
+                    walk.within(*p, 0.9, |e| found.push(e.index));
                     let mut within = |distance: f64| -> Vec<u32> {
                         all.around(i).filter(|e| e.at.distance(*p) <= distance).map(|e| e.index).collect()
                     };

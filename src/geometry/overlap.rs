@@ -1,9 +1,14 @@
 //! How far yarns run into each other.
 
+use std::{
+    collections::BTreeMap,
+    sync::atomic::{AtomicU32, Ordering::Relaxed},
+};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::contact::{PointGrid, Walk, nearest};
+use super::contact::{PointGrid, nearest};
 use crate::geometry::{
     chain::Chain,
     curve::{Basis, Curve},
@@ -31,6 +36,8 @@ pub const TOLERATED: f64 = 0.05;
 const ALONG: f64 = 2.0;
 /// Length of the pieces that are compared, in diameters.
 const PIECE: f64 = 0.35;
+/// Pieces that one thread takes at once.
+const CHUNK: usize = 512;
 /// More pieces are not compared: 1.5 GB.
 const MOST_PIECES: usize = 1 << 24;
 
@@ -51,6 +58,14 @@ struct Piece {
 }
 
 impl Piece {
+    fn middle(&self) -> DVec3 {
+        0.5 * (self.from + self.to)
+    }
+
+    fn length(&self) -> f64 {
+        self.from.distance(self.to)
+    }
+
     /// Half of the section's short axis.
     fn short(&self) -> f64 {
         (self.radius * self.radius - self.wider.length_squared()).max(0.0).sqrt()
@@ -109,58 +124,13 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
             return None;
         }
     }
-    let widest = pieces.iter().map(|p| p.radius).fold(0.0, f64::max);
-    let longest = pieces.iter().map(|p| p.from.distance(p.to)).fold(0.0, f64::max);
-    let middles: Vec<DVec3> = pieces.iter().map(|p| 0.5 * (p.from + p.to)).collect();
-    let reach = 2.0 * widest + longest;
-    if reach <= 0.0 || !reach.is_finite() {
-        return Some(Overlap { length: 0.0, share: 0.0, deepest: 0.0, nearest: f64::INFINITY });
-    }
-    let grid = PointGrid::new(&middles, reach, None);
-    let nearest_of = |walk: &mut Walk<'_>, i: usize| {
-        let a = &pieces[i];
-        let half = 0.5 * a.from.distance(a.to);
-        let mut best = f64::INFINITY;
-        walk.within(i, middles[i], reach, |near| {
-            let away = middles[i].distance(near.at);
-            if away > reach {
-                return;
-            }
-            let b = &pieces[near.index as usize];
-            let both = a.radius + b.radius;
-            let round = a.is_round() && b.is_round();
-            // Farther than what was found already, however they lie: sections reach no farther than their radii.
-            let least = (away - half - 0.5 * b.from.distance(b.to)) / both;
-            let rounds = a.round + b.round;
-            let nearest_pressed = |gap: f64| 1.0 + gap / rounds;
-            let hopeless = if round { least > best } else { nearest_pressed((least - 1.0) * both) > best };
-            if hopeless || best <= 0.0 {
-                return;
-            }
-            if a.curve == b.curve {
-                let along = (a.along - b.along).abs();
-                if along.min(rings[a.curve as usize] - along) < ALONG * both {
-                    return;
-                }
-            }
-            let between = nearest(a.from, a.to, b.from, b.to).between;
-            let length = between.length();
-            if round {
-                best = best.min(length / both);
-            } else if nearest_pressed(length - both) <= best {
-                best = best.min(between_pressed(a, b, between));
-            }
-        });
-        best as f32
-    };
-    let all = (0..pieces.len()).into_par_iter().with_min_len(512);
-    let found: Vec<f32> = all.map_init(|| grid.walk(), nearest_of).collect();
+    let found = Near::of(&pieces, &rings);
     let (mut length, mut over, mut near) = (0.0, 0.0, f64::INFINITY);
     for (piece, distance) in pieces.iter().zip(found) {
-        let here = piece.from.distance(piece.to);
+        let (here, distance) = (piece.length(), f64::from(f32::from_bits(distance.into_inner())));
         length += here;
-        near = near.min(distance.into());
-        if f64::from(distance) < 1.0 - TOLERATED {
+        near = near.min(distance);
+        if distance < 1.0 - TOLERATED {
             over += here;
         }
     }
@@ -170,6 +140,104 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
         deepest: (1.0 - near).max(0.0),
         nearest: near,
     })
+}
+
+/// Looks for the nearest other strand of all pieces.
+struct Near<'a> {
+    pieces: &'a [Piece],
+    /// Length of each curve that is closed; infinite of others.
+    rings: &'a [f64],
+    /// How near another one comes to each: bits of a number that is not negative, which are in the order of the numbers.
+    found: Vec<AtomicU32>,
+}
+
+impl<'a> Near<'a> {
+    /// How near another strand comes to each piece, in mean diameters: bits of single precision.
+    fn of(pieces: &'a [Piece], rings: &'a [f64]) -> Vec<AtomicU32> {
+        let found = pieces.iter().map(|_| AtomicU32::new(f32::INFINITY.to_bits())).collect();
+        let near = Self { pieces, rings, found };
+        // By thickness, so that a thin piece does not look at all within reach of a thick one.
+        let mut classes: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
+        for (i, piece) in pieces.iter().enumerate().filter(|(_, piece)| piece.radius > 0.0 && piece.radius.is_finite())
+        {
+            classes.entry(piece.radius.log2().floor() as i32).or_default().push(i);
+        }
+        // Longer pieces of thin yarns count for thick ones too.
+        let mut longest = 0.0;
+        for (class, members) in &classes {
+            let most = |of: fn(&Piece) -> f64| members.iter().map(|&i| of(&pieces[i])).fold(0.0, f64::max);
+            longest = f64::max(longest, most(Piece::length));
+            let reach = 2.0 * most(|piece| piece.radius) + longest;
+            if !reach.is_finite() {
+                continue;
+            }
+            let middles: Vec<DVec3> = members.iter().map(|&i| pieces[i].middle()).collect();
+            let grid = PointGrid::new(&middles, reach, None);
+            (0..members.len()).into_par_iter().with_min_len(CHUNK).for_each_init(
+                || grid.walk_ahead(),
+                |walk, own| {
+                    walk.within(middles[own], reach, |other| {
+                        let other = other.index as usize;
+                        if other > own || !grid.share_cell(own, other) {
+                            near.pair(members[own], members[other], reach);
+                        }
+                    });
+                },
+            );
+            for thinner in classes.range(..class).map(|(_, thinner)| thinner) {
+                thinner.par_iter().with_min_len(CHUNK).for_each_init(
+                    || grid.walk(),
+                    |walk, &own| {
+                        walk.within(pieces[own].middle(), reach, |other| {
+                            near.pair(own, members[other.index as usize], reach);
+                        });
+                    },
+                );
+            }
+        }
+        near.found
+    }
+
+    /// Looks how near two pieces are, unless their middles are farther apart than `reach`.
+    fn pair(&self, i: usize, j: usize, reach: f64) {
+        let (a, b) = (&self.pieces[i], &self.pieces[j]);
+        let away = a.middle().distance(b.middle());
+        if i == j || away > reach {
+            return;
+        }
+        // What is known of the one that is farther from all others.
+        let known = [i, j].map(|k| f32::from_bits(self.found[k].load(Relaxed)));
+        let best = f64::from(known[0].max(known[1]));
+        let both = a.radius + b.radius;
+        let round = a.is_round() && b.is_round();
+        // Farther than what was found already, however they lie: sections reach no farther than their radii.
+        let least = (away - 0.5 * (a.length() + b.length())) / both;
+        let rounds = a.round + b.round;
+        let nearest_pressed = |gap: f64| 1.0 + gap / rounds;
+        let hopeless = if round { least > best } else { nearest_pressed((least - 1.0) * both) > best };
+        if hopeless || best <= 0.0 {
+            return;
+        }
+        if a.curve == b.curve {
+            let along = (a.along - b.along).abs();
+            if along.min(self.rings[a.curve as usize] - along) < ALONG * both {
+                return;
+            }
+        }
+        let between = nearest(a.from, a.to, b.from, b.to).between;
+        let length = between.length();
+        let distance = if round {
+            length / both
+        } else if nearest_pressed(length - both) <= best {
+            between_pressed(a, b, between)
+        } else {
+            return;
+        };
+        // The least of all, in whatever order they come.
+        for k in [i, j] {
+            self.found[k].fetch_min((distance as f32).to_bits(), Relaxed);
+        }
+    }
 }
 
 /// Cuts a curve into straight pieces; gives its length.

@@ -150,7 +150,7 @@ impl Search<'_> {
         let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
         let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
         // Most of what cells hold is too far away: that is told of many at once.
-        walk.within(i, middle, touch + half + 0.5 * self.longest, |near| {
+        walk.within(middle, touch + half + 0.5 * self.longest, |near| {
             let (j, mut cells) = middles.images[near.index as usize];
             let j = j as usize;
             // Each pair once. (Images do not lie in the grid as what they are of does.)
