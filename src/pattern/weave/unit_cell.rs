@@ -28,7 +28,7 @@ const LARGE: usize = 1024;
 /// Most ends and picks of that part.
 const PART: usize = 24;
 /// Most steps of a relaxation.
-const MOST_STEPS: usize = 700;
+const MOST_STEPS: usize = 1500;
 /// The same where most is at rest when it begins.
 const STEPS_BESIDE: usize = 150;
 /// Force on each yarn that packs the cloth, unless spacings are given.

@@ -40,6 +40,29 @@ impl Spheroid {
     }
 }
 
+/// A sloping yarn cut by a plane across the cloth. It is higher there whichever way it slopes, so that twined yarns keep apart, and
+/// wider where it goes aside.
+struct Cut {
+    /// Half width and half height, over those of its section.
+    longer: [f64; 2],
+    /// Derivatives of both by the tangent's components along and aside.
+    slopes: [[f64; 2]; 2],
+}
+
+impl Cut {
+    /// Of a unit tangent along, aside and up.
+    fn of([along, aside, _]: [f64; 3]) -> Self {
+        const STEEPEST: f64 = 0.2;
+        let along = along.max(STEEPEST);
+        let level = along.hypot(aside);
+        let square = level * along * along;
+        Self {
+            longer: [level / along, 1.0 / along],
+            slopes: [[-aside * aside / square, aside / (level * along)], [-1.0 / (along * along), 0.0]],
+        }
+    }
+}
+
 /// What the gradient of the energy is gathered in.
 pub(super) struct Gradient<'a> {
     pub(super) nodes: &'a mut [f64],
@@ -64,8 +87,8 @@ impl Energy<'_> {
         let count = self.count[side];
         let thickest = self.thickness[side].iter().fold(1.0, |m: f64, t| m.max(*t));
         let far = ((3.2 * thickest * self.radius[side] / spacing[side]).ceil() as usize).clamp(1, 5);
-        // Half height of a sloping yarn's cut, over its own.
-        let steep = |at: usize| 1.0 / local(side, tangents[at / PER_NODE].unit)[0].max(0.2);
+        let first = self.at(side, 0, 0) / PER_NODE;
+        let cuts: Vec<Cut> = tangents[first..first + count * n].iter().map(|t| Cut::of(local(side, t.unit))).collect();
         let mut sum = 0.0;
         for yarn in 0..count {
             for apart in 1..=far {
@@ -78,8 +101,8 @@ impl Energy<'_> {
                         continue;
                     }
                     let (s, t) = (axes[a / PER_NODE], axes[b / PER_NODE]);
-                    let (steep_s, steep_t) = (steep(a), steep(b));
-                    let axes = [s[0] + t[0], s[1] * steep_s + t[1] * steep_t];
+                    let (cut_s, cut_t) = (&cuts[a / PER_NODE - first], &cuts[b / PER_NODE - first]);
+                    let axes = [0, 1].map(|c| s[c] * cut_s.longer[c] + t[c] * cut_t.longer[c]);
                     let scaled = [d[0] / axes[0], d[1] / axes[1]];
                     let f = scaled[0] * scaled[0] + scaled[1] * scaled[1];
                     if f >= 1.0 {
@@ -96,11 +119,12 @@ impl Energy<'_> {
                     }
                     gradient.spacing[side] += by_d[0] * apart as f64;
                     let by_axes = [0, 1].map(|c| -by_f * 2.0 * scaled[c] * scaled[c] / axes[c]);
-                    gradient.nodes[a + 2] += by_axes[0] * s[0] - by_axes[1] * s[1] * steep_s;
-                    gradient.nodes[b + 2] += by_axes[0] * t[0] - by_axes[1] * t[1] * steep_t;
-                    let along = world(side, [1.0, 0.0, 0.0]);
-                    gradient.tangents[a / PER_NODE] -= by_axes[1] * s[1] * steep_s * steep_s * along;
-                    gradient.tangents[b / PER_NODE] -= by_axes[1] * t[1] * steep_t * steep_t * along;
+                    for (node, axes, cut) in [(a, s, cut_s), (b, t, cut_t)] {
+                        let by = [0, 1].map(|c| by_axes[c] * axes[c]);
+                        gradient.nodes[node + 2] += by[0] * cut.longer[0] - by[1] * cut.longer[1];
+                        let by_tangent = [0, 1].map(|k| by[0] * cut.slopes[0][k] + by[1] * cut.slopes[1][k]);
+                        gradient.tangents[node / PER_NODE] += world(side, [by_tangent[0], by_tangent[1], 0.0]);
+                    }
                 }
             }
         }
