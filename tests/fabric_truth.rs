@@ -70,7 +70,7 @@ fn scene(truth: &Value, curves: &Path, kind: Curves, light: &str) -> String {
     let mut text = String::new();
     writeln!(
         text,
-        "render = {{ width = {}, height = {}, filter = \"box\" }}",
+        "render = {{ width = {}, height = {}, filter = \"box\", fiber_detail = false }}",
         camera["pixels"][0], camera["pixels"][1]
     )
     .unwrap();

@@ -82,6 +82,23 @@ fn alike(name: &str, a: &str, b: &str, mean: f64, rmse: f64) {
 }
 
 #[test]
+fn fibers_that_are_told_apart_leave_the_mean_as_it_is() {
+    let close = |size, detail| {
+        straight("mm", 1.0, 0.0, 15.0, &format!("fiber_detail = {detail}"))
+            .replace("size = 6", &format!("size = {size}"))
+    };
+    let (smooth, apart) = (render(&close(1.5, false), &[]), render(&close(1.5, true), &[]));
+    let ratio: [f64; 3] = std::array::from_fn(|k| apart.mean()[k] / smooth.mean()[k]);
+    let seen = difference(&smooth, &apart);
+    let noise = difference(&smooth, &render(&close(1.5, false), &["--seed", "1"]));
+    eprintln!("mean ratio {ratio:.4?}, relative RMSE {seen:.4}, of noise {noise:.4}");
+    assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.02), "{ratio:?}");
+    assert!(seen > 1.3 * noise, "{seen} where noise is {noise}");
+    // From far away nobody can tell.
+    assert_eq!(difference(&render(&close(600.0, false), &[]), &render(&close(600.0, true), &[])), 0.0);
+}
+
+#[test]
 fn units_do_not_matter() {
     let millimetres = straight("mm", 1.0, 0.0, 15.0, "");
     alike("cm", &millimetres, &straight("cm", 10.0, 0.0, 15.0, ""), 2e-3, 0.05);
@@ -146,6 +163,7 @@ fn plies_are_continuous_along_a_yarn_and_across_its_seam() {
                 ply_rate: rate,
                 symmetry,
                 phases: vec![start],
+                distances: false,
             };
             let strands = Strands::new(&[(curve, radii)], &options);
             let count = strands.segments().len() as u32;
@@ -179,6 +197,7 @@ fn plies_turn_evenly_between_points() {
         ply_rate: 0.3,
         symmetry: TAU / 3.0,
         phases: vec![],
+        distances: false,
     };
     let strands = Strands::new(&[(curve, radii)], &options);
     let mut total = 0.0;

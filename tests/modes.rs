@@ -117,8 +117,8 @@ fn more_fibers_cost_the_aggregated_model_nothing() {
     let stats = |fibers, mode: &str| {
         let (directory, path) = weave(fibers, "");
         let file = directory.path().join("stats.json");
-        let args = ["render", path.to_str().unwrap(), "-q", "--mode", mode, "--spp", "1"];
-        let stats_args = ["--stats", "stats.json", "-o", "x.exr"];
+        let args = ["render", path.to_str().unwrap(), "-q", "--mode", mode, "--spp", "1", "--set"];
+        let stats_args = ["render.fiber_detail=false", "--stats", "stats.json", "-o", "x.exr"];
         yarnray(directory.path(), &[&args[..], &stats_args].concat()).good();
         read_json(&file)["memory"].clone()
     };

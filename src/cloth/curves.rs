@@ -3,7 +3,7 @@
 use std::{borrow::Cow, f64::consts::TAU};
 
 use super::{
-    estimate::{BuildError, Estimate, FLATTENING_BYTES, MATERIAL_INDEX_BYTES},
+    estimate::{BuildError, DISTANCE_BYTES, Estimate, FLATTENING_BYTES, MATERIAL_INDEX_BYTES},
     material::{self, Scatterers},
 };
 use crate::{
@@ -134,6 +134,9 @@ impl Prepared<'_> {
                         estimate.add(points, segments, false, compact);
                     }
                 }
+                if self.fabric.shows_fibers {
+                    estimate.geometry_bytes += estimate.points * DISTANCE_BYTES;
+                }
                 if let Some(flyaways) = &yarn.flyaways {
                     let (points, segments) = plies.flyaway_counts(flyaways);
                     estimate.add(points, segments, false, compact);
@@ -153,7 +156,8 @@ impl Prepared<'_> {
             Of::Fibers { curves, material } => return vec![Piece::of_lone_fibers(index, &curves, material)],
         };
         let plies = Plies::new(&strands, &yarn.plies, &shape, fabric.seed);
-        let wound = Wound { index, yarn, variants: &fabric.variants, shape: &shape, strands: &strands, plies };
+        let (variants, shows_fibers) = (&fabric.variants[..], fabric.shows_fibers);
+        let wound = Wound { index, yarn, variants, shape: &shape, strands: &strands, plies, shows_fibers };
         let slots = 0..yarn.plies.len();
         let mut all: Vec<Piece> = match mode {
             Mode::Yarn => Vec::new(),
@@ -201,12 +205,13 @@ struct Wound<'a> {
     shape: &'a YarnShape,
     strands: &'a Strands,
     plies: Plies<'a>,
+    shows_fibers: bool,
 }
 
 impl Wound<'_> {
     /// One ply of all yarns, each as a yarn of its own.
     fn ply(&self, ply: usize, model: Model) -> Piece {
-        let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply);
+        let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply, self.shows_fibers);
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
         let scatterers =
@@ -258,12 +263,19 @@ fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
             ply_rate: f64::from(shape.ply_rate),
             symmetry: shape.symmetry,
             phases: fabric.phases.clone(),
+            distances: fabric.shows_fibers,
         },
     )
 }
 
 /// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
-fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usize) -> (Strands, YarnShape) {
+fn ply_strands(
+    plies: &Plies<'_>,
+    ply: &PlyParameters,
+    of: &YarnShape,
+    slot: usize,
+    distances: bool,
+) -> (Strands, YarnShape) {
     let strands = Strands::new(
         plies.ply_curves(slot),
         &StrandOptions {
@@ -273,6 +285,7 @@ fn ply_strands(plies: &Plies<'_>, ply: &PlyParameters, of: &YarnShape, slot: usi
             ply_rate: 0.0,
             symmetry: TAU,
             phases: vec![0.0],
+            distances,
         },
     );
     let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));

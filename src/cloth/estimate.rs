@@ -12,6 +12,8 @@ const POINT_BYTES: u64 = 16;
 const FRAME_BYTES: u64 = 12;
 /// Of what presses a point's section flat, in yarns that are.
 pub(super) const FLATTENING_BYTES: u64 = 8;
+/// Bytes of each point's distance along its yarn, where fibres are told apart.
+pub(super) const DISTANCE_BYTES: u64 = 4;
 /// Bytes of a segment's index.
 const SEGMENT_BYTES: u64 = 4;
 /// Bytes of the material index of each segment, in a fabric with variants.

@@ -18,6 +18,7 @@ mod crossing;
 mod inside;
 mod march;
 mod neighbourhood;
+mod seen_fiber;
 
 use std::ops::ControlFlow;
 
@@ -26,6 +27,7 @@ use glam::{Vec2, Vec3A};
 pub use self::{
     crossing::{Crossings, PlyAhead, PlyCrossing},
     inside::Inside,
+    seen_fiber::SeenFiber,
 };
 use self::{
     march::{LIGHT, Line},

@@ -36,6 +36,8 @@ pub struct StrandOptions {
     pub symmetry: f64,
     /// Phase of the plies where each yarn starts, radians; yarn i takes entry i modulo their number.
     pub phases: Vec<f64>,
+    /// Whether to keep how far along its yarn each point is: see [`Strands::distance_along`].
+    pub distances: bool,
 }
 
 /// A bend whose radius of curvature is so much smaller than the yarn's radius that the tube folds into itself, and plies
@@ -66,6 +68,8 @@ pub struct Strands {
     uvs: SegmentUvs,
     /// Short axis of the section at each point, see [`YarnFrame::flattening`]; empty where all yarns are round.
     flattening: Vec<Vec2>,
+    /// How far along its yarn, at rest, each point is, in yarn radii; empty where nobody asks.
+    distances: Vec<f32>,
     /// One for each segment, or empty: see [`Self::material_index`].
     material_indices: Vec<u16>,
     /// The first segment of each yarn, and the number of all segments at the end.
@@ -194,6 +198,7 @@ impl Strands {
             + size_of_val(&*self.segments)
             + size_of_val(&*self.frames)
             + size_of_val(&*self.flattening)
+            + size_of_val(&*self.distances)
             + self.uvs.bytes()
             + self
                 .later
@@ -329,6 +334,22 @@ impl Strands {
             }
         }
         length
+    }
+
+    /// How far from the start of its yarn a place is, in yarn radii, by lengths at rest: as exact as its points are close. `None` where
+    /// [`StrandOptions::distances`] did not ask.
+    #[inline]
+    pub fn distance_along(&self, segment: u32, u: f32) -> Option<f32> {
+        let first = self.segments[segment as usize] as usize;
+        let (from, to) = (self.distances.get(first + 1)?, self.distances.get(first + 2)?);
+        let p = std::array::from_fn(|i| self.points[first + i]);
+        // As fast at its ends as the segment, so that lines which wind about the yarn do not kink there.
+        let [start, end] = [0.0, 1.0].map(|u| {
+            let (at, speed, _) = evaluate_f32(self.basis, &p, u);
+            speed.length() / at.w.max(1e-30)
+        });
+        let (length, v) = (to - from, 1.0 - u);
+        Some(from + u * (u * (3.0 - 2.0 * u) * length + v * (v * start - u * end)))
     }
 
     /// Mean radius of one yarn's control points.

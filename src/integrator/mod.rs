@@ -26,7 +26,7 @@ use crate::{
     light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
     scattering::{Arrival, LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, Ground, Layers, Material, Scene},
+    scene::{CurveKind, Fabric, FiberDetail, Ground, Layers, Material, Scene},
     trace::{Hit, SurfacePlace, YarnGeometry},
 };
 
@@ -95,6 +95,7 @@ pub(crate) struct Integrator<'a> {
     /// Where the camera is, and how wide its pixels are: [`crate::scene::Camera::pixel_width`].
     camera: Vec3A,
     pixel_width: (f32, f32),
+    fiber_detail: Option<FiberDetail>,
 }
 
 /// A worker's own memory: reused from sample to sample.
@@ -153,6 +154,7 @@ impl<'a> Integrator<'a> {
             back: Vec3A::from(scene.camera.back_f32()),
             camera: scene.camera.position.as_vec3a(),
             pixel_width: scene.camera.pixel_width(scene.render.height),
+            fiber_detail: FiberDetail::of(scene),
         }
     }
 
@@ -322,6 +324,9 @@ impl<'a> Integrator<'a> {
         section.crossings(yarn.shape(), &mut scratch.crossings);
         let unscattered = yarn.transparency(&scratch.crossings);
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
+        let seen = self.seen_fiber(hit, section, (yarns, yarn), path, scratch);
+        // A line without any fibre comes after all others.
+        let u_pass = seen.map_or(u_pass, |seen| 1.0 - seen);
         if u_pass < unscattered {
             path.passes += 1;
             // Behind the surface, so that the same hit is not found again.
@@ -347,7 +352,8 @@ impl<'a> Integrator<'a> {
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
         let mut stream = path.sampler.even_stream();
-        let arrival = Arrival { throughput: path.throughput, lit: !self.lights.is_empty() };
+        let first_fiber = seen.map(|seen| (seen / (1.0 - unscattered)).min(1.0 - f32::EPSILON));
+        let arrival = Arrival { throughput: path.throughput, lit: !self.lights.is_empty(), first_fiber };
         let vertex = yarn.vertex(section, &scratch.crossings, unscattered, arrival, u, &mut stream);
 
         let node = section.point_on_ray(vertex.node_start());

@@ -2,15 +2,21 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::Integrator;
+use super::{Integrator, Path, Scratch};
 use crate::{
     film::Sample,
+    geometry::section::Section,
+    math::sampler::hash2,
+    scattering::yarn::YarnScatterer,
     scene::{Camera, Scene},
     trace::{Hit, YarnGeometry},
 };
 
 /// The most pixels by which anything is said to move: what passes close by the camera moves without end.
 const MOST_PIXELS: f64 = 65_536.0;
+
+/// The stream of random numbers by which fibres are told apart.
+const SEEN_FIBER: u32 = 0xf1be_7000;
 
 /// The view at the frame's own time and one frame later.
 #[derive(Debug)]
@@ -54,6 +60,30 @@ impl Integrator<'_> {
         if let Some(flow) = &self.flow {
             sample.motion = flow.pixels(point, next);
         }
+    }
+
+    /// Which fibre the camera sees first, by [`crate::geometry::section::SeenFiber::number`], if fibres are told apart there.
+    #[inline]
+    pub(super) fn seen_fiber(
+        &self,
+        hit: &Hit<'_>,
+        section: &Section<'_>,
+        (yarns, yarn): (&YarnGeometry, &YarnScatterer),
+        path: &Path<'_>,
+        scratch: &Scratch,
+    ) -> Option<f32> {
+        let detail = self.fiber_detail.filter(|_| path.bounces == 0)?;
+        let distance = yarns.strands.distance_along(hit.segment, hit.u)?;
+        let front = scratch.crossings.first()?;
+        let shape = yarn.shape();
+        let width = 2.0 * shape.plies[front.ply].fiber_radius * section.radius;
+        let mut stream = path.sampler.stream(SEEN_FIBER);
+        if stream.next() >= detail.chance(width, section.point_on_ray(front.enter)) {
+            return None;
+        }
+        let ply = (yarns.first_ply + front.ply) as u32;
+        let key = hash2(hash2(yarns.fabric as u32, yarns.strands.yarn_of(hit.segment) as u32), ply);
+        Some(section.seen_fiber(shape, front, distance).number(key, [stream.next(), stream.next()]))
     }
 
     /// Notes a place on a yarn, which may move: it keeps its place in the yarn's frame.

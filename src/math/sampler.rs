@@ -18,7 +18,7 @@ pub fn hash2(a: u32, b: u32) -> u32 {
 
 /// A float in [0, 1) from the upper bits of a word.
 #[inline]
-fn unit(bits: u32) -> f32 {
+pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 

@@ -9,7 +9,7 @@ pub(crate) use memory::{Memory, TooLarge};
 use crate::{
     film::Tile,
     light::Light,
-    scene::{CurveKind, Fabric, Layers, Mode, Scene, Yarn},
+    scene::{CurveKind, Fabric, FiberDetail, Layers, Mode, Scene, Yarn},
 };
 
 /// One feature of the renderer.
@@ -99,6 +99,16 @@ impl List {
             scene.yarns.iter().any(|y| y.fibers.windows(2).any(|w| w[0].1 != w[1].1)),
             "plies of a yarn are of different fibres",
             "all plies of a yarn are of the same fibre",
+        );
+        self.add(
+            "fiber_detail",
+            scene.fabrics.iter().any(|f| f.shows_fibers),
+            "fibres are wide enough in the picture to be told apart",
+            if FiberDetail::of(scene).is_some() {
+                "fibres are narrower than a quarter of a pixel"
+            } else {
+                "not asked for"
+            },
         );
     }
 

@@ -94,12 +94,15 @@ pub struct Arrival {
     pub throughput: Rgb,
     /// Whether light may be sampled at the vertex too. Where only the path itself finds light, less has to be known of F.
     pub lit: bool,
+    /// Where fibres are told apart: the share of those lines whose first fibre is met before this one, [0, 1), in place of a random
+    /// number.
+    pub first_fiber: Option<f32>,
 }
 
 impl From<Rgb> for Arrival {
     /// A path of this weight, where light may be sampled.
     fn from(throughput: Rgb) -> Self {
-        Self { throughput, lit: true }
+        Self { throughput, lit: true, first_fiber: None }
     }
 }
 

@@ -196,6 +196,7 @@ impl SceneBuilder {
         };
         keep_used(&mut scene);
         remove_lobes(&mut scene);
+        scene.look_for_fibers();
         for name in scene.render.force.clone() {
             force::force(&mut scene, &name).map_err(SceneError)?;
         }
@@ -278,6 +279,7 @@ impl Fabric {
             material_indices: Vec::new(),
             uvs: Vec::new(),
             taken: Taken::default(),
+            shows_fibers: false,
             phases: curves.iter().map(|_| TAU * f64::from(stream.next())).collect(),
             seed,
             basis: match curves.first().map(|curve| curve.basis) {

@@ -89,6 +89,7 @@ impl Default for RenderSettings {
             threads: None,
             seed: 0,
             frame: None,
+            fiber_detail: true,
             compact_bvh: true,
             max_memory: None,
             force: Vec::new(),

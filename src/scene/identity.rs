@@ -182,6 +182,7 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
         threads: _,
         seed,
         frame,
+        fiber_detail,
         compact_bvh,
         max_memory: _,
         force,
@@ -198,6 +199,7 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
     setting("max_bounces", max_bounces);
     setting("seed", seed);
     setting("frame", frame);
+    setting("fiber_detail", fiber_detail);
     setting("bvh", &if *compact_bvh { "compact" } else { "fast" });
     setting("force", force);
 }
@@ -239,6 +241,8 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         uvs,
         taken: _,
         phases,
+        // It follows from the rest.
+        shows_fibers: _,
         seed,
         basis,
         tolerance,

@@ -9,6 +9,7 @@ pub(crate) mod animation;
 pub mod builder;
 pub mod camera;
 pub mod defaults;
+mod fiber_detail;
 pub(crate) mod force;
 pub(crate) mod identity;
 mod layers;
@@ -23,6 +24,7 @@ use rayon::prelude::*;
 
 pub use builder::{SceneBuilder, SceneError};
 pub use camera::Camera;
+pub use fiber_detail::FiberDetail;
 pub use layers::{LayerName, Layers};
 
 use crate::{
@@ -163,6 +165,8 @@ pub struct RenderSettings {
     pub seed: u32,
     /// The number of the frame in a sequence; noise changes with it.
     pub frame: Option<u32>,
+    /// Whether fibres are told apart where they are wide enough in the picture.
+    pub fiber_detail: bool,
     /// Smaller or faster BVH.
     pub compact_bvh: bool,
     /// Bytes that curves and BVH may take; `None` for no limit.
@@ -283,6 +287,8 @@ pub struct Fabric {
     pub taken: Taken,
     /// Phase of the plies where each yarn starts, radians; reused in turn if there are fewer than yarns.
     pub phases: Vec<f64>,
+    /// Whether its fibres are told apart somewhere in the picture.
+    pub shows_fibers: bool,
     /// Start of what is random in it: where explicit fibres lie.
     pub seed: u32,
     /// The basis for Embree.

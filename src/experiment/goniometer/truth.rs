@@ -75,6 +75,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         ply_rate: f64::from(shape.ply_rate),
         symmetry: shape.symmetry,
         phases: vec![0.0],
+        distances: false,
     };
     let strands = Strands::new(&[(curve, radii)], &options);
     let mut tallies = Vec::new();

@@ -40,6 +40,7 @@ fn arch(shape: &YarnShape) -> Strands {
         ply_rate: f64::from(shape.ply_rate),
         symmetry: shape.symmetry,
         phases: vec![0.3],
+        distances: false,
     };
     Strands::new(&[(curve, vec![0.5; 40])], &options)
 }
@@ -56,6 +57,7 @@ fn pressed(shape: &YarnShape, ratio: f64) -> Strands {
         ply_rate: f64::from(shape.ply_rate),
         symmetry: 1.0,
         phases: vec![0.0],
+        distances: false,
     };
     Strands::new(&[(curve, vec![1.0; 30])], &options)
 }

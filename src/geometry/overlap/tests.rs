@@ -83,6 +83,7 @@ fn searched(curves: &[(Curve, Vec<f64>)], diameter: f64, around: usize) -> [f64;
         ply_rate: 0.0,
         symmetry: TAU,
         phases: vec![0.0],
+        distances: false,
     };
     let strands = Strands::new(curves, &options);
     let section = |segment: u32, k: usize| {

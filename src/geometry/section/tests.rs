@@ -216,6 +216,7 @@ fn wild_loop(stream: &mut Stream, tightest: f64) -> Strands {
         ply_rate: 0.6,
         symmetry: TAU / 3.0,
         phases: vec![0.4],
+        distances: false,
     };
     Strands::new(&[(curve, vec![1.0; n as usize])], &options)
 }

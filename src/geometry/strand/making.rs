@@ -88,6 +88,8 @@ struct Strand {
     poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
     /// For each point, or empty.
     flattening: Vec<Vec2>,
+    /// As before.
+    distances: Vec<f32>,
     material_indices: Vec<u16>,
     uvs: SegmentUvs,
     tight: Option<Tight>,
@@ -121,14 +123,16 @@ impl Strand {
             .collect();
         let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, options)).collect();
         let rest = rest.map(|rest| Winding::new(&rest, options));
-        let frames = frames(&wound, rest.as_ref().unwrap_or(&wound[0]), curve.closed, given.phase, options.symmetry);
+        let at_rest = rest.as_ref().unwrap_or(&wound[0]);
+        let frames = frames(&wound, at_rest, curve.closed, given.phase, options.symmetry);
+        let distances = if options.distances { at_rest.distances() } else { Vec::new() };
         let flattening = match &curve.flattening {
             Some(vectors) => flattening_along(curve, vectors, knots.as_deref(), &wound[0]),
             None => Vec::new(),
         };
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
         let poses = poses.iter().map(points).zip(frames).collect();
-        Self { poses, flattening, material_indices, uvs, tight: wound[0].tight, length: total }
+        Self { poses, flattening, distances, material_indices, uvs, tight: wound[0].tight, length: total }
     }
 }
 
@@ -202,6 +206,7 @@ struct Joined {
     poses: Vec<(Vec<Vec4>, Vec<PointFrame>)>,
     /// Of the points of all yarns up to the last that is pressed flat.
     flattening: Vec<Vec2>,
+    distances: Vec<f32>,
     segments: Vec<u32>,
     material_indices: Vec<u16>,
     uvs: SegmentUvs,
@@ -215,6 +220,7 @@ impl Joined {
         Self {
             poses: vec![(Vec::new(), Vec::new()); 1 + later],
             flattening: Vec::new(),
+            distances: Vec::new(),
             segments: Vec::new(),
             material_indices: Vec::new(),
             uvs: SegmentUvs::default(),
@@ -237,6 +243,7 @@ impl Joined {
             all.0.extend(points);
             all.1.extend(frames);
         }
+        self.distances.extend(strand.distances);
         self.material_indices.extend(strand.material_indices);
         self.uvs.append(&strand.uvs);
         self.length += strand.length;
@@ -268,6 +275,7 @@ impl Joined {
             flow,
             uvs: self.uvs,
             flattening: self.flattening,
+            distances: self.distances,
             material_indices: self.material_indices,
             first_segments: self.first_segments,
             tight_bends: self.tight_bends,

@@ -3,7 +3,15 @@ use std::f64::consts::TAU;
 use super::*;
 
 fn options(basis: Basis) -> StrandOptions {
-    StrandOptions { basis, tolerance: 0.01, longest_segment: 1.5, ply_rate: 0.4, symmetry: TAU, phases: vec![0.7] }
+    StrandOptions {
+        basis,
+        tolerance: 0.01,
+        longest_segment: 1.5,
+        ply_rate: 0.4,
+        symmetry: TAU,
+        phases: vec![0.7],
+        distances: true,
+    }
 }
 
 fn knit_like(n: usize, closed: bool) -> Curve {
@@ -256,4 +264,29 @@ fn degenerate_curves_do_not_break() {
         }
     }
     assert_eq!(Strands::new(Vec::new(), &options(Basis::CatmullRom)).yarns(), 0);
+}
+
+#[test]
+fn distances_go_on_from_segment_to_segment_as_fast_as_the_yarn() {
+    for basis in [Basis::CatmullRom, Basis::BSpline] {
+        for closed in [false, true] {
+            let s = strands(knit_like(60, closed), 0.5, &options(basis));
+            let count = s.segments().len() as u32;
+            let at = |segment, u| s.distance_along(segment, u).expect("asked for");
+            assert_eq!(at(0, 0.0), 0.0);
+            assert!((f64::from(at(count - 1, 1.0)) * 0.5 / s.length_of(0) - 1.0).abs() < 1e-3);
+            for segment in 0..count {
+                for u in [0.0, 0.3, 0.8] {
+                    let step = (at(segment, u + 0.1) - at(segment, u)) / 0.1;
+                    let stride = s.frame(segment, u + 0.05).stride;
+                    assert!((step / stride - 1.0).abs() < 0.02, "{segment}, {u}: {step} for {stride}");
+                }
+                if segment > 0 {
+                    assert!((at(segment - 1, 1.0) - at(segment, 0.0)).abs() < 1e-4);
+                }
+            }
+            let silent = StrandOptions { distances: false, ..options(basis) };
+            assert_eq!(strands(knit_like(60, closed), 0.5, &silent).distance_along(0, 0.5), None);
+        }
+    }
 }

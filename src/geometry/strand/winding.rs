@@ -49,6 +49,8 @@ pub(super) struct Knot {
     pub(super) normal: DVec3,
     /// The angle of the plies' turns up to here.
     turned: f64,
+    /// How far along the chain, in yarn radii.
+    along: f64,
 }
 
 /// Segments along which a normal is carried in one go; longer chains are cut, whatever the number of threads.
@@ -75,6 +77,7 @@ impl Winding {
                 for knot in &mut stretch {
                     knot.normal = cos * knot.normal + sin * knot.tangent.cross(knot.normal);
                     knot.turned += end.turned;
+                    knot.along += end.along;
                 }
             }
             knots.append(&mut stretch);
@@ -88,6 +91,12 @@ impl Winding {
     /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
     pub(super) fn residual(&self, at_rest: &Self) -> f64 {
         self.angle + at_rest.knots[at_rest.knots.len() - 1].turned
+    }
+
+    /// How far along the chain each control point is, in yarn radii.
+    pub(super) fn distances(&self) -> Vec<f32> {
+        let at = |i: usize| self.knots[i.min(self.knots.len() - 1)].along as f32;
+        std::iter::once(at(0)).chain((0..=self.knots.len()).map(at)).collect()
     }
 
     /// What is known at each control point.
@@ -122,10 +131,10 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
     // Any rule will do for where the turning starts; this one is easy to reproduce: +z, laid across the yarn.
     let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
     let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
-    let mut turned = 0.0;
+    let (mut turned, mut along) = (0.0, 0.0);
     let (mut fold, mut tight): (f64, Option<Tight>) = (0.0, None);
     let mut knots = Vec::with_capacity(end - start + 1);
-    knots.push(Knot { tangent, normal, turned });
+    knots.push(Knot { tangent, normal, turned, along });
     for segment in start..end {
         let points = chain.points_of(segment);
         for (weights, weight) in &nodes {
@@ -135,6 +144,7 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
             let next_tangent = velocity.try_normalize().unwrap_or(tangent);
             normal = double_reflection(here.at.truncate(), tangent, next.at.truncate(), next_tangent, normal);
             turned += weight * ply_rate * speed / next.at.w.max(1e-300);
+            along += weight * speed / next.at.w.max(1e-300);
             // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
             // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
             let distance = next.at.truncate().distance(here.at.truncate());
@@ -152,7 +162,7 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
         }
         // Rounding must not accumulate over thousands of segments.
         normal = (normal - normal.dot(tangent) * tangent).try_normalize().unwrap_or(normal);
-        knots.push(Knot { tangent, normal, turned });
+        knots.push(Knot { tangent, normal, turned, along });
     }
     (knots, tight)
 }

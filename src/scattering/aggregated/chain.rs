@@ -25,14 +25,15 @@ pub(super) struct ChainEnd {
 impl ChainEnd {
     /// Draws one: a ply by the energy that leaves from it, a place by the law of a channel drawn with `weight`, the path's.
     ///
+    /// Where fibres are told apart, as many chains end at the `first_fiber` as a fibre ends: there the place's number is drawn by.
     /// A chain that keeps a share at each fibre falls as e^(-rho n). `None` if no light leaves.
     #[inline]
     pub(super) fn draw(
         yarn: &AggregatedYarn,
         crossings: &Crossings,
         weight: Rgb,
-        u_ply: f32,
-        u_depth: f32,
+        [u_ply, u_depth]: [f32; 2],
+        first_fiber: Option<f32>,
     ) -> Option<Self> {
         let depths = crossings.iter().map(|c| yarn.plies[c.ply].rho * c.fibers);
         let all = depths.clone().fold(Rgb::ZERO, |a, b| a + b).one_minus_exp_neg();
@@ -69,6 +70,13 @@ impl ChainEnd {
         let chances = normalised((ended * yarn.node_gain[crossing.ply] * weight).to_array());
         let channel = choose(chances, pick);
         let (d, e) = (depth.to_array()[channel], share.to_array()[channel]);
+        let u_depth = match first_fiber {
+            Some(first) if std::ptr::eq(crossing, &crossings[0]) => {
+                let ends = 1.0 - optics.chain.to_array()[channel];
+                if u_depth < ends { first } else { (u_depth - ends) / (1.0 - ends) }
+            }
+            _ => u_depth,
+        };
         let x = if d > 1e-4 { (-(-u_depth * e).ln_1p() / d).clamp(0.0, 1.0) } else { u_depth };
         // Density of x in [0, 1] for each channel: d e^-dx / (1 - e^-d), 1 for d -> 0.
         let fall = (depth * -x).exp();

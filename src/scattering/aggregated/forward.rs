@@ -147,7 +147,7 @@ struct Way {
 
 impl Forward {
     /// Draws the first fibre that a ray meets, and a way out from there. `gain` is [`super::chain::ChainEnd::gain`], `weight` the
-    /// path's. `None` if nothing passes fibres.
+    /// path's; `u_first` draws the first fibre. `None` if nothing passes fibres.
     #[inline]
     pub(super) fn draw(
         view: &View<'_>,
@@ -155,9 +155,10 @@ impl Forward {
         unscattered: f32,
         gain: Rgb,
         (weight, lit): (Rgb, bool),
+        u_first: f32,
         stream: &mut Stream,
     ) -> Option<Self> {
-        let (first, met) = first_fiber(crossings, unscattered, stream.next())?;
+        let (first, met) = first_fiber(crossings, unscattered, u_first)?;
         let crossing = &crossings[first];
         if view.yarn.plies[crossing.ply].chain.max_channel() <= 0.0 {
             return None;

@@ -166,12 +166,15 @@ impl<'a> Vertex<'a> {
         stream: &mut Stream,
     ) -> Self {
         let view = View::new(yarn, section);
-        let Arrival { throughput, lit } = arrival.into();
+        let Arrival { throughput, lit, first_fiber } = arrival.into();
         let weight = throughput.max(Rgb::splat(1e-20));
-        let end = ChainEnd::draw(yarn, crossings, weight, u[0], u[1]);
+        let end = ChainEnd::draw(yarn, crossings, weight, [u[0], u[1]], first_fiber);
         let gain = end.as_ref().map_or(Rgb::ZERO, |end| end.gain);
         // Each has even numbers of its own: F takes an unknown number of them.
-        let forward = Forward::draw(&view, crossings, unscattered, gain, (weight, lit), &mut stream.branch());
+        let mut of_forward = stream.branch();
+        let drawn = of_forward.next();
+        let first = first_fiber.unwrap_or(drawn);
+        let forward = Forward::draw(&view, crossings, unscattered, gain, (weight, lit), first, &mut of_forward);
         let kept = forward.as_ref().map_or(Rgb::ONE, |f| Rgb::ONE - f.drawn.share);
         let node = LateNode::new(end, kept, weight, [u[2], u[3]], stream.branch());
         Self { view, forward, node, backward: Backward::later(stream) }

@@ -229,7 +229,7 @@ fn white_fibers_return_all_light_whatever_ways_its_colours_take() {
     for (index, (case, pressed)) in cases().enumerate() {
         for (m, slack) in [(lossless(), 0.003), (white_by_different_ways(), 0.01)] {
             let (yarn, section) = build(case, pressed, &m);
-            let arrival = Arrival { throughput: Rgb::ONE, lit: index % 2 == 0 };
+            let arrival = Arrival { throughput: Rgb::ONE, lit: index % 2 == 0, first_fiber: None };
             let mut crossings = Crossings::new();
             section.crossings(yarn.occluder().shape(), &mut crossings);
             if crossings.is_empty() {
@@ -266,7 +266,7 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
     for (index, (case, pressed)) in cases().enumerate() {
         for (white, m, lit) in [(true, lossless(), true), (false, silk(), true), (false, silk(), false)] {
             let (yarn, section) = build(case, pressed, &m);
-            let arrival = Arrival { throughput: Rgb::ONE, lit };
+            let arrival = Arrival { throughput: Rgb::ONE, lit, first_fiber: None };
             let mut crossings = Crossings::new();
             section.crossings(yarn.occluder().shape(), &mut crossings);
             let t0 = yarn.occluder().transparency(&crossings);

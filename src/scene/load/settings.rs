@@ -64,6 +64,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         threads: threads(table),
         seed: table.u64_or("seed", otherwise.seed.into(), 0..=u64::from(u32::MAX)) as u32,
         frame: table.u64("frame", 0..=u64::from(u32::MAX)).map(|f| f as u32),
+        fiber_detail: table.bool_or("fiber_detail", otherwise.fiber_detail),
         compact_bvh: table.one_of_or("bvh", otherwise.compact_bvh, &[("compact", true), ("fast", false)]),
         max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
         force: force(table),

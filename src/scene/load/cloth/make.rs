@@ -255,6 +255,7 @@ impl Made {
             uvs: Vec::new(),
             taken,
             phases,
+            shows_fibers: false,
             seed: keys.seed,
             basis: detail.basis.unwrap_or(of_file),
             tolerance: if exact { 0.0 } else { detail.tolerance },
