@@ -10,6 +10,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         fiber::{Plies, flyaway::Flyaways},
+        material_indices::MaterialIndices,
         segment_uvs::SegmentUvs,
         strand::{Along, StrandMotion, StrandOptions, Strands},
         tube::Tubes,
@@ -190,7 +191,7 @@ impl Piece {
             ply: 0,
             first_tubes: Vec::new(),
             tubes: Tubes::new(curves),
-            material_indices: Vec::new(),
+            material_indices: MaterialIndices::default(),
             uvs: SegmentUvs::default(),
         });
         Self { curves, scatterers: Scatterers::Fibers(PerVariant::same(material)) }
@@ -239,6 +240,7 @@ impl Wound<'_> {
         let root = |segment| from[tubes.tube_of(segment)];
         let segments = tubes.segments().len() as u32;
         let material_indices = (0..segments).filter_map(|s| self.strands.material_index(root(s))).collect();
+        let material_indices = MaterialIndices::new(material_indices, false);
         let own = self.strands.uvs();
         let placed = if own.is_empty() { 0 } else { segments };
         let uvs = SegmentUvs::constant((0..placed).map(|s| own.at(root(s), 0.0)));
@@ -254,7 +256,7 @@ impl Wound<'_> {
 fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
     Strands::with(
         curves,
-        Along { material_indices: &fabric.material_indices, uvs: &fabric.uvs },
+        Along { material_indices: &fabric.material_indices, blended: fabric.printed, uvs: &fabric.uvs },
         StrandMotion { later: &fabric.motion.later, rest: fabric.motion.rest.as_deref(), flow: &fabric.motion.flow },
         &StrandOptions {
             basis: fabric.basis,

@@ -130,10 +130,10 @@ impl Cloth {
         let index = hit.geometry;
         match (&hit.place, &self.world.geometries()[index], &self.scatterers[index]) {
             (HitPlace::Yarn(section), CurveGeometry::Yarns(yarns), Scatterers::Yarns(all)) => {
-                Met::Yarn { section, yarns, scatterer: all.at(yarns.strands.material_index(hit.segment)) }
+                Met::Yarn { section, yarns, scatterer: all.at(yarns.strands.material_index_at(hit.segment, hit.u)) }
             }
             (HitPlace::Fiber(place), CurveGeometry::Fibers(fibers), Scatterers::Fibers(all)) => {
-                Met::Fiber { place, fibers, scatterer: all.at(fibers.material_index(hit.segment)) }
+                Met::Fiber { place, fibers, scatterer: all.at(fibers.material_index_at(hit.segment, hit.u)) }
             }
             _ => unreachable!("a hit is of the kind of what it hit"),
         }

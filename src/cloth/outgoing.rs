@@ -77,8 +77,9 @@ fn plies_or_fibers(scene: &Scene, limit: Option<u64>) -> Result<CurveSet, BuildE
                         0 => tube,
                         after => after - 1,
                     };
-                    let indices = own.material_indices.get(own.tubes.segments_of(tube)).unwrap_or_default();
-                    add(yarn, curve, palette.mean(indices, &mut mixed));
+                    let segments = own.tubes.segments_of(tube);
+                    let indices: Vec<u16> = segments.filter_map(|s| own.material_index(s as u32)).collect();
+                    add(yarn, curve, palette.mean(&indices, &mut mixed));
                 }
             }
         }

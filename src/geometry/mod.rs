@@ -5,6 +5,7 @@ pub(crate) mod contact;
 pub mod curve;
 pub(crate) mod density;
 pub mod fiber;
+pub mod material_indices;
 pub mod mesh;
 pub(crate) mod occluder;
 pub mod overlap;

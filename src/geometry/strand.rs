@@ -15,6 +15,7 @@ use glam::{DVec3, Vec2, Vec3A, Vec4};
 use self::frames::{PointFrame, SegmentFrame};
 use super::{
     curve::{Basis, Curve},
+    material_indices::MaterialIndices,
     segment_uvs::SegmentUvs,
     spline::evaluate_f32,
     tube::curve_of,
@@ -70,8 +71,7 @@ pub struct Strands {
     flattening: Vec<Vec2>,
     /// How far along its yarn, at rest, each point is, in yarn radii; empty where nobody asks.
     distances: Vec<f32>,
-    /// One for each segment, or empty: see [`Self::material_index`].
-    material_indices: Vec<u16>,
+    material_indices: MaterialIndices,
     /// The first segment of each yarn, and the number of all segments at the end.
     first_segments: Vec<u32>,
     tight_bends: Vec<TightBend>,
@@ -102,6 +102,8 @@ pub struct Along<'a> {
     /// Material indices, so many evenly from each given point to the next (a closed curve goes on to its first point, an
     /// open one ends with its last), of which each segment gets that nearest to its middle.
     pub material_indices: &'a [Vec<u16>],
+    /// Whether these go over into each other along a curve: see [`MaterialIndices::new`].
+    pub blended: bool,
     /// Texture coordinates of each given point.
     pub uvs: &'a [Vec<Vec2>],
 }
@@ -206,14 +208,20 @@ impl Strands {
                 .chain(&self.flow)
                 .map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames))
                 .sum::<usize>()
-            + size_of_val(&*self.material_indices)
             + size_of_val(&*self.first_segments)) as u64
+            + self.material_indices.bytes()
     }
 
     /// The material index of a segment, if any has one.
     #[inline]
     pub fn material_index(&self, segment: u32) -> Option<u16> {
-        self.material_indices.get(segment as usize).copied()
+        self.material_indices.of(segment)
+    }
+
+    /// The material index at `u` (0 to 1) of a segment, if any has one: see [`MaterialIndices::at`].
+    #[inline]
+    pub fn material_index_at(&self, segment: u32, u: f32) -> Option<u16> {
+        self.material_indices.at(segment, u, |forward| self.neighbour(segment, forward))
     }
 
     /// Texture coordinates along all segments.
@@ -241,11 +249,16 @@ impl Strands {
         }))
     }
 
+    /// What segments are made of.
+    pub fn material_indices(&self) -> &MaterialIndices {
+        &self.material_indices
+    }
+
     /// Sets the material indices, made elsewhere: none, or one for each segment.
     ///
     /// # Panics
     /// If their number is another.
-    pub fn set_material_indices(&mut self, material_indices: Vec<u16>) {
+    pub fn set_material_indices(&mut self, material_indices: MaterialIndices) {
         assert!(
             material_indices.is_empty() || material_indices.len() == self.segments.len(),
             "a material index for each segment"

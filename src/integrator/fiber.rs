@@ -38,7 +38,7 @@ impl Integrator<'_> {
             if self.layers.uv {
                 sample.uv = fibers.uvs.at(hit.segment, hit.u);
             }
-            self.describe(sample, fibers.fabric, fibers.material_index(hit.segment), fibers.ply, || {
+            self.describe(sample, fibers.fabric, fibers.material_index_at(hit.segment, hit.u), fibers.ply, || {
                 fibers.yarn_of(hit.segment)
             });
         }

@@ -346,7 +346,7 @@ impl<'a> Integrator<'a> {
             sample.depth = (path.from - point).dot(self.back);
             self.sees_yarn(sample, hit, yarns, point, scratch.time);
             let ply = yarns.first_ply + front.ply;
-            let index = yarns.strands.material_index(hit.segment);
+            let index = yarns.strands.material_index_at(hit.segment, hit.u);
             self.describe(sample, yarns.fabric, index, ply, || yarns.strands.yarn_of(hit.segment));
         }
         let u = path.sampler.next4();

@@ -277,6 +277,7 @@ impl Fabric {
             motion: FabricMotion::default(),
             variants: Vec::new(),
             material_indices: Vec::new(),
+            printed: false,
             uvs: Vec::new(),
             taken: Taken::default(),
             shows_fibers: false,

@@ -238,6 +238,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         motion,
         variants,
         material_indices,
+        printed,
         uvs,
         taken: _,
         phases,
@@ -261,7 +262,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
             indices.iter().for_each(|index| hash.bytes(&index.to_le_bytes()));
             hash
         };
-        key("colors", &(variants, in_order(material_indices.par_iter().map(of_curve))));
+        key("colors", &(variants, printed, in_order(material_indices.par_iter().map(of_curve))));
     }
     let of_curve = |(Curve { basis, closed, points, radii: _, flattening }, radii): &(Curve, Vec<f64>)| {
         let mut hash = Hash::default();

@@ -281,6 +281,8 @@ pub struct Fabric {
     pub variants: Vec<Yarn>,
     /// Indices into `variants` along each curve, as many from each control point to the next; empty without variants.
     pub material_indices: Vec<Vec<u16>>,
+    /// Whether these are colours of a print, which go over into each other along a yarn.
+    pub printed: bool,
     /// Texture coordinates of each control point of each curve, 0 to 1 over the fabric; empty if no layer holds them.
     pub uvs: Vec<Vec<Vec2>>,
     /// What they were, where a render has taken them.

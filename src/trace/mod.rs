@@ -22,6 +22,7 @@ use crate::{
     ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
     geometry::{
         curve::Basis,
+        material_indices::MaterialIndices,
         occluder::Occluder,
         ray::{Ray, YarnPlace},
         section::{Crossings, Section},
@@ -60,7 +61,7 @@ pub struct FiberGeometry {
     /// The fibres.
     pub tubes: Tubes,
     /// Material indices: which of the fabric's variants each segment is made of; empty without variants.
-    pub material_indices: Vec<u16>,
+    pub material_indices: MaterialIndices,
     /// Texture coordinates along all segments.
     pub uvs: SegmentUvs,
 }
@@ -261,7 +262,16 @@ impl FiberGeometry {
     /// Material index of a segment: which of the fabric's variants it is made of, if there are any.
     #[inline]
     pub fn material_index(&self, segment: u32) -> Option<u16> {
-        self.material_indices.get(segment as usize).copied()
+        self.material_indices.of(segment)
+    }
+
+    /// The material index at `u` (0 to 1) of a segment: see [`MaterialIndices::at`].
+    #[inline]
+    pub fn material_index_at(&self, segment: u32, u: f32) -> Option<u16> {
+        let same = |next: &u32| self.tubes.tube_of(*next) == self.tubes.tube_of(segment);
+        let next = |forward: bool| if forward { segment.checked_add(1) } else { segment.checked_sub(1) };
+        let known = |next: &u32| (*next as usize) < self.material_indices.len();
+        self.material_indices.at(segment, u, |forward| next(forward).filter(known).filter(same))
     }
 
     /// The yarn that a segment's fibre belongs to, or the fibre itself where there are no yarns.
@@ -307,7 +317,7 @@ impl CurveGeometry {
     fn bytes(&self) -> u64 {
         match self {
             Self::Yarns(w) => w.strands.bytes(),
-            Self::Fibers(f) => f.tubes.bytes() + (size_of_val(&*f.material_indices) + f.uvs.bytes()) as u64,
+            Self::Fibers(f) => f.tubes.bytes() + f.material_indices.bytes() + f.uvs.bytes() as u64,
         }
     }
 }

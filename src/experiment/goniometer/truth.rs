@@ -16,6 +16,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         fiber::Plies,
+        material_indices::MaterialIndices,
         segment_uvs::SegmentUvs,
         strand::{StrandOptions, Strands},
     },
@@ -91,7 +92,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
                     ply,
                     first_tubes,
                     tubes,
-                    material_indices: Vec::new(),
+                    material_indices: MaterialIndices::default(),
                     uvs: SegmentUvs::default(),
                 };
                 (CurveGeometry::Fibers(curves), FiberBcsdf::new(&yarn.fibers[ply].1))

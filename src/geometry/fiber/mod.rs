@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::{
     curve::{Basis, Curve},
     density::{KnownPacking, PlyPacking},
+    material_indices::MaterialIndices,
     segment_uvs::SegmentUvs,
     strand::Strands,
     tube::{Tubes, spline_through},
@@ -318,7 +319,7 @@ impl<'a> Plies<'a> {
 
     /// For each segment of so many curves along each yarn, the material index of the yarn's segment below it; nothing if
     /// nothing was.
-    pub fn material_indices_along(&self, curves: usize) -> Vec<u16> {
+    pub fn material_indices_along(&self, curves: usize) -> MaterialIndices {
         let mut material_indices = Vec::new();
         for yarn in 0..self.strands.yarns() {
             let (guide, steps) = (Guide::new(self.strands, yarn), self.steps()[yarn]);
@@ -327,7 +328,7 @@ impl<'a> Plies<'a> {
             let along: Vec<u16> = below.filter_map(|segment| self.strands.material_index(segment)).collect();
             material_indices.extend(std::iter::repeat_n(along, curves).flatten());
         }
-        material_indices
+        MaterialIndices::new(material_indices, self.strands.material_indices().blended())
     }
 
     /// For each segment of so many curves along each yarn, the texture coordinates of the yarn where it starts and ends;

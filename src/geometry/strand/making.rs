@@ -13,6 +13,7 @@ use super::{
 use crate::geometry::{
     chain::{Chain, Fit, nearest_indices, resample, uvs_of_segments},
     curve::{Basis, Curve},
+    material_indices::MaterialIndices,
     segment_uvs::SegmentUvs,
     yarn_frame::{Pressed, ROUND},
 };
@@ -54,7 +55,7 @@ pub(super) fn strands(
         made.into_iter().for_each(|strand| joined.push(strand));
         first = end;
     }
-    joined.finish(options.basis, motion.flow.len())
+    joined.finish(options.basis, motion.flow.len(), along.blended)
 }
 
 /// How many of the next curves are made at once: at least one.
@@ -251,7 +252,7 @@ impl Joined {
         self.tight_bends.extend(strand.tight.map(bend));
     }
 
-    fn finish(mut self, basis: Basis, flow: usize) -> Strands {
+    fn finish(mut self, basis: Basis, flow: usize, blended: bool) -> Strands {
         self.first_segments.push(self.segments.len() as u32);
         if self.flattening.iter().all(|f| Pressed::new(*f).is_none()) {
             self.flattening = Vec::new();
@@ -276,7 +277,7 @@ impl Joined {
             uvs: self.uvs,
             flattening: self.flattening,
             distances: self.distances,
-            material_indices: self.material_indices,
+            material_indices: MaterialIndices::new(self.material_indices, blended),
             first_segments: self.first_segments,
             tight_bends: self.tight_bends,
             length: self.length,

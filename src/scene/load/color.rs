@@ -231,6 +231,7 @@ impl ColorPlan {
             fabric.variants = known.into_iter().map(|yarn| yarns[yarn].clone()).collect();
             return Some(());
         }
+        let printed = print.is_some();
         let painter = Painter { coordinates: &coordinates, cells: &cells, dyes, print, shades, yarns: &yarns };
         let (variants, material_indices) = painter.paint(&fabric.curves);
         if variants.len() > usize::from(u16::MAX) {
@@ -239,7 +240,7 @@ impl ColorPlan {
             return None;
         }
         fabric.variants = variants;
-        fabric.material_indices = material_indices;
+        (fabric.material_indices, fabric.printed) = (material_indices, printed);
         Some(())
     }
 

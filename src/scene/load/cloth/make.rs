@@ -252,6 +252,7 @@ impl Made {
             motion,
             variants: Vec::new(),
             material_indices: Vec::new(),
+            printed: false,
             uvs: Vec::new(),
             taken,
             phases,

@@ -115,7 +115,9 @@ impl Painter<'_> {
                 Some(print) => {
                     let next = self.coordinates.between(index, place + 1, steps, count);
                     let mut stream = Stream::new(hash2(index as u32, place as u32));
-                    let level = |v: f32| LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + stream.next();
+                    // One number for all channels: what is dithered is brightness, not the hue.
+                    let dither = stream.next();
+                    let level = |v: f32| LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + dither;
                     let levels = print.color(at, next).map(level).map(|level| level.min(LEVELS) as u8);
                     Key { yarn, shade: None, dye, levels: Some(levels) }
                 }
