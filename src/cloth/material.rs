@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::{
     geometry::{occluder::Occluder, yarn::YarnShape},
     scattering::{
-        aggregated::AggregatedYarn,
+        aggregated::{AggregatedYarn, Solutions},
         fiber::{FiberBcsdf, FiberMaterial},
         lobes::{ChordModel, ChordYarn},
         yarn::YarnScatterer,
@@ -25,18 +27,19 @@ pub enum Scatterers {
 
 /// A round yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
-    of_shape(shape_for(yarn, model, 1.0), &materials(yarn), model)
+    of_shape(shape_for(yarn, model, 1.0), &materials(yarn), model, 1.0, &Solutions::default())
 }
 
 /// Whole yarns, pressed to axes of `stretch` : 1 on the mean. Variants whose plies are the same share one shape.
 pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model, stretch: f64) -> PerVariant<YarnScatterer> {
     let own = |of: &Yarn| Arc::new(shape_for(of, model, stretch));
     let shape = own(yarn);
+    let solutions = Solutions::default();
     let scatterer = |of: &Yarn| {
         let alike = of.plies == yarn.plies && of.placement == yarn.placement;
-        of_shape(if alike { Arc::clone(&shape) } else { own(of) }, &materials(of), model)
+        of_shape(if alike { Arc::clone(&shape) } else { own(of) }, &materials(of), model, stretch, &solutions)
     };
-    PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
+    PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
 }
 
 /// One ply of a yarn that is pressed to axes of `stretch` : 1 as a yarn of its own, whose shape `alone` is given.
@@ -51,8 +54,9 @@ pub(super) fn of_plies(
         Model::Aggregated => alone.packed(&yarn.packings(stretch)[ply..=ply]),
         _ => alone,
     });
-    let scatterer = |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], model);
-    PerVariant::new(scatterer(yarn), variants.iter().map(scatterer).collect())
+    let solutions = Solutions::default();
+    let scatterer = |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], model, stretch, &solutions);
+    PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
 }
 
 /// The fibres of one ply of a yarn.
@@ -82,9 +86,17 @@ fn materials(yarn: &Yarn) -> Vec<&FiberMaterial> {
     yarn.fibers.iter().map(|(_, material)| material).collect()
 }
 
-fn of_shape(shape: impl Into<Arc<YarnShape>>, materials: &[&FiberMaterial], model: Model) -> YarnScatterer {
+fn of_shape(
+    shape: impl Into<Arc<YarnShape>>,
+    materials: &[&FiberMaterial],
+    model: Model,
+    stretch: f64,
+    solutions: &Solutions,
+) -> YarnScatterer {
     let chord = match model {
-        Model::Aggregated => return YarnScatterer::Aggregated(AggregatedYarn::new(shape, materials)),
+        Model::Aggregated => {
+            return YarnScatterer::Aggregated(AggregatedYarn::pressed(shape, materials, stretch, solutions));
+        }
         Model::TwoStream => ChordModel::TwoStream,
         Model::Paper => ChordModel::Paper,
         Model::Printed => ChordModel::Printed,

@@ -78,13 +78,6 @@ impl Pressed {
         p + (self.stretch - 1.0) * p.dot(self.axis) * self.axis
     }
 
-    /// Length of the pressed section's outline over that of a circle of its area, at least 1 (Ramanujan's approximation).
-    #[inline]
-    pub fn girth(&self) -> f32 {
-        let (long, short) = (self.stretch.sqrt(), self.stretch.sqrt().recip());
-        0.5 * (3.0 * (long + short) - ((3.0 * long + short) * (long + 3.0 * short)).sqrt())
-    }
-
     /// A point or a vector of the round section in the pressed one.
     #[inline]
     pub fn real(&self, p: Vec2) -> Vec2 {

@@ -1,9 +1,12 @@
 //! A ply as a medium of fibres: what its material and its packing give before any ray is known, in `f64`.
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::{
+    f64::consts::{FRAC_PI_4, PI},
+    sync::Arc,
+};
 
 use super::{
-    escape::{self, Disc, RINGS},
+    escape::{self, Leaving, Medium, Solutions},
     fiber::FiberMaterial,
     kernel::{kappa_of_variance, normalisation},
 };
@@ -18,10 +21,6 @@ mod calibrated {
     pub(super) const START_SHRINK: f64 = 0.4;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
-    /// Share of multiply scattered light that leaves as from a matt cylinder: strength, half point, and its fall with albedo.
-    pub(super) const LEAN: f64 = 3.0;
-    pub(super) const LEAN_HALF: f64 = 10.0;
-    pub(super) const LEAN_ALBEDO: f64 = 0.14;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
     pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.5;
 }
@@ -112,21 +111,15 @@ pub(crate) struct PlyOptics {
     /// Of light scattered twice or more, evenly in the ply: the share that leaves the yarn at last, when its other plies are
     /// met at random.
     pub leaves_yarn: Rgb,
-    /// What leaves this ply at last of light that meets another fibre after one in each ring of equal area, from the axis on, or
-    /// at the rim.
-    pub leaves_from: [Rgb; RINGS + 1],
-    /// What leaves the yarn at last of light that meets a fibre of this ply on its way from another one.
-    pub leaves_again: Rgb,
+    /// What leaves this ply at last of light that meets another fibre after one at a place in it, and what leaves the yarn at last
+    /// of light that meets a fibre of this ply on its way from another one.
+    pub leaving: Arc<Leaving>,
     /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
     pub mirrored: Rgb,
     /// Inverse width of that lobe, of [`super::kernel`], and its normalisation.
     pub mirrored_kappa: Rgb,
     /// As above.
     pub mirrored_factor: Rgb,
-    /// The ply's radius in free paths of that light.
-    pub thickness: Rgb,
-    /// What [`Self::lean`] of an endlessly thick ply would be.
-    pub most_lean: Rgb,
     /// Whether R is so much narrower than TT that what met no TT on its way is told from what did.
     pub sharp: bool,
     /// Of light that goes on in chains: TT events per expected fibre.
@@ -158,8 +151,14 @@ pub(crate) struct PlyOptics {
 pub(crate) const LEAST_RATE: f64 = 1e-6;
 
 impl PlyOptics {
-    /// For a ply among `plies` of a yarn.
-    pub(crate) fn new(material: &FiberMaterial, ply: &PlyShape, plies: usize) -> Self {
+    /// For a ply among `plies` of a yarn whose section is pressed to axes of `stretch` : 1, with transport that is solved already.
+    pub(crate) fn new(
+        material: &FiberMaterial,
+        ply: &PlyShape,
+        plies: usize,
+        stretch: f64,
+        solutions: &Solutions,
+    ) -> Self {
         let n = f64::from(ply.fibers);
         let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
         let density = ply.density();
@@ -191,11 +190,22 @@ impl PlyOptics {
             let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
             if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
         };
-        // At last out of the ply, by rings, and out of the yarn, when it comes from another ply.
-        let discs = [0, 1, 2].map(|c| {
-            let disc = Disc::new(radius_optical(c));
-            let leaves = |neighbours: f64| disc.shares(albedo(c), own_escape(c), taken_back(neighbours, c));
-            (leaves(calibrated::NEIGHBOURS_AT_ONCE * neighbours).0, leaves(neighbours).1)
+        // Chains are bent: a chain that keeps the share a of TT at each fibre gets as far as a straight one that keeps a g, with g the
+        // mean cosine by which TT of a chain turns. Where it turns and goes on nothing is lost.
+        let straight = if f > 1e-9 { ((-0.5 * material.beta_n.powi(2)).exp() / f).min(1.0) } else { 1.0 };
+        let media = [0, 1, 2].map(|c| {
+            let loss = 1.0 - straight * chain(c);
+            let (rate, bent_rate) = (extinction_rate(ended(c), density), extinction_rate(loss, density));
+            let absorbed = if bent_rate > 0.0 { (1.0 - albedo(c)) * rate / bent_rate } else { 1.0 - albedo(c) };
+            Medium {
+                radius: sigma * bent_rate * core,
+                // The mean way to the next fibre is one, between the ends of chains 1 / loss.
+                apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
+                albedo: (1.0 - absorbed).clamp(0.0, 1.0),
+                first: albedo(c),
+                sent_back: taken_back(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c),
+                taken_back: taken_back(neighbours, c),
+            }
         });
         // Of what a fibre sends out of a chain: the share that it reflects, and of a ply's events: those that another follows.
         let reflected = |c: usize| {
@@ -223,7 +233,6 @@ impl PlyOptics {
         };
         let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
         let (beta_tt_squared, beta_n) = ((material.beta_tt * material.beta_tt) as f32, material.beta_n as f32);
-        let most_lean = |c: usize| calibrated::LEAN * (1.0 - calibrated::LEAN_ALBEDO * albedo(c));
         Self {
             gaps,
             chain_share: f as f32,
@@ -234,13 +243,10 @@ impl PlyOptics {
             single_tt: per_channel(&|c| single(tt_out(c), c)),
             albedo: per_channel(&albedo),
             leaves_yarn: per_channel(&|c| closure(escape_yarn(c), c)),
-            leaves_from: std::array::from_fn(|ring| per_channel(&|c| discs[c].0[ring])),
-            leaves_again: per_channel(&|c| discs[c].1),
+            leaving: Arc::new(Leaving::new(&media, stretch, solutions)),
             mirrored: per_channel(&mirrored),
             mirrored_kappa,
             mirrored_factor: normalisation(mirrored_kappa),
-            thickness: per_channel(&radius_optical),
-            most_lean: per_channel(&most_lean),
             sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
             events: per_channel(&events),
             untouched: per_channel(&untouched),
@@ -277,22 +283,6 @@ impl PlyOptics {
         let beyond = (after - Rgb::splat(self.gaps.dead_zone)).max(Rgb::ZERO);
         let untouched = into * (-(self.untouched * beyond)).exp();
         (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
-    }
-
-    /// Of light that is scattered on in the ply: the share that leaves as a matt cylinder would send it off; the rest leaves
-    /// evenly. `thicker`: how much thicker the ply is where the camera looks through it than a round one.
-    #[inline]
-    pub(crate) fn lean(&self, thicker: f32) -> Rgb {
-        let t = self.thickness * thicker;
-        (self.most_lean * t / (t + Rgb::splat(calibrated::LEAN_HALF as f32))).min(Rgb::ONE)
-    }
-
-    /// [`Self::leaves_from`] at a square distance from the axis, as a share of that of the outermost fibres.
-    #[inline]
-    pub(crate) fn leaves_at(&self, r2: f32) -> Rgb {
-        let (ring, share) = escape::between(r2);
-        let [low, high] = [self.leaves_from[ring], self.leaves_from[ring + 1]];
-        low + (high - low) * share
     }
 }
 

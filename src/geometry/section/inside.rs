@@ -46,10 +46,27 @@ impl Inside {
         v.x * self.x + v.y * self.y + v.z * self.z
     }
 
-    /// The short axis of the section there, in the section's frame, and how it is pressed; nothing where it is round.
+    /// The point in a ply, from its axis, in radii of the circle within which the centres of its fibres lie; where the yarn is
+    /// pressed flat, in the round section. Axes are those of the unwound yarn.
     #[inline]
-    pub fn short_axis(&self) -> Option<(Vec3A, Pressed)> {
-        self.pressed.map(|pressed| (self.out(pressed.axis.extend(0.0).into()), pressed))
+    pub fn in_ply(&self, shape: &YarnShape, ply: usize) -> Vec2 {
+        let ply = &shape.plies[ply];
+        let from = self.at - ply.distance * ply.direction;
+        let (along, across) = (from.dot(ply.direction), ply.direction.perp_dot(from));
+        let circle = ply.stretch.x * along * ply.direction + ply.stretch.y * across * ply.direction.perp();
+        circle / ply.core_radius
+    }
+
+    /// The short axis of the section there, as a unit vector of the unwound yarn; any where it is round.
+    #[inline]
+    pub fn short_axis_within(&self) -> Vec2 {
+        self.pressed.map_or(Vec2::X, |pressed| pressed.axis)
+    }
+
+    /// A vector across the unwound yarn in the section's frame.
+    #[inline]
+    pub fn out_of(&self, v: Vec2) -> Vec3A {
+        v.x * self.x + v.y * self.y
     }
 
     /// A vector of the section's frame across the yarn there.
@@ -66,6 +83,13 @@ impl Inside {
             let across = self.across(w);
             pressed.stretch.sqrt() * across.length() / pressed.round(across).length().max(1e-12)
         })
+    }
+
+    /// A vector of the section's frame across the unwound yarn, where the yarn is pressed flat in the round section.
+    #[inline]
+    pub fn round_across(&self, v: Vec3A) -> Vec2 {
+        let across = self.across(v);
+        self.pressed.map_or(across, |pressed| pressed.round(across))
     }
 
     /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.

@@ -1,14 +1,12 @@
 //! Lobe B: light that was scattered more than once (docs/model.md, section 7).
 
-use std::{
-    cell::OnceCell,
-    f32::consts::{FRAC_1_PI, PI, TAU},
-};
+use std::{cell::OnceCell, f32::consts::FRAC_1_PI};
 
 use glam::{Vec2, Vec3A};
 
 use super::{
     super::{
+        escape::Outwards,
         kernel::{DIFFUSE, normalised_kernel, sample_sine, sample_sine_diffuse},
         lobe::LobeFrame,
         medium::PlyOptics,
@@ -17,13 +15,7 @@ use super::{
     View,
     single::Node,
 };
-use crate::{
-    geometry::{section::PlyCrossing, yarn_frame::Pressed},
-    math::{Rgb, frame::sin_cos, sampler::Stream},
-};
-
-/// How strongly multiply scattered light moves sideways with the camera's offset.
-const LEAN_SIDEWAYS: f32 = 1.2;
+use crate::math::{Rgb, sampler::Stream};
 
 /// Multiply scattered light of a vertex, made when first asked for: a path that goes on from the node may never do.
 #[derive(Clone, Debug)]
@@ -37,49 +29,16 @@ pub(super) struct Backward {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lobe {
     frame: LobeFrame,
-    /// How the section is pressed flat, if it is.
-    flat: Option<Flat>,
-    /// Unit vector across the axis towards which it leans, before [`Flat::turn`].
-    lean_to: Vec2,
-    /// The share that leans.
-    pub(super) lean: Rgb,
+    /// The axes against which azimuths count, as unit vectors across the frame's.
+    axes: [Vec2; 2],
+    /// Where to it leaves.
+    outwards: Outwards,
     /// Energy that leaves the node's ply, given the direction drawn.
     energy: Rgb,
     /// Chance that the node's drawn direction does not escape.
     pub(super) chance: f32,
     /// In a yarn of several plies: light that leaves the ply and meets another one.
     again: Option<Again>,
-    /// Channel mean of `lean`, for sampling.
-    mean_lean: f32,
-}
-
-/// Light leaves a section that is pressed flat mostly through its broad sides: as much as is seen of them. Azimuths of a round
-/// section, turned as by a map that makes a circle an ellipse, come near to that: towards the short axis of a section of the
-/// ratio a : b there is a / b times as much as towards the long one.
-#[derive(Clone, Copy, Debug)]
-struct Flat {
-    /// The short axis against x and y of the lobe's frame.
-    axis: Vec2,
-    /// Fourth root of long over short axis.
-    fourth: f32,
-}
-
-impl Flat {
-    /// Where the pressed section sends what a round one sends towards a unit vector across the axis.
-    #[inline]
-    fn turn(&self, round: Vec2) -> Vec2 {
-        let inverse = self.fourth.recip();
-        (round * inverse + (self.fourth - inverse) * round.dot(self.axis) * self.axis).normalize_or(round)
-    }
-
-    /// The inverse of [`Self::turn`], and how much denser azimuths lie here than they do there.
-    #[inline]
-    fn unturn(&self, pressed: Vec2) -> (Vec2, f32) {
-        let inverse = self.fourth.recip();
-        let round = pressed * self.fourth + (inverse - self.fourth) * pressed.dot(self.axis) * self.axis;
-        let square = round.length_squared().max(1e-12);
-        (round / square.sqrt(), square.recip())
-    }
 }
 
 /// Light that left the node's ply in a direction drawn from its lobe, as far as other plies took it up.
@@ -91,8 +50,11 @@ struct Again {
     pdf: f32,
     /// Chance that it goes on in this direction.
     open: f32,
-    /// Energy that other plies took up and give off evenly.
+    /// Energy that other plies took up and give off.
     energy: Rgb,
+    /// How they do, as the lobe's own.
+    axes: [Vec2; 2],
+    outwards: Outwards,
 }
 
 impl Backward {
@@ -113,46 +75,28 @@ impl Lobe {
     fn of_node(view: &View<'_>, node: &Node, stream: &mut Stream) -> Self {
         let optics = &view.yarn.plies[node.spot.ply];
         let energy = node.amplitude * optics.albedo * node.leaves * (Rgb::ONE - node.drawn.value.clear);
-        let short_axis = node.spot.inside.short_axis();
-        let mut lobe = Self::new(view, &node.crossing, short_axis, energy, 1.0 - node.drawn.escape);
+        let (place, axes) = node.spot.place(view.yarn);
+        let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
+        let outwards = optics.leaving.draw(&place, stream);
+        let axes = axes_across(&frame, axes);
+        let mut lobe = Self { frame, axes, outwards, energy, chance: 1.0 - node.drawn.escape, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             let w = lobe.draw(optics, stream);
             let (value, pdf) = lobe.value(view, node.spot.ply, w);
             if pdf > 0.0 {
-                let open = (-node.optical_depth(view, w).1).exp();
+                let (open, rim) = node.others(view, w, stream);
                 let weight = value / pdf;
+                let inside = &node.spot.inside;
+                let (place, axes) = optics.leaving.place(rim.unwrap_or(Vec2::X), inside.short_axis_within());
+                let outwards = optics.leaving.draw(&place, stream);
                 let energy = weight * (Rgb::ONE - open) * node.leaves_again;
                 let chance = open_chance(node, open);
-                lobe.again = Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy });
+                let axes = axes_across(&frame, axes.map(|axis| inside.out_of(axis)));
+                lobe.again =
+                    Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy, axes, outwards });
             }
         }
         lobe
-    }
-
-    /// Lobe B of a ply, for a given energy and chance of sampling; `short_axis` is that of the yarn's section, if it is pressed
-    /// flat.
-    #[inline]
-    pub(super) fn new(
-        view: &View<'_>,
-        crossing: &PlyCrossing,
-        short_axis: Option<(Vec3A, Pressed)>,
-        energy: Rgb,
-        chance: f32,
-    ) -> Self {
-        let shape = view.yarn.occluder().shape();
-        let optics = &view.yarn.plies[crossing.ply];
-        let relative = if shape.plies.len() == 1 { crossing.offset / shape.plies[0].radius } else { view.section.h };
-        let (lean_sin, lean_cos) = sin_cos(LEAN_SIDEWAYS * relative.clamp(-1.0, 1.0).asin());
-        let frame = LobeFrame::of_ply(shape, view.section, crossing, view.camera);
-        let flat = short_axis.map(|(axis, pressed)| {
-            let axis = Vec2::new(axis.dot(frame.x), axis.dot(frame.y)).normalize_or(Vec2::X);
-            Flat { axis, fourth: pressed.stretch.sqrt().sqrt() }
-        });
-        // It leans from where the camera is.
-        let camera = flat.map_or(Vec2::X, |flat| flat.unturn(Vec2::X).0);
-        let lean_to = Vec2::new(lean_cos, lean_sin).rotate(camera);
-        let lean = optics.lean(view.section.squeeze() / view.section.rounded());
-        Self { frame, flat, lean_to, lean, energy, chance, again: None, mean_lean: lean.mean() }
     }
 
     /// Value (with the cosine) and density, 1/steradian, of light that leaves the ply towards `w`, whatever lies there.
@@ -160,40 +104,37 @@ impl Lobe {
     pub(super) fn value(&self, view: &View<'_>, ply: usize, w: Vec3A) -> (Rgb, f32) {
         let optics = &view.yarn.plies[ply];
         let (at, cos) = self.frame.latitudes(w);
-        let (lean, dense) = self.leaning(w);
-        let even = cos * (0.5 * FRAC_1_PI) * dense;
         let mut latitude = Rgb::splat(DIFFUSE);
         if optics.mirrored.max_channel() > 0.0 {
             let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
             latitude += optics.mirrored * (m - latitude);
         }
-        let matt = off_a_matt_cylinder(lean) - 1.0;
-        let value = self.energy * latitude * (self.lean * matt + 1.0) * even;
-        let pdf = latitude.mean() * (self.mean_lean * lean + 1.0) * even;
-        (value, pdf)
+        let around = optics.leaving.towards(self.outwards, self.azimuth(self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
+        (self.energy * latitude * around, latitude.mean() * around.mean())
     }
 
-    /// Cosine of the azimuth of `w` from where the lobe leans to, in a round section, and how much denser azimuths lie in this one.
+    /// Cosine and sine of the azimuth of `w` against the lobe's axes, but for a factor.
     #[inline]
-    pub(super) fn leaning(&self, w: Vec3A) -> (f32, f32) {
+    fn azimuth(&self, axes: [Vec2; 2], w: Vec3A) -> Vec2 {
         let across = Vec2::new(w.dot(self.frame.x), w.dot(self.frame.y));
-        let across = across / across.length().max(1e-12);
-        let (round, dense) = self.flat.map_or((across, 1.0), |flat| flat.unturn(across));
-        (round.dot(self.lean_to), dense)
+        Vec2::new(across.dot(axes[0]), across.dot(axes[1]))
     }
 
-    /// A direction by the sine of its latitude and by its azimuth in a round section, as a unit vector across the axis.
+    /// A direction by the sine of its latitude and by its azimuth against the lobe's axes.
     #[inline]
-    fn direction(&self, sin: f32, round: Vec2) -> Vec3A {
-        let across = self.flat.map_or(round, |flat| flat.turn(round));
+    fn direction(&self, sin: f32, azimuth: Vec2, axes: [Vec2; 2]) -> Vec3A {
+        let across = azimuth.x * axes[0] + azimuth.y * axes[1];
         let cos = (1.0 - sin * sin).max(0.0).sqrt();
         cos * (across.x * self.frame.x + across.y * self.frame.y) + sin * self.frame.z
     }
 
-    /// Density per steradian of the diffuse lobe about the axis: (2/pi) cos / 2 pi, as a flat section has it.
+    /// What comes back from other plies leaves towards `w` by the diffuse lobe about the axis: value for an energy of one, and
+    /// density, per steradian.
     #[inline]
-    fn even(&self, w: Vec3A) -> f32 {
-        DIFFUSE * self.frame.latitudes(w).1 * (0.5 * FRAC_1_PI) * self.leaning(w).1
+    fn sent_back(&self, view: &View<'_>, ply: usize, again: &Again, w: Vec3A) -> (Rgb, f32) {
+        let around = view.yarn.plies[ply].leaving.towards(again.outwards, self.azimuth(again.axes, w));
+        let value = around * (DIFFUSE * self.frame.latitudes(w).1 * (0.5 * FRAC_1_PI));
+        (value, value.mean())
     }
 
     /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
@@ -214,9 +155,9 @@ impl Lobe {
             None => first * mis_weight(light_pdf, chance * pdf),
             Some(again) => {
                 let goes_on = open_chance(node, open);
-                let even = self.even(w);
+                let (even, even_pdf) = self.sent_back(view, node.spot.ply, again, w);
                 first * open * mis_weight(light_pdf, chance * goes_on * pdf)
-                    + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even)
+                    + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even_pdf)
             }
         }
     }
@@ -234,11 +175,14 @@ impl Lobe {
                 (again.direction, again.weight * again.pdf, again.pdf * again.open)
             }
             Some(again) => {
-                let sin = sample_sine_diffuse([u[0], stream.next()]);
-                let (s, c) = sin_cos(TAU * u[1]);
-                let w = self.direction(sin, Vec2::new(c, s));
-                let even = self.even(w);
-                (w, again.energy * even, even * (1.0 - again.open))
+                let sin = sample_sine_diffuse(u);
+                let w = self.direction(
+                    sin,
+                    view.yarn.plies[node.spot.ply].leaving.azimuth(again.outwards, stream),
+                    again.axes,
+                );
+                let (even, pdf) = self.sent_back(view, node.spot.ply, again, w);
+                (w, again.energy * even, pdf * (1.0 - again.open))
             }
         };
         (direction, value, pdf * self.chance)
@@ -257,23 +201,17 @@ impl Lobe {
         } else {
             sample_sine_diffuse(lat)
         };
-        // Azimuth with density (1 + lean cos(phi - phi0)) / 2 pi: uniform, then folded towards the front.
-        let mut phi = TAU * stream.next();
-        if stream.next() < self.mean_lean && stream.next() > 0.5 * (1.0 + sin_cos(phi).1) {
-            phi = PI - phi;
-        }
-        // Turned by phi0.
-        let (s, c) = sin_cos(phi);
-        self.direction(sin, self.lean_to.rotate(Vec2::new(c, s)))
+        self.direction(sin, optics.leaving.azimuth(self.outwards, stream), self.axes)
     }
 }
 
-/// What a matt cylinder sends off, against an even azimuth, by the cosine of the angle to the light, averaged over its width:
-/// (pi / 4) ((pi - angle) cos + sin).
+/// Two axes across a ply, which stand square on each other, as unit vectors across a lobe's frame.
 #[inline]
-pub(super) fn off_a_matt_cylinder(cos: f32) -> f32 {
-    let cos = cos.clamp(-1.0, 1.0);
-    (0.25 * PI * ((PI - cos.acos()) * cos + (1.0 - cos * cos).sqrt())).max(0.0)
+fn axes_across(frame: &LobeFrame, axes: [Vec3A; 2]) -> [Vec2; 2] {
+    let across = |axis: Vec3A| Vec2::new(axis.dot(frame.x), axis.dot(frame.y));
+    let zero = across(axes[0]).normalize_or(Vec2::X);
+    let side = zero.perp();
+    [zero, if side.dot(across(axes[1])) < 0.0 { -side } else { side }]
 }
 
 /// The chance, given how open a direction is, that multiply scattered light goes on in it.

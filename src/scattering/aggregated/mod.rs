@@ -23,7 +23,10 @@ use std::sync::Arc;
 
 use glam::Vec3A;
 
-use super::{Arrival, Continuation, Direct, LobeValues, fiber::FiberMaterial, medium::PlyOptics, mis_weight};
+pub use super::escape::Solutions;
+use super::{
+    Arrival, Continuation, Direct, LobeValues, escape::Place, fiber::FiberMaterial, medium::PlyOptics, mis_weight,
+};
 use crate::{
     geometry::{
         occluder::{Occluder, Transparency},
@@ -60,10 +63,25 @@ impl AggregatedYarn {
     /// # Panics
     /// If their numbers differ.
     pub fn new(shape: impl Into<Arc<YarnShape>>, materials: &[&FiberMaterial]) -> Self {
+        Self::pressed(shape, materials, 1.0, &Solutions::default())
+    }
+
+    /// The same for a yarn that is pressed flat, to axes of `stretch` : 1 on the mean. What is solved for it is added to `solutions`, and
+    /// not solved again.
+    ///
+    /// # Panics
+    /// If there is not one material for each ply.
+    pub fn pressed(
+        shape: impl Into<Arc<YarnShape>>,
+        materials: &[&FiberMaterial],
+        stretch: f64,
+        solutions: &Solutions,
+    ) -> Self {
         let shape = shape.into();
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
         let count = shape.plies.len();
-        let plies: Vec<_> = shape.plies.iter().zip(materials).map(|(p, m)| PlyOptics::new(m, p, count)).collect();
+        let plies = shape.plies.iter().zip(materials);
+        let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, count, stretch, solutions)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
         Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, node_gain, plain: false }
     }
@@ -132,6 +150,14 @@ impl Spot {
         let tangent = inside.fiber_tangent(view.yarn.occluder().shape(), view.section, ply);
         let stretch = tangent.length();
         Self { ply, depth, inside, tangent: tangent / stretch, stretch }
+    }
+
+    /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count.
+    #[inline]
+    fn place(&self, yarn: &AggregatedYarn) -> (Place, [Vec3A; 2]) {
+        let at = self.inside.in_ply(yarn.occluder().shape(), self.ply);
+        let (place, axes) = yarn.plies[self.ply].leaving.place(at, self.inside.short_axis_within());
+        (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 
     /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the
@@ -263,5 +289,7 @@ impl<'a> Vertex<'a> {
     }
 }
 
+#[cfg(test)]
+mod azimuth_tests;
 #[cfg(test)]
 mod tests;

@@ -163,13 +163,7 @@ impl Node {
         let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
         let before = crossing.fibers * x;
         let weight = throughput * amplitude;
-        let core = view.yarn.occluder().shape().plies[spot.ply].core_radius;
-        let along = (crossing.foot - spot.depth) * view.section.cos * view.section.rounded();
-        let leaves = optics.leaves_at((crossing.offset * crossing.offset + along * along) / (core * core));
-        // A flat section has more surface for its fibres: the chance to escape at each meeting is so much higher, and what
-        // leaves against what is lost.
-        let girth = spot.inside.short_axis().map_or(1.0, |(_, pressed)| pressed.girth());
-        let out_of_flat = |leaves: Rgb| leaves * girth / (leaves * (girth - 1.0) + 1.0);
+        let leaves = optics.leaving.share(&spot.place(view.yarn).0);
         let (untouched, events) = optics.touched(before, Rgb::splat(SAMPLING_WIDENING));
         let lobes =
             [optics.single_r * (Rgb::ONE - untouched), optics.single_r * untouched, optics.single_tt, optics.single_d];
@@ -188,8 +182,8 @@ impl Node {
             ])),
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
-            leaves: out_of_flat(leaves),
-            leaves_again: out_of_flat(optics.leaves_again),
+            leaves,
+            leaves_again: optics.leaving.entering,
             drawn: Drawn { direction: Vec3A::ZERO, value: NodeValue::NOTHING, escape: 0.0 },
         }
     }
@@ -247,6 +241,23 @@ impl Node {
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 
+    /// What other plies let pass in a direction, and where light meets one of them, if it does: the place on that ply's rim, as a unit vector
+    /// of the unwound yarn's round section. One of them, by the fibres in each.
+    #[inline]
+    pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Vec2>) {
+        let shape = view.yarn.occluder().shape();
+        let ahead = self.spot.inside.round_across(w).normalize_or(Vec2::X);
+        let (mut all, mut at) = (0.0, None);
+        let (_, others) = self.depth_by_plies(view, w, |way, fibers| {
+            all += fibers;
+            if fibers > 0.0 && stream.next() * all < fibers {
+                let beside = (way.offset / shape.plies[way.ply].radius).clamp(-1.0, 1.0);
+                at = Some(beside * ahead.perp() - (1.0 - beside * beside).sqrt() * ahead);
+            }
+        });
+        ((-others).exp(), at)
+    }
+
     /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
     /// plies, and of all but the node's own.
     ///
@@ -254,6 +265,12 @@ impl Node {
     /// as a fibre (the "hot spot"), and the light starts at the fibre's surface, not at its centre.
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
+        self.depth_by_plies(view, w, |_, _| {})
+    }
+
+    /// The same; `other` is told of the fibres in each other ply.
+    #[inline]
+    fn depth_by_plies(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead, f32)) -> (Rgb, Rgb) {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
@@ -290,7 +307,9 @@ impl Node {
                     own += passed.rho * fibers.max(0.0);
                 }
             } else {
-                others += passed.rho * chord.ahead(-way.foot);
+                let fibers = chord.ahead(-way.foot);
+                others += passed.rho * fibers;
+                other(&way, fibers);
             }
         });
         let tilt = spot.tilt(view.section, w);

@@ -7,12 +7,7 @@ use std::{
 
 use glam::Vec2;
 
-use super::{
-    backward::{Lobe, off_a_matt_cylinder},
-    forward::More,
-    single::Node,
-    *,
-};
+use super::{forward::More, single::Node, *};
 use crate::{
     geometry::{
         yarn::{PlyParameters, touching_plies},
@@ -20,8 +15,9 @@ use crate::{
     },
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
     scattering::{
-        kernel::{kappa_of_variance, kernel, normalisation},
+        kernel::{DIFFUSE, kappa_of_variance, kernel, normalisation, normalised_kernel},
         lobe::LobeFrame,
+        medium::extinction_rate,
         testing::{SILK, lossless, material, section, silk, sphere},
     },
 };
@@ -75,22 +71,34 @@ fn quadrature(
             }
         }
         let energy = reaching * ended * optics.albedo * optics.leaves_yarn * (Rgb::ONE - clear_share);
-        let backward = Lobe::new(&view, c, None, energy, 1.0);
         for (w, out) in directions.iter().zip(&mut out) {
-            out[1] += plain_backward(&view, &backward, c.ply, *w);
+            out[1] += plain_backward(&view, c, energy, *w);
         }
         reaching *= (-depth).exp();
     }
     out
 }
 
-/// B of the plain form: it leans as (1 + b cos phi) / 2 pi. Only the share of light that leans, and how it does, have changed.
-fn plain_backward(view: &View<'_>, lobe: &Lobe, ply: usize, w: Vec3A) -> Rgb {
-    const STRENGTHS: f32 = 3.2 / 3.0;
-    let share = lobe.lean;
-    let leaning = lobe.leaning(w).0;
-    let plain = (share * STRENGTHS).min(Rgb::ONE) * leaning + 1.0;
-    lobe.value(view, ply, w).0 * plain / (share * (off_a_matt_cylinder(leaning) - 1.0) + 1.0)
+/// B of the plain form: a share of it, by the ply's thickness, leans as (1 + cos phi) / 2 pi from where the camera looks. The program
+/// has solved where it leaves; its energy and its latitudes are the same.
+fn plain_backward(view: &View<'_>, crossing: &PlyCrossing, energy: Rgb, w: Vec3A) -> Rgb {
+    let shape = view.yarn.occluder().shape();
+    let (ply, optics) = (&shape.plies[crossing.ply], &view.yarn.plies[crossing.ply]);
+    let relative = if shape.plies.len() == 1 { crossing.offset / ply.radius } else { view.section.h };
+    let to = 1.2 * relative.clamp(-1.0, 1.0).asin();
+    let frame = LobeFrame::of_ply(shape, view.section, crossing, view.camera);
+    let (at, cos) = frame.latitudes(w);
+    let across = Vec2::new(w.dot(frame.x), w.dot(frame.y)).normalize();
+    let free_paths = |chain: f32| {
+        let sigma = 2.0 * ply.fiber_radius * ply.fibers / (PI * ply.core_radius);
+        sigma * extinction_rate(f64::from(1.0 - chain), ply.density()) as f32
+    };
+    let thickness = Rgb::from(optics.chain.to_array().map(free_paths));
+    let lean = thickness / (thickness + Rgb::splat(10.0)) * 3.2 * (Rgb::ONE - optics.albedo * 0.14);
+    let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
+    let latitude = Rgb::splat(DIFFUSE) + optics.mirrored * (m - Rgb::splat(DIFFUSE));
+    let around = lean.min(Rgb::ONE) * across.dot(Vec2::from_angle(to)) + 1.0;
+    energy * latitude * around * (cos / TAU)
 }
 
 /// F of the plain form, and T0: the camera's chord alone says how much passes, and the mean number of TT events how far it
@@ -147,7 +155,8 @@ fn build(case: Case, pressed: Option<Pressed>, m: &FiberMaterial) -> (Aggregated
         ply.crowding = 0.06;
     }
     let section = Section { pressed, ..section(theta, h, phase) };
-    (AggregatedYarn::new(shape, &vec![m; plies as usize]), section)
+    let stretch = pressed.map_or(1.0, |pressed| f64::from(pressed.stretch));
+    (AggregatedYarn::pressed(shape, &vec![m; plies as usize], stretch, &Solutions::default()), section)
 }
 
 #[test]

@@ -1,0 +1,281 @@
+//! What leaves a ply of light that is scattered evenly around in it, by where it is and where to: transport in its section,
+//! solved when a model is made ready (docs/model.md, section 7).
+
+use std::{
+    collections::HashMap,
+    f32::consts::{FRAC_PI_2, TAU},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+};
+
+use glam::Vec2;
+
+use crate::math::{Rgb, frame::sin_cos, sampler::Stream};
+
+mod linear;
+mod pressed;
+mod round;
+
+/// Rings of equal area into which the section is cut.
+pub(crate) const RINGS: usize = 16;
+/// Azimuths for which what leaves is held; between them it goes straight.
+pub(crate) const AZIMUTHS: usize = 24;
+/// The thickest section that so few rings tell, in mean free paths of its radius: of thicker ones the outer part is as thick.
+const THICKEST: f64 = 24.0;
+
+/// Media are told apart whose lengths, or losses, differ by more than one part in so many.
+const TOLD_APART: f64 = 200.0;
+
+/// Long over short axis of a section that is as good as round.
+const NEARLY_ROUND: f64 = 1.01;
+
+/// What sends light on takes part in its own escape: a chance to escape with so much of it, in mean free paths, `own`.
+pub(crate) fn past_itself(escape: f64, own: f64) -> f64 {
+    escape * (1.0 + own) / (1.0 + own * escape)
+}
+
+/// A ply's section as one channel of light sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Medium {
+    /// The radius in mean free paths: of the circle of the section's area.
+    pub(crate) radius: f64,
+    /// How far from each meeting no other is, in mean free paths beyond that.
+    pub(crate) apart: f64,
+    /// What a meeting keeps.
+    pub(crate) albedo: f64,
+    /// What the first meeting keeps.
+    pub(crate) first: f64,
+    /// The share of what leaves that other plies send back at once; where the rest of them takes it is followed by direction.
+    pub(crate) sent_back: f64,
+    /// Of light that comes from other plies: the share of what leaves that returns to them.
+    pub(crate) taken_back: f64,
+}
+
+impl Medium {
+    /// The next one of those that are told apart: colours that nobody does are solved once. What is not absorbed stays so.
+    fn rounded(&self) -> Self {
+        let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
+        let kept = |albedo: f64| 1.0 - near(1.0 - albedo).min(1.0);
+        let Self { radius, apart, albedo, first, sent_back, taken_back } = *self;
+        Self {
+            radius: near(radius),
+            apart: near(apart),
+            albedo: kept(albedo),
+            first: kept(first),
+            sent_back: near(sent_back).min(1.0),
+            taken_back: near(taken_back).min(1.0),
+        }
+    }
+
+    /// What the first meeting keeps over what others do.
+    fn first(&self) -> f64 {
+        if self.albedo > 0.0 { (self.first / self.albedo).min(1.0) } else { 1.0 }
+    }
+}
+
+/// Light that leaves at last.
+#[derive(Clone, Copy, Debug)]
+struct Outgoing {
+    /// The share that does.
+    share: f64,
+    /// Towards each azimuth, over what would go there if it left evenly.
+    azimuths: [f64; AZIMUTHS],
+}
+
+impl Outgoing {
+    /// The share that leaves, and how it does, but for a factor.
+    fn new(share: f64, leaving: [f64; AZIMUTHS]) -> Self {
+        let leaving = leaving.map(|part| part.max(0.0));
+        let sum: f64 = leaving.iter().sum();
+        let azimuths = if sum > 0.0 { leaving.map(|part| part / sum * AZIMUTHS as f64) } else { [1.0; AZIMUTHS] };
+        Self { share: share.clamp(0.0, 1.0), azimuths }
+    }
+
+    /// Part of the way to another, or beyond.
+    fn towards(&self, other: &Self, part: f64) -> Self {
+        let between = |a: f64, b: f64| a + (b - a) * part;
+        let azimuths = |k| between(self.share * self.azimuths[k], other.share * other.azimuths[k]);
+        Self::new(between(self.share, other.share), std::array::from_fn(azimuths))
+    }
+}
+
+/// For each sector of a quarter, from the short axis to the long one: light from the middle of each ring that meets something
+/// next. One sector in a circle, where azimuths count from that of the place.
+struct Solved {
+    sectors: Vec<[Outgoing; RINGS]>,
+    /// Of light that enters from all sides, the share that leaves at last.
+    entering: f64,
+}
+
+/// What leaves a ply of one channel: by sectors and rings, as [`Leaving`] holds it, and of light that enters from all sides.
+#[derive(Debug)]
+struct OfChannel {
+    cells: Vec<Outgoing>,
+    entering: f64,
+}
+
+/// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
+#[derive(Debug, Default)]
+pub struct Solutions(Mutex<HashMap<[u64; 7], Arc<OnceLock<Arc<OfChannel>>>>>);
+
+impl Solutions {
+    fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
+        let medium = medium.rounded();
+        let Medium { radius, apart, albedo, first, sent_back, taken_back } = medium;
+        let key = [radius, apart, albedo, first, sent_back, taken_back, stretch].map(f64::to_bits);
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let cell = Arc::clone(all.entry(key).or_default());
+        drop(all);
+        Arc::clone(cell.get_or_init(|| Arc::new(Leaving::of_channel(&medium, stretch))))
+    }
+}
+
+/// What leaves a ply at last, per channel.
+#[derive(Clone, Debug)]
+pub(crate) struct Leaving {
+    /// How many sectors there are in a quarter, with both axes.
+    sectors: usize,
+    /// Of light that comes from a place and meets something: sector by sector, ring by ring of equal area from the axis on, and at the
+    /// rim.
+    shares: Vec<Rgb>,
+    azimuths: Vec<[Rgb; AZIMUTHS]>,
+    /// Of light that comes from other plies, the share that leaves at last.
+    pub(crate) entering: Rgb,
+}
+
+impl Leaving {
+    /// For each channel, in a section of long over short axis `stretch`.
+    pub(crate) fn new(channels: &[Medium; 3], stretch: f64, solutions: &Solutions) -> Self {
+        let tables = channels.map(|medium| solutions.of(&medium, stretch));
+        let rgb = |value: &dyn Fn(&Outgoing) -> f64, cell: usize| {
+            Rgb::from([0, 1, 2].map(|c: usize| value(&tables[c].cells[cell])))
+        };
+        let cells = 0..tables[0].cells.len();
+        let azimuths = |cell| std::array::from_fn(|k| rgb(&|out| out.azimuths[k], cell));
+        Self {
+            sectors: if stretch > NEARLY_ROUND { pressed::QUARTER } else { 1 },
+            shares: cells.clone().map(|cell| rgb(&|out| out.share, cell)).collect(),
+            azimuths: cells.map(azimuths).collect(),
+            entering: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering)),
+        }
+    }
+
+    fn of_channel(medium: &Medium, stretch: f64) -> OfChannel {
+        // Of thicker sections the outer part is as deep below the rim as in the one that is looked at.
+        let thicker = (medium.radius / THICKEST).max(1.0);
+        let looked_at = Medium { radius: medium.radius.min(THICKEST), ..*medium };
+        let solved =
+            if stretch > NEARLY_ROUND { pressed::solve(&looked_at, stretch) } else { round::solve(&looked_at) };
+        let mut cells = Vec::with_capacity(solved.sectors.len() * (RINGS + 1));
+        for rings in &solved.sectors {
+            let rim = rings[RINGS - 1].towards(&rings[RINGS - 2], -0.5);
+            let at = |ring: usize| rings.get(ring).unwrap_or(&rim);
+            cells.extend((0..=RINGS).map(|i| {
+                let r = ((i as f64 + 0.5) / RINGS as f64).min(1.0).sqrt();
+                let (ring, part) = between((1.0 - (1.0 - r) * thicker).max(0.0).powi(2) as f32);
+                if thicker > 1.0 { at(ring).towards(at(ring + 1), f64::from(part)) } else { *at(i) }
+            }));
+        }
+        OfChannel { cells, entering: solved.entering.clamp(0.0, 1.0) }
+    }
+
+    /// Of light that comes from a place and meets something: the share that leaves at last.
+    #[inline]
+    pub(crate) fn share(&self, place: &Place) -> Rgb {
+        let mix = |from: usize| {
+            let [low, high] = [self.shares[from + place.ring], self.shares[from + place.ring + 1]];
+            low + (high - low) * place.beyond
+        };
+        let from = mix(place.sector * (RINGS + 1));
+        if self.sectors == 1 { from } else { from + (mix((place.sector + 1) * (RINGS + 1)) - from) * place.turned }
+    }
+
+    /// Where to it leaves from there: one of the places around it, as likely as it is near.
+    #[inline]
+    pub(crate) fn draw(&self, place: &Place, stream: &mut Stream) -> Outwards {
+        let ring = place.ring + usize::from(stream.next() < place.beyond);
+        let sector = place.sector + usize::from(self.sectors > 1 && stream.next() < place.turned);
+        Outwards(sector * (RINGS + 1) + ring)
+    }
+
+    /// What leaves towards an azimuth, given by its cosine and sine, over what would go there if it left evenly.
+    #[inline]
+    pub(crate) fn towards(&self, outwards: Outwards, azimuth: Vec2) -> Rgb {
+        let at = azimuth.y.atan2(azimuth.x) * (AZIMUTHS as f32 / TAU) + AZIMUTHS as f32;
+        let k = at as usize;
+        let part = at - k as f32;
+        let row = &self.azimuths[outwards.0];
+        let [low, high] = [row[k % AZIMUTHS], row[(k + 1) % AZIMUTHS]];
+        low + (high - low) * part
+    }
+
+    /// Draws an azimuth, as cosine and sine: with the mean of the channels over an even one.
+    #[inline]
+    pub(crate) fn azimuth(&self, outwards: Outwards, stream: &mut Stream) -> Vec2 {
+        let mut left = stream.next() * AZIMUTHS as f32;
+        let mut chosen = 0;
+        for (k, value) in self.azimuths[outwards.0].iter().enumerate() {
+            let value = value.mean();
+            if value > 0.0 {
+                chosen = k;
+                if left < value {
+                    break;
+                }
+            }
+            left -= value;
+        }
+        // What goes straight between values is a sum of triangles.
+        let (s, c) = sin_cos(TAU / AZIMUTHS as f32 * (chosen as f32 + stream.next() + stream.next() - 1.0));
+        Vec2::new(c, s)
+    }
+}
+
+/// Which of a [`Leaving`]'s distributions light leaves by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outwards(usize);
+
+/// A place in a ply's section, among those of a [`Leaving`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    ring: usize,
+    beyond: f32,
+    sector: usize,
+    turned: f32,
+}
+
+impl Leaving {
+    /// The place at `at`, in radii of the circle that the section becomes when its axes are made equal, and the axes against which azimuths
+    /// count from there. `short` is the unit vector along its short axis.
+    #[inline]
+    pub(crate) fn place(&self, at: Vec2, short: Vec2) -> (Place, [Vec2; 2]) {
+        let (ring, beyond) = between(at.length_squared());
+        if self.sectors == 1 {
+            let x = at.normalize_or(Vec2::X);
+            return (Place { ring, beyond, sector: 0, turned: 0.0 }, [x, x.perp()]);
+        }
+        let (turned, axes) = quarter(at, short);
+        let turned = turned * (self.sectors - 1) as f32;
+        let sector = (turned as usize).min(self.sectors - 2);
+        (Place { ring, beyond, sector, turned: turned - sector as f32 }, axes)
+    }
+}
+
+/// How far a vector is from the short axis to the long one, as a share of that quarter, and the axes of the quarter it lies in.
+#[inline]
+fn quarter(at: Vec2, short: Vec2) -> (f32, [Vec2; 2]) {
+    let long = short.perp();
+    let (x, y) = (at.dot(short), at.dot(long));
+    let turned = (y.abs().atan2(x.abs()) / FRAC_PI_2).min(1.0);
+    (turned, [short * 1f32.copysign(x), long * 1f32.copysign(y)])
+}
+
+/// Where a square distance from the axis is between two rings, and how far.
+#[inline]
+fn between(r2: f32) -> (usize, f32) {
+    let at = (r2 * RINGS as f32 - 0.5).clamp(0.0, RINGS as f32 - 0.5);
+    let ring = (at as usize).min(RINGS - 1);
+    // From the last ring to the rim it is half as far as from ring to ring.
+    (ring, (at - ring as f32) * if ring + 1 == RINGS { 2.0 } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests;

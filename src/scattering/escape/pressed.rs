@@ -1,0 +1,142 @@
+//! Transport in an ellipse: ring by ring and sector by sector of the circle that it becomes when its axes are made equal.
+
+use std::f64::consts::TAU;
+
+use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, linear};
+
+/// Sectors of the whole, a multiple of 4, and those from the short axis to the long one, with both.
+const SECTORS: usize = 12;
+pub(super) const QUARTER: usize = SECTORS / 4 + 1;
+const CELLS: usize = RINGS * SECTORS;
+/// Directions, twice the azimuths that are held, and places along each, that are looked at from every cell.
+const DIRECTIONS: usize = 2 * AZIMUTHS;
+const PLACES: usize = 12;
+
+/// From one cell: what leaves without meeting anything, towards each azimuth, and what meets something next in each other cell.
+#[derive(Clone)]
+struct Row {
+    escape: [f64; AZIMUTHS],
+    next: Vec<f64>,
+}
+
+impl Row {
+    fn new(ring: usize, sector: usize, [short, long]: [f64; 2], apart: f64) -> Self {
+        let mut out = Self { escape: [0.0; AZIMUTHS], next: vec![0.0; CELLS] };
+        let r2 = (ring as f64 + 0.5) / RINGS as f64;
+        let (sin, cos) = (TAU * sector as f64 / SECTORS as f64).sin_cos();
+        let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
+        for k in 0..DIRECTIONS {
+            let (sin, cos) = (TAU * k as f64 / DIRECTIONS as f64).sin_cos();
+            let (dx, dy) = (cos / short, sin / long);
+            // To the rim, in mean free paths.
+            let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
+            let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
+            let met = -(-(length - apart).max(0.0)).exp_m1();
+            // Directions between two azimuths by halves.
+            for azimuth in [k / 2, k.div_ceil(2) % AZIMUTHS] {
+                out.escape[azimuth] += 0.5 * (1.0 - met) / DIRECTIONS as f64;
+            }
+            for m in 0..PLACES {
+                let u = (m as f64 + 0.5) / PLACES as f64;
+                let s = if met > 1e-9 { apart - (-u * met).ln_1p() } else { u * length };
+                out.meets((x + s * dx, y + s * dy), met / (DIRECTIONS * PLACES) as f64);
+            }
+        }
+        out
+    }
+
+    /// Light that meets something at a point: by a cubic between the sectors, or it would spread around.
+    fn meets(&mut self, (x, y): (f64, f64), met: f64) {
+        let ring = (((x * x + y * y) * RINGS as f64) as usize).min(RINGS - 1);
+        let at = y.atan2(x) / TAU * SECTORS as f64 + SECTORS as f64;
+        let (sector, t) = (at as usize, at.fract());
+        let weights = [
+            -t * (t - 1.0) * (t - 2.0) / 6.0,
+            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+            -t * (t + 1.0) * (t - 2.0) / 2.0,
+            t * (t + 1.0) * (t - 1.0) / 6.0,
+        ];
+        for (k, weight) in weights.into_iter().enumerate() {
+            self.next[ring * SECTORS + (sector + SECTORS + k - 1) % SECTORS] += met * weight;
+        }
+    }
+
+    /// The same for the cell `own`, if of what leaves the share `taken_back` returns.
+    fn closed(&self, own: usize, taken_back: f64) -> Self {
+        let escape: f64 = self.escape.iter().sum();
+        let leaves = escape * (1.0 - taken_back);
+        let more = if escape > 0.0 { leaves / escape } else { 0.0 };
+        let mut next = self.next.clone();
+        let met: f64 = next.iter().sum();
+        if met > 0.0 {
+            next.iter_mut().for_each(|chance| *chance *= (1.0 - leaves) / met);
+        } else {
+            // It meets nothing else: what returns does so where it was.
+            next[own] = 1.0 - leaves;
+        }
+        Self { escape: self.escape.map(|part| part * more), next }
+    }
+
+    /// The row of the cell that this one becomes when the section is mirrored about the long axis, the short one, or both.
+    fn mirrored(&self, long: bool, short: bool) -> Self {
+        let image = |k: usize, of: usize| {
+            let k = if long { (of + of / 2 - k) % of } else { k };
+            if short { (of - k) % of } else { k }
+        };
+        let next = (0..CELLS).map(|cell| self.next[cell / SECTORS * SECTORS + image(cell % SECTORS, SECTORS)]);
+        Self { escape: std::array::from_fn(|k| self.escape[image(k, AZIMUTHS)]), next: next.collect() }
+    }
+}
+
+/// Of light that meets something in each cell: what leaves at last towards each azimuth.
+fn leaving(rows: &[Row], albedo: f64) -> Vec<f64> {
+    // L = albedo (escape + next L)
+    let mut matrix: Vec<f64> = rows.iter().flat_map(|row| row.next.iter().map(|chance| -albedo * chance)).collect();
+    matrix.iter_mut().step_by(CELLS + 1).for_each(|own| *own += 1.0);
+    let mut out: Vec<f64> = rows.iter().flat_map(|row| row.escape.map(|part| albedo * part)).collect();
+    linear::solve(&mut matrix, &mut out, CELLS);
+    out
+}
+
+pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
+    let axes = [medium.radius / stretch.sqrt(), medium.radius * stretch.sqrt()];
+    // All four quarters from one of them.
+    let rows: Vec<Row> = (0..RINGS)
+        .flat_map(|ring| {
+            let quarter: Vec<Row> = (0..QUARTER).map(|sector| Row::new(ring, sector, axes, medium.apart)).collect();
+            let half = SECTORS / 2;
+            (0..SECTORS).map(move |sector| {
+                let (upper, mirrored) = (sector.min(SECTORS - sector), sector > half);
+                let (first, long) = (upper.min(half - upper), upper > half / 2);
+                quarter[first].mirrored(long, mirrored)
+            })
+        })
+        .collect();
+    let closed =
+        |share: f64| -> Vec<Row> { rows.iter().enumerate().map(|(own, row)| row.closed(own, share)).collect() };
+    let near = closed(medium.sent_back);
+    let (out, first) = (leaving(&near, medium.albedo), medium.first());
+    let mean = |weights: &[f64], out: &[f64], own: usize| {
+        let sum: f64 = weights.iter().sum();
+        let mut towards = [0.0; AZIMUTHS];
+        for (cell, (weight, out)) in weights.iter().zip(out.chunks_exact(AZIMUTHS)).enumerate() {
+            // Where nothing is met it is as from the place itself.
+            let weight = if sum > 0.0 { weight / sum } else { f64::from(u8::from(cell == own)) };
+            towards.iter_mut().zip(out).for_each(|(to, from)| *to += weight * from);
+        }
+        Outgoing::new(first * towards.iter().sum::<f64>(), towards)
+    };
+    let sectors = (0..QUARTER)
+        .map(|sector| {
+            std::array::from_fn(|ring| {
+                let own = ring * SECTORS + sector;
+                mean(&near[own].next, &out, own)
+            })
+        })
+        .collect();
+    // What enters is met where what leaves would come from.
+    let outer = closed(medium.taken_back);
+    let other = if medium.taken_back > 0.0 { leaving(&outer, medium.albedo) } else { out };
+    let enters: Vec<f64> = outer.iter().map(|row| row.escape.iter().sum()).collect();
+    Solved { sectors, entering: mean(&enters, &other, CELLS - 1).share }
+}
