@@ -95,6 +95,7 @@ pub(crate) struct Integrator<'a> {
     /// Where the camera is, and how wide its pixels are: [`crate::scene::Camera::pixel_width`].
     camera: Vec3A,
     pixel_width: (f32, f32),
+    /// Where fibres are told apart, if they are anywhere.
     fiber_detail: Option<FiberDetail>,
 }
 

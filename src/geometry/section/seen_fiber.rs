@@ -183,7 +183,6 @@ mod tests {
                 wide += 1.4 / (2.0 * radius);
             }
             let lines = seen / wide;
-            println!("{count} fibres at {density}: {lines:.2} lines for each width");
             let stated = f64::from(lines_for_each_width(density as f32));
             assert!((lines / stated - 1.0).abs() < 0.06, "{count} fibres at {density}: {lines}, not {stated}");
         }

@@ -46,7 +46,6 @@ fn thick_plies_send_light_back_as_their_fibers_do() {
         [0.0166, 0.0158, 0.0136],
     ];
     let found = around(210, 0.5, &material(([0.0; 3], [0.0; 3], [0.02, 0.3, 0.9]), [0.15, 0.12, 0.35]));
-    eprintln!("{found:.4?}");
     for (found, truth) in found.iter().zip(truth) {
         for (found, truth) in found.iter().zip(truth) {
             assert!((found / truth - 1.0).abs() < 0.12, "{found:.4} of all light, not {truth:.4}");
