@@ -115,7 +115,10 @@ struct OfChannel {
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<[u64; 7], Arc<OnceLock<Arc<OfChannel>>>>>);
+pub struct Solutions(Mutex<HashMap<[u64; 7], Pending>>);
+
+/// What one thread solves and others wait for.
+type Pending = Arc<OnceLock<Arc<OfChannel>>>;
 
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
