@@ -18,6 +18,8 @@ const SEEN_FOLD: f64 = 0.5;
 /// A normal carried along a chain, and how far plies have turned about it.
 pub(super) struct Winding {
     pub(super) knots: Vec<Knot>,
+    /// Turns of the plies, radians per yarn radius.
+    ply_rate: f64,
     /// By how much a closed chain turns the normal against itself.
     angle: f64,
     /// Where plies are seen to break, if they are.
@@ -47,8 +49,6 @@ impl Tight {
 pub(super) struct Knot {
     pub(super) tangent: DVec3,
     pub(super) normal: DVec3,
-    /// The angle of the plies' turns up to here.
-    turned: f64,
     /// How far along the chain, in yarn radii.
     along: f64,
 }
@@ -61,10 +61,8 @@ impl Winding {
     pub(super) fn new(chain: &Chain, options: &StrandOptions) -> Self {
         let segments = chain.segments();
         let starts: Vec<usize> = (0..segments.max(1)).step_by(STRETCH).collect();
-        let stretches: Vec<_> = starts
-            .into_par_iter()
-            .map(|start| carry(chain, start, (start + STRETCH).min(segments), options.ply_rate))
-            .collect();
+        let stretches: Vec<_> =
+            starts.into_par_iter().map(|start| carry(chain, start, (start + STRETCH).min(segments))).collect();
         // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
         let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
         let mut tight: Option<Tight> = None;
@@ -76,7 +74,6 @@ impl Winding {
                 let (sin, cos) = if size > 0.0 { (sin / size, cos / size) } else { (0.0, 1.0) };
                 for knot in &mut stretch {
                     knot.normal = cos * knot.normal + sin * knot.tangent.cross(knot.normal);
-                    knot.turned += end.turned;
                     knot.along += end.along;
                 }
             }
@@ -85,12 +82,17 @@ impl Winding {
         }
         let (start, end) = (knots[0].normal, knots[knots.len() - 1]);
         let angle = end.tangent.dot(start.cross(end.normal)).atan2(start.dot(end.normal));
-        Self { knots, angle, tight }
+        Self { knots, ply_rate: options.ply_rate, angle, tight }
+    }
+
+    /// The angle by which the plies have turned up to a knot.
+    fn turned(&self, knot: usize) -> f64 {
+        self.ply_rate * self.knots[knot].along
     }
 
     /// By how much a closed yarn's section comes back turned, when its plies turn as they do at rest.
     pub(super) fn residual(&self, at_rest: &Self) -> f64 {
-        self.angle + at_rest.knots[at_rest.knots.len() - 1].turned
+        self.angle + at_rest.turned(at_rest.knots.len() - 1)
     }
 
     /// How far along the chain each control point is, in yarn radii.
@@ -102,7 +104,7 @@ impl Winding {
     /// What is known at each control point.
     pub(super) fn frames(&self, at_rest: &Self, missing: f64, phase: f64) -> Vec<PointFrame> {
         let segments = self.knots.len() - 1;
-        let turned = |i: usize| at_rest.knots[i].turned - missing * i as f64 / segments as f64;
+        let turned = |i: usize| at_rest.turned(i) - missing * i as f64 / segments as f64;
         // Knot i is where segment i starts: the second of its four points.
         let frame = |i: usize| {
             let angle = |i: usize| phase + turned(i.min(segments));
@@ -121,7 +123,7 @@ impl Winding {
 
 /// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
 /// knots from there to there, and the tightest bend.
-fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, Option<Tight>) {
+fn carry(chain: &Chain, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) {
     let [a, b, c, d] = GAUSS;
     let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (Weights::new(chain.basis, u), weight));
     let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
@@ -131,10 +133,10 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
     // Any rule will do for where the turning starts; this one is easy to reproduce: +z, laid across the yarn.
     let across = |axis: DVec3| (axis - axis.dot(tangent) * tangent).try_normalize();
     let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
-    let (mut turned, mut along) = (0.0, 0.0);
+    let mut along = 0.0;
     let (mut fold, mut tight): (f64, Option<Tight>) = (0.0, None);
     let mut knots = Vec::with_capacity(end - start + 1);
-    knots.push(Knot { tangent, normal, turned, along });
+    knots.push(Knot { tangent, normal, along });
     for segment in start..end {
         let points = chain.points_of(segment);
         for (weights, weight) in &nodes {
@@ -143,7 +145,6 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
             let speed = velocity.length();
             let next_tangent = velocity.try_normalize().unwrap_or(tangent);
             normal = double_reflection(here.at.truncate(), tangent, next.at.truncate(), next_tangent, normal);
-            turned += weight * ply_rate * speed / next.at.w.max(1e-300);
             along += weight * speed / next.at.w.max(1e-300);
             // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
             // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
@@ -162,7 +163,7 @@ fn carry(chain: &Chain, start: usize, end: usize, ply_rate: f64) -> (Vec<Knot>, 
         }
         // Rounding must not accumulate over thousands of segments.
         normal = (normal - normal.dot(tangent) * tangent).try_normalize().unwrap_or(normal);
-        knots.push(Knot { tangent, normal, turned, along });
+        knots.push(Knot { tangent, normal, along });
     }
     (knots, tight)
 }
