@@ -42,9 +42,8 @@ impl Section<'_> {
     #[inline]
     pub fn seen_fiber(&self, shape: &YarnShape, front: &PlyCrossing, distance: f32) -> SeenFiber {
         let ply = &shape.plies[front.ply];
-        let at = self.inside(shape, self.point(front.enter), front.travel[0]).at - ply.distance * ply.direction;
-        let (outward, across) = (at.dot(ply.direction), ply.direction.perp_dot(at));
-        let angle = (across * ply.stretch.y).atan2(outward * ply.stretch.x);
+        let at = self.inside(shape, self.point(front.enter), front.travel[0]).in_ply(shape, front.ply);
+        let angle = ply.direction.perp_dot(at).atan2(ply.direction.dot(at));
         let along = distance + front.travel[0];
         SeenFiber {
             turn: (angle - (ply.fiber_rate - shape.ply_rate) * along) / TAU,
