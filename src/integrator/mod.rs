@@ -26,7 +26,7 @@ use crate::{
     light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
     scattering::{Arrival, LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, FiberDetail, Ground, Layers, Material, Scene},
+    scene::{CurveKind, Fabric, FiberDetail, Footprint, Ground, Layers, Material, Scene},
     trace::{Hit, SurfacePlace, YarnGeometry},
 };
 
@@ -92,9 +92,8 @@ pub(crate) struct Integrator<'a> {
     flow: Option<Flow>,
     /// View direction for depths.
     back: Vec3A,
-    /// Where the camera is, and how wide its pixels are: [`crate::scene::Camera::pixel_width`].
-    camera: Vec3A,
-    pixel_width: (f32, f32),
+    /// How wide pixels are.
+    footprint: Footprint,
     /// Where fibres are told apart, if they are anywhere.
     fiber_detail: Option<FiberDetail>,
 }
@@ -153,9 +152,8 @@ impl<'a> Integrator<'a> {
             layers: scene.layers,
             flow: Flow::of(scene),
             back: Vec3A::from(scene.camera.back_f32()),
-            camera: scene.camera.position.as_vec3a(),
-            pixel_width: scene.camera.pixel_width(scene.render.height),
-            fiber_detail: FiberDetail::of(scene),
+            footprint: scene.camera.footprint(scene.render.height),
+            fiber_detail: FiberDetail::of(scene).filter(|_| scene.fabrics.iter().any(|f| f.shows_fibers)),
         }
     }
 

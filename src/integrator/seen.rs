@@ -73,7 +73,6 @@ impl Integrator<'_> {
         scratch: &Scratch,
     ) -> Option<f32> {
         let detail = self.fiber_detail.filter(|_| path.bounces == 0)?;
-        let distance = yarns.strands.distance_along(hit.segment, hit.u)?;
         let front = scratch.crossings.first()?;
         let shape = yarn.shape();
         let width = 2.0 * shape.plies[front.ply].fiber_radius * section.radius;
@@ -81,6 +80,7 @@ impl Integrator<'_> {
         if stream.next() >= detail.chance(width, section.point_on_ray(front.enter)) {
             return None;
         }
+        let distance = yarns.strands.distance_along(hit.segment, hit.u)?;
         let ply = (yarns.first_ply + front.ply) as u32;
         let key = hash2(hash2(yarns.fabric as u32, yarns.strands.yarn_of(hit.segment) as u32), ply);
         Some(section.seen_fiber(shape, front, distance).number(key, [stream.next(), stream.next()]))

@@ -32,9 +32,8 @@ impl Integrator<'_> {
         let mut albedo = material.surface.albedo();
         if let Some(picture) = &material.texture {
             // As wide as a pixel there: light that comes after other scattering sees no wider, which only costs noise.
-            let width = self.pixel_width.0 + self.pixel_width.1 * (place.point - self.camera).length();
             let uv = place.uv * picture.repeat;
-            let width = width * place.uv_per_length * picture.repeat.max_element();
+            let width = self.footprint.at(place.point) * place.uv_per_length * picture.repeat.max_element();
             albedo *= Rgb::from(picture.texture.sample(uv.x, uv.y, width)).min(Rgb::ONE);
         }
         if path.bounces == 0 {

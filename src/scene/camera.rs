@@ -239,18 +239,35 @@ impl Camera {
         to_picture * self.world_to_camera(middle)
     }
 
-    /// How wide a pixel of a picture of so many rows is at the camera, and by how much wider for each length of
-    /// distance.
-    pub fn pixel_width(&self, height: u32) -> (f32, f32) {
-        match self.projection {
+    /// How wide the pixels of a picture of so many rows are.
+    pub fn footprint(&self, height: u32) -> Footprint {
+        let (width, per_length) = match self.projection {
             Projection::Perspective(angle) => (0.0, (2.0 * (0.5 * angle).tan() / f64::from(height)) as f32),
             Projection::Orthographic(size) => ((size / f64::from(height)) as f32, 0.0),
-        }
+        };
+        Footprint { camera: self.position.as_vec3a(), width, per_length }
     }
 
     /// The direction towards the viewer in single precision: distances along it are depths.
     pub fn back_f32(&self) -> Vec3 {
         self.back.as_vec3()
+    }
+}
+
+/// How wide pixels are at the places that they show.
+#[derive(Clone, Copy, Debug)]
+pub struct Footprint {
+    camera: Vec3A,
+    /// At the camera, millimetres, and by how much more for each of them of distance.
+    width: f32,
+    per_length: f32,
+}
+
+impl Footprint {
+    /// The width of a pixel at a place, millimetres.
+    #[inline]
+    pub fn at(&self, place: Vec3A) -> f32 {
+        self.width + self.per_length * (place - self.camera).length()
     }
 }
 

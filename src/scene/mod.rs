@@ -23,7 +23,7 @@ use glam::{DAffine3, DVec3, Vec2};
 use rayon::prelude::*;
 
 pub use builder::{SceneBuilder, SceneError};
-pub use camera::Camera;
+pub use camera::{Camera, Footprint};
 pub use fiber_detail::FiberDetail;
 pub use layers::{LayerName, Layers};
 
