@@ -1,6 +1,9 @@
 //! `yarnray info`
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use glam::DVec3;
@@ -275,6 +278,23 @@ fn scene_report(scene: &Scene) -> (Value, String) {
     (facts.json(), facts.text())
 }
 
+/// How far the yarns of a scene run into each other, each as wide as it is in the mean; `None` where nothing lies near.
+fn overlap_of(scene: &Scene) -> Option<Overlap> {
+    fn of_fabric<'s>(fabric: &'s Fabric, scene: &Scene) -> Vec<(&'s Curve, Cow<'s, [f64]>)> {
+        let half_width = match fabric.kind {
+            CurveKind::Yarn(yarn) => scene.yarns[yarn].half_width(),
+            CurveKind::Fiber(_) => 1.0,
+        };
+        let widths = |radii: &'s Vec<f64>| match half_width {
+            1.0 => Cow::Borrowed(radii.as_slice()),
+            _ => radii.iter().map(|r| r * half_width).collect(),
+        };
+        fabric.curves.iter().map(|(curve, radii)| (curve, widths(radii))).collect()
+    }
+    let curves: Vec<_> = scene.fabrics.iter().flat_map(|fabric| of_fabric(fabric, scene)).collect();
+    (!curves.is_empty()).then(|| overlap(curves.iter().map(|(curve, radii)| (*curve, &**radii)))).flatten()
+}
+
 impl<'a> SceneFacts<'a> {
     fn new(scene: &'a Scene) -> Self {
         let estimates = cloth::estimates(scene);
@@ -285,9 +305,7 @@ impl<'a> SceneFacts<'a> {
         let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
         // Of garments that are not laid only their tile is measured.
-        let overlap = (scene.fabrics.iter().any(|f| !f.curves.is_empty()))
-            .then(|| overlap(scene.fabrics.iter().flat_map(|f| &f.curves).map(|(c, r)| (c, r.as_slice()))))
-            .flatten();
+        let overlap = overlap_of(scene);
         let (plan, memory) = (Plan::new(scene), Memory::new(scene));
         Self { scene, estimates, total, plan, memory, bounds: [low, high], overlap }
     }

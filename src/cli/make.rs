@@ -160,11 +160,13 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
     let radius = own(args.output.radius, 0).unwrap_or(otherwise);
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
+    let weft_radius = own(args.weft_radius, 1).unwrap_or(radius);
+    let half_width = yarn.as_ref().map_or(1.0, Yarn::half_width);
     let piece = Weave {
         warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
         wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
-        warp_radius: radius,
-        weft_radius: own(args.weft_radius, 1).unwrap_or(radius),
+        warp_radius: radius * half_width,
+        weft_radius: weft_radius * half_width,
         warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
         weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
         cover: args.cover,
@@ -189,7 +191,9 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
-    write(cloth.strands(), &args.output, [radius, piece.weft_radius], yarn.as_ref(), color)?;
+    let mut strands = cloth.strands();
+    strands.iter_mut().for_each(|strand| strand.widen(half_width));
+    write(strands, &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
         let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
@@ -271,8 +275,10 @@ fn write(
     };
     write_all(&output.out, &set, output.quiet)?;
     if !output.quiet && set.plies.is_empty() {
-        let lengths = overlap(set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?))));
-        if let Some(found) = lengths {
+        let half_width = yarn.map_or(1.0, Yarn::half_width);
+        let widths: Vec<Vec<f64>> =
+            set.curves.iter().map(|c| c.radii.iter().flatten().map(|r| r * half_width).collect()).collect();
+        if let Some(found) = overlap(set.curves.iter().zip(widths.iter().map(Vec::as_slice))) {
             log::say(&super::overlap_in_words(&found));
         }
     }

@@ -36,6 +36,11 @@ impl PlyParameters {
         self.radius / self.aspect.sqrt()
     }
 
+    /// The shorter semi-axis of the cross-section, which lies along the line to the yarn's axis.
+    pub fn short_axis(&self) -> f64 {
+        self.radius * self.aspect.sqrt()
+    }
+
     /// The same ply as the only one of a yarn that is as wide as it: lengths in units of its longer semi-axis.
     pub fn alone(&self) -> Self {
         let unit = self.long_axis();
@@ -47,6 +52,21 @@ impl PlyParameters {
             ..self.clone()
         }
     }
+}
+
+/// Mean half width of a yarn of these plies as it is seen from all sides, yarn radii, at most 1: half of the room that it takes
+/// beside others. Plied yarns turn, and lie in the hollows between each other's plies.
+pub fn mean_half_width(plies: &[PlyParameters]) -> f64 {
+    const DIRECTIONS: u32 = 360;
+    let reach = |direction: f64| {
+        let of = |ply: &PlyParameters| {
+            let (sin, cos) = (direction - ply.angle).sin_cos();
+            ply.distance * cos + (ply.short_axis() * cos).hypot(ply.long_axis() * sin)
+        };
+        plies.iter().map(of).fold(0.0, f64::max)
+    };
+    let sum: f64 = (0..DIRECTIONS).map(|k| reach(TAU * f64::from(k) / f64::from(DIRECTIONS))).sum();
+    (sum / f64::from(DIRECTIONS)).min(1.0)
 }
 
 /// A ply made ready for rays.
@@ -185,21 +205,34 @@ pub fn fiber_tangent(ply: &PlyShape, ply_rate: f32, centre: Vec2, axis: Vec2, at
 pub(crate) mod tests {
     use super::*;
 
+    fn touching(count: u32, fibers: u32, density: f64, fiber_twist: f64) -> Vec<PlyParameters> {
+        let (radius, distance) = touching_plies(count);
+        let ply = |k: u32| PlyParameters {
+            radius,
+            aspect: 1.0,
+            distance,
+            angle: TAU * f64::from(k) / f64::from(count),
+            fibers,
+            fiber_radius: radius * (density / f64::from(fibers)).sqrt(),
+            fiber_twist,
+        };
+        (0..count).map(ply).collect()
+    }
+
     /// `count` touching round plies with `fibers` each at area fraction `density`.
     pub(crate) fn touching_yarn(count: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64) -> YarnShape {
-        let (radius, distance) = touching_plies(count);
-        let plies: Vec<PlyParameters> = (0..count)
-            .map(|k| PlyParameters {
-                radius,
-                aspect: 1.0,
-                distance,
-                angle: TAU * f64::from(k) / f64::from(count),
-                fibers,
-                fiber_radius: radius * (density / f64::from(fibers)).sqrt(),
-                fiber_twist,
-            })
-            .collect();
-        YarnShape::new(&plies, ply_twist, true)
+        YarnShape::new(&touching(count, fibers, density, fiber_twist), ply_twist, true)
+    }
+
+    #[test]
+    fn plied_yarns_are_as_wide_as_the_hulls_of_their_plies() {
+        // Perimeters of hulls of circles over 2 pi (Cauchy).
+        for count in [2, 3, 4] {
+            let radius = touching_plies(count).0;
+            let expected = radius + 2.0 * f64::from(count) * radius / TAU;
+            assert!((mean_half_width(&touching(count, 10, 0.5, 0.0)) - expected).abs() < 1e-4, "{count}");
+        }
+        assert_eq!(mean_half_width(&touching(1, 10, 0.5, 0.0)), 1.0);
     }
 
     #[test]

@@ -33,7 +33,7 @@ use crate::{
         density::{KnownPacking, PlyPacking},
         fiber::{Placement, flyaway::Flyaways},
         mesh::Mesh,
-        yarn::{PlyParameters, YarnShape},
+        yarn::{PlyParameters, YarnShape, mean_half_width},
     },
     image::{Compression, png::Display, texture::Texture},
     light::Light,
@@ -223,6 +223,11 @@ impl Yarn {
             }
         }
         yarn
+    }
+
+    /// Half of the room that it takes beside others, over its radius: see [`mean_half_width`].
+    pub fn half_width(&self) -> f64 {
+        mean_half_width(&self.plies)
     }
 
     /// The cross-section, ready for rays.

@@ -14,6 +14,7 @@ use crate::{
         weave::{self, Edges, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
+    scene::Yarn,
 };
 
 /// A weave that is checked.
@@ -29,6 +30,8 @@ pub(super) struct WeavePlan {
     header: Span,
     /// Whether spacings of warps and wefts are those of the draft's file.
     filed: [bool; 2],
+    /// Mean half width of warp and weft over their radius: what they take up beside each other.
+    half_width: [f64; 2],
 }
 
 /// Woven yarns.
@@ -44,7 +47,8 @@ pub(super) struct Woven {
 impl WeavePlan {
     /// Radii of warp and weft, mm.
     pub(super) fn radii(&self) -> [f64; 2] {
-        [self.weave.warp_radius, self.weave.weft_radius]
+        let [warp, weft] = self.half_width;
+        [self.weave.warp_radius / warp, self.weave.weft_radius / weft]
     }
 
     /// Weaves it.
@@ -52,8 +56,11 @@ impl WeavePlan {
         let wrong = |problem: String, hint: &str| context.error(self.header, problem, Some(hint.to_owned()));
         match self.weave.relax() {
             Ok(cloth) => {
-                let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
+                let (mut warps, mut wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     cloth.strands().into_iter().partition(|s| s.kind == StrandKind::Warp);
+                for (side, half_width) in [&mut warps, &mut wefts].into_iter().zip(self.half_width) {
+                    side.iter_mut().for_each(|strand| strand.widen(half_width));
+                }
                 let length =
                     [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
@@ -131,8 +138,12 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     });
     let written = |side: usize| wif.and_then(|w| w.radius[side]).filter(|_| !yarns.has_radius());
     let own = yarns.radius();
-    let weft_radius = weft_yarn.and_then(|name| yarns.library.yarns.get(name)).map_or(own, |y| y.radius);
-    let (own, weft_radius) = (written(0).unwrap_or(own), written(1).unwrap_or(weft_radius));
+    let weft_of_its_own = weft_yarn.and_then(|name| yarns.library.yarns.get(name));
+    let weft_radius = weft_of_its_own.map_or(own, |y| y.radius);
+    let half_width = yarns.half_width();
+    let half_width = [half_width, weft_of_its_own.map_or(half_width, Yarn::half_width)];
+    let own = written(0).unwrap_or(own) * half_width[0];
+    let weft_radius = written(1).unwrap_or(weft_radius) * half_width[1];
     let cover = table.f64("cover", Range::between(0.01, 1.0));
     let filed = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
     let asked =
@@ -181,6 +192,7 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
         name,
         header: table.header(),
         filed: own_setting,
+        half_width,
     })
 }
 

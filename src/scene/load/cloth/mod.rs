@@ -238,6 +238,11 @@ impl Yarns<'_> {
         self.radius.or(self.own.1.map(|y| y.radius)).unwrap_or(self.fallback)
     }
 
+    /// Mean half width of the fabric's yarns over their radius, see [`Yarn::half_width`]; 1 of fibres.
+    pub(super) fn half_width(&self) -> f64 {
+        self.own.1.map_or(1.0, Yarn::half_width)
+    }
+
     /// Whether the fabric itself says it.
     pub(super) fn has_radius(&self) -> bool {
         self.radius.is_some()
