@@ -164,6 +164,7 @@ fn plies_are_continuous_along_a_yarn_and_across_its_seam() {
                 symmetry,
                 phases: vec![start],
                 distances: false,
+                unevenness: None,
             };
             let strands = Strands::new(&[(curve, radii)], &options);
             let count = strands.segments().len() as u32;
@@ -198,6 +199,7 @@ fn plies_turn_evenly_between_points() {
         symmetry: TAU / 3.0,
         phases: vec![],
         distances: false,
+        unevenness: None,
     };
     let strands = Strands::new(&[(curve, radii)], &options);
     let mut total = 0.0;

@@ -12,7 +12,7 @@ use crate::{
         fiber::{Plies, flyaway::Flyaways},
         material_indices::MaterialIndices,
         segment_uvs::SegmentUvs,
-        strand::{Along, StrandMotion, StrandOptions, Strands},
+        strand::{Along, StrandMotion, StrandOptions, Strands, Unevenness},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
     },
@@ -61,7 +61,7 @@ impl<'a> Preparation<'a> {
                     CurveKind::Yarn(yarn) => {
                         let yarn = &scene.yarns[yarn];
                         let shape = Box::new(yarn.shape());
-                        let strands = strands(fabric, curves, &shape);
+                        let strands = strands(fabric, curves, yarn, &shape);
                         Of::Yarns { yarn, shape, strands }
                     }
                     CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
@@ -253,7 +253,8 @@ impl Wound<'_> {
     }
 }
 
-fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
+fn strands(fabric: &Fabric, curves: Given<'_>, yarn: &Yarn, shape: &YarnShape) -> Strands {
+    let uneven = yarn.unevenness > 0.0;
     Strands::with(
         curves,
         Along { material_indices: &fabric.material_indices, blended: fabric.printed, uvs: &fabric.uvs },
@@ -266,6 +267,7 @@ fn strands(fabric: &Fabric, curves: Given<'_>, shape: &YarnShape) -> Strands {
             symmetry: shape.symmetry,
             phases: fabric.phases.clone(),
             distances: fabric.shows_fibers,
+            unevenness: uneven.then_some(Unevenness { spread: yarn.unevenness, seed: fabric.seed }),
         },
     )
 }
@@ -288,6 +290,7 @@ fn ply_strands(
             symmetry: TAU,
             phases: vec![0.0],
             distances,
+            unevenness: None,
         },
     );
     let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));

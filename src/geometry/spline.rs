@@ -47,6 +47,11 @@ macro_rules! weights {
 weights!(weights_f32, f32);
 weights!(weights_f64, f64);
 
+/// The weights of four control points of a B-spline at `u` in 0..1.
+pub(crate) fn bspline_weights(u: f64) -> [f64; 4] {
+    weights_f64(Basis::BSpline, u)[0]
+}
+
 /// A point of a segment and its derivative by u. `w` is the radius.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SplinePoint {

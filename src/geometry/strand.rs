@@ -6,6 +6,7 @@
 
 mod frames;
 mod making;
+mod unevenness;
 mod winding;
 
 use std::{borrow::Cow, sync::Arc};
@@ -13,6 +14,7 @@ use std::{borrow::Cow, sync::Arc};
 use glam::{DVec3, Vec2, Vec3A, Vec4};
 
 use self::frames::{PointFrame, SegmentFrame};
+pub use self::unevenness::Unevenness;
 use super::{
     curve::{Basis, Curve},
     material_indices::MaterialIndices,
@@ -39,6 +41,8 @@ pub struct StrandOptions {
     pub phases: Vec<f64>,
     /// Whether to keep how far along its yarn each point is: see [`Strands::distance_along`].
     pub distances: bool,
+    /// How the thickness of yarns changes along them, if it does.
+    pub unevenness: Option<Unevenness>,
 }
 
 /// A bend whose radius of curvature is so much smaller than the yarn's radius that the tube folds into itself, and plies

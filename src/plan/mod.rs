@@ -83,6 +83,12 @@ impl List {
             "a yarn has fly-aways",
             "no yarn has fly-aways",
         );
+        self.add(
+            "uneven_yarns",
+            scene.yarns.iter().any(|y| y.unevenness > 0.0),
+            "the thickness of a yarn changes along it",
+            "yarns are as thick as their curves say",
+        );
         self.add("exit_rejection", !scene.fabrics.is_empty(), "Embree offers hits from inside of curves", "no curves");
         self.add(
             "all_lobes",

@@ -98,6 +98,7 @@ fn layers_do_not_change_the_picture() {
 #[test]
 fn shapes_forced_in_do_not_change_the_picture() {
     forced_is_the_same(MINIMAL, "flyaways", true);
+    forced_is_the_same(MINIMAL, "uneven_yarns", true);
     forced_is_the_same(MINIMAL, "meshes", true);
     let three = MINIMAL.replace("radius = 1\n", "radius = 1\nplies = 3\n");
     forced_is_the_same(&three, "ply_twist", false);

@@ -346,6 +346,7 @@ impl Yarn {
             placement: Placement::Regular,
             known_packing: KnownPacking::default(),
             flyaways: None,
+            unevenness: 0.0,
             tex: None,
             tilted: defaults::TILTED,
             name,

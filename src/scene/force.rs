@@ -17,12 +17,13 @@ use crate::{
 const FAINT: f32 = 1e-30;
 
 /// Names of features that can be forced, as the plan of a render has them.
-pub(crate) const FORCEABLE: [&str; 21] = [
+pub(crate) const FORCEABLE: [&str; 22] = [
     "ply_filter",
     "elliptical_plies",
     "ply_twist",
     "all_lobes",
     "flyaways",
+    "uneven_yarns",
     "environment_image",
     "distant_light",
     "point_light",
@@ -119,6 +120,7 @@ fn force_of_yarns(yarns: &mut [Yarn], name: &str) -> bool {
                 yarn.flyaways.get_or_insert(none);
             }
         }
+        "uneven_yarns" => yarns.iter_mut().for_each(|yarn| yarn.unevenness = yarn.unevenness.max(1e-30)),
         _ => return false,
     }
     true

@@ -205,7 +205,8 @@ fn of_settings(render: &RenderSettings, keys: &mut Keys) {
 }
 
 fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
-    let Yarn { name, radius, plies, ply_twist, fibers, placement, known_packing, flyaways, tex: _, tilted } = yarn;
+    let Yarn { name, radius, plies, ply_twist, fibers, placement, known_packing, flyaways, unevenness, tex: _, tilted } =
+        yarn;
     let mut key = |key: &str, value: &dyn Debug| keys.add(&format!("yarn.{name}.{key}"), value);
     key("radius", radius);
     key("ply", plies);
@@ -216,6 +217,7 @@ fn of_yarn(yarn: &Yarn, keys: &mut Keys) {
     key("crowding", crowding);
     key("regularity", regularity);
     key("flyaways", flyaways);
+    key("unevenness", unevenness);
     key("ply_intersection", &if *tilted { "tilted" } else { "perpendicular" });
     let mut different: Vec<_> = fibers.iter().collect();
     different.dedup_by_key(|(name, _)| name);

@@ -203,6 +203,8 @@ pub struct Yarn {
     pub known_packing: KnownPacking,
     /// Fibres that leave the plies.
     pub flyaways: Option<Flyaways>,
+    /// Standard deviation of its radius along it, relative; 0 for a yarn that is even.
+    pub unevenness: f64,
     /// Grams in a kilometre, if known.
     pub tex: Option<f64>,
     /// Whether rays see plies as tilted cylinders; false is the paper's perpendicular section.

@@ -77,6 +77,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         symmetry: shape.symmetry,
         phases: vec![0.0],
         distances: false,
+        unevenness: None,
     };
     let strands = Strands::new(&[(curve, radii)], &options);
     let mut tallies = Vec::new();

@@ -41,6 +41,7 @@ fn arch(shape: &YarnShape) -> Strands {
         symmetry: shape.symmetry,
         phases: vec![0.3],
         distances: false,
+        unevenness: None,
     };
     Strands::new(&[(curve, vec![0.5; 40])], &options)
 }
@@ -58,6 +59,7 @@ fn pressed(shape: &YarnShape, ratio: f64) -> Strands {
         symmetry: 1.0,
         phases: vec![0.0],
         distances: false,
+        unevenness: None,
     };
     Strands::new(&[(curve, vec![1.0; 30])], &options)
 }

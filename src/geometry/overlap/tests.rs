@@ -84,6 +84,7 @@ fn searched(curves: &[(Curve, Vec<f64>)], diameter: f64, around: usize) -> [f64;
         symmetry: TAU,
         phases: vec![0.0],
         distances: false,
+        unevenness: None,
     };
     let strands = Strands::new(curves, &options);
     let section = |segment: u32, k: usize| {

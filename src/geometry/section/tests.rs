@@ -217,6 +217,7 @@ fn wild_loop(stream: &mut Stream, tightest: f64) -> Strands {
         symmetry: TAU / 3.0,
         phases: vec![0.4],
         distances: false,
+        unevenness: None,
     };
     Strands::new(&[(curve, vec![1.0; n as usize])], &options)
 }

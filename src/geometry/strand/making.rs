@@ -44,7 +44,7 @@ pub(super) fn strands(
                     rest: motion.rest.map(|curves| curves[yarn].as_slice()),
                     phase: if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] },
                 };
-                Strand::new(&given, options)
+                Strand::new(&given, options, yarn)
             })
             .collect();
         if let Cow::Owned(curves) = &mut curves {
@@ -98,8 +98,13 @@ struct Strand {
 }
 
 impl Strand {
-    fn new(given: &Given<'_>, options: &StrandOptions) -> Self {
+    fn new(given: &Given<'_>, options: &StrandOptions, yarn: usize) -> Self {
         let &Given { curve, radii, along: (material_indices, uvs), .. } = given;
+        let uneven = options.unevenness.map(|u| u.of(yarn, curve, radii, given.rest.unwrap_or(&curve.points)));
+        let (radii, pressed) = match &uneven {
+            Some(uneven) => (uneven.radii.as_slice(), &uneven.flattening),
+            None => (radii, &curve.flattening),
+        };
         let chain = Chain::new(curve, radii);
         let lengths = chain.lengths();
         let total = lengths[lengths.len() - 1];
@@ -127,7 +132,7 @@ impl Strand {
         let at_rest = rest.as_ref().unwrap_or(&wound[0]);
         let frames = frames(&wound, at_rest, curve.closed, given.phase, options.symmetry);
         let distances = if options.distances { at_rest.distances() } else { Vec::new() };
-        let flattening = match &curve.flattening {
+        let flattening = match pressed {
             Some(vectors) => flattening_along(curve, vectors, knots.as_deref(), &wound[0]),
             None => Vec::new(),
         };

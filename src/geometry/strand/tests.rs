@@ -11,6 +11,7 @@ fn options(basis: Basis) -> StrandOptions {
         symmetry: TAU,
         phases: vec![0.7],
         distances: true,
+        unevenness: None,
     }
 }
 

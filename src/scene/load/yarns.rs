@@ -313,6 +313,7 @@ fn yarn(
     let tex = table.f64("tex", Range::POSITIVE);
     let radius = table.f64("radius", Range::POSITIVE);
     let ply_twist = table.f64_or("ply_twist", 0.0, TWIST);
+    let unevenness = table.f64_or("unevenness", 0.0, Range::between(0.0, 0.3));
     let distance = table.f64("ply_distance", Range::at_least(0.0));
     let shared = PlyKeys::read(&table, None, context.sources);
     let ply_tables = table.tables("ply");
@@ -355,6 +356,7 @@ fn yarn(
         placement,
         known_packing,
         flyaways,
+        unevenness,
         tex,
         tilted,
     })

@@ -107,6 +107,7 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
         placement: Placement::Regular,
         known_packing: KnownPacking::default(),
         flyaways: None,
+        unevenness: 0.0,
         tex: None,
     }
 }
