@@ -61,6 +61,11 @@ fn sizes_are_kept_to_the_nearest_stitch_and_yarn() {
     let tube = ["knit", "--form", "tube", "--stitches", "24", "--circumference", "96", "--rows", "8", "--height", "24"];
     let said = made(&tube);
     assert!(said.contains("24 x 8, 96.000 around, 24.000 high; "), "{said}");
+    // A tube is of whole repeats too, however narrow.
+    let lace =
+        ["knit", "--form", "tube", "--chart", "k2tog yo", "--gauge", "22,34", "--circumference", "1", "--rows", "8"];
+    let said = made(&lace);
+    assert!(said.contains("4 x 8, "), "{said}");
     // A tile is of whole repeats.
     let said = made(&["knit", "--pattern", "moss", "--tile", "--gauge", "22,34", "--width", "60", "--height", "39"]);
     assert!(said.contains("period 63.636364 across, 35.294118 up; "), "{said}");
@@ -92,8 +97,18 @@ fn what_cannot_be_made_is_refused() {
         ),
         (
             &["knit", "--form", "tube", "--stitches", "100", "--circumference", "100", "-o", "a.bcc"],
-            "error: 100 stitches on a circumference of 100.0 mm are 1.00 yarn diameters wide\n  hint: about 33 stitches fit",
+            "error: 100 stitches on a circumference of 100.0 mm are 1.00 yarn diameters wide; \
+             1.5 to 20 can be knitted\n  hint: about 33 stitches fit",
         ),
+        (
+            &["knit", "--rows", "200", "--height", "0.6", "-o", "a.bcc"],
+            "error: 200 rows on a height of 0.6 mm are 0.00 yarn diameters high; 0.9 to 20 can be knitted\n  hint: about 1 rows",
+        ),
+        (
+            &["knit", "--stitches", "2", "--width", "1e12", "-o", "a.bcc"],
+            "error: 2 stitches on a width of 1000000000000.0 mm are ",
+        ),
+        (&["weave", "--draft", "velvet", "--pile-height", "1e15", "-o", "a.bcc"], "error: --pile-height "),
         (
             &["knit", "--form", "tube", "--width", "100", "-o", "a.bcc"],
             "error: a tube has no width\n  hint: --circumference is the way round it\n",

@@ -189,6 +189,10 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
     }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
+    if piece.pile_height > weave::LONGEST * radius {
+        let most = weave::LONGEST * radius;
+        return Err(Failure::Input(format!("error: --pile-height is at most {most}, a thousand radii of the yarn")));
+    }
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     let mut strands = cloth.strands();

@@ -31,7 +31,7 @@ use self::{
 pub use self::{
     colors::{Colors, Work},
     rims::{CastOn, Closing, Rims},
-    size::{Misfit, Sizes},
+    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, fits_stitch},
 };
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
@@ -495,12 +495,13 @@ impl Knit {
                     return None;
                 }
                 known.iter().position(|k| k == kind).or_else(|| {
-                    known.push(kind.clone());
-                    (known.len() <= MOST_KINDS).then(|| known.len() - 1)
+                    (known.len() < MOST_KINDS).then(|| {
+                        known.push(kind.clone());
+                        known.len() - 1
+                    })
                 })
             })
             .collect();
-        known.truncate(MOST_KINDS);
         if known.is_empty() {
             known.push(vec![false]);
         }

@@ -25,17 +25,27 @@ pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     Some(out.into())
 }
 
-/// The smallest number for which a numbered file exists.
-pub(crate) fn first_number(path: &Path) -> Option<u32> {
+/// The numbers for which a numbered file exists, from the smallest to the largest.
+pub(crate) fn numbers(path: &Path) -> Vec<u32> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let numbers_in = |name: &str| -> Vec<u32> {
         let runs = name.split(|c: char| !c.is_ascii_digit());
         runs.filter_map(|digits| digits.parse().ok()).collect()
     };
-    let entries = std::fs::read_dir(folder).ok()?;
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
     let fits = |name: &str, number: u32| numbered(path, number).is_some_and(|p| p.file_name() == Some(name.as_ref()));
-    names.filter_map(|name| numbers_in(&name).into_iter().filter(|&n| fits(&name, n)).min()).min()
+    let mut found: Vec<u32> =
+        names.filter_map(|name| numbers_in(&name).into_iter().filter(|&n| fits(&name, n)).min()).collect();
+    found.sort_unstable();
+    found
+}
+
+/// The number of the file that is shown at a frame, of those that there are: before the first one and after the last one all
+/// stands still.
+pub(crate) fn number_at(numbers: &[u32], frame: i64) -> Option<u32> {
+    let (first, last) = (*numbers.first()?, *numbers.last()?);
+    Some(frame.clamp(first.into(), last.into()) as u32)
 }
 
 /// A value that goes smoothly through keys in time and stays at the first and the last: a Catmull-Rom spline with its
@@ -88,14 +98,17 @@ mod tests {
     }
 
     #[test]
-    fn the_first_file_of_a_sequence_is_found() {
+    fn files_of_a_sequence_are_found() {
         let folder = tempfile::tempdir().expect("a directory");
         for name in ["x.0012.bcc", "x.0009.bcc", "x.9.bcc", "y.0001.bcc", "x.0003.txt"] {
             std::fs::write(folder.path().join(name), "").expect("a file");
         }
-        assert_eq!(first_number(&folder.path().join("x.####.bcc")), Some(9));
-        assert_eq!(first_number(&folder.path().join("z.####.bcc")), None);
-        assert_eq!(first_number(&folder.path().join("none/z.####.bcc")), None);
+        assert_eq!(numbers(&folder.path().join("x.####.bcc")), [9, 12]);
+        assert!(numbers(&folder.path().join("z.####.bcc")).is_empty());
+        assert!(numbers(&folder.path().join("none/z.####.bcc")).is_empty());
+        let shown = [-3, 0, 9, 10, 12, 13].map(|frame| number_at(&[9, 12], frame));
+        assert_eq!(shown, [9, 9, 9, 10, 12, 12].map(Some));
+        assert_eq!(number_at(&[], 3), None);
     }
 
     #[test]

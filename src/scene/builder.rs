@@ -14,7 +14,7 @@ use crate::{
         curve::{Basis, Curve},
         density::KnownPacking,
         fiber::{Placement, packing},
-        yarn::{PlyParameters, touching_plies},
+        yarn::{MAX_PLIES, PlyParameters, touching_plies},
     },
     image::png::Display,
     light::Light,
@@ -222,8 +222,11 @@ impl SceneBuilder {
             ));
         }
         for yarn in &self.yarns {
-            if yarn.plies.is_empty() || yarn.plies.len() != yarn.fibers.len() {
-                return fail(format!("yarn `{}`: expected plies, and as many fibres", yarn.name));
+            if !(1..=MAX_PLIES).contains(&yarn.plies.len()) || yarn.plies.len() != yarn.fibers.len() {
+                return fail(format!("yarn `{}`: expected 1 to {MAX_PLIES} plies, and as many fibres", yarn.name));
+            }
+            if !(yarn.radius > 0.0 && yarn.radius.is_finite()) {
+                return fail(format!("yarn `{}`: expected a radius above 0, found {}", yarn.name, yarn.radius));
             }
         }
         for fabric in &self.fabrics {
@@ -235,7 +238,8 @@ impl SceneBuilder {
                 return fail(format!("fabric `{}`: the scene has no {:?}", fabric.name, fabric.kind));
             }
             for (curve, radii) in &fabric.curves {
-                let finite = curve.points.iter().all(|p| p.is_finite()) && radii.iter().all(|r| r.is_finite());
+                let finite =
+                    curve.points.iter().all(|p| p.is_finite()) && radii.iter().all(|r| *r >= 0.0 && r.is_finite());
                 if curve.points.len() < 2 || radii.len() != curve.points.len() || !finite {
                     return fail(format!(
                         "fabric `{}`: expected curves of two finite points or more and as many radii, found {} and {}",
@@ -319,7 +323,7 @@ impl Yarn {
     ) -> Result<Self, SceneError> {
         let name = name.into();
         let fail = |what: &str| Err(SceneError(format!("yarn `{name}`: {what}")));
-        if !(1..=crate::geometry::yarn::MAX_PLIES as u32).contains(&plies) {
+        if !(1..=MAX_PLIES as u32).contains(&plies) {
             return fail("expected 1 to 64 plies");
         }
         if fibers == 0 || !(density > 0.0 && density.is_finite()) || !(radius > 0.0 && radius.is_finite()) {

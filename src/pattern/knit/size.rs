@@ -31,10 +31,15 @@ pub struct Misfit {
     pub hint: String,
 }
 
-/// The shortest yarn of a stitch, and the narrowest stitch, in diameters: beyond them yarns would lie inside each other.
+/// The shortest yarn of a stitch, in diameters: beyond it yarns would lie inside each other.
 const SHORTEST: f64 = 11.0;
-const NARROWEST: f64 = 1.5;
-const LOWEST: f64 = 0.9;
+/// The narrowest and the widest stitch, and the lowest and the highest, in diameters: below them yarns would lie inside each
+/// other, above them nothing holds.
+pub const STITCH_WIDTHS: [f64; 2] = [1.5, 20.0];
+/// As [`STITCH_WIDTHS`].
+pub const ROW_HEIGHTS: [f64; 2] = [0.9, 20.0];
+/// Width and height of a usual stitch, in diameters.
+const USUAL: [f64; 2] = [3.0, 2.2];
 /// Yarn of a firm stitch.
 const FIRM: f64 = 14.0;
 /// Most stitches or rows.
@@ -112,22 +117,20 @@ impl Sizes {
         let open = [width.filter(|_| !self.counted[0]), height.filter(|_| !self.counted[1])];
         if open != [None, None] {
             let stitch = knit.gauge();
-            let count = |size: f64, own: f64, of: u32| {
-                let of = f64::from(of.max(1));
-                ((size / own / of).round().clamp(1.0, (MOST / of).max(1.0)) * of) as u32
+            let count = |size: f64, own: f64, of: u32, least: u32| {
+                let (least, of) = (f64::from(least.div_ceil(of.max(1))), f64::from(of.max(1)));
+                ((size / own / of).round().clamp(least, (MOST / of).max(least)) * of) as u32
             };
             // Whole repeats, where rows do not fit otherwise or must close to a ring or a tile.
             let whole = knit.form != Form::Flat || !knit.chart.is_plain() || knit.edges == Edges::Tile;
             let wide = knit.chart.even_width(10_000).filter(|_| whole).unwrap_or(1);
             let high = if knit.edges == Edges::Tile { knit.chart.rows() } else { 1 };
             if let Some(width) = open[0] {
-                knit.stitches = count(width, stitch[0], wide);
+                // A ring of fewer cannot be laid.
+                knit.stitches = count(width, stitch[0], wide, if knit.form == Form::Flat { 1 } else { 3 });
             }
             if let Some(height) = open[1] {
-                knit.rows = count(height, stitch[1], high);
-            }
-            if knit.form != Form::Flat {
-                knit.stitches = knit.stitches.max(3);
+                knit.rows = count(height, stitch[1], high, 1);
             }
         }
         Ok(knit)
@@ -140,21 +143,29 @@ impl Sizes {
 
     /// Whether yarn of this thickness can be knitted so.
     fn check(&self, knit: &Knit, d: f64) -> Result<(), Misfit> {
-        match (knit.stitch_width, knit.row_height) {
-            (Some(width), Some(height)) => fits_stitch(width, height, d)?,
-            (Some(width), None) if width < NARROWEST => {
-                let (size, key) = self.across().unwrap_or((width * f64::from(knit.stitches) * d, "width"));
-                let most = (size / (3.0 * d)).floor();
+        if let (Some(width), Some(height)) = (knit.stitch_width, knit.row_height) {
+            fits_stitch(width, height, d)?;
+        }
+        let across = self.across().map_or("width", |(_, key)| key);
+        let sides = [
+            (knit.stitch_width, STITCH_WIDTHS, knit.stitches, ["stitches", across, "wide"]),
+            (knit.row_height, ROW_HEIGHTS, knit.rows, ["rows", "height", "high"]),
+        ];
+        for ((size, [least, most], count, [counted, key, word]), usual) in sides.into_iter().zip(USUAL) {
+            if let Some(size) = size.filter(|s| !(least..=most).contains(s)) {
+                let whole = size * f64::from(count) * d;
                 return Err(Misfit {
-                    key: None,
+                    key: Some(counted),
                     problem: format!(
-                        "{} stitches on a {key} of {size:.1} mm are {width:.2} yarn diameters wide",
-                        knit.stitches
+                        "{count} {counted} on a {key} of {whole:.1} mm are {size:.2} yarn diameters {word}; \
+                         {least} to {most} can be knitted"
                     ),
-                    hint: format!("about {most} stitches fit yarn {d:.3} mm thick"),
+                    hint: format!(
+                        "about {:.0} {counted} fit yarn {d:.3} mm thick",
+                        (whole / (usual * d)).round().clamp(1.0, MOST)
+                    ),
                 });
             }
-            _ => {}
         }
         match &knit.form {
             Form::Revolution(profile) => fits_profile(knit, &Revolution::new(profile), d),
@@ -164,14 +175,18 @@ impl Sizes {
 }
 
 /// Whether yarn of a diameter `d` (mm) makes stitches so wide and high, in diameters.
-fn fits_stitch(width: f64, height: f64, d: f64) -> Result<(), Misfit> {
+///
+/// # Errors
+/// They would have less yarn than a loop takes, or are too narrow or too low for it.
+pub fn fits_stitch(width: f64, height: f64, d: f64) -> Result<(), Misfit> {
     let length = (STITCHES_PER_SQUARE * width * height).sqrt();
-    if length >= SHORTEST && width >= NARROWEST {
+    if length >= SHORTEST && width >= STITCH_WIDTHS[0] && height >= ROW_HEIGHTS[0] {
         return Ok(());
     }
     let [across, up] = [width, height].map(|s| 100.0 / (s * d));
-    let radius = 0.5 * d * (length / FIRM).min(width / 3.0);
-    let by = (FIRM / length).max(3.0 / width);
+    // By how much finer the yarn has to be.
+    let by = (FIRM / length).max(USUAL[0] / width).max(USUAL[1] / height);
+    let radius = 0.5 * d / by;
     let problem = format!(
         "a gauge of {across:.1} x {up:.1} in 10 cm is too dense for yarn {d:.3} mm thick: a stitch of {:.3} x {:.3} mm takes \
          {length:.1} diameters of yarn",
@@ -192,7 +207,7 @@ fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit>
         (round / f64::from(*count) / d, row, round, *count)
     };
     let tightest = widths.iter().enumerate().map(of_row).min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((width, row, round, count)) = tightest.filter(|t| t.0 < NARROWEST) {
+    if let Some((width, row, round, count)) = tightest.filter(|t| t.0 < STITCH_WIDTHS[0]) {
         let most = (round / (3.0 * d)).floor().max(1.0);
         let radius = 0.5 * d * width / 3.0;
         return Err(Misfit {
@@ -204,7 +219,7 @@ fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit>
             hint: format!("about {most} stitches there, or yarn of a radius of {radius:.3} mm"),
         });
     }
-    if height < LOWEST * d {
+    if height < ROW_HEIGHTS[0] * d {
         let most = (surface.length() / (2.2 * d)).floor();
         return Err(Misfit {
             key: None,

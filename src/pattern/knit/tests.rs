@@ -217,6 +217,17 @@ fn charts_that_do_not_fit_are_refused() {
 }
 
 /// A piece of stockinette in colours: a sign for each stitch, rows from the bottom.
+/// More kinds of plain rows than there are cells for: the others are laid without.
+#[test]
+fn a_shaped_chart_may_have_rows_of_many_kinds() {
+    let rows = ["4: k", "4: p", "4: k p", "4: p k", "4: k2 p", "4: k p2", "4: k2 p2", "k28 k2tog"];
+    let chart = Chart::parse(&rows).unwrap();
+    let knit = Knit { rows: chart.rows(), chart, ..knit("stockinette", 30, 1) };
+    let knitted = knit.knitted(1.0).unwrap();
+    assert_eq!(knitted.strands.len(), 1);
+    assert!(measured(&knitted.strands).share < 0.05);
+}
+
 fn in_colors(rows: &[&str], form: Form) -> Knit {
     let row = |r: &&str| r.bytes().map(|b| u16::from(b - b'a')).collect();
     let colors = Colors { rows: rows.iter().map(row).collect(), work: Work::Stranded, catch: Some(5), carry: 3 };

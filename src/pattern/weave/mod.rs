@@ -107,6 +107,8 @@ pub struct Measures {
 pub const POINTS: u32 = 8;
 /// Yarns of each side unless asked otherwise.
 pub const YARNS: u32 = 20;
+/// The longest fringe and the highest pile that can be asked for, in radii of the warp.
+pub const LONGEST: f64 = 1000.0;
 /// Length of a fringe unless asked otherwise, in radii of the warp.
 pub const FRINGE: f64 = 24.0;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
@@ -244,8 +246,9 @@ impl Weave {
             Extent::Length(length) => (length / spacing).round().clamp(1.0, 1e9) as u32,
         };
         let count = [count(self.warps, cell.spacing[0]), count(self.wefts, cell.spacing[1])];
-        let points = 2 * u64::from(count[0] + 1) * u64::from(count[1] + 1) * u64::from(self.points);
-        if points > MAX_POINTS {
+        // In f64, which does not overflow.
+        let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.points);
+        if points > MAX_POINTS as f64 {
             return Err(Impossible::TooLarge);
         }
         Ok(Cloth { weave: self, cell, count })

@@ -57,9 +57,7 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
         }
     }
     let known = |name: &str, span: Span| {
-        if !library.yarn_names.iter().any(|n| n == name) {
-            context.unknown(span, "yarn", name, library.yarn_names.iter().map(String::as_str));
-        }
+        context.check_yarn(span, name, library);
     };
     let names = |key: &str| -> Vec<String> {
         let names = table.strings(key);

@@ -6,11 +6,12 @@ use crate::{
     pattern::knit::{Form, Knit, Sizes},
 };
 
-/// Sizes with the place where they were written.
+/// Sizes with the places where stitches and rows were said to be so many or so large.
 #[derive(Clone, Copy)]
 pub(super) struct GivenSizes {
     sizes: Sizes,
-    span: Span,
+    stitches: Span,
+    rows: Span,
 }
 
 impl GivenSizes {
@@ -38,12 +39,15 @@ impl GivenSizes {
                 None => table.error(wrong.problem, Some(&wrong.hint)),
             }
         }
-        Self { sizes, span: table.span("gauge").or(table.span("stitches")).unwrap_or(table.header()) }
+        let gauge = table.span("gauge");
+        let [stitches, rows] = ["stitches", "rows"].map(|key| gauge.or(table.span(key)).unwrap_or(table.header()));
+        Self { sizes, stitches, rows }
     }
 
     /// The knit of this size, of yarn of a diameter (mm). What cannot be knitted is told, with what would fit.
     pub(super) fn apply(&self, knit: &Knit, diameter: f64, context: &Context<'_>) -> Option<Knit> {
         let sized = self.sizes.apply(knit, diameter);
-        sized.map_err(|wrong| context.error(self.span, wrong.problem, Some(wrong.hint))).ok()
+        let place = |key: Option<&str>| if key == Some("rows") { self.rows } else { self.stitches };
+        sized.map_err(|wrong| context.error(place(wrong.key), wrong.problem, Some(wrong.hint))).ok()
     }
 }

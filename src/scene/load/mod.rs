@@ -140,6 +140,13 @@ impl Context<'_> {
         }
     }
 
+    /// Tells where no yarn has such a name.
+    fn check_yarn(&self, span: Span, name: &str, library: &yarns::Library) {
+        if !library.yarn_names.iter().any(|n| n == name) {
+            self.unknown(span, "yarn", name, library.yarn_names.iter().map(String::as_str));
+        }
+    }
+
     fn error(&self, span: Span, message: impl Into<String>, hint: Option<String>) {
         let diagnostic = Diagnostic::error(message).at(span);
         self.diagnostics.push(match hint {

@@ -229,7 +229,7 @@ fn drawn(table: &Reader<'_>, picture: Reader<'_>, context: &Context<'_>) -> Opti
 
 /// Written instructions over so many `stitches`, as a chart.
 fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Option<Chart> {
-    if let Some(other) = ["pattern", "chart"].into_iter().find(|key| table.has(key)) {
+    for other in ["pattern", "chart"].into_iter().filter(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
     let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
@@ -329,8 +329,9 @@ fn counted(
 ) -> Option<KnitPlan> {
     let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
-    let stitch_width = table.f64("stitch_width", Range::between(1.0, 20.0));
-    let row_height = table.f64("row_height", Range::between(0.5, 20.0));
+    let in_range = |[least, most]: [f64; 2]| Range::between(least, most);
+    let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
+    let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
     let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
     let edges = table.one_of_or("edges", Edges::Finished, &kinds);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    super::animation::{first_number, numbered},
+    super::animation::{number_at, numbered, numbers},
     Context,
     cloth::Detail,
     mesh::polygons,
@@ -130,17 +130,15 @@ impl Frames {
             let pose = Pose { before: own.clone(), after: own.clone(), share: 0.0 };
             return Self { rest: own, poses: vec![pose], shown: 1, animated: false };
         };
-        // Before the first file and after the last all stand still.
-        let there = |number: f64| {
-            let path = numbered(path, number.max(0.0) as u32)?;
-            path.exists().then_some(path)
-        };
-        let needed = |number: f64| Moment::of_file(&there(number).unwrap_or_else(|| own.clone()));
+        // Where the frame has no file, who reads it says so.
+        let there = if own.exists() { numbers(path) } else { Vec::new() };
+        let file = |frame: f64| number_at(&there, frame as i64).and_then(|number| numbered(path, number));
+        let needed = |frame: f64| Moment::of_file(&file(frame).unwrap_or_else(|| own.clone()));
         let poses = times
             .into_iter()
             .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
             .collect();
-        let rest = first_number(path).and_then(|n| numbered(path, n)).unwrap_or_else(|| own.clone());
+        let rest = there.first().and_then(|n| numbered(path, *n)).unwrap_or_else(|| own.clone());
         Self { rest: Moment::of_file(&rest), poses, shown, animated: true }
     }
 

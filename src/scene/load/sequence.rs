@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::{
     super::{
         FabricMotion,
-        animation::{first_number, numbered},
+        animation::{number_at, numbered, numbers},
     },
     Context,
     cloth::{CurveFile, Detail},
@@ -51,16 +51,19 @@ pub(super) fn read(
 
     // Between two files yarns move evenly from one to the other.
     let Times { all: times, shown } = Times::of(detail);
-    let mut files: BTreeMap<i64, Curves> = BTreeMap::new();
-    // Before the first file and after the last they stand still.
-    let there = |number: i64| -> Option<(i64, PathBuf)> {
-        let path = numbered(&file.path, u32::try_from(number).ok()?)?;
-        path.exists().then_some((number, path))
+    let mut files: BTreeMap<u32, Curves> = BTreeMap::new();
+    if !own.exists() {
+        // The reader says so.
+        read(&own)?;
+    }
+    let there = numbers(&file.path);
+    let needed = |frame: f64| {
+        let number = number_at(&there, frame as i64).unwrap_or(detail.frame);
+        (number, numbered(&file.path, number).unwrap_or_else(|| own.clone()))
     };
-    let needed = |number: i64| there(number).unwrap_or((i64::from(detail.frame), own.clone()));
     let mut around = Vec::new();
     for &time in &times {
-        let (before, after) = (needed(time.floor() as i64), needed(time.ceil() as i64));
+        let (before, after) = (needed(time.floor()), needed(time.ceil()));
         around.push((before.0, after.0, time - time.floor()));
         for (number, path) in [before, after] {
             if !files.contains_key(&number) {
@@ -72,7 +75,7 @@ pub(super) fn read(
             }
         }
     }
-    let pose = |&(before, after, share): &(i64, i64, f64)| -> Vec<Vec<DVec3>> {
+    let pose = |&(before, after, share): &(u32, u32, f64)| -> Vec<Vec<DVec3>> {
         let pairs = files[&before].iter().zip(&files[&after]);
         pairs.map(|((a, _), (b, _))| a.points.iter().zip(&b.points).map(|(a, b)| a.lerp(*b, share)).collect()).collect()
     };
@@ -89,7 +92,7 @@ pub(super) fn read(
     }
     let rest = match &file.rest {
         Some(path) => Some(path.clone()),
-        None => first_number(&file.path).filter(|n| *n != detail.frame).and_then(|n| numbered(&file.path, n)),
+        None => there.first().filter(|n| **n != detail.frame).and_then(|n| numbered(&file.path, *n)),
     };
     let rest = match rest {
         // At rest is where the curves are, or the first of them.

@@ -10,7 +10,7 @@ use crate::{
     },
     pattern::{
         PatternStrand, StrandKind,
-        draft::{Draft, DraftError, Threads},
+        draft::{Draft, DraftError},
         weave::{self, Edges, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
@@ -123,11 +123,8 @@ impl WeavePlan {
 pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
     let (name, drafted) = draft(table, context);
     let wif = drafted.as_ref().and_then(|d| d.wif.as_ref());
-    let names = &yarns.library.yarn_names;
     let check = |key: &str, name: &str| {
-        if !names.iter().any(|n| n == name) {
-            context.unknown(table.span(key).unwrap_or(table.header()), "yarn", name, names.iter().map(String::as_str));
-        }
+        context.check_yarn(table.span(key).unwrap_or(table.header()), name, yarns.library);
     };
     let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
     weft_yarn.inspect(|name| check("weft_yarn", name));
@@ -159,10 +156,11 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let crimp = table.f64("crimp", Range::UNIT);
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
-    let pile = table.f64("pile_height", Range::POSITIVE).map(|h| h * context.unit);
+    let longest = Range::above(0.0).and_at_most(weave::LONGEST * own / context.unit);
+    let pile = table.f64("pile_height", longest).map(|h| h * context.unit);
+    let edges = edges(table, context, own, wif.is_some_and(has_unequal_threads));
     let Drafted { draft, wif } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
-    let edges = edges(table, context, own, &threads);
     let default_pile = weave::pile_height(&draft, own);
     let weave = Weave {
         draft,
@@ -199,13 +197,17 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
 /// Thickness of a thread over the mean from which on cloth is not hemmed unless asked: three layers of it do not lie flat.
 const UNEQUAL: f64 = 1.5;
 
+fn has_unequal_threads(wif: &WovenWif) -> bool {
+    wif.threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL)
+}
+
 /// How the cloth ends.
-fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, threads: &[Threads; 2]) -> Edges {
-    let fringe = table.f64("fringe", Range::POSITIVE).map(|l| l * context.unit);
+fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, unequal: bool) -> Edges {
+    let longest = Range::above(0.0).and_at_most(weave::LONGEST * radius / context.unit);
+    let fringe = table.f64("fringe", longest).map(|l| l * context.unit);
     let fringed = Edges::Fringe(fringe.unwrap_or(weave::FRINGE * radius));
     let names =
         [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
-    let unequal = threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL);
     let default = match fringe {
         Some(_) => fringed,
         None if unequal => Edges::Selvedge,

@@ -225,10 +225,9 @@ impl PlyMaker<'_> {
             place.error_at("ply_radius", "a ply cannot be thicker than its yarn", Some("ply_radius <= radius"));
         }
         let short = ply_radius * keys.aspect.sqrt();
-        let long = ply_radius / keys.aspect.sqrt();
         let in_the_middle = if self.count == 1 { 0.0 } else { (1.0 - short).max(0.0) };
         let distance = self.distance.map_or(in_the_middle, |d| d / self.radius);
-        if distance.hypot(long).max(distance + short) > 1.0 + 1e-6 && self.count > 1 && distance + short > 1.0 + 1e-6 {
+        if distance + short > 1.0 + 1e-6 {
             place.error_at(
                 "ply_distance",
                 "the ply reaches beyond the yarn's radius",

@@ -112,7 +112,7 @@ pub(super) struct CellMap {
 
 impl CellMap {
     pub(super) fn at(&self, x: f32, y: f32) -> usize {
-        let place = |v: f32, offset: i64| v.floor() as i64 - offset;
+        let place = |v: f32, offset: i64| (v.floor() as i64).saturating_sub(offset);
         let (x, y) = (place(x, self.offset[0]), place(y, self.offset[1]));
         let (w, h) = (self.width as i64, self.height as i64);
         let outside = |v: i64, n: i64, again: bool| !again && !(0..n).contains(&v);

@@ -17,11 +17,11 @@ use super::{
 use crate::{
     files::{curve_file, stage::PrimPattern},
     garment::SeamKind,
-    input::diagnostic::{Span, unknown_name},
+    input::diagnostic::Span,
     pattern::{
         chart::Chart,
-        draft::Draft,
-        knit::{self, Edges, Form, Knit},
+        draft::{Draft, Threads},
+        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, fits_stitch},
         tile::Tile,
         weave::{FLATTEN, Impossible, Weave},
     },
@@ -29,18 +29,24 @@ use crate::{
 
 /// Control points of a stitch unless asked otherwise.
 const POINTS: u64 = 12;
-/// Stitches per area times the square of their yarn's length, of relaxed plain knit (after Munden, "The Geometry and
-/// Dimensional Properties of Plain-Knit Fabrics", 1959).
-const MUNDEN: f64 = 23.1;
-/// Below so many diameters of yarn in a stitch loops jam; above so many they are a net.
-const TIGHTEST: f64 = 10.5;
+/// Above so many diameters of yarn in a stitch loops are a net.
 const LOOSEST: f64 = 30.0;
 
 /// What repeats, as it is written.
 #[derive(Clone)]
 enum Pattern {
-    Knit { chart: Chart, yarn_per_stitch: Option<f64>, stranding: Option<Stranding> },
-    Weave { draft: Draft, crimp: Option<f64>, flatten: f64 },
+    Knit {
+        chart: Chart,
+        yarn_per_stitch: Option<f64>,
+        stranding: Option<Stranding>,
+    },
+    /// A draft, how its threads differ, the warp's share of the crimp, and how flat yarns are.
+    Weave {
+        draft: Draft,
+        threads: [Threads; 2],
+        crimp: Option<f64>,
+        flatten: f64,
+    },
     File(PathBuf),
 }
 
@@ -139,11 +145,8 @@ pub(super) fn garment(
             let group = table.string("group").map(str::to_owned);
             let own_cloth = table.table("cloth").map(|t| cloth(t, context));
             let yarn = table.string("yarn").map(str::to_owned);
-            if let Some(name) = &yarn
-                && !yarns.library.yarn_names.contains(name)
-            {
-                let (message, hint) = unknown_name("yarn", name, yarns.library.yarn_names.iter().map(String::as_str));
-                table.error_at("yarn", message, Some(&hint));
+            if let Some(name) = &yarn {
+                context.check_yarn(table.span("yarn").unwrap_or(table.header()), name, yarns.library);
             }
             let colored = ["rows", "columns", "motif", "tint", "vary"].iter().any(|k| table.has(k));
             let color = color::plan(&table, context, yarns.library);
@@ -205,7 +208,14 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
             let crimp = table.f64("crimp", Range::UNIT);
             let flatten = table.f64_or("flatten", FLATTEN, Range::between(1.0, 4.0));
             let (name, drafted) = weave::draft(&table, context);
-            drafted.map(|d| (name, Pattern::Weave { draft: d.draft, crimp, flatten }))
+            drafted.map(|d| {
+                if d.wif.as_ref().is_some_and(|wif| wif.colors.iter().any(|side| !side.is_empty())) {
+                    let hint = "`columns` and `rows` of the fabric name the yarns of warps and wefts";
+                    table.warning_at("draft", "colours of a draft's file are not used on a garment", Some(hint));
+                }
+                let threads = d.wif.map(|wif| wif.threads).unwrap_or_default();
+                (name, Pattern::Weave { draft: d.draft, threads, crimp, flatten })
+            })
         }
         Some(2) => {
             let path = table.required_string("path");
@@ -243,22 +253,20 @@ impl ClothPlan {
         match &self.pattern {
             Pattern::Knit { chart, yarn_per_stitch, .. } => {
                 let length = yarn_per_stitch
-                    .or(stitch.map(|s| (MUNDEN * s.element_product()).sqrt() / d))
+                    .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / d))
                     .unwrap_or(knit::YARN_PER_STITCH);
                 if let Some(s) = stitch {
-                    let about = format!(
-                        "a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, {length:.1} diameters of {d:.3} mm",
-                        s.x,
-                        s.y,
-                        length * d
-                    );
-                    if length < TIGHTEST || s.x < 2.0 * d || s.y < d {
-                        let problem = format!("the yarn is too thick for this gauge: {about}");
-                        let least = (MUNDEN * s.element_product()).sqrt() / 13.0 / 2.0;
-                        return tell(problem, &format!("thinner yarn (radius about {least:.3} mm), or fewer stitches"));
+                    if let Err(misfit) = fits_stitch(s.x / d, s.y / d, d) {
+                        return tell(misfit.problem, &misfit.hint);
                     }
                     if length > LOOSEST {
-                        warnings.push(format!("the yarn is thin for this gauge: {about}; the cloth will be a net"));
+                        warnings.push(format!(
+                            "the yarn is thin for this gauge: a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, \
+                             {length:.1} diameters of {d:.3} mm; the cloth will be a net",
+                            s.x,
+                            s.y,
+                            length * d
+                        ));
                     }
                 }
                 let knit = Knit {
@@ -280,10 +288,11 @@ impl ClothPlan {
                     Err(error) => tell(error.problem, &error.hint),
                 }
             }
-            Pattern::Weave { draft, crimp, flatten } => {
+            Pattern::Weave { draft, threads, crimp, flatten } => {
                 let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
                 let own = Weave::of(draft.clone(), radius);
-                let weave = Weave { warp_spacing, weft_spacing, crimp: *crimp, flatten: *flatten, ..own };
+                let (crimp, flatten, threads) = (*crimp, *flatten, threads.clone());
+                let weave = Weave { warp_spacing, weft_spacing, crimp, flatten, threads, ..own };
                 match Tile::of_weave(&weave) {
                     Ok(tile) => Some(tile),
                     Err(Impossible::TooTight { warp, least }) => {
