@@ -135,8 +135,10 @@ impl Section<'_> {
                 for _ in 0..4 {
                     let depth = station.depth + step;
                     next = self.step(near, start + depth * direction, direction, depth, reach);
-                    let turned = rate * (next.station.travel - station.travel);
-                    if turned.abs() <= 1.3 * reach.turn || step <= SHORTEST_STEP {
+                    // How far it turns, and how much faster at the end than at the start.
+                    let turned = (next.station.travel - station.travel).abs();
+                    let hastened = 2.0 * step * (next.station.advance - station.advance).abs();
+                    if rate * turned.max(hastened) <= 1.3 * reach.turn || step <= SHORTEST_STEP {
                         break;
                     }
                     step *= 0.5;
