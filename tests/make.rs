@@ -69,6 +69,8 @@ fn sizes_are_kept_to_the_nearest_stitch_and_yarn() {
     // A tile is of whole repeats.
     let said = made(&["knit", "--pattern", "moss", "--tile", "--gauge", "22,34", "--width", "60", "--height", "39"]);
     assert!(said.contains("period 63.636364 across, 35.294118 up; "), "{said}");
+    let said = made(&["weave", "--draft", "twill 2/1", "--warps", "10", "--wefts", "11", "--tile"]);
+    assert!(said.contains("21 yarns, ") && said.contains("\nperiod "), "{said}");
     let said = made(&["weave", "--width", "24", "--wefts", "6", "--warp-spacing", "2.5"]);
     assert!(said.contains("16 yarns, ") && said.contains("25.000 wide, "), "{said}");
 }

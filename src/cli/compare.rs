@@ -25,7 +25,7 @@ use crate::{
 const EXAMPLES: &str = "Examples:
   yarnray compare yarns.exr fibers.exr                        all metrics; the second picture is the reference
   yarnray compare a.exr b.exr --json                          the same for programs
-  yarnray compare a.exr b.exr --mask alpha -o map.png         only where both pictures show cloth; a map of FLIP
+  yarnray compare a.exr b.exr --mask alpha -o map.png         only where both pictures show something; a map of FLIP
   yarnray compare a.exr b.exr -o page.html                    metrics, slider and map on one page
   yarnray compare a.exr b.exr --threshold flip_hdr=0.05 --threshold mean_ratio=0.02
                                                               exit status 1 if a metric is worse

@@ -119,6 +119,9 @@ struct WeaveArgs {
     /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
     #[arg(long, value_parser = ["live", "selvedge", "fringe", "finished"])]
     edges: Option<String>,
+    /// Whole repeats, cut all around: cloth that goes on at one border as it begins at the other.
+    #[arg(long, conflicts_with = "edges")]
+    tile: bool,
     /// How high the pile of terry, velvet and corduroy stands.
     #[arg(long, value_name = "L", value_parser = positive)]
     pile_height: Option<f64>,
@@ -183,6 +186,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
         draft,
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
+        tile: args.tile,
     };
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
     if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
@@ -203,10 +207,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
         log::say(&format!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]));
         log::say(&format!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through));
-        log::say(&format!(
-            "{:.3} wide, {:.3} high; {:.1} of warp, {:.1} of weft",
-            size[0], size[1], length[0], length[1]
-        ));
+        let extent = match args.tile {
+            true => format!("period {:.6} across, {:.6} up", size[0], size[1]),
+            false => format!("{:.3} wide, {:.3} high", size[0], size[1]),
+        };
+        log::say(&format!("{extent}; {:.1} of warp, {:.1} of weft", length[0], length[1]));
     }
     Ok(())
 }

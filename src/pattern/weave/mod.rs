@@ -56,6 +56,8 @@ pub struct Weave {
     pub pile_height: f64,
     /// How warps differ, and wefts, one value for each of the draft's repeat.
     pub threads: [Threads; 2],
+    /// Whether it is of whole repeats, so that it goes on at one border as it begins at the other.
+    pub tile: bool,
 }
 
 /// How far cloth goes.
@@ -175,6 +177,7 @@ impl Weave {
             pile_height: pile_height(&draft, radius),
             draft,
             threads: <[Threads; 2]>::default(),
+            tile: false,
         }
     }
 
@@ -240,12 +243,19 @@ impl Weave {
     }
 
     fn cloth(&self, cell: UnitCell) -> Result<Cloth<'_>, Impossible> {
-        let count = |extent: Extent, spacing: f64| match extent {
-            Extent::Yarns(count) => count,
-            // Threads of several spacings are so far apart in the mean.
-            Extent::Length(length) => (length / spacing).round().clamp(1.0, 1e9) as u32,
+        let count = |extent: Extent, spacing: f64, repeat: usize| {
+            let wanted = match extent {
+                Extent::Yarns(count) => f64::from(count),
+                // Threads of several spacings are so far apart in the mean.
+                Extent::Length(length) => length / spacing,
+            };
+            let of = if self.tile { repeat as f64 } else { 1.0 };
+            ((wanted / of).round().clamp(1.0, 1e9 / of) * of) as u32
         };
-        let count = [count(self.warps, cell.spacing[0]), count(self.wefts, cell.spacing[1])];
+        let count = [
+            count(self.warps, cell.spacing[0], self.draft.warps()),
+            count(self.wefts, cell.spacing[1], self.draft.wefts()),
+        ];
         // In f64, which does not overflow.
         let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.points);
         if points > MAX_POINTS as f64 {

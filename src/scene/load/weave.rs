@@ -1,6 +1,6 @@
 //! `source = { type = "weave" }`: woven cloth that the program makes.
 
-use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates};
+use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates, garment};
 use crate::{
     files::unreadable::in_words,
     geometry::curve::Curve,
@@ -120,7 +120,12 @@ impl WeavePlan {
 }
 
 /// Reads the keys of a weave.
-pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>) -> Option<WeavePlan> {
+pub(super) fn weave(
+    table: &Reader<'_>,
+    fabric: &Reader<'_>,
+    context: &Context<'_>,
+    yarns: &Yarns<'_>,
+) -> Option<WeavePlan> {
     let (name, drafted) = draft(table, context);
     let wif = drafted.as_ref().and_then(|d| d.wif.as_ref());
     let check = |key: &str, name: &str| {
@@ -145,6 +150,8 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let filed = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
     let asked =
         [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
+    let gauge = gauge(table, fabric, &asked);
+    let asked = [0, 1].map(|side| asked[side].or(gauge.map(|g| g[side])));
     let own_setting = [0, 1].map(|side| asked[side].is_none() && filed(side).is_some());
     let [warp_spacing, weft_spacing] = [0, 1].map(|side| asked[side].or_else(|| filed(side)));
     if cover.is_some() && warp_spacing.is_some() && weft_spacing.is_some() {
@@ -159,6 +166,13 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
     let longest = Range::above(0.0).and_at_most(weave::LONGEST * own / context.unit);
     let pile = table.f64("pile_height", longest).map(|h| h * context.unit);
     let edges = edges(table, context, own, wif.is_some_and(has_unequal_threads));
+    let tile = table.bool_or("tile", false);
+    if tile && table.has("edges") {
+        table.error_at("tile", "a tile has no edges", Some("leave out `edges`"));
+    }
+    if !table.bool_or("flat", true) {
+        table.error_at("flat", "woven cloth lies flat by itself", Some("leave out `flat`"));
+    }
     let Drafted { draft, wif } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
     let default_pile = weave::pile_height(&draft, own);
@@ -174,9 +188,10 @@ pub(super) fn weave(table: &Reader<'_>, context: &Context<'_>, yarns: &Yarns<'_>
         crimp,
         flatten,
         points,
-        edges,
+        edges: if tile { Edges::Live } else { edges },
         pile_height: pile.unwrap_or(default_pile),
         threads,
+        tile,
     };
     if pile.is_some() && weave.draft.pile().is_none() {
         table.error_at("pile_height", "this draft has no pile", Some("draft = \"terry\", \"velvet\" or \"corduroy\""));
@@ -261,6 +276,17 @@ fn spacing(table: &Reader<'_>, context: &Context<'_>, key: &str, density: &str) 
         table.error_at(density, format!("give `{key}` or `{density}`, not both"), None);
     }
     spacing.or(counted)
+}
+
+/// Distances of warps and of wefts by the `gauge`, ends and picks, of the weave or of its fabric.
+fn gauge(table: &Reader<'_>, fabric: &Reader<'_>, spacings: &[Option<f64>; 2]) -> Option<[f64; 2]> {
+    let place = [table, fabric].into_iter().find(|t| t.has("gauge"))?;
+    let given = garment::stitch(place, None)?;
+    if spacings.iter().any(Option::is_some) {
+        let hint = "`gauge` has ends and picks: leave out `ends_per_cm`, `picks_per_cm` and spacings";
+        place.error_at("gauge", "both a gauge and distances of yarns are given", Some(hint));
+    }
+    Some(given.to_array())
 }
 
 /// A number of yarns, `default` unless given, or the length that they fill.

@@ -286,7 +286,7 @@ fn source(
             path.map(|_| source)
         }
         Some(1) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
-        Some(2) => weave::weave(&table, context, yarns).map(|plan| Source::Weave(Box::new(plan))),
+        Some(2) => weave::weave(&table, fabric, context, yarns).map(|plan| Source::Weave(Box::new(plan))),
         // Short for a flat knit of that pattern.
         Some(4) => pattern::stockinette(&table, fabric, context).map(Source::Knit),
         Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),

@@ -150,6 +150,9 @@ pub(super) fn garment(
             }
             let colored = ["rows", "columns", "motif", "tint", "vary"].iter().any(|k| table.has(k));
             let color = color::plan(&table, context, yarns.library);
+            if color.tension().is_some() {
+                table.error_at("vary", "`tension` is of the whole garment", Some("`vary` of the fabric"));
+            }
             let rule = Rule {
                 group: Some(group?),
                 stitch: stitch(&table, Some(per)).or(gauge),
