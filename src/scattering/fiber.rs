@@ -12,6 +12,7 @@ use super::LobeValues;
 use super::kernel::{
     DIFFUSE, Latitudes, kappa_of_variance, normalisation, normalised_kernel, sample_sine, sample_sine_diffuse,
 };
+use super::lobe::normalised;
 use crate::math::{
     Rgb,
     frame::sin_cos,
@@ -129,9 +130,7 @@ impl FiberBcsdf {
     }
 
     fn lobe_shares(&self, throughput: Rgb) -> [f32; 3] {
-        let w = [self.r, self.tt, self.d].map(|a| a.weighted_mean(throughput));
-        let total = w[0] + w[1] + w[2];
-        if total > 0.0 { w.map(|x| x / total) } else { [0.0; 3] }
+        normalised([self.r, self.tt, self.d].map(|a| a.weighted_mean(throughput)))
     }
 
     /// Draws a direction; `None` for a black fibre.

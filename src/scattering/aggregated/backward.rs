@@ -90,7 +90,7 @@ impl Lobe {
                 let (place, axes) = optics.leaving.place(rim.unwrap_or(Vec2::X), inside.short_axis_within());
                 let outwards = optics.leaving.draw(&place, stream);
                 let energy = weight * (Rgb::ONE - open) * node.leaves_again;
-                let chance = open_chance(node, open);
+                let chance = node.chance_out(open, node.leaves_again);
                 let axes = axes_across(&frame, axes.map(|axis| inside.out_of(axis)));
                 lobe.again =
                     Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy, axes, outwards });
@@ -154,7 +154,7 @@ impl Lobe {
         match &self.again {
             None => first * mis_weight(light_pdf, chance * pdf),
             Some(again) => {
-                let goes_on = open_chance(node, open);
+                let goes_on = node.chance_out(open, node.leaves_again);
                 let (even, even_pdf) = self.sent_back(view, node.spot.ply, again, w);
                 first * open * mis_weight(light_pdf, chance * goes_on * pdf)
                     + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even_pdf)
@@ -212,12 +212,4 @@ fn axes_across(frame: &LobeFrame, axes: [Vec3A; 2]) -> [Vec2; 2] {
     let zero = across(axes[0]).normalize_or(Vec2::X);
     let side = zero.perp();
     [zero, if side.dot(across(axes[1])) < 0.0 { -side } else { side }]
-}
-
-/// The chance, given how open a direction is, that multiply scattered light goes on in it.
-#[inline]
-fn open_chance(node: &Node, open: Rgb) -> f32 {
-    let out = open.weighted_mean(node.weight);
-    let stay = ((Rgb::ONE - open) * node.leaves_again).weighted_mean(node.weight);
-    if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
 }

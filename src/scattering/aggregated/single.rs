@@ -236,8 +236,14 @@ impl Node {
     /// The chance, given the clearness of a direction, that light sent there counts as escaped and not as B.
     #[inline]
     pub(super) fn escape_chance(&self, clear: Rgb) -> f32 {
-        let out = clear.weighted_mean(self.weight);
-        let stay = ((Rgb::ONE - clear) * self.leaves).weighted_mean(self.weight);
+        self.chance_out(clear, self.leaves)
+    }
+
+    /// The chance that light goes out where `open` of it may, and of the rest `stays` goes on inside.
+    #[inline]
+    pub(super) fn chance_out(&self, open: Rgb, stays: Rgb) -> f32 {
+        let out = open.weighted_mean(self.weight);
+        let stay = ((Rgb::ONE - open) * stays).weighted_mean(self.weight);
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 

@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
     super::{AlbedoTexture, Material, Object, animation::numbered, defaults},
-    Context, Range, Reader, UNITS, placement,
+    Context, Range, Reader, UNITS, Y_UP, placement,
     stages::Stages,
 };
 use crate::{
@@ -335,7 +335,7 @@ impl MeshFile {
         let (mut mesh, own_unit, up_axis) = read.map_err(|error| context.error(self.span, error, None)).ok()?;
         let scale = self.unit.or(own_unit).unwrap_or(context.unit);
         let z_up = self.z_up.unwrap_or(up_axis == Some(2));
-        let up = if z_up { DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DAffine3::IDENTITY };
+        let up = if z_up { DAffine3::from_mat3(Y_UP) } else { DAffine3::IDENTITY };
         mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));
         Some((path, mesh))
     }

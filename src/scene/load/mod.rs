@@ -29,7 +29,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::{DAffine3, DQuat, DVec3, EulerRot};
+use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
 pub use definitions::{Definitions, load_definitions};
 
@@ -76,6 +76,9 @@ impl std::error::Error for LoadError {}
 
 /// Units of length and their millimetres.
 const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)];
+
+/// From z up to y up: a quarter turn about x.
+const Y_UP: DMat3 = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
 
 /// What all parts of the loader share.
 struct Context<'a> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     super::animation::{number_at, numbered, numbers},
-    Context,
+    Context, Y_UP,
     cloth::Detail,
     mesh::polygons,
     sequence::Times,
@@ -71,7 +71,7 @@ impl Moment {
         if !stage::is_stage(&self.path) {
             let mut mesh = obj::read(&self.path).map_err(|e| e.to_string())?;
             if z_up == Some(true) {
-                mesh.transform(&glam::DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+                mesh.transform(&glam::DAffine3::from_mat3(Y_UP));
             }
             return Ok((mesh, None));
         }
@@ -96,7 +96,7 @@ impl Moment {
 
 /// z up becomes y up.
 fn upright(p: &mut glam::DVec3) {
-    *p = glam::DVec3::new(p.x, p.z, -p.y);
+    *p = Y_UP * *p;
 }
 
 /// A time between two moments.

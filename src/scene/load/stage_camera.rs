@@ -10,7 +10,7 @@ use super::{
         motion::Aim,
         view::{CameraSetup, Focus, LensSetup},
     },
-    Context, Reader, motion,
+    Context, Reader, Y_UP, motion,
 };
 use crate::files::stage::{Stage, StageCamera, StageError};
 
@@ -26,7 +26,7 @@ struct Pose {
 
 impl Pose {
     fn new(camera: &StageCamera, unit: f64, z_up: bool) -> Self {
-        let turn = if z_up { DMat4::from_rotation_x(-std::f64::consts::FRAC_PI_2) } else { DMat4::IDENTITY };
+        let turn = if z_up { DMat4::from_mat3(Y_UP) } else { DMat4::IDENTITY };
         let to_world = DMat4::from_scale(DVec3::splat(unit)) * turn * camera.to_stage;
         let position = to_world.w_axis.truncate();
         let back = to_world.z_axis.truncate().normalize();

@@ -2,13 +2,13 @@
 
 use std::{f64::consts::TAU, path::Path};
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::DAffine3;
 use rayon::prelude::*;
 
 use super::{
     super::{
         super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Taken, defaults, transform_curves},
-        Context,
+        Context, Y_UP,
         color::{ColorPlan, FabricCoordinates},
         dyes::Dyes,
         pattern::KnitPlan,
@@ -193,9 +193,7 @@ impl<'a> Base<'a> {
             };
             let mut curves: Vec<(Curve, Vec<f64>)> = set.curves.into_iter().map(own_radii).collect();
             if file.up == Up::Z || (file.up == Up::Auto && set.up_axis == Some(2)) {
-                // z up becomes y up: a quarter turn about x.
-                let turn = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
-                transform_curves(&mut curves, &DAffine3::from_mat3(turn));
+                transform_curves(&mut curves, &DAffine3::from_mat3(Y_UP));
             }
             Some(curves)
         };
