@@ -1,9 +1,6 @@
 //! `yarnray info`
 
-use std::{
-    borrow::Cow,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use glam::DVec3;
@@ -15,7 +12,7 @@ use crate::{
     files::curve_file::{self, ReadOptions},
     geometry::{
         curve::{Basis, Curve, CurveSet},
-        overlap::{Overlap, TOLERATED, overlap},
+        overlap::{Overlap, TOLERATED, overlap, overlap_of_plied},
         proposal::{self, Proposal},
     },
     plan::{Feature, Memory, Plan},
@@ -279,20 +276,18 @@ fn scene_report(scene: &Scene) -> (Value, String) {
 }
 
 /// How far the yarns of a scene run into each other, each as wide as it is in the mean; `None` where nothing lies near.
-fn overlap_of(scene: &Scene) -> Option<Overlap> {
-    fn of_fabric<'s>(fabric: &'s Fabric, scene: &Scene) -> Vec<(&'s Curve, Cow<'s, [f64]>)> {
-        let half_width = match fabric.kind {
-            CurveKind::Yarn(yarn) => scene.yarns[yarn].half_width(),
-            CurveKind::Fiber(_) => 1.0,
-        };
-        let widths = |radii: &'s Vec<f64>| match half_width {
-            1.0 => Cow::Borrowed(radii.as_slice()),
-            _ => radii.iter().map(|r| r * half_width).collect(),
-        };
-        fabric.curves.iter().map(|(curve, radii)| (curve, widths(radii))).collect()
-    }
-    let curves: Vec<_> = scene.fabrics.iter().flat_map(|fabric| of_fabric(fabric, scene)).collect();
-    (!curves.is_empty()).then(|| overlap(curves.iter().map(|(curve, radii)| (*curve, &**radii)))).flatten()
+fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
+    let half_width = |fabric: &Fabric| match fabric.kind {
+        CurveKind::Yarn(yarn) => scene.yarns[yarn].half_width(),
+        CurveKind::Fiber(_) => 1.0,
+    };
+    let of_fabric = |fabric: &'s Fabric| {
+        let half_width = half_width(fabric);
+        fabric.curves.iter().map(move |(curve, radii)| (curve, radii.as_slice(), half_width))
+    };
+    (scene.fabrics.iter().any(|f| !f.curves.is_empty()))
+        .then(|| overlap_of_plied(scene.fabrics.iter().flat_map(of_fabric)))
+        .flatten()
 }
 
 impl<'a> SceneFacts<'a> {

@@ -19,7 +19,7 @@ use crate::{
     files::curve_file,
     geometry::{
         curve::{Curve, CurveSet},
-        overlap::overlap,
+        overlap::overlap_of_plied,
     },
     image::output,
     pattern::{
@@ -170,6 +170,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
         warp_radius: radius * half_width,
         weft_radius: weft_radius * half_width,
+        half_width: [half_width; 2],
         warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
         weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
         cover: args.cover,
@@ -193,15 +194,13 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
     }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
-    if piece.pile_height > weave::LONGEST * radius {
-        let most = weave::LONGEST * radius;
+    let most = weave::LONGEST * radius;
+    if piece.pile_height > most {
         return Err(Failure::Input(format!("error: --pile-height is at most {most}, a thousand radii of the yarn")));
     }
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
-    let mut strands = cloth.strands();
-    strands.iter_mut().for_each(|strand| strand.widen(half_width));
-    write(strands, &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
+    write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
         let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
@@ -285,9 +284,8 @@ fn write(
     write_all(&output.out, &set, output.quiet)?;
     if !output.quiet && set.plies.is_empty() {
         let half_width = yarn.map_or(1.0, Yarn::half_width);
-        let widths: Vec<Vec<f64>> =
-            set.curves.iter().map(|c| c.radii.iter().flatten().map(|r| r * half_width).collect()).collect();
-        if let Some(found) = overlap(set.curves.iter().zip(widths.iter().map(Vec::as_slice))) {
+        let curves = set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?, half_width)));
+        if let Some(found) = overlap_of_plied(curves) {
             log::say(&super::overlap_in_words(&found));
         }
     }

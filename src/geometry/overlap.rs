@@ -1,6 +1,7 @@
 //! How far yarns run into each other.
 
 use std::{
+    borrow::Cow,
     collections::BTreeMap,
     sync::atomic::{AtomicU32, Ordering::Relaxed},
 };
@@ -115,10 +116,20 @@ fn between_pressed(a: &Piece, b: &Piece, way: DVec3) -> f64 {
 /// Measures curves with their radii (one for each control point): for every piece the nearest strand that is not its
 /// neighbour along the yarn. `None` where this would take too much memory.
 pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Option<Overlap> {
+    overlap_of_plied(curves.map(|(curve, radii)| (curve, radii, 1.0)))
+}
+
+/// As [`overlap`] of yarns which in the mean are narrower than their radii, each by a factor: see
+/// [`mean_half_width`](super::yarn::mean_half_width).
+pub fn overlap_of_plied<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<Overlap> {
     let mut pieces = Vec::new();
     let mut rings = Vec::new();
-    for (index, (curve, radii)) in curves.enumerate() {
-        let length = cut(curve, radii, index as u32, &mut pieces);
+    for (index, (curve, radii, half_width)) in curves.enumerate() {
+        let radii: Cow<'_, [f64]> = match half_width {
+            1.0 => Cow::Borrowed(radii),
+            _ => radii.iter().map(|r| r * half_width).collect(),
+        };
+        let length = cut(curve, &radii, index as u32, &mut pieces);
         rings.push(if curve.closed { length } else { f64::INFINITY });
         if pieces.len() > MOST_PIECES {
             return None;

@@ -62,11 +62,6 @@ impl PatternStrand {
         self.share * self.curve.polygon_length()
     }
 
-    /// Gives a yarn that lies as if its radius were `half_width` times what it is its radii; sections keep their shape.
-    pub fn widen(&mut self, half_width: f64) {
-        self.curve.radii.iter_mut().flatten().for_each(|r| *r /= half_width);
-    }
-
     /// With the smoothest curve through the same points, a B-spline. Embree meets it sooner than a Catmull-Rom curve, it
     /// has no jumps of curvature where segments join, and so fewer points follow it.
     pub fn smooth(mut self) -> Self {

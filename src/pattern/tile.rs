@@ -123,7 +123,7 @@ impl Tile {
                 index: strand.index - own,
                 points: both.clone().map(|(p, _)| *p - corner).collect(),
                 step: if is_warp { [0, 1] } else { [1, 0] },
-                radius: if is_warp { weave.warp_radius } else { weave.weft_radius },
+                radius: weave.yarn_radii()[usize::from(!is_warp)],
                 sections: sections.zip(&strand.coordinates).filter(|(_, c)| inside(c)).map(|(s, _)| s).collect(),
                 coordinates: both.map(|(_, c)| [c[0] - warps as f32, c[1] - wefts as f32]).collect(),
             });

@@ -34,10 +34,12 @@ pub struct Weave {
     pub warps: Extent,
     /// How many wefts, or how high.
     pub wefts: Extent,
-    /// Radius of the warp yarn where it is round.
+    /// Half of the room that a warp takes where it is round: its radius, or less if it is plied.
     pub warp_radius: f64,
-    /// Radius of the weft yarn where it is round.
+    /// Half of the room that a weft takes where it is round.
     pub weft_radius: f64,
+    /// These over the radii of the yarns themselves: 1, or less for plied yarns, which lie in each other's hollows.
+    pub half_width: [f64; 2],
     /// Distance between warps; what the loom gives if absent.
     pub warp_spacing: Option<f64>,
     /// Distance between wefts.
@@ -167,6 +169,7 @@ impl Weave {
             wefts: Extent::Yarns(YARNS),
             warp_radius: radius,
             weft_radius: radius,
+            half_width: [1.0; 2],
             warp_spacing: None,
             weft_spacing: None,
             cover: None,
@@ -179,6 +182,11 @@ impl Weave {
             threads: <[Threads; 2]>::default(),
             tile: false,
         }
+    }
+
+    /// Radii of warp and weft themselves, where they are round.
+    pub fn yarn_radii(&self) -> [f64; 2] {
+        [self.warp_radius / self.half_width[0], self.weft_radius / self.half_width[1]]
     }
 
     fn options(&self) -> CellOptions {
@@ -347,7 +355,16 @@ impl Cloth<'_> {
     /// top.
     pub fn ground(&self) -> Vec<PatternStrand> {
         let sides = (0..2).flat_map(|side| (0..self.count[side]).map(move |index| (side, index)));
-        sides.map(|(side, index)| self.strand(side, index, 0)).collect()
+        self.widened(sides.map(|(side, index)| self.strand(side, index, 0)).collect())
+    }
+
+    /// Strands as wide as their yarns, which were as wide as the room that these take.
+    fn widened(&self, mut strands: Vec<PatternStrand>) -> Vec<PatternStrand> {
+        for strand in &mut strands {
+            let half_width = self.weave.half_width[usize::from(strand.kind == StrandKind::Weft)];
+            strand.curve.radii.iter_mut().flatten().for_each(|r| *r /= half_width);
+        }
+        strands
     }
 
     /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top, which
@@ -379,7 +396,7 @@ impl Cloth<'_> {
         if edges == Edges::Finished {
             edges::hem(&mut strands, 0.5 * size[1], thickness);
         }
-        strands
+        self.widened(strands)
     }
 
     /// A yarn across all of the other side, with half a spacing beyond the first and the last. There are `hem` more wefts

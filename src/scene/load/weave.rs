@@ -30,8 +30,6 @@ pub(super) struct WeavePlan {
     header: Span,
     /// Whether spacings of warps and wefts are those of the draft's file.
     filed: [bool; 2],
-    /// Mean half width of warp and weft over their radius: what they take up beside each other.
-    half_width: [f64; 2],
 }
 
 /// Woven yarns.
@@ -47,8 +45,7 @@ pub(super) struct Woven {
 impl WeavePlan {
     /// Radii of warp and weft, mm.
     pub(super) fn radii(&self) -> [f64; 2] {
-        let [warp, weft] = self.half_width;
-        [self.weave.warp_radius / warp, self.weave.weft_radius / weft]
+        self.weave.yarn_radii()
     }
 
     /// Weaves it.
@@ -56,11 +53,8 @@ impl WeavePlan {
         let wrong = |problem: String, hint: &str| context.error(self.header, problem, Some(hint.to_owned()));
         match self.weave.relax() {
             Ok(cloth) => {
-                let (mut warps, mut wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
+                let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     cloth.strands().into_iter().partition(|s| s.kind == StrandKind::Warp);
-                for (side, half_width) in [&mut warps, &mut wefts].into_iter().zip(self.half_width) {
-                    side.iter_mut().for_each(|strand| strand.widen(half_width));
-                }
                 let length =
                     [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
@@ -163,8 +157,7 @@ pub(super) fn weave(
     let crimp = table.f64("crimp", Range::UNIT);
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
-    let longest = Range::above(0.0).and_at_most(weave::LONGEST * own / context.unit);
-    let pile = table.f64("pile_height", longest).map(|h| h * context.unit);
+    let pile = standing(table, context, "pile_height", own);
     let edges = edges(table, context, own, wif.is_some_and(has_unequal_threads));
     let tile = table.bool_or("tile", false);
     if tile && table.has("edges") {
@@ -182,6 +175,7 @@ pub(super) fn weave(
         wefts,
         warp_radius: own,
         weft_radius,
+        half_width,
         warp_spacing,
         weft_spacing,
         cover,
@@ -205,7 +199,6 @@ pub(super) fn weave(
         name,
         header: table.header(),
         filed: own_setting,
-        half_width,
     })
 }
 
@@ -216,10 +209,15 @@ fn has_unequal_threads(wif: &WovenWif) -> bool {
     wif.threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL)
 }
 
+/// How far a fringe or a pile of yarn of a radius stands out, mm.
+fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, radius: f64) -> Option<f64> {
+    let longest = Range::above(0.0).and_at_most(weave::LONGEST * radius / context.unit);
+    table.f64(key, longest).map(|length| length * context.unit)
+}
+
 /// How the cloth ends.
 fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, unequal: bool) -> Edges {
-    let longest = Range::above(0.0).and_at_most(weave::LONGEST * radius / context.unit);
-    let fringe = table.f64("fringe", longest).map(|l| l * context.unit);
+    let fringe = standing(table, context, "fringe", radius);
     let fringed = Edges::Fringe(fringe.unwrap_or(weave::FRINGE * radius));
     let names =
         [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
