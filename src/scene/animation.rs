@@ -25,8 +25,41 @@ pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     Some(out.into())
 }
 
+/// A sequence of numbered files, about one of its frames.
+pub(crate) struct Files {
+    pattern: PathBuf,
+    frame: u32,
+    /// Those that there are, from the smallest to the largest; none where the frame has no file, which its reader tells.
+    numbers: Vec<u32>,
+}
+
+impl Files {
+    /// `None` where the path is that of a file itself, or has no place for a number.
+    pub(crate) fn about(path: &Path, frame: u32) -> Option<Self> {
+        let own = numbered(path, frame).filter(|_| !path.exists())?;
+        let numbers = if own.exists() { numbers(path) } else { Vec::new() };
+        Some(Self { pattern: path.to_owned(), frame, numbers })
+    }
+
+    /// The number of the file that is shown at a frame: before the first one and after the last one all stands still.
+    pub(crate) fn number_at(&self, frame: f64) -> u32 {
+        let (Some(first), Some(last)) = (self.numbers.first(), self.numbers.last()) else { return self.frame };
+        (frame as i64).clamp((*first).into(), (*last).into()) as u32
+    }
+
+    /// The file of a number.
+    pub(crate) fn file(&self, number: u32) -> PathBuf {
+        numbered(&self.pattern, number).unwrap_or_else(|| self.pattern.clone())
+    }
+
+    /// The number of the first file.
+    pub(crate) fn first(&self) -> u32 {
+        self.numbers.first().copied().unwrap_or(self.frame)
+    }
+}
+
 /// The numbers for which a numbered file exists, from the smallest to the largest.
-pub(crate) fn numbers(path: &Path) -> Vec<u32> {
+fn numbers(path: &Path) -> Vec<u32> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let numbers_in = |name: &str| -> Vec<u32> {
         let runs = name.split(|c: char| !c.is_ascii_digit());
@@ -39,13 +72,6 @@ pub(crate) fn numbers(path: &Path) -> Vec<u32> {
         names.filter_map(|name| numbers_in(&name).into_iter().filter(|&n| fits(&name, n)).min()).collect();
     found.sort_unstable();
     found
-}
-
-/// The number of the file that is shown at a frame, of those that there are: before the first one and after the last one all
-/// stands still.
-pub(crate) fn number_at(numbers: &[u32], frame: i64) -> Option<u32> {
-    let (first, last) = (*numbers.first()?, *numbers.last()?);
-    Some(frame.clamp(first.into(), last.into()) as u32)
 }
 
 /// A value that goes smoothly through keys in time and stays at the first and the last: a Catmull-Rom spline with its
@@ -106,9 +132,13 @@ mod tests {
         assert_eq!(numbers(&folder.path().join("x.####.bcc")), [9, 12]);
         assert!(numbers(&folder.path().join("z.####.bcc")).is_empty());
         assert!(numbers(&folder.path().join("none/z.####.bcc")).is_empty());
-        let shown = [-3, 0, 9, 10, 12, 13].map(|frame| number_at(&[9, 12], frame));
-        assert_eq!(shown, [9, 9, 9, 10, 12, 12].map(Some));
-        assert_eq!(number_at(&[], 3), None);
+        let files = Files::about(&folder.path().join("x.####.bcc"), 9).expect("a place for a number");
+        assert_eq!([-3.0, 0.0, 9.0, 10.0, 12.0, 13.0].map(|frame| files.number_at(frame)), [9, 9, 9, 10, 12, 12]);
+        assert_eq!((files.first(), files.file(12)), (9, folder.path().join("x.0012.bcc")));
+        // Of a frame without a file nothing else is shown.
+        let none = Files::about(&folder.path().join("x.####.bcc"), 3).expect("a place for a number");
+        assert_eq!((none.number_at(12.0), none.first()), (3, 3));
+        assert!(Files::about(&folder.path().join("x.0012.bcc"), 3).is_none());
     }
 
     #[test]

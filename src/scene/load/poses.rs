@@ -2,13 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{
-    super::animation::{number_at, numbered, numbers},
-    Context, Y_UP,
-    cloth::Detail,
-    mesh::polygons,
-    sequence::Times,
-};
+use super::{super::animation::Files, Context, Y_UP, cloth::Detail, mesh::polygons, sequence::Times};
 use crate::{
     files::{
         obj,
@@ -124,22 +118,17 @@ impl Frames {
             let poses = times.into_iter().map(pose).collect();
             return Self { rest: Moment::of_file(path), poses, shown, animated: true };
         }
-        let own = numbered(path, detail.frame).filter(|_| !path.exists());
-        let Some(own) = own else {
+        let Some(there) = Files::about(path, detail.frame) else {
             let own = Moment::of_file(path);
             let pose = Pose { before: own.clone(), after: own.clone(), share: 0.0 };
             return Self { rest: own, poses: vec![pose], shown: 1, animated: false };
         };
-        // Where the frame has no file, who reads it says so.
-        let there = if own.exists() { numbers(path) } else { Vec::new() };
-        let file = |frame: f64| number_at(&there, frame as i64).and_then(|number| numbered(path, number));
-        let needed = |frame: f64| Moment::of_file(&file(frame).unwrap_or_else(|| own.clone()));
+        let needed = |frame: f64| Moment::of_file(&there.file(there.number_at(frame)));
         let poses = times
             .into_iter()
             .map(|time| Pose { before: needed(time.floor()), after: needed(time.ceil()), share: time - time.floor() })
             .collect();
-        let rest = there.first().and_then(|n| numbered(path, *n)).unwrap_or_else(|| own.clone());
-        Self { rest: Moment::of_file(&rest), poses, shown, animated: true }
+        Self { rest: Moment::of_file(&there.file(there.first())), poses, shown, animated: true }
     }
 
     /// All moments, each once.

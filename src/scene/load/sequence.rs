@@ -9,10 +9,7 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    super::{
-        FabricMotion,
-        animation::{number_at, numbered, numbers},
-    },
+    super::{FabricMotion, animation::Files},
     Context,
     cloth::{CurveFile, Detail},
 };
@@ -33,13 +30,12 @@ pub(super) fn read(
         return of_stage(file, detail, context, read);
     }
     let read = &mut |path: &Path| read(path, None);
-    let own = numbered(&file.path, detail.frame).filter(|_| !file.path.exists());
     let rest_of = |curves: &Curves, rest: Curves| same_shape(curves, &rest).map(|()| points_of(rest));
     let tell = |problem: String, other: &Path| {
         let message = format!("{}: {problem}", other.display());
         context.error(file.span, message, Some("yarns keep their points from file to file".to_owned()));
     };
-    let Some(own) = own else {
+    let Some(there) = Files::about(&file.path, detail.frame) else {
         let curves = read(&file.path)?;
         let mut motion = FabricMotion::default();
         if let Some(path) = &file.rest {
@@ -52,21 +48,13 @@ pub(super) fn read(
     // Between two files yarns move evenly from one to the other.
     let Times { all: times, shown } = Times::of(detail);
     let mut files: BTreeMap<u32, Curves> = BTreeMap::new();
-    if !own.exists() {
-        // The reader says so.
-        read(&own)?;
-    }
-    let there = numbers(&file.path);
-    let needed = |frame: f64| {
-        let number = number_at(&there, frame as i64).unwrap_or(detail.frame);
-        (number, numbered(&file.path, number).unwrap_or_else(|| own.clone()))
-    };
     let mut around = Vec::new();
     for &time in &times {
-        let (before, after) = (needed(time.floor()), needed(time.ceil()));
-        around.push((before.0, after.0, time - time.floor()));
-        for (number, path) in [before, after] {
+        let [before, after] = [time.floor(), time.ceil()].map(|frame| there.number_at(frame));
+        around.push((before, after, time - time.floor()));
+        for number in [before, after] {
             if !files.contains_key(&number) {
+                let path = there.file(number);
                 let curves = read(&path)?;
                 if let Some(first) = files.values().next() {
                     same_shape(first, &curves).map_err(|problem| tell(problem, &path)).ok()?;
@@ -92,18 +80,18 @@ pub(super) fn read(
     }
     let rest = match &file.rest {
         Some(path) => Some(path.clone()),
-        None => there.first().filter(|n| **n != detail.frame).and_then(|n| numbered(&file.path, *n)),
+        None => Some(there.first()).filter(|n| *n != detail.frame).map(|n| there.file(n)),
     };
     let rest = match rest {
         // At rest is where the curves are, or the first of them.
         None if later.is_empty() => None,
-        None => Some(points_of(read(&own)?)),
+        None => Some(points_of(read(&there.file(detail.frame))?)),
         Some(path) => {
             let rest = read(&path)?;
             Some(rest_of(&curves, rest).map_err(|problem| tell(problem, &path)).ok()?)
         }
     };
-    Some((own, curves, FabricMotion { later, rest, flow }))
+    Some((there.file(detail.frame), curves, FabricMotion { later, rest, flow }))
 }
 
 /// The curves of a stage while the shutter is open; plies wind as in its first frame, or in the file `rest`.
