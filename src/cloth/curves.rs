@@ -254,7 +254,6 @@ impl Wound<'_> {
 }
 
 fn strands(fabric: &Fabric, curves: Given<'_>, yarn: &Yarn, shape: &YarnShape) -> Strands {
-    let uneven = yarn.unevenness > 0.0;
     Strands::with(
         curves,
         Along { material_indices: &fabric.material_indices, blended: fabric.printed, uvs: &fabric.uvs },
@@ -267,7 +266,7 @@ fn strands(fabric: &Fabric, curves: Given<'_>, yarn: &Yarn, shape: &YarnShape) -
             symmetry: shape.symmetry,
             phases: fabric.phases.clone(),
             distances: fabric.shows_fibers,
-            unevenness: uneven.then_some(Unevenness { spread: yarn.unevenness, seed: fabric.seed }),
+            unevenness: (yarn.unevenness > 0.0).then_some(Unevenness { spread: yarn.unevenness, seed: fabric.seed }),
         },
     )
 }

@@ -205,7 +205,8 @@ pub fn fiber_tangent(ply: &PlyShape, ply_rate: f32, centre: Vec2, axis: Vec2, at
 pub(crate) mod tests {
     use super::*;
 
-    fn touching(count: u32, fibers: u32, density: f64, fiber_twist: f64) -> Vec<PlyParameters> {
+    /// `count` touching round plies with `fibers` each at area fraction `density`.
+    pub(crate) fn touching(count: u32, fibers: u32, density: f64, fiber_twist: f64) -> Vec<PlyParameters> {
         let (radius, distance) = touching_plies(count);
         let ply = |k: u32| PlyParameters {
             radius,
@@ -219,7 +220,7 @@ pub(crate) mod tests {
         (0..count).map(ply).collect()
     }
 
-    /// `count` touching round plies with `fibers` each at area fraction `density`.
+    /// A yarn of [`touching`] plies.
     pub(crate) fn touching_yarn(count: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64) -> YarnShape {
         YarnShape::new(&touching(count, fibers, density, fiber_twist), ply_twist, true)
     }

@@ -1,28 +1,11 @@
-use std::f64::consts::TAU;
-
 use glam::{DVec3, Vec3A};
 
 use super::{flyaway::Flyaways, *};
 use crate::geometry::{
     curve::Curve,
     strand::StrandOptions,
-    yarn::{tests::touching_yarn, touching_plies},
+    yarn::tests::{touching, touching_yarn},
 };
-
-fn plies(count: u32, fibers: u32, density: f64, twist: f64) -> Vec<PlyParameters> {
-    let (radius, distance) = touching_plies(count);
-    (0..count)
-        .map(|k| PlyParameters {
-            radius,
-            aspect: 1.0,
-            distance,
-            angle: TAU * f64::from(k) / f64::from(count),
-            fibers,
-            fiber_radius: radius * (density / f64::from(fibers)).sqrt(),
-            fiber_twist: twist,
-        })
-        .collect()
-}
 
 /// A yarn of radius 0.5 bent to an arch.
 fn arch(shape: &YarnShape) -> Strands {
@@ -81,7 +64,7 @@ fn locate(strands: &Strands, point: Vec3A) -> (YarnFrame, DVec2) {
 fn fibers_stay_in_their_ply_and_turn_as_the_model_says() {
     let (twist, count) = (-19f64.to_radians(), 33);
     let shape = touching_yarn(3, count, 0.4, 13f64.to_radians(), twist);
-    let parameters = plies(3, count, 0.4, twist);
+    let parameters = touching(3, count, 0.4, twist);
     let strands = arch(&shape);
     let made = Plies::new(&strands, &parameters, &shape, 1);
     let (tubes, first) = made.fibers(1, Placement::Regular);
@@ -117,7 +100,7 @@ fn fibers_stay_in_their_ply_and_turn_as_the_model_says() {
 #[test]
 fn regular_fibers_do_not_cut_through_each_other() {
     let shape = touching_yarn(1, 40, 0.5, 0.0, 0.3);
-    let parameters = plies(1, 40, 0.5, 0.3);
+    let parameters = touching(1, 40, 0.5, 0.3);
     let strands = arch(&shape);
     let (tubes, _) = Plies::new(&strands, &parameters, &shape, 4).fibers(0, Placement::Regular);
     let per_fiber = tubes.segments().len() / 40;
@@ -133,7 +116,7 @@ fn regular_fibers_do_not_cut_through_each_other() {
 #[test]
 fn elliptical_plies_keep_their_short_axis_towards_the_yarn() {
     let shape_of = |parameters: &[PlyParameters]| YarnShape::new(parameters, 0.25, true);
-    let mut parameters = plies(2, 60, 0.3, -0.4);
+    let mut parameters = touching(2, 60, 0.3, -0.4);
     for p in &mut parameters {
         p.aspect = 0.6;
         p.radius = 0.4;
@@ -159,7 +142,7 @@ fn elliptical_plies_keep_their_short_axis_towards_the_yarn() {
 #[test]
 fn measured_fibers_crowd_at_the_axis_and_migrate() {
     let shape = touching_yarn(1, 400, 0.3, 0.0, 0.35);
-    let parameters = plies(1, 400, 0.3, 0.35);
+    let parameters = touching(1, 400, 0.3, 0.35);
     let strands = arch(&shape);
     let made = Plies::new(&strands, &parameters, &shape, 3);
     let radii = |beta: f64, migration: [f64; 2], segment_of: &dyn Fn(usize) -> usize| -> Vec<f64> {
@@ -186,7 +169,7 @@ fn measured_fibers_crowd_at_the_axis_and_migrate() {
 #[test]
 fn flyaways_are_as_many_and_reach_as_far_as_asked() {
     let shape = touching_yarn(3, 30, 0.3, 0.2, -0.3);
-    let parameters = plies(3, 30, 0.3, -0.3);
+    let parameters = touching(3, 30, 0.3, -0.3);
     let strands = arch(&shape);
     let made = Plies::new(&strands, &parameters, &shape, 9);
     let of = Flyaways {
@@ -215,7 +198,7 @@ fn flyaways_are_as_many_and_reach_as_far_as_asked() {
 #[test]
 fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
     let shape = touching_yarn(3, 33, 0.3, 0.25, -0.3);
-    let parameters = plies(3, 33, 0.3, -0.3);
+    let parameters = touching(3, 33, 0.3, -0.3);
     let strands = pressed(&shape, 0.5);
     let made = Plies::new(&strands, &parameters, &shape, 1);
     let (mut wide, mut high) = (0.0f32, 0.0f32);
@@ -246,7 +229,7 @@ fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
 #[test]
 fn fibers_of_a_pressed_yarn_give_way_to_each_other() {
     let shape = touching_yarn(3, 33, 0.5, 0.25, -0.3);
-    let parameters = plies(3, 33, 0.5, -0.3);
+    let parameters = touching(3, 33, 0.5, -0.3);
     // Of all plies together: pairs for each fibre that lie in each other by more than 2 %, so far between two knots.
     let deep = |ratio: f64, u: f32| {
         let strands = pressed(&shape, ratio);
@@ -275,7 +258,7 @@ fn fibers_of_a_pressed_yarn_give_way_to_each_other() {
 #[test]
 fn the_same_seed_makes_the_same_fibers() {
     let shape = touching_yarn(2, 20, 0.3, 0.2, -0.3);
-    let parameters = plies(2, 20, 0.3, -0.3);
+    let parameters = touching(2, 20, 0.3, -0.3);
     let strands = arch(&shape);
     let points =
         |seed| Plies::new(&strands, &parameters, &shape, seed).fibers(1, Placement::Regular).0.points().to_vec();
@@ -286,7 +269,7 @@ fn the_same_seed_makes_the_same_fibers() {
 #[test]
 fn ply_curves_run_through_the_middle_of_their_plies() {
     let shape = touching_yarn(3, 33, 0.3, 0.25, -0.3);
-    let parameters = plies(3, 33, 0.3, -0.3);
+    let parameters = touching(3, 33, 0.3, -0.3);
     let strands = arch(&shape);
     let made = Plies::new(&strands, &parameters, &shape, 1);
     let curves = made.ply_curves(2);
