@@ -110,6 +110,11 @@ impl PointGrid {
         Self { wrap, size, entries, places, origin, cells, cell_of }
     }
 
+    /// All points, those of a cell one after the other: in this order [`Self::walk`] is quickest.
+    pub(crate) fn in_order(&self) -> &[Entry] {
+        &self.entries
+    }
+
     /// What finds neighbours: quickest of points that follow each other in space.
     pub(crate) fn walk(&self) -> Walk<'_> {
         Walk { grid: self, ahead: false, cell: None, runs: Vec::with_capacity(9) }

@@ -4,13 +4,15 @@
 //! each other (`shape`); the curves are relaxed as elastic rods, cloth that repeats as one cell with periodic borders that
 //! finds its own gauge (`cell`); and a piece is put together, with one yarn from row to row and finished edges (`piece`), as
 //! large as is asked for (`size`).
-//! Inside this folder the unit is the yarn's diameter.
+//! Last, yarns are pressed flat where they lie on each other (`pressed`). Inside this folder the unit is the distance at which the centre lines
+//! of two yarns touch: the diameter of yarn that stays round ([`Thickness`]).
 
 mod cell;
 mod colors;
 mod curl;
 mod loops;
 mod piece;
+mod pressed;
 mod rims;
 mod shape;
 mod short_rows;
@@ -27,11 +29,12 @@ use self::{
     curl::Curl,
     loops::{Border, Loops},
     piece::{Laying, State, Surface, Thread, ease, settle, sheet::Sheet},
+    pressed::{Alike, flatten_where_touching},
 };
 pub use self::{
     colors::{Colors, Work},
     rims::{CastOn, Closing, Rims},
-    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, fits_stitch},
+    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, fits_stitch},
 };
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
@@ -83,11 +86,11 @@ pub struct Knit {
     pub edges: Edges,
     /// How a finished piece is cast on and closed at its top.
     pub rims: Rims,
-    /// Width of a stitch in yarn diameters; what the pattern draws itself to if absent.
+    /// Width of a stitch in units; what the pattern draws itself to if absent.
     pub stitch_width: Option<f64>,
-    /// Distance between rows in yarn diameters, likewise.
+    /// Distance between rows in units, likewise.
     pub row_height: Option<f64>,
-    /// Length of yarn in a stitch, in diameters; what suits the gauge if absent.
+    /// Length of yarn in a stitch, in units; what suits the gauge if absent.
     pub yarn_per_stitch: Option<f64>,
     /// Control points of a stitch.
     pub points: u32,
@@ -108,14 +111,16 @@ pub struct Knitted {
     pub gauge: [f64; 2],
 }
 
-/// Yarn in a stitch of plain knit of middling tightness, in diameters: Peirce's closed loop has 16.7, firm cloth 14.
+/// Yarn in a stitch of plain knit of middling tightness, in units: Peirce's closed loop has 16.7, firm cloth 14.
 pub const YARN_PER_STITCH: f64 = 16.2;
-/// Width of a stitch of stockinette as it relaxes, in yarn diameters.
+/// Width of a stitch of stockinette as it relaxes, in units.
 pub const STITCH_WIDTH: f64 = 4.15;
-/// Height of a row of stockinette as it relaxes, in yarn diameters.
+/// Height of a row of stockinette as it relaxes, in units.
 pub const ROW_HEIGHT: f64 = 2.9;
 /// Stitches in the square of the length of yarn that one of them has: Munden's constant of fully relaxed plain knit.
 pub const STITCHES_PER_SQUARE: f64 = 5.5 * 4.2;
+/// Width over height of a yarn's section where stitches press on it, unless asked otherwise.
+pub const FLATTEN: f64 = 1.5;
 /// Control points of a stitch unless asked otherwise.
 pub const POINTS: u32 = 24;
 
@@ -229,7 +234,8 @@ impl Knit {
     }
 
     /// A patch that repeats, of one colour, centred.
-    fn patch(&self, diameter: f64) -> Result<Knitted, ChartError> {
+    fn patch(&self, yarn: &Thickness) -> Result<Knitted, ChartError> {
+        let diameter = yarn.pressed();
         let wide = self.repeat_for("for a tile")?;
         let high = self.chart.rows();
         if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
@@ -254,7 +260,8 @@ impl Knit {
                 share: 1.0,
             }
         };
-        let strands: Vec<_> = (0..self.rows as usize).map(row).collect();
+        let mut strands: Vec<_> = (0..self.rows as usize).map(row).collect();
+        flatten_where_touching(&mut strands, yarn, &Alike::Tile(size * diameter));
         Ok(Knitted { colors: vec![0; strands.len()], strands, gauge: [width * diameter, height * diameter] })
     }
 
@@ -385,7 +392,7 @@ impl Knit {
         Err(ChartError::new(None, wrong.0, wrong.1))
     }
 
-    /// The yarns of the piece, in the unit of `diameter`.
+    /// The yarns of the piece, round and `diameter` apart where they touch.
     ///
     /// # Errors
     /// A chart that does not fit the stitches or the rows, or that makes too many control points.
@@ -393,14 +400,24 @@ impl Knit {
         Ok(self.knitted(diameter)?.strands)
     }
 
-    /// The piece, in the unit of `diameter`.
+    /// The piece, as [`Self::strands`].
     ///
     /// # Errors
     /// The chart does not fit the stitches, or asks for more than [`MAX_POINTS`] control points.
     pub fn knitted(&self, diameter: f64) -> Result<Knitted, ChartError> {
+        let yarn = Thickness::round(0.5 * diameter);
+        self.pressed(&yarn)
+    }
+
+    /// The piece of yarn of a thickness, pressed flat where stitches lie on each other.
+    ///
+    /// # Errors
+    /// As [`Self::knitted`].
+    pub fn pressed(&self, yarn: &Thickness) -> Result<Knitted, ChartError> {
         self.check()?;
+        let diameter = yarn.pressed();
         if self.edges == Edges::Tile {
-            return self.patch(diameter);
+            return self.patch(yarn);
         }
         let rows = self.worked()?;
         let finished = self.is_finished();
@@ -453,7 +470,7 @@ impl Knit {
             threads.iter_mut().for_each(|t| t.refine(f64::from(self.points) / f64::from(points)));
             let run = Run { growing: 0, ..run };
             settle(&mut threads, &Run { steps: FINE_STEPS, firm: 4.0, ..run });
-            ease(&mut threads, self.points as usize, &Run { steps: EASE_STEPS, ..run });
+            ease(&mut threads, self.points as usize, yarn.radius / diameter, &Run { steps: EASE_STEPS, ..run });
         }
         let shift = match &surface {
             Surface::Plane { height, .. } => DVec3::new(0.0, -0.5 * height * count, 0.0),
@@ -463,6 +480,12 @@ impl Knit {
             let curl = Curl::of(cell, DVec2::new(width * f64::from(self.stitches), height * count));
             roll_up(&mut threads, &curl, shift);
         }
+        let alike = match &cell {
+            Some(cell) if even && yarn.flatten != 1.0 && matches!(surface, Surface::Plane { .. }) && self.flat => {
+                self.alike(cell, &threads)
+            }
+            _ => Alike::No,
+        };
         let strand = |(index, thread): (usize, Thread)| PatternStrand {
             curve: Curve {
                 basis: Basis::CatmullRom,
@@ -476,9 +499,50 @@ impl Knit {
             coordinates: thread.grid,
             share: 1.0,
         };
-        let strands = threads.into_iter().enumerate().map(strand).collect();
+        let mut strands: Vec<_> = threads.into_iter().enumerate().map(strand).collect();
+        flatten_where_touching(&mut strands, yarn, &alike);
         let colors = ways.iter().map(|w| w.color).collect();
         Ok(Knitted { strands, colors, gauge: [width * diameter, height * diameter] })
+    }
+
+    /// Which points of a flat piece lie alike: those that rest where their cell has them, in stitches around which all do.
+    fn alike(&self, cell: &Cell, threads: &[Thread]) -> Alike {
+        // As far as a loop reaches, and one more.
+        const AROUND: i32 = 2;
+        if self.colors.is_some() {
+            return Alike::No;
+        }
+        let [wide, high] = [self.stitches as i32, self.rows as i32];
+        let stitch = |grid: &[f32; 2]| [grid[0].floor() as i32, grid[1].floor() as i32];
+        let inside = |x: i32, y: i32| (0..wide).contains(&x) && (0..high).contains(&y);
+        let at = |x: i32, y: i32| y as usize * wide as usize + x as usize;
+        // Whether a stitch, and then whether all around it, rests.
+        let mut rests = vec![true; wide as usize * high as usize];
+        for thread in threads {
+            for (grid, _) in thread.grid.iter().zip(&thread.state).filter(|(_, state)| **state != State::Rest) {
+                let [x, y] = stitch(grid);
+                if inside(x, y) {
+                    rests[at(x, y)] = false;
+                }
+            }
+        }
+        let deep = |x: i32, y: i32| {
+            let mut around = (y - AROUND..=y + AROUND).flat_map(|y| (x - AROUND..=x + AROUND).map(move |x| (x, y)));
+            around.all(|(x, y)| inside(x, y) && rests[at(x, y)])
+        };
+        let deep: Vec<bool> =
+            (0..rests.len()).into_par_iter().map(|i| deep(i as i32 % wide, i as i32 / wide)).collect();
+        let kind = |(grid, point): (&[f32; 2], &DVec3)| {
+            let [x, y] = stitch(grid);
+            if !inside(x, y) || !deep[at(x, y)] {
+                return pressed::ALONE;
+            }
+            // Copies differ by less than this in what rounding makes of them.
+            let part = |v: f32, of: u32| (f64::from(v).rem_euclid(of.into()) * 1024.0).round() as u64;
+            part(grid[0], cell.wide) << 42 | part(grid[1], cell.high) << 20 | ((point.z + 64.0) * 4096.0) as u64
+        };
+        let of_thread = |thread: &Thread| thread.grid.iter().zip(&thread.points).map(kind).collect::<Vec<_>>();
+        Alike::Points(threads.iter().flat_map(of_thread).collect())
     }
 
     /// Cells for rows of knit and purl columns that are above and below their like: what a shaped piece begins with.

@@ -9,8 +9,9 @@ use crate::{
     pattern::{
         MAX_POINTS,
         chart::{Chart, PATTERNS},
-        knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes},
+        knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
     },
+    scene::Yarn,
 };
 
 #[derive(Args, Debug)]
@@ -44,7 +45,7 @@ pub(super) struct KnitArgs {
     /// Distance between rows in yarn diameters.
     #[arg(long, value_name = "D", value_parser = positive)]
     row_height: Option<f64>,
-    /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2, if not given.
+    /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2 times what two yarns need side by side, if not given.
     #[arg(long, value_name = "D", value_parser = positive)]
     yarn_per_stitch: Option<f64>,
     /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
@@ -108,14 +109,14 @@ fn wrong(error: &dyn std::fmt::Display) -> Failure {
 }
 
 impl KnitArgs {
-    /// What is to be knitted, of yarn of a radius.
-    fn piece(&self, radius: f64) -> Result<Knit, Failure> {
+    /// What is to be knitted, of yarn of a thickness.
+    fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
         let chart = if self.chart.is_empty() {
             Chart::named(self.pattern.as_deref().unwrap_or("stockinette")).ok_or_else(|| wrong(&"unknown pattern"))?
         } else {
             Chart::parse(&self.chart).map_err(|e| wrong(&e))?
         };
-        let form = self.form(radius)?;
+        let form = self.form(yarn.radius)?;
         // Shaped pieces are knitted once, from the first row of the chart to the last.
         let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
         let rows = if all { chart.rows() } else { COUNT };
@@ -144,7 +145,7 @@ impl KnitArgs {
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
-        let piece = self.sized(&piece, 2.0 * radius)?;
+        let piece = self.sized(&piece, yarn)?;
         if piece.form != Form::Flat && piece.stitches < 3 {
             return Err(wrong(&"knitting in the round takes at least 3 stitches"));
         }
@@ -168,7 +169,7 @@ impl KnitArgs {
     }
 
     /// The piece in the size that is asked for.
-    fn sized(&self, piece: &Knit, diameter: f64) -> Result<Knit, Failure> {
+    fn sized(&self, piece: &Knit, yarn: &Thickness) -> Result<Knit, Failure> {
         let SizeArgs { gauge, width, height, circumference } = self.size;
         let sizes = Sizes {
             stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
@@ -183,15 +184,17 @@ impl KnitArgs {
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {
             return Err(told(clash));
         }
-        sizes.apply(piece, diameter).map_err(told)
+        sizes.apply(piece, yarn).map_err(told)
     }
 }
 
 pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     let yarn = args.output.checked()?;
     let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
-    let piece = args.piece(radius)?;
-    let Knitted { strands, gauge, .. } = piece.knitted(2.0 * radius).map_err(|e| wrong(&e))?;
+    // Curve files know round yarns only.
+    let thickness = Thickness { half_width: yarn.as_ref().map_or(1.0, Yarn::half_width), ..Thickness::round(radius) };
+    let piece = args.piece(&thickness)?;
+    let Knitted { strands, gauge, .. } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
     let length: f64 = strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
     write(strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;

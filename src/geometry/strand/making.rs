@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use glam::{DVec2, DVec3, Vec2, Vec4};
+use glam::{DVec2, DVec3, DVec4, Vec2, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -127,13 +127,14 @@ impl Strand {
             .chain(given.later.iter().map(|points| Chain::at_time(curve, radii, points)))
             .map(resampled)
             .collect();
-        let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, options)).collect();
-        let rest = rest.map(|rest| Winding::new(&rest, options));
+        let pressed = pressed.as_ref().map(|vectors| pressed_along(curve, vectors, knots.as_deref()));
+        let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, pressed.as_deref(), options)).collect();
+        let rest = rest.map(|rest| Winding::new(&rest, None, options));
         let at_rest = rest.as_ref().unwrap_or(&wound[0]);
         let frames = frames(&wound, at_rest, curve.closed, given.phase, options.symmetry);
         let distances = if options.distances { at_rest.distances() } else { Vec::new() };
         let flattening = match pressed {
-            Some(vectors) => flattening_along(curve, vectors, knots.as_deref(), &wound[0]),
+            Some(pressed) => flattening_along(&pressed, &wound[0]),
             None => Vec::new(),
         };
         let points = |chain: &Chain| chain.points.iter().map(|p| p.as_vec4()).collect();
@@ -176,8 +177,8 @@ fn frames(wound: &[Winding], at_rest: &Winding, closed: bool, phase: f64, symmet
     wound.iter().map(of).collect()
 }
 
-/// What presses a curve flat, in the frame of each point of the chain made from it: it moves with that frame.
-fn flattening_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]>, wound: &Winding) -> Vec<Vec2> {
+/// What presses a curve flat, at each knot of the chain made from it: the direction of the short axis, with the ratio of both axes.
+fn pressed_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]>) -> Vec<DVec4> {
     assert_eq!(vectors.len(), curve.points.len(), "a curve is pressed flat at each of its points or at none");
     // An axis has no sign: each points to the side of the one before. Its direction and its ratio make a chain of their
     // own, which has its knots where the curve has them.
@@ -194,12 +195,16 @@ fn flattening_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f6
     let chain = Chain::at_time(curve, &ratios, &axes);
     let ends = || (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]);
     let at: Vec<(usize, f64)> = knots.map_or_else(|| ends().collect(), <[_]>::to_vec);
+    at.iter().map(|&(segment, u)| chain.at(segment, u).at).collect()
+}
+
+/// The same in the frame of each point of the chain: it moves with that frame.
+fn flattening_along(pressed: &[DVec4], wound: &Winding) -> Vec<Vec2> {
     let mut before = DVec2::ZERO;
-    let made = at.iter().zip(&wound.knots).map(|(&(segment, u), knot)| {
-        let place = chain.at(segment, u);
-        let axis = place.at.truncate();
+    let made = pressed.iter().zip(&wound.knots).map(|(place, knot)| {
+        let axis = place.truncate();
         let across = DVec2::new(axis.dot(knot.normal), axis.dot(knot.tangent.cross(knot.normal)));
-        let across = across.try_normalize().unwrap_or(DVec2::X) * place.at.w.clamp(FLATTEST, 1.0);
+        let across = across.try_normalize().unwrap_or(DVec2::X) * place.w.clamp(FLATTEST, 1.0);
         before = if across.dot(before) < 0.0 { -across } else { across };
         before.as_vec2()
     });

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::{StrandOptions, frames::PointFrame};
@@ -57,12 +57,13 @@ pub(super) struct Knot {
 const STRETCH: usize = 16_384;
 
 impl Winding {
-    /// Carries the normal along the chain and integrates the phase of the plies.
-    pub(super) fn new(chain: &Chain, options: &StrandOptions) -> Self {
+    /// Carries the normal along the chain and integrates the phase of the plies. `pressed` are the directions of the sections'
+    /// short axes at the ends of its segments, with the ratio of both axes.
+    pub(super) fn new(chain: &Chain, pressed: Option<&[DVec4]>, options: &StrandOptions) -> Self {
         let segments = chain.segments();
         let starts: Vec<usize> = (0..segments.max(1)).step_by(STRETCH).collect();
         let stretches: Vec<_> =
-            starts.into_par_iter().map(|start| carry(chain, start, (start + STRETCH).min(segments))).collect();
+            starts.into_par_iter().map(|start| carry(chain, pressed, start, (start + STRETCH).min(segments))).collect();
         // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
         let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
         let mut tight: Option<Tight> = None;
@@ -123,9 +124,9 @@ impl Winding {
 
 /// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
 /// knots from there to there, and the tightest bend.
-fn carry(chain: &Chain, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) {
+fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) {
     let [a, b, c, d] = GAUSS;
-    let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (Weights::new(chain.basis, u), weight));
+    let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (u, Weights::new(chain.basis, u), weight));
     let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
     // Where the segment before ends: straight segments do not go on as they began.
     let mut here = if start == 0 { chain.at(0, 0.0) } else { chain.at(start - 1, 1.0) };
@@ -139,7 +140,8 @@ fn carry(chain: &Chain, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) 
     knots.push(Knot { tangent, normal, along });
     for segment in start..end {
         let points = chain.points_of(segment);
-        for (weights, weight) in &nodes {
+        let axes = pressed.map(|pressed| [pressed[segment], pressed[segment + 1]]);
+        for (u, weights, weight) in &nodes {
             let next = weights.evaluate(points);
             let velocity = next.d1.truncate();
             let speed = velocity.length();
@@ -149,7 +151,8 @@ fn carry(chain: &Chain, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) 
             // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
             // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
             let distance = next.at.truncate().distance(here.at.truncate());
-            let forward = distance / (0.5 * (here.at.w + next.at.w)).max(1e-300);
+            let inwards = axes.map_or(1.0, |[from, to]| reach(from.lerp(to, *u), next_tangent - tangent));
+            let forward = distance / (0.5 * (here.at.w + next.at.w) * inwards).max(1e-300);
             // An angle is at most pi / 2 times its chord.
             if fold > 0.0 || FRAC_PI_2 * tangent.distance(next_tangent) > forward {
                 let before = fold;
@@ -166,6 +169,13 @@ fn carry(chain: &Chain, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) 
         knots.push(Knot { tangent, normal, along });
     }
     (knots, tight)
+}
+
+/// How far a section reaches in a direction, of half its long axis: `axis` is its short axis and the ratio of both.
+fn reach(axis: DVec4, direction: DVec3) -> f64 {
+    let (short, direction) = (axis.truncate().normalize_or_zero(), direction.normalize_or_zero());
+    let cos2 = short.dot(direction).powi(2).min(1.0);
+    (1.0 - cos2 * (1.0 - axis.w * axis.w)).max(0.0).sqrt()
 }
 
 /// Carries `normal` from one point of a curve to the next without turning it about the tangent.

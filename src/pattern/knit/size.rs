@@ -1,4 +1,5 @@
-//! How large a knit is to be: a gauge, a width or circumference and a height, which count its stitches and rows.
+//! How thick the yarn of a knit is, and how large the knit is to be: a gauge, a width or circumference and a height, which count
+//! its stitches and rows.
 
 use std::f64::consts::TAU;
 
@@ -20,6 +21,39 @@ pub struct Sizes {
     pub counted: [bool; 2],
 }
 
+/// How thick a yarn is where stitches press on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thickness {
+    /// Radius of the yarn by itself, mm.
+    pub radius: f64,
+    /// Half of the room that it takes beside others, over its radius: see [`mean_half_width`](crate::geometry::yarn::mean_half_width).
+    pub half_width: f64,
+    /// Width over height of its section where it is pressed, at least 1; its area stays.
+    pub flatten: f64,
+}
+
+impl Thickness {
+    /// Of a yarn that stays round.
+    pub fn round(radius: f64) -> Self {
+        Self { radius, half_width: 1.0, flatten: 1.0 }
+    }
+
+    /// Diameter of the yarn by itself, mm.
+    pub fn diameter(&self) -> f64 {
+        2.0 * self.radius
+    }
+
+    /// Distance of the centre lines of two such yarns that press on each other, mm: the unit of a [`Knit`].
+    pub fn pressed(&self) -> f64 {
+        self.diameter() * self.half_width / self.flatten.sqrt()
+    }
+
+    /// A unit of a [`Knit`] in diameters of the yarn.
+    fn unit(&self) -> f64 {
+        self.pressed() / self.diameter()
+    }
+}
+
 /// A size that does not fit the rest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Misfit {
@@ -31,14 +65,14 @@ pub struct Misfit {
     pub hint: String,
 }
 
-/// The shortest yarn of a stitch, in diameters: beyond it yarns would lie inside each other.
+/// The shortest yarn of a stitch, in units: beyond it yarns would lie inside each other.
 const SHORTEST: f64 = 11.0;
-/// The narrowest and the widest stitch, and the lowest and the highest, in diameters: below them yarns would lie inside each
+/// The narrowest and the widest stitch, and the lowest and the highest, in units: below them yarns would lie inside each
 /// other, above them nothing holds.
 pub const STITCH_WIDTHS: [f64; 2] = [1.5, 20.0];
 /// As [`STITCH_WIDTHS`].
 pub const ROW_HEIGHTS: [f64; 2] = [0.9, 20.0];
-/// Width and height of a usual stitch, in diameters.
+/// Width and height of a usual stitch, in units.
 const USUAL: [f64; 2] = [3.0, 2.2];
 /// Yarn of a firm stitch.
 const FIRM: f64 = 14.0;
@@ -96,12 +130,17 @@ impl Sizes {
         found
     }
 
-    /// The knit with counts and stitches that make it so large, knitted of yarn of a diameter (mm).
+    /// The knit with counts and stitches that make it so large, knitted of yarn of a thickness. Lengths of `knit` are as they
+    /// were given, in diameters of the yarn; those of the result are in the knit's own unit.
     ///
     /// # Errors
     /// What cannot be knitted of such yarn is told, with what would fit.
-    pub fn apply(&self, knit: &Knit, diameter: f64) -> Result<Knit, Misfit> {
+    pub fn apply(&self, knit: &Knit, yarn: &Thickness) -> Result<Knit, Misfit> {
         let mut knit = knit.clone();
+        let diameter = yarn.pressed();
+        for length in [&mut knit.stitch_width, &mut knit.row_height, &mut knit.yarn_per_stitch] {
+            *length = length.map(|l| l / yarn.unit());
+        }
         if let Some([width, height]) = self.stitch {
             (knit.stitch_width, knit.row_height) = (Some(width / diameter), Some(height / diameter));
         }
@@ -113,7 +152,7 @@ impl Sizes {
         if let (Some(height), true) = (height, self.counted[1]) {
             knit.row_height = Some(height / f64::from(knit.rows));
         }
-        self.check(&knit, diameter)?;
+        self.check(&knit, yarn)?;
         let open = [width.filter(|_| !self.counted[0]), height.filter(|_| !self.counted[1])];
         if open != [None, None] {
             let stitch = knit.gauge();
@@ -142,9 +181,10 @@ impl Sizes {
     }
 
     /// Whether yarn of this thickness can be knitted so.
-    fn check(&self, knit: &Knit, d: f64) -> Result<(), Misfit> {
+    fn check(&self, knit: &Knit, yarn: &Thickness) -> Result<(), Misfit> {
+        let (d, unit) = (yarn.pressed(), yarn.unit());
         if let (Some(width), Some(height)) = (knit.stitch_width, knit.row_height) {
-            fits_stitch(width, height, d)?;
+            fits_stitch(width, height, yarn)?;
         }
         let across = self.across().map_or("width", |(_, key)| key);
         let sides = [
@@ -154,31 +194,41 @@ impl Sizes {
         for ((size, [least, most], count, [counted, key, word]), usual) in sides.into_iter().zip(USUAL) {
             if let Some(size) = size.filter(|s| !(least..=most).contains(s)) {
                 let whole = size * f64::from(count) * d;
+                let [size, least, most] = [size, least, most].map(|s| s * unit);
                 return Err(Misfit {
                     key: Some(counted),
                     problem: format!(
                         "{count} {counted} on a {key} of {whole:.1} mm are {size:.2} yarn diameters {word}; \
-                         {least} to {most} can be knitted"
+                         {} to {} can be knitted",
+                        rounded(least),
+                        rounded(most)
                     ),
                     hint: format!(
-                        "about {:.0} {counted} fit yarn {d:.3} mm thick",
-                        (whole / (usual * d)).round().clamp(1.0, MOST)
+                        "about {:.0} {counted} fit yarn {:.3} mm thick",
+                        (whole / (usual * d)).round().clamp(1.0, MOST),
+                        yarn.diameter()
                     ),
                 });
             }
         }
         match &knit.form {
-            Form::Revolution(profile) => fits_profile(knit, &Revolution::new(profile), d),
+            Form::Revolution(profile) => fits_profile(knit, &Revolution::new(profile), yarn),
             _ => Ok(()),
         }
     }
 }
 
-/// Whether yarn of a diameter `d` (mm) makes stitches so wide and high, in diameters.
+/// Two digits behind the point, without zeros at the end.
+fn rounded(x: f64) -> f64 {
+    (100.0 * x).round() / 100.0
+}
+
+/// Whether yarn of a thickness makes stitches so wide and high, in units of the knit.
 ///
 /// # Errors
 /// They would have less yarn than a loop takes, or are too narrow or too low for it.
-pub fn fits_stitch(width: f64, height: f64, d: f64) -> Result<(), Misfit> {
+pub fn fits_stitch(width: f64, height: f64, yarn: &Thickness) -> Result<(), Misfit> {
+    let d = yarn.pressed();
     let length = (STITCHES_PER_SQUARE * width * height).sqrt();
     if length >= SHORTEST && width >= STITCH_WIDTHS[0] && height >= ROW_HEIGHTS[0] {
         return Ok(());
@@ -186,19 +236,22 @@ pub fn fits_stitch(width: f64, height: f64, d: f64) -> Result<(), Misfit> {
     let [across, up] = [width, height].map(|s| 100.0 / (s * d));
     // By how much finer the yarn has to be.
     let by = (FIRM / length).max(USUAL[0] / width).max(USUAL[1] / height);
-    let radius = 0.5 * d / by;
+    let radius = yarn.radius / by;
     let problem = format!(
-        "a gauge of {across:.1} x {up:.1} in 10 cm is too dense for yarn {d:.3} mm thick: a stitch of {:.3} x {:.3} mm takes \
-         {length:.1} diameters of yarn",
+        "a gauge of {across:.1} x {up:.1} in 10 cm is too dense for yarn {:.3} mm thick: a stitch of {:.3} x {:.3} mm takes \
+         {:.1} diameters of yarn",
+        yarn.diameter(),
         width * d,
-        height * d
+        height * d,
+        length * yarn.unit()
     );
     let hint = format!("at most {:.1} x {:.1}, or yarn of a radius of {radius:.3}", across / by, up / by);
     Err(Misfit { key: None, problem, hint })
 }
 
 /// Whether the rows of a knit fit the surface that they are spread over.
-fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit> {
+fn fits_profile(knit: &Knit, surface: &Revolution, yarn: &Thickness) -> Result<(), Misfit> {
+    let (d, unit) = (yarn.pressed(), yarn.unit());
     // A chart that does not fit is told by who knits it.
     let Ok(widths) = knit.widths() else { return Ok(()) };
     let height = surface.length() / widths.len() as f64;
@@ -209,12 +262,13 @@ fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit>
     let tightest = widths.iter().enumerate().map(of_row).min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((width, row, round, count)) = tightest.filter(|t| t.0 < STITCH_WIDTHS[0]) {
         let most = (round / (3.0 * d)).floor().max(1.0);
-        let radius = 0.5 * d * width / 3.0;
+        let radius = yarn.radius * width / 3.0;
         return Err(Misfit {
             key: None,
             problem: format!(
-                "{count} stitches of row {} on a circumference of {round:.1} mm are {width:.2} yarn diameters wide",
-                row + 1
+                "{count} stitches of row {} on a circumference of {round:.1} mm are {:.2} yarn diameters wide",
+                row + 1,
+                width * unit
             ),
             hint: format!("about {most} stitches there, or yarn of a radius of {radius:.3} mm"),
         });
@@ -227,9 +281,9 @@ fn fits_profile(knit: &Knit, surface: &Revolution, d: f64) -> Result<(), Misfit>
                 "{} rows on a profile {:.1} mm long are {:.2} yarn diameters high",
                 knit.rows,
                 surface.length(),
-                height / d
+                height / yarn.diameter()
             ),
-            hint: format!("about {most} rows fit yarn {d:.3} mm thick"),
+            hint: format!("about {most} rows fit yarn {:.3} mm thick", yarn.diameter()),
         });
     }
     Ok(())

@@ -3,7 +3,7 @@
 use super::{Context, Range, Reader, garment};
 use crate::{
     input::diagnostic::Span,
-    pattern::knit::{Form, Knit, Sizes},
+    pattern::knit::{Form, Knit, Sizes, Thickness},
 };
 
 /// Sizes with the places where stitches and rows were said to be so many or so large.
@@ -44,9 +44,9 @@ impl GivenSizes {
         Self { sizes, stitches, rows }
     }
 
-    /// The knit of this size, of yarn of a diameter (mm). What cannot be knitted is told, with what would fit.
-    pub(super) fn apply(&self, knit: &Knit, diameter: f64, context: &Context<'_>) -> Option<Knit> {
-        let sized = self.sizes.apply(knit, diameter);
+    /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.
+    pub(super) fn apply(&self, knit: &Knit, yarn: &Thickness, context: &Context<'_>) -> Option<Knit> {
+        let sized = self.sizes.apply(knit, yarn);
         let place = |key: Option<&str>| if key == Some("rows") { self.rows } else { self.stitches };
         sized.map_err(|wrong| context.error(place(wrong.key), wrong.problem, Some(wrong.hint))).ok()
     }

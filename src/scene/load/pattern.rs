@@ -9,7 +9,7 @@ use super::{
     knit_size::GivenSizes,
 };
 use crate::{
-    geometry::{curve::Curve, overlap::overlap},
+    geometry::{curve::Curve, overlap::overlap_of_plied},
     input::{
         diagnostic::{Span, unknown_name},
         document::Value,
@@ -17,7 +17,7 @@ use crate::{
     pattern::{
         MAX_POINTS,
         chart::{Chart, ChartError, PATTERNS},
-        knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Work},
+        knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
         knitspeak,
     },
 };
@@ -37,6 +37,7 @@ pub(super) struct KnitPlan {
     header: Span,
     work: ColorWork,
     sizes: GivenSizes,
+    yarn: Thickness,
 }
 
 /// How the stitches of a knit get their colours.
@@ -68,9 +69,9 @@ impl KnitPlan {
         format!("{}, {stitches} x {rows}, gauge {across:.1} x {up:.1} in 10 cm{size}, {yarn}", self.name)
     }
 
-    /// The same with the counts that its sizes make, of yarn of a diameter; what cannot be knitted is told.
-    pub(super) fn sized(mut self, diameter: f64, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Self> {
-        self.knit = self.sizes.apply(&self.knit, diameter, context)?;
+    /// The same with the counts that its sizes make; what cannot be knitted is told.
+    pub(super) fn sized(mut self, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Self> {
+        self.knit = self.sizes.apply(&self.knit, &self.yarn, context)?;
         let Knit { chart, stitches, rows, .. } = &self.knit;
         let widths = self.told(self.knit.widths(), context)?;
         if let Some((row, takes)) = chart.cut_short(*stitches, &widths) {
@@ -94,10 +95,10 @@ impl KnitPlan {
         if !given && !matches!(self.knit.form, Form::Revolution(_)) {
             return;
         }
-        let found = overlap(curves.iter().map(|(c, r)| (c, r.as_slice())));
+        let found = overlap_of_plied(curves.iter().map(|(c, r)| (c, r.as_slice(), self.yarn.half_width)));
         if let Some(found) = found.filter(|f| f.share > MOST) {
             let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
-            let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * 2.0 * curves[0].1[0]));
+            let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
             warnings.push(format!(
                 "{}: {:.0} % of the yarn overlaps: too many stitches or rows for its size; this yarn knits to {own_across:.1} x \
                  {own_up:.1} in 10 cm by itself",
@@ -132,7 +133,6 @@ impl KnitPlan {
     /// The yarns with their places; what is wrong with the chart is told.
     pub(super) fn curves(
         &self,
-        diameter: f64,
         (colors, yarns): (Option<Colors>, Vec<usize>),
         context: &Context<'_>,
     ) -> Option<(Vec<Curve>, FabricCoordinates, String)> {
@@ -144,7 +144,7 @@ impl KnitPlan {
             return None;
         }
         let knit = Knit { colors, ..self.knit.clone() };
-        let made = self.told(knit.knitted(diameter), context)?;
+        let made = self.told(knit.pressed(&self.yarn), context)?;
         let origin = self.origin(&made);
         let (curves, coordinates) = FabricCoordinates::of(made.strands, [knit.stitches, knit.rows]);
         let own = if yarns.is_empty() { yarns } else { made.colors.iter().map(|c| yarns[usize::from(*c)]).collect() };
@@ -260,7 +260,7 @@ pub(super) fn knit(
     context: &Context<'_>,
     yarns: &Yarns<'_>,
 ) -> Option<KnitPlan> {
-    let (name, chart, lines) = chart(table, context);
+    let charted = chart(table, context);
     let profile = table.pairs("profile", Range::FINITE);
     let forms = [("flat", 0), ("tube", 1), ("revolution", 2)];
     let form = match table.one_of_or("form", if profile.is_some() { 2 } else { 0 }, &forms) {
@@ -271,9 +271,10 @@ pub(super) fn knit(
     if let (Some(Form::Flat | Form::Tube), true) = (&form, profile.is_some()) {
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
-    let rows = if lines_are_all(&form, &lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
+    let (_, chart, lines) = &charted;
+    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    counted(table, chart, form, &name, rows, lines, sizes)
+    counted(table, yarns, charted, form, rows, sizes)
 }
 
 /// Shaped pieces are knitted once, from the first row of the chart to the last.
@@ -282,10 +283,16 @@ fn lines_are_all(form: &Option<Form>, lines: &[Span]) -> bool {
 }
 
 /// `type = "stockinette"`: a flat knit of that pattern.
-pub(super) fn stockinette(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>) -> Option<KnitPlan> {
+pub(super) fn stockinette(
+    table: &Reader<'_>,
+    fabric: &Reader<'_>,
+    context: &Context<'_>,
+    yarns: &Yarns<'_>,
+) -> Option<KnitPlan> {
     let form = Some(Form::Flat);
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    counted(table, Chart::named("stockinette"), form, "stockinette", 20, Vec::new(), sizes)
+    let charted = ("stockinette".to_owned(), Chart::named("stockinette"), Vec::new());
+    counted(table, yarns, charted, form, 20, sizes)
 }
 
 /// Over how many stitches a float goes before it is caught, if it is, and over how many rows a yarn is carried.
@@ -320,11 +327,10 @@ pub(super) fn too_many_strands(row: &str, yarns: usize, instead: &str) -> Option
 
 fn counted(
     table: &Reader<'_>,
-    chart: Option<Chart>,
+    yarns: &Yarns<'_>,
+    (name, chart, lines): (String, Option<Chart>, Vec<Span>),
     form: Option<Form>,
-    name: &str,
     rows: u32,
-    lines: Vec<Span>,
     sizes: GivenSizes,
 ) -> Option<KnitPlan> {
     let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
@@ -333,6 +339,8 @@ fn counted(
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
     let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+    let flatten = table.f64_or("flatten", knit::FLATTEN, Range::between(1.0, 2.0));
+    let yarn = yarns.thickness(flatten);
     let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
     let edges = table.one_of_or("edges", Edges::Finished, &kinds);
     let tile = table.bool_or("tile", false);
@@ -382,7 +390,7 @@ fn counted(
         table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
         return None;
     }
-    Some(KnitPlan { knit, name: name.to_owned(), lines, header: table.header(), work, sizes })
+    Some(KnitPlan { knit, name, lines, header: table.header(), work, sizes, yarn })
 }
 
 /// `cast_on` and `top` of a finished piece.

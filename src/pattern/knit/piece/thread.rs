@@ -211,8 +211,8 @@ pub(in super::super) fn settle(threads: &mut [Thread], run: &Run) {
 }
 
 /// Relaxes what still folds into itself, with a quarter of a stitch on either side of it; all else is at rest meanwhile.
-/// `per_stitch` is the number of points in a stitch.
-pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, run: &Run) {
+/// `per_stitch` is the number of points in a stitch, `radius` that of the yarn.
+pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: f64, run: &Run) {
     // How far a yarn may turn beyond what its radius allows, in radians; plies are seen to break at five times that.
     const FOLD: f64 = 0.1;
     const ROUNDS: usize = 8;
@@ -222,7 +222,7 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, run: &Ru
             .iter()
             .map(|t| {
                 let along = t.points.windows(3).scan(0.0, |fold, w| {
-                    *fold = folded(*fold, w, 0.5);
+                    *fold = folded(*fold, w, radius);
                     Some(*fold)
                 });
                 along.enumerate().filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()

@@ -145,7 +145,7 @@ impl<'a> Base<'a> {
 
     fn knit(&self, plan: KnitPlan, color: &ColorPlan, warnings: &mut Vec<String>) -> Option<Made> {
         let Self { kind, radius, context, library } = *self;
-        let plan = plan.sized(2.0 * radius, context, warnings)?;
+        let plan = plan.sized(context, warnings)?;
         let colors = match kind {
             CurveKind::Yarn(base) if !color.is_plain() => {
                 let of_rows = |widths: &[u32]| color.stitches(widths, base, context, library);
@@ -153,7 +153,7 @@ impl<'a> Base<'a> {
             }
             _ => Default::default(),
         };
-        let (curves, coordinates, origin) = plan.curves(2.0 * radius, colors, context)?;
+        let (curves, coordinates, origin) = plan.curves(colors, context)?;
         let curves = with_radius(curves, radius);
         plan.warn_of_overlap(&curves, warnings);
         Some(Made::new(origin, kind, curves, Some(coordinates)))

@@ -17,7 +17,9 @@ use super::{
     weave::{self, WeavePlan},
     yarns::Library,
 };
-use crate::{files::curve_file::ReadOptions, geometry::curve::Basis, input::diagnostic::Span};
+use crate::{
+    files::curve_file::ReadOptions, geometry::curve::Basis, input::diagnostic::Span, pattern::knit::Thickness,
+};
 
 /// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
 const SHOWN_CELLS: [u32; 2] = [6, 6];
@@ -243,6 +245,12 @@ impl Yarns<'_> {
         self.own.1.map_or(1.0, Yarn::half_width)
     }
 
+    /// How thick they are where stitches press them to a width over height of `flatten`; fibres stay round.
+    pub(super) fn thickness(&self, flatten: f64) -> Thickness {
+        let flatten = if self.own.1.is_some() { flatten } else { 1.0 };
+        Thickness { radius: self.radius(), half_width: self.half_width(), flatten }
+    }
+
     /// Whether the fabric itself says it.
     pub(super) fn has_radius(&self) -> bool {
         self.radius.is_some()
@@ -288,7 +296,7 @@ fn source(
         Some(1) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
         Some(2) => weave::weave(&table, fabric, context, yarns).map(|plan| Source::Weave(Box::new(plan))),
         // Short for a flat knit of that pattern.
-        Some(4) => pattern::stockinette(&table, fabric, context).map(Source::Knit),
+        Some(4) => pattern::stockinette(&table, fabric, context, yarns).map(Source::Knit),
         Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
         Some(3) => Some(Source::Straight {
             count: table.u64_or("count", 1, 1..=1_000_000) as u32,

@@ -21,7 +21,7 @@ use crate::{
     pattern::{
         chart::Chart,
         draft::{Draft, Threads},
-        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, fits_stitch},
+        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, Thickness, fits_stitch},
         tile::Tile,
         weave::{FLATTEN, Impossible, Weave},
     },
@@ -259,7 +259,7 @@ impl ClothPlan {
                     .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / d))
                     .unwrap_or(knit::YARN_PER_STITCH);
                 if let Some(s) = stitch {
-                    if let Err(misfit) = fits_stitch(s.x / d, s.y / d, d) {
+                    if let Err(misfit) = fits_stitch(s.x / d, s.y / d, &Thickness::round(radius)) {
                         return tell(misfit.problem, &misfit.hint);
                     }
                     if length > LOOSEST {

@@ -1,0 +1,380 @@
+//! Sections of yarns that press on each other.
+//!
+//! Stitches are relaxed with yarns that keep [`Thickness::pressed`] apart, which is less than a round yarn takes. Where another
+//! strand is nearer than that, the section gives way to it: it becomes an ellipse whose short axis points to the nearest strand
+//! and ends half way to it. Its area stays if there is room beside; else the ellipse ends where it meets the
+//! next strand, and the yarn is denser there. In bends that are tighter than the yarn is thick it gives way to itself.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::Thickness;
+use crate::{
+    geometry::contact::{Entry, PointGrid, Walk, nearest},
+    pattern::PatternStrand,
+};
+
+/// Along a yarn, nearer than this many diameters is not another strand.
+const ALONG: f64 = 2.2;
+/// Beside the short axis by less than this, as the sine of the angle, a strand does not bound the long axis.
+const BESIDE: f64 = 0.15;
+/// Sections end this much before half way to another strand, for what is between points.
+const HALF_WAY: f64 = 0.97;
+/// No section is narrower than this along its short axis, of a round one's radius.
+const NARROWEST: f64 = 0.5;
+/// Sections of a larger ratio of their axes stay round.
+const ROUND: f64 = 0.98;
+/// The share of a bend's radius that a section takes on the inside.
+const INSIDE: f64 = 0.85;
+/// Points that one thread takes at once.
+const CHUNK: usize = 512;
+
+/// From a point of a strand to the next one.
+#[derive(Clone, Copy)]
+struct Segment {
+    from: DVec3,
+    to: DVec3,
+    strand: u32,
+    /// Way along the strand to its start, mm.
+    along: f64,
+}
+
+impl Segment {
+    fn middle(&self) -> DVec3 {
+        self.from.midpoint(self.to)
+    }
+}
+
+/// A section: half of its axes, mm, and the direction of the short one, zero of a round one.
+#[derive(Clone, Copy)]
+struct Section {
+    short: f32,
+    long: f32,
+    axis: Vec3,
+}
+
+impl Section {
+    fn round(room: f64) -> Self {
+        Self { short: room as f32, long: room as f32, axis: Vec3::ZERO }
+    }
+
+    /// How flat it is.
+    fn ratio(&self) -> f32 {
+        self.short / self.long
+    }
+
+    /// That of a yarn whose section has a radius of `room` by itself, along `tangent`, where `ways` lead half way to other strands; it
+    /// is no wider than to `far`.
+    fn between(tangent: DVec3, ways: &[DVec3], [room, far]: [f64; 2]) -> Self {
+        let across = |way: &DVec3| way.reject_from_normalized(tangent).try_normalize();
+        let nearest = ways.iter().min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        let Some(nearest) = nearest.filter(|way| way.length_squared() < room * room) else { return Self::round(room) };
+        let Some(axis) = across(nearest) else { return Self::round(room) };
+        let short = (HALF_WAY * nearest.length()).max(NARROWEST * room);
+        // An ellipse reaches as far as this along a direction whose angle with the short axis has that sine.
+        let most = |way: &DVec3| {
+            let cos = across(way)?.dot(axis);
+            let sin = (1.0 - cos * cos).max(0.0).sqrt();
+            (sin > BESIDE).then(|| (way.length_squared() - (short * cos).powi(2)).max(0.0).sqrt() / sin)
+        };
+        let long = ways.iter().filter_map(most).fold((room * room / short).min(far), f64::min).max(short);
+        let axis = if short < ROUND * long { axis } else { DVec3::ZERO };
+        Self { short: short as f32, long: long as f32, axis: axis.as_vec3() }
+    }
+}
+
+/// Points that lie alike, with all that is around them.
+pub(super) enum Alike {
+    /// Nothing is known to repeat.
+    No,
+    /// For each point of the strands, one behind the other, what kind it is of; [`ALONE`] if it is by itself.
+    Points(Vec<u64>),
+    /// The whole repeats, by so much across and up.
+    Tile(DVec2),
+}
+
+/// The kind of a point that is like no other.
+pub(super) const ALONE: u64 = u64::MAX;
+
+/// Presses yarns flat where they are nearer to each other than round yarns come: gives their curves radii and short axes.
+pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thickness, alike: &Alike) {
+    if yarn.flatten == 1.0 {
+        return;
+    }
+    let mut segments = segments(strands);
+    let count = segments.len();
+    let room = yarn.radius * yarn.half_width;
+    let longest = segments.iter().map(|s| s.from.distance(s.to)).fold(0.0, f64::max);
+    // What is farther bounds no section.
+    let far = room * yarn.flatten.sqrt();
+    let reach = 2.0 * far + longest;
+    if let Alike::Tile(period) = alike {
+        add_images(&mut segments, *period, reach);
+    }
+    let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
+    let grid = PointGrid::new(&middles, reach, None);
+    // Where a segment starts, by the half of it that follows and the half of the one before.
+    let section = |(walk, ways): &mut (Walk<'_>, Vec<DVec3>), i: usize| {
+        let (own, after) = (&segments[i], middles[i]);
+        let follows = |i: &usize| segments[*i].strand == own.strand;
+        let before = i.checked_sub(1).filter(follows).map_or(own.from, |i| middles[i]);
+        ways.clear();
+        walk.within(own.from, reach, |entry| {
+            let other = &segments[entry.index as usize];
+            if own.strand == other.strand && (own.along - other.along).abs() < ALONG * 2.0 * room {
+                return;
+            }
+            let [a, b] = [before, after].map(|end| nearest(own.from, end, other.from, other.to).between);
+            let way = 0.5 * if b.length_squared() < a.length_squared() { b } else { a };
+            if way.length_squared() < far * far {
+                ways.push(way);
+            }
+        });
+        if before != own.from {
+            ways.extend(inwards(before, own.from, after).map(|way| INSIDE * yarn.half_width * way));
+        }
+        Section::between((after - before).normalize_or_zero(), ways, [room, far])
+    };
+    // Of those that are alike, the first.
+    let first_of = firsts(alike, strands, count);
+    let asked = |entry: &&Entry| {
+        (entry.index as usize) < count && first_of.get(entry.index as usize).is_none_or(|f| *f == entry.index)
+    };
+    let found: Vec<(u32, Section)> = grid
+        .in_order()
+        .par_iter()
+        .with_min_len(CHUNK)
+        .filter(asked)
+        .map_init(|| (grid.walk(), Vec::new()), |state, entry| (entry.index, section(state, entry.index as usize)))
+        .collect();
+    let mut sections = vec![Section::round(room); count];
+    found.into_iter().for_each(|(i, section)| sections[i as usize] = section);
+    for (i, first) in first_of.into_iter().enumerate() {
+        sections[i] = sections[first as usize];
+    }
+    let mut rest = sections.as_slice();
+    for strand in strands {
+        let points = &strand.curve.points;
+        let (own, after) = rest.split_at(points.len().saturating_sub(1));
+        rest = after;
+        // A row of a tile ends as it begins, another strand as its last segment.
+        let last = if matches!(alike, Alike::Tile(_)) { own.first() } else { own.last() };
+        let own: Vec<Section> = own.iter().chain(last).copied().collect();
+        strand.curve.radii = Some(own.iter().map(|s| f64::from(s.long) / yarn.half_width).collect());
+        strand.curve.flattening = Some(axes(points, &own));
+    }
+}
+
+/// The way to the centre of the circle through three points, from the second.
+fn inwards(a: DVec3, b: DVec3, c: DVec3) -> Option<DVec3> {
+    let (u, v) = (a - b, c - b);
+    let normal = u.cross(v);
+    let square = normal.length_squared();
+    let to_centre = (v * u.length_squared() - u * v.length_squared()).cross(normal) * 0.5;
+    (square > 0.0).then(|| to_centre / square)
+}
+
+/// For each segment the first one whose start is alike; nothing if none are.
+fn firsts(alike: &Alike, strands: &[PatternStrand], count: usize) -> Vec<u32> {
+    let Alike::Points(kinds) = alike else { return Vec::new() };
+    let mut known = HashMap::new();
+    let mut firsts = Vec::with_capacity(count);
+    let mut rest = kinds.as_slice();
+    for strand in strands {
+        let (own, after) = rest.split_at(strand.curve.points.len());
+        rest = after;
+        for kind in &own[..own.len().saturating_sub(1)] {
+            let next = firsts.len() as u32;
+            firsts.push(if *kind == ALONE { next } else { *known.entry(*kind).or_insert(next) });
+        }
+    }
+    firsts
+}
+
+/// Adds what lies around a tile, as far as it may matter: beside it rows go on, above and below it are other strands.
+fn add_images(segments: &mut Vec<Segment>, period: DVec2, reach: f64) {
+    let (low, high) = segments.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), s| {
+        let at = s.middle().truncate();
+        (low.min(at), high.max(at))
+    });
+    let [across, up] = (reach / period).ceil().to_array().map(|n| n as i32);
+    let (own, strands) = (segments.len(), segments.last().map_or(0, |s| s.strand + 1));
+    let mut lengths = vec![0.0; strands as usize];
+    segments.iter().for_each(|s| lengths[s.strand as usize] = s.along + s.from.distance(s.to));
+    let shifts = (-up..=up).flat_map(|y| (-across..=across).map(move |x| (x, y))).filter(|shift| *shift != (0, 0));
+    for (image, (x, y)) in (1..).zip(shifts) {
+        let by = (DVec2::new(x.into(), y.into()) * period).extend(0.0);
+        for i in 0..own {
+            let Segment { from, to, strand, along } = segments[i];
+            let (strand, along) = match y {
+                0 => (strand, along + f64::from(x) * lengths[strand as usize]),
+                _ => (strand + image * strands, along),
+            };
+            let moved = Segment { from: from + by, to: to + by, strand, along };
+            let at = moved.middle().truncate();
+            if at.cmpgt(low - reach).all() && at.cmplt(high + reach).all() {
+                segments.push(moved);
+            }
+        }
+    }
+}
+
+/// The segments of all strands, one behind the other.
+fn segments(strands: &[PatternStrand]) -> Vec<Segment> {
+    let mut out = Vec::new();
+    for (strand, s) in strands.iter().enumerate() {
+        let mut along = 0.0;
+        out.extend(s.curve.points.windows(2).map(|w| {
+            let segment = Segment { from: w[0], to: w[1], strand: strand as u32, along };
+            along += w[0].distance(w[1]);
+            segment
+        }));
+    }
+    out
+}
+
+/// Short axes of the sections along a strand, as long as the ratio of both axes. Their directions are evened out, so that plies
+/// do not jump from one to the next.
+fn axes(points: &[DVec3], sections: &[Section]) -> Vec<DVec3> {
+    const ROUNDS: usize = 3;
+    let mut lead: Vec<Vec3> = sections.iter().map(|s| s.axis * (1.0 - s.ratio())).collect();
+    for _ in 0..ROUNDS {
+        // An axis has no sign: those beside point to its side.
+        let even = |i: usize| {
+            let beside = |k: Option<usize>| k.and_then(|k| lead.get(k)).copied().unwrap_or(Vec3::ZERO);
+            let (before, own, after) = (beside(i.checked_sub(1)), lead[i], beside(Some(i + 1)));
+            let side = [own, before, after].into_iter().find(|v| *v != Vec3::ZERO).unwrap_or(Vec3::ZERO);
+            let turned = |v: Vec3| if v.dot(side) < 0.0 { -v } else { v };
+            0.5 * own + 0.25 * (turned(before) + turned(after))
+        };
+        lead = (0..lead.len()).into_par_iter().with_min_len(CHUNK).map(even).collect();
+    }
+    let axis = |i: usize| {
+        let tangent = (points[(i + 1).min(points.len() - 1)] - points[i.saturating_sub(1)]).normalize_or(DVec3::X);
+        let across = lead[i].as_dvec3().reject_from_normalized(tangent).try_normalize();
+        let ratio = if sections[i].axis == Vec3::ZERO { 1.0 } else { f64::from(sections[i].ratio()) };
+        // Where nothing is pressed near, any direction does.
+        ratio * across.unwrap_or_else(|| tangent.any_orthonormal_vector())
+    };
+    (0..points.len()).into_par_iter().with_min_len(CHUNK).map(axis).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::overlap::{overlap, overlap_of_plied},
+        pattern::{
+            chart::Chart,
+            knit::{Edges, FLATTEN, Form, Knit, Knitted, POINTS, Rims},
+        },
+    };
+
+    const YARN: Thickness = Thickness { radius: 0.65, half_width: 0.91, flatten: FLATTEN };
+
+    fn knit(pattern: &str, edges: Edges) -> Knit {
+        Knit {
+            chart: Chart::named(pattern).unwrap(),
+            stitches: 24,
+            rows: 14,
+            form: Form::Flat,
+            stitch_width: None,
+            row_height: None,
+            yarn_per_stitch: None,
+            edges,
+            rims: Rims::default(),
+            points: POINTS,
+            colors: None,
+            flat: true,
+        }
+    }
+
+    fn share(made: &Knitted, round: bool) -> f64 {
+        let curves = made.strands.iter().map(|s| {
+            let mut curve = s.curve.clone();
+            if round {
+                curve.make_round();
+                let radii = vec![YARN.radius; curve.points.len()];
+                curve.radii = Some(radii);
+            }
+            curve
+        });
+        let curves: Vec<_> = curves.collect();
+        let measured = curves.iter().map(|c| (c, c.radii.as_deref().unwrap(), YARN.half_width));
+        overlap_of_plied(measured).unwrap().share
+    }
+
+    #[test]
+    fn yarns_give_way_where_they_touch() {
+        for pattern in ["stockinette", "rib2x2", "moss", "cable", "lace"] {
+            let made = knit(pattern, Edges::Finished).pressed(&YARN).unwrap();
+            let (round, pressed) = (share(&made, true), share(&made, false));
+            println!(
+                "{pattern}: of {:.1} % of its length, {:.2} % is left that overlaps",
+                100.0 * round,
+                100.0 * pressed
+            );
+            assert!(round > 0.3 && pressed < 0.02, "{pattern}: {round} {pressed}");
+        }
+    }
+
+    #[test]
+    fn sections_keep_their_area_but_where_they_have_no_room() {
+        let made = knit("stockinette", Edges::Finished).pressed(&YARN).unwrap();
+        let curve = &made.strands[0].curve;
+        let (radii, axes) = (curve.radii.as_ref().unwrap(), curve.flattening.as_ref().unwrap());
+        let area = |(radius, axis): (&f64, &DVec3)| radius * radius * axis.length() / YARN.radius.powi(2);
+        let areas: Vec<f64> = radii.iter().zip(axes).map(area).collect();
+        assert!(areas.iter().all(|a| (0.3..1.001).contains(a)));
+        let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+        let pressed = axes.iter().filter(|axis| axis.length() < 0.9).count() as f64 / axes.len() as f64;
+        assert!(mean > 0.75 && pressed > 0.3, "{mean} {pressed}");
+        let widest = YARN.radius * FLATTEN.sqrt();
+        assert!(radii.iter().all(|r| *r <= 1.001 * widest), "no section is wider than that of the flattest");
+        // Short axes stand across the yarn.
+        for (way, axis) in curve.points.windows(3).zip(&axes[1..]) {
+            assert!((way[2] - way[0]).normalize().dot(*axis).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn stitches_that_are_alike_are_pressed_once() {
+        let knit = Knit { stitches: 14, rows: 14, ..knit("stockinette", Edges::Finished) };
+        let once = knit.pressed(&YARN).unwrap();
+        let mut each = once.clone();
+        flatten_where_touching(&mut each.strands, &YARN, &Alike::No);
+        for (a, b) in once.strands.iter().zip(&each.strands) {
+            for (a, b) in a.curve.radii.iter().flatten().zip(b.curve.radii.iter().flatten()) {
+                assert!((a - b).abs() < 1e-4 * YARN.radius, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tile_ends_as_it_begins() {
+        let tile = Knit { stitches: 2, rows: 2, ..knit("stockinette", Edges::Tile) }.pressed(&YARN).unwrap();
+        let larger = Knit { stitches: 6, rows: 6, ..knit("stockinette", Edges::Tile) }.pressed(&YARN).unwrap();
+        let radii = |made: &Knitted, row: usize| made.strands[row].curve.radii.clone().unwrap();
+        for row in &tile.strands {
+            let radii = row.curve.radii.as_ref().unwrap();
+            assert_eq!(radii.first(), radii.last());
+        }
+        // What is around a small one is its images: as pressed as in the middle of a large one.
+        let (small, large) = (radii(&tile, 0), radii(&larger, 2));
+        let inside = &large[small.len() - 1..][1..small.len() - 1];
+        for (a, b) in small[1..].iter().zip(inside) {
+            assert!((a - b).abs() < 1e-3 * YARN.radius, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn yarn_that_stays_round_is_left_alone() {
+        let round = Thickness { flatten: 1.0, half_width: 1.0, ..YARN };
+        let made = knit("stockinette", Edges::Live).pressed(&round).unwrap();
+        assert!(made.strands.iter().all(|s| s.curve.radii.is_none() && s.curve.flattening.is_none()));
+        let radii = vec![YARN.radius; made.strands[0].curve.points.len()];
+        assert!(overlap(std::iter::once((&made.strands[0].curve, radii.as_slice()))).unwrap().share < 0.01);
+    }
+}
