@@ -20,7 +20,7 @@ use crate::{
 const ALONG: f64 = 2.2;
 /// Beside the short axis by less than this, as the sine of the angle, a strand does not bound the long axis.
 const BESIDE: f64 = 0.15;
-/// Sections end this much before half way to another strand, for what is between points.
+/// The share of half the way to another strand that a section takes: not all, for what is between points.
 const HALF_WAY: f64 = 0.97;
 /// No section is narrower than this along its short axis, of a round one's radius.
 const NARROWEST: f64 = 0.5;
