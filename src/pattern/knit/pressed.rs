@@ -5,9 +5,9 @@
 //! and ends half way to it. Its area stays if there is room beside; else the ellipse ends where it meets the
 //! next strand, and the yarn is denser there. In bends that are tighter than the yarn is thick it gives way to itself.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Thickness;
@@ -36,7 +36,9 @@ const CHUNK: usize = 512;
 struct Segment {
     from: DVec3,
     to: DVec3,
+    /// Which of all strands, and which of all their segments.
     strand: u32,
+    index: u32,
     /// Way along the strand to its start, mm.
     along: f64,
 }
@@ -95,6 +97,9 @@ pub(super) enum Alike {
     Tile(DVec2),
 }
 
+/// The index of segments that are images of a tile's.
+const IMAGE: u32 = u32::MAX;
+
 /// The kind of a point that is like no other.
 pub(super) const ALONE: u64 = u64::MAX;
 
@@ -103,13 +108,16 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
     if yarn.flatten == 1.0 {
         return;
     }
-    let mut segments = segments(strands);
-    let count = segments.len();
     let room = yarn.radius * yarn.half_width;
-    let longest = segments.iter().map(|s| s.from.distance(s.to)).fold(0.0, f64::max);
+    let lengths = || strands.iter().flat_map(|s| s.curve.points.windows(2).map(|w| w[0].distance(w[1])));
+    let (count, longest) = lengths().fold((0, 0.0), |(count, longest), l| (count + 1, f64::max(longest, l)));
     // What is farther bounds no section.
     let far = room * yarn.flatten.sqrt();
     let reach = 2.0 * far + longest;
+    // Of those that are alike, the first.
+    let first_of = firsts(alike, strands, count);
+    let asked = |i: u32| first_of.get(i as usize).is_none_or(|first| *first == i);
+    let mut segments = segments(strands, &asked, reach, first_of.is_empty());
     if let Alike::Tile(period) = alike {
         add_images(&mut segments, *period, reach);
     }
@@ -118,7 +126,7 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
     // Where a segment starts, by the half of it that follows and the half of the one before.
     let section = |(walk, ways): &mut (Walk<'_>, Vec<DVec3>), i: usize| {
         let (own, after) = (&segments[i], middles[i]);
-        let follows = |i: &usize| segments[*i].strand == own.strand;
+        let follows = |i: &usize| segments[*i].strand == own.strand && segments[*i].index + 1 == own.index;
         let before = i.checked_sub(1).filter(follows).map_or(own.from, |i| middles[i]);
         ways.clear();
         walk.within(own.from, reach, |entry| {
@@ -137,17 +145,19 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
         }
         Section::between((after - before).normalize_or_zero(), ways, [room, far])
     };
-    // Of those that are alike, the first.
-    let first_of = firsts(alike, strands, count);
-    let asked = |entry: &&Entry| {
-        (entry.index as usize) < count && first_of.get(entry.index as usize).is_none_or(|f| *f == entry.index)
+    let is_asked = |entry: &&Entry| {
+        let own = &segments[entry.index as usize];
+        own.index != IMAGE && asked(own.index)
     };
     let found: Vec<(u32, Section)> = grid
         .in_order()
         .par_iter()
         .with_min_len(CHUNK)
-        .filter(asked)
-        .map_init(|| (grid.walk(), Vec::new()), |state, entry| (entry.index, section(state, entry.index as usize)))
+        .filter(is_asked)
+        .map_init(
+            || (grid.walk(), Vec::new()),
+            |state, entry| (segments[entry.index as usize].index, section(state, entry.index as usize)),
+        )
         .collect();
     let mut sections = vec![Section::round(room); count];
     found.into_iter().for_each(|(i, section)| sections[i as usize] = section);
@@ -207,12 +217,12 @@ fn add_images(segments: &mut Vec<Segment>, period: DVec2, reach: f64) {
     for (image, (x, y)) in (1..).zip(shifts) {
         let by = (DVec2::new(x.into(), y.into()) * period).extend(0.0);
         for i in 0..own {
-            let Segment { from, to, strand, along } = segments[i];
+            let Segment { from, to, strand, along, .. } = segments[i];
             let (strand, along) = match y {
                 0 => (strand, along + f64::from(x) * lengths[strand as usize]),
                 _ => (strand + image * strands, along),
             };
-            let moved = Segment { from: from + by, to: to + by, strand, along };
+            let moved = Segment { from: from + by, to: to + by, strand, index: IMAGE, along };
             let at = moved.middle().truncate();
             if at.cmpgt(low - reach).all() && at.cmplt(high + reach).all() {
                 segments.push(moved);
@@ -221,16 +231,34 @@ fn add_images(segments: &mut Vec<Segment>, period: DVec2, reach: f64) {
     }
 }
 
-/// The segments of all strands, one behind the other.
-fn segments(strands: &[PatternStrand]) -> Vec<Segment> {
+/// The segments of all strands, one behind the other: those near to one that is asked for, unless it is all of them.
+fn segments(strands: &[PatternStrand], asked: &dyn Fn(u32) -> bool, reach: f64, all: bool) -> Vec<Segment> {
+    let cell = |p: DVec3| (p / reach).floor().as_ivec3();
+    let mut near = HashSet::new();
+    let mut index = 0;
+    for points in strands.iter().filter(|_| !all).map(|s| &s.curve.points) {
+        let mut last = None;
+        for point in &points[..points.len().saturating_sub(1)] {
+            let own = cell(*point);
+            if asked(index) && last != Some(own) {
+                near.extend((0..27).map(|k| own + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+                last = Some(own);
+            }
+            index += 1;
+        }
+    }
     let mut out = Vec::new();
-    for (strand, s) in strands.iter().enumerate() {
+    let mut index = 0;
+    for (strand, s) in (0..).zip(strands) {
         let mut along = 0.0;
-        out.extend(s.curve.points.windows(2).map(|w| {
-            let segment = Segment { from: w[0], to: w[1], strand: strand as u32, along };
+        for w in s.curve.points.windows(2) {
+            let segment = Segment { from: w[0], to: w[1], strand, index, along };
+            if all || near.contains(&cell(segment.middle())) {
+                out.push(segment);
+            }
             along += w[0].distance(w[1]);
-            segment
-        }));
+            index += 1;
+        }
     }
     out
 }
