@@ -91,11 +91,26 @@ impl KnitPlan {
     /// Tells if yarns run into each other, where a given size could make them.
     pub(super) fn warn_of_overlap(&self, curves: &[(Curve, Vec<f64>)], warnings: &mut Vec<String>) {
         const MOST: f64 = 0.05;
+        const ENOUGH: usize = 400_000;
         let given = self.knit.stitch_width.or(self.knit.row_height).or(self.knit.yarn_per_stitch).is_some();
         if !given && !matches!(self.knit.form, Form::Revolution(_)) {
             return;
         }
-        let found = overlap_of_plied(curves.iter().map(|(c, r)| (c, r.as_slice(), self.yarn.half_width)));
+        let half_width = self.yarn.half_width;
+        let found = match curves {
+            // The first rows of one large piece are as the others.
+            [(curve, radii)] if radii.len() > ENOUGH => {
+                let first = Curve {
+                    basis: curve.basis,
+                    closed: false,
+                    points: curve.points[..ENOUGH].to_vec(),
+                    radii: None,
+                    flattening: curve.flattening.as_ref().map(|axes| axes[..ENOUGH].to_vec()),
+                };
+                overlap_of_plied(std::iter::once((&first, &radii[..ENOUGH], half_width)))
+            }
+            _ => overlap_of_plied(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
+        };
         if let Some(found) = found.filter(|f| f.share > MOST) {
             let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
             let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
