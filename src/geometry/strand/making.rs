@@ -128,7 +128,10 @@ impl Strand {
             .map(resampled)
             .collect();
         let pressed = pressed.as_ref().map(|vectors| pressed_along(curve, vectors, knots.as_deref()));
-        let wound: Vec<Winding> = poses.iter().map(|pose| Winding::new(pose, pressed.as_deref(), options)).collect();
+        // Axes are those of the first pose, of which alone it is told how tightly it bends.
+        let axes = |pose: usize| pressed.as_deref().filter(|_| pose == 0);
+        let wound: Vec<Winding> =
+            poses.iter().enumerate().map(|(i, pose)| Winding::new(pose, axes(i), options)).collect();
         let rest = rest.map(|rest| Winding::new(&rest, None, options));
         let at_rest = rest.as_ref().unwrap_or(&wound[0]);
         let frames = frames(&wound, at_rest, curve.closed, given.phase, options.symmetry);

@@ -151,11 +151,13 @@ fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> 
             // The inner side of a step is as much shorter than its middle as the step turns, times the radius; what is
             // less than nothing runs backwards. Angles and lengths stay finite where curvature does not.
             let distance = next.at.truncate().distance(here.at.truncate());
-            let inwards = axes.map_or(1.0, |[from, to]| reach(from.lerp(to, *u), next_tangent - tangent));
-            let forward = distance / (0.5 * (here.at.w + next.at.w) * inwards).max(1e-300);
+            let forward = distance / (0.5 * (here.at.w + next.at.w)).max(1e-300);
             // An angle is at most pi / 2 times its chord.
             if fold > 0.0 || FRAC_PI_2 * tangent.distance(next_tangent) > forward {
                 let before = fold;
+                // A section that is pressed reaches less far inwards.
+                let inwards = axes.map_or(1.0, |[from, to]| reach(from.lerp(to, *u), next_tangent - tangent));
+                let forward = forward / inwards.max(1e-300);
                 fold = (fold + tangent.angle_between(next_tangent) - forward).max(0.0);
                 if fold > SEEN_FOLD {
                     let here = Tight { segment, fold, places: usize::from(before <= SEEN_FOLD) };
