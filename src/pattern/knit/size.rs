@@ -67,10 +67,10 @@ pub struct Misfit {
 
 /// The shortest yarn of a stitch, in units: beyond it yarns would lie inside each other.
 const SHORTEST: f64 = 11.0;
-/// The narrowest and the widest stitch, and the lowest and the highest, in units: below them yarns would lie inside each
-/// other, above them nothing holds.
+/// The narrowest stitch, in units, and the widest, in diameters of the yarn: below it yarns would lie inside each other, above it
+/// nothing holds.
 pub const STITCH_WIDTHS: [f64; 2] = [1.5, 20.0];
-/// As [`STITCH_WIDTHS`].
+/// The lowest and the highest, as [`STITCH_WIDTHS`].
 pub const ROW_HEIGHTS: [f64; 2] = [0.9, 20.0];
 /// Width and height of a usual stitch, in units.
 const USUAL: [f64; 2] = [3.0, 2.2];
@@ -192,6 +192,8 @@ impl Sizes {
             (knit.row_height, ROW_HEIGHTS, knit.rows, ["rows", "height", "high"]),
         ];
         for ((size, [least, most], count, [counted, key, word]), usual) in sides.into_iter().zip(USUAL) {
+            // Nothing holds beyond so many diameters of the yarn, however flat it is pressed.
+            let most = most / unit;
             if let Some(size) = size.filter(|s| !(least..=most).contains(s)) {
                 let whole = size * f64::from(count) * d;
                 let [size, least, most] = [size, least, most].map(|s| s * unit);
