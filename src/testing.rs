@@ -4,13 +4,17 @@ use std::{io::Write as _, path::PathBuf};
 
 use crate::pattern::{
     chart::Chart,
-    knit::{Edges, Form, Knit, Rims},
+    knit::{Edges, FLATTEN, Form, Knit, Rims, Thickness},
     tile::Tile,
 };
 
 /// Stockinette of stitches of 4 x 3 mm.
 pub(crate) fn stockinette() -> Tile {
-    let knit = Knit {
+    Tile::of_knit(&stockinette_knit(), &Thickness::round(0.6)).unwrap()
+}
+
+fn stockinette_knit() -> Knit {
+    Knit {
         chart: Chart::named("stockinette").unwrap(),
         stitches: 1,
         rows: 1,
@@ -23,8 +27,13 @@ pub(crate) fn stockinette() -> Tile {
         points: 24,
         colors: None,
         flat: true,
-    };
-    Tile::of_knit(&knit, 1.2).unwrap()
+    }
+}
+
+/// Stockinette as it comes by itself, of yarn of three plies that stitches press flat: of stitches of 4 x 2.8 mm.
+pub(crate) fn pressed_stockinette() -> Tile {
+    let knit = Knit { stitch_width: None, row_height: None, yarn_per_stitch: None, ..stockinette_knit() };
+    Tile::of_knit(&knit, &Thickness { radius: 0.65, half_width: 0.91, flatten: FLATTEN }).unwrap()
 }
 
 /// The text of a file of `tests/data`.

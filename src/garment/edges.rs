@@ -118,8 +118,8 @@ impl Rail<'_> {
 /// What runs along a way.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Finish {
-    /// Links of a chain, so far apart, mm, of yarn of a radius.
-    Chain { link: f64, radius: f64 },
+    /// Links of a chain, so far apart, mm, of yarn that takes so much room, and of its radius.
+    Chain { link: f64, room: f64, radius: f64 },
     /// Thread over and over the edge, as far in as `reach`.
     Overcast { radius: f64, reach: f64 },
     /// To and fro between edges that are turned in, a turn each `step`. Places are mm from the seam's plane and out, on the
@@ -195,8 +195,7 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
     let share = |step: f64| step / count as f64;
     let mut out = Vec::new();
     let radius = match *finish {
-        Finish::Chain { radius, .. } => {
-            let d = 2.0 * radius;
+        Finish::Chain { room: d, radius, .. } => {
             for i in 0..count {
                 for p in link {
                     let along = i as f64 + p.x / LINK;

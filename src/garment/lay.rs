@@ -48,7 +48,7 @@ impl LaidYarn {
             let radii = vec![radius; points.len()];
             return (curve(points, None), radii);
         }
-        let (axes, widths) = sections.iter().map(|s| (s.short_axis, s.half_width)).unzip();
+        let (axes, widths) = sections.iter().map(|s| (s.short_axis, f64::from(s.half_width))).unzip();
         (curve(points, Some(axes)), widths)
     }
 }
@@ -82,6 +82,15 @@ impl Run {
     fn start(&self) -> usize {
         if self.backwards { self.last } else { self.first }
     }
+}
+
+/// Where on its way a yarn is.
+#[derive(Clone, Copy)]
+enum On {
+    /// At a control point of a stitch that is strained so.
+    Stitch(usize, usize, Strain),
+    /// Behind a stitch, or between its row and another.
+    Beside(usize),
 }
 
 /// A yarn goes on over so many stitches, then another begins: pieces of work for all threads.
@@ -136,7 +145,7 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
             };
             let (closed, shape) = (way.runs[0].ring, layer.shape(way.runs[0].line));
             // They move with the yarn: one frame tells them.
-            layer.sections = (frame == 0 && !shape.sections.is_empty()).then(Vec::new);
+            layer.sections = (frame == 0 && shape.is_pressed()).then(Vec::new);
             layer.way(way);
             LaidYarn {
                 points: layer.out,
@@ -206,20 +215,32 @@ impl<'a> Layer<'a> {
         shape.expect("a tile has a yarn for each of its lines")
     }
 
-    /// A place in stitches across, rows up, mm out, of control point k of stitch s.
-    fn push(&mut self, p: Vec3, run: &Run, (s, k): (usize, usize)) {
-        let at = self.sheet.place(p).as_dvec3();
-        self.out.push(at);
-        let pressed = self.sections.is_some().then(|| self.shape(run.line));
-        if let (Some(sections), Some(shape)) = (&mut self.sections, pressed) {
-            let Section { half_width, short_axis } = shape.section(s + self.shift[self.axis], k);
+    /// The section of a yarn of a run at a place of it.
+    fn section(&self, run: &Run, on: On) -> Section {
+        let shape = self.shape(run.line);
+        let (s, k, strain) = match on {
+            On::Stitch(s, k, strain) => (s, k, strain),
+            On::Beside(_) if shape.kind == StrandKind::Course => return self.shapes.beside,
+            On::Beside(s) => (s, 0, UNSTRAINED),
+        };
+        self.shapes.section(shape, s + self.shift[self.axis], k, strain)
+    }
+
+    /// A place in stitches across, rows up, mm out.
+    fn push(&mut self, p: Vec3, run: &Run, on: On) {
+        let pressed = self.sections.is_some().then(|| self.section(run, on));
+        let at = if let (Some(sections), Some(Section { half_width, short_axis })) = (&mut self.sections, pressed) {
             // Where the axis points to on the cloth as it lies, a part of the yarn's width away.
-            let [x, y] = self.sheet.lattice.stitch.to_array();
-            let step = (0.25 * half_width * short_axis / DVec3::new(x, y, 1.0)).as_vec3();
-            let there = self.sheet.place(p + step).as_dvec3();
-            let short_axis = (there - at).normalize_or(DVec3::Y) * short_axis.length();
+            let stitch = self.sheet.lattice.stitch.extend(1.0).as_vec3();
+            let step = 0.25 * half_width * short_axis / stitch;
+            let (at, direction) = self.sheet.place_and_direction(p, step);
+            let short_axis = direction.normalize_or(Vec3::Y) * short_axis.length();
             sections.push(Section { half_width, short_axis });
-        }
+            at
+        } else {
+            self.sheet.place(p)
+        };
+        self.out.push(at.as_dvec3());
         if let Some(places) = &mut self.places {
             // Colours are by stitches of the panel: what reaches over the border is of the last one.
             let mut place = [p.x, p.y];
@@ -266,7 +287,7 @@ impl<'a> Layer<'a> {
         // The end of a run's last stitch is the start of one that is not there.
         let far_end = |layer: &mut Self, strain| {
             let place = layer.corner(run.line, run.last, strand, strain);
-            layer.push(place, run, (run.last, 0));
+            layer.push(place, run, On::Stitch(run.last, 0, strain));
         };
         if run.backwards {
             far_end(self, here);
@@ -278,7 +299,7 @@ impl<'a> Layer<'a> {
             for k in 0..if floats.is_some() { FLOATING.len() } else { per_stitch } {
                 if let Some(strand) = floats {
                     let place = self.float(run, s, k, strand);
-                    self.push(place, run, (s, k));
+                    self.push(place, run, On::Beside(s));
                     continue;
                 }
                 // Strain changes evenly from the middle of a stitch to that of the next.
@@ -287,7 +308,7 @@ impl<'a> Layer<'a> {
                 let mixed = [0, 1, 2].map(|a| here[a] + share * (other[a] - here[a]));
                 let k = if run.backwards { per_stitch - 1 - k } else { k };
                 let place = self.place(run.line, s, k, mixed) + self.led(run.line, s, k, strand);
-                self.push(place, run, (s, k));
+                self.push(place, run, On::Stitch(s, k, mixed));
             }
             (before, here) = (here, next);
         }
@@ -382,7 +403,7 @@ impl<'a> Layer<'a> {
             let mut p = from.lerp(to, share);
             p[self.axis] = along;
             p.z -= deep;
-            self.push(p, run, (run.end(), 0));
+            self.push(p, run, On::Beside(run.end()));
         }
     }
 
@@ -418,9 +439,9 @@ impl<'a> Layer<'a> {
         };
         let places: Vec<Vec3> = way.iter().copied().map(place).collect();
         if first {
-            places.into_iter().rev().for_each(|p| self.push(p, run, (corner, 0)));
+            places.into_iter().rev().for_each(|p| self.push(p, run, On::Beside(corner)));
         } else {
-            places.into_iter().for_each(|p| self.push(p, run, (corner, 0)));
+            places.into_iter().for_each(|p| self.push(p, run, On::Beside(corner)));
         }
     }
 }

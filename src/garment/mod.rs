@@ -278,7 +278,7 @@ impl Garment {
 
     /// Whether yarns of a cloth are pressed flat.
     pub(crate) fn is_pressed(&self, cloth: usize) -> bool {
-        self.shapes[cloth].strands.iter().any(|s| !s.sections.is_empty())
+        self.shapes[cloth].strands.iter().any(|s| s.is_pressed())
     }
 
     /// Lays the yarns in some frames, which have the first one's topology: the same yarns with the same points in each.

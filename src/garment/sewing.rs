@@ -31,7 +31,10 @@ struct Trim {
     stitch: DVec2,
     repeat: [u32; 2],
     knitted: bool,
+    /// Distance of its yarns where they press on each other, the room of one that nothing presses, and its own radius, mm.
     diameter: f64,
+    room: f64,
+    radius: f64,
     free: DVec2,
     sewn: [[DVec2; 2]; SeamKind::COUNT],
     folds: Folds,
@@ -70,7 +73,8 @@ impl Trim {
             None => [meets; 2],
             Some(fold) => [-turned_in(kind, fold, stitch, d); 2],
         });
-        Self { stitch, repeat, knitted, diameter: d, free, sewn, folds, turn: turn(stitch.y, d) }
+        let (room, radius) = (2.0 * shapes.half_room, shapes.radius);
+        Self { stitch, repeat, knitted, diameter: d, room, radius, free, sewn, folds, turn: turn(stitch.y, d) }
     }
 }
 
@@ -183,9 +187,9 @@ impl Sewing {
         let mut out = Vec::new();
         for way in ways(&free) {
             let cloth = self.cloth[way.panel as usize];
-            let Trim { stitch, knitted, diameter: d, .. } = &self.trims[cloth];
+            let Trim { stitch, knitted, diameter: d, room, radius, .. } = &self.trims[cloth];
             let finish = if *knitted {
-                Finish::Chain { link: stitch.x.max(2.9 * d), radius: 0.5 * d }
+                Finish::Chain { link: stitch.x.max(2.9 * room), room: *room, radius: *radius }
             } else {
                 Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
             };

@@ -139,6 +139,22 @@ impl<'a> Sheet<'a> {
         self.folded(p, at).map_or(at + normal * p.z, |(inward, [aside, out])| at + inward * aside + normal * out)
     }
 
+    /// The place, and in which direction a small step from it goes.
+    pub(super) fn place_and_direction(&self, p: Vec3, step: Vec3) -> (Vec3, Vec3) {
+        let (i, j) = (p.x.floor(), p.y.floor());
+        let (u, v) = (p.x - i, p.y - j);
+        let (i, j) = (i as isize, j as isize);
+        let is_folded = !self.hems.is_empty() && self.corner(i, j).is_none_or(|k| self.hem(k).is_some());
+        let [point, across, up] =
+            self.bicubic([i, j], [(cubic(u), cubic(v)), (cubic_slope(u), cubic(v)), (cubic(u), cubic_slope(v))]);
+        if is_folded || point.is_nan() {
+            let at = self.place(p);
+            return (at, self.place(p + step) - at);
+        }
+        let normal = self.linear([i, j], [u, v]).1;
+        (point + normal * p.z, across * step.x + up * step.y + normal * step.z)
+    }
+
     /// By how much a place, which is at `at` on the flat cloth, is moved from the seam and lies over it, if it is near a seam.
     fn folded(&self, p: Vec3, at: Vec3) -> Option<(Vec3, [f32; 2])> {
         let (i, j) = (p.x.floor(), p.y.floor());
@@ -179,15 +195,34 @@ impl<'a> Sheet<'a> {
         let (i, j) = (x.floor(), y.floor());
         let (u, v) = (x - i, y - j);
         let (i, j) = (i as isize, j as isize);
-        let (wu, wv) = (cubic(u), cubic(v));
-        let mut point = Vec3::ZERO;
-        for (row, wy) in wv.into_iter().enumerate() {
-            for (column, wx) in wu.into_iter().enumerate() {
+        let [mut point] = self.bicubic([i, j], [(cubic(u), cubic(v))]);
+        let (flat, normal) = self.linear([i, j], [u, v]);
+        if point.is_nan() {
+            // Beyond what is known: the nearest that is.
+            point = flat.unwrap_or_else(|| self.nearest(x, y));
+        }
+        (point, normal)
+    }
+
+    /// Sums of the corners around a stitch with some weights across and up; NaN where one is not known.
+    #[inline]
+    fn bicubic<const N: usize>(&self, [i, j]: [isize; 2], weights: [([f32; 4], [f32; 4]); N]) -> [Vec3; N] {
+        let mut sums = [Vec3::ZERO; N];
+        for row in 0..4 {
+            for column in 0..4 {
                 let k = self.lattice.index(i + column as isize - 1, j + row as isize - 1);
-                point += wx * wy * k.map_or(Vec3::NAN, |k| self.points[k]);
+                let point = k.map_or(Vec3::NAN, |k| self.points[k]);
+                for (sum, (wu, wv)) in sums.iter_mut().zip(&weights) {
+                    *sum += wu[column] * wv[row] * point;
+                }
             }
         }
-        // Normals turn slowly: a linear mean will do.
+        sums
+    }
+
+    /// Means of a stitch's four corners: place, if any is known near, and unit normal. Normals turn slowly: linear ones will do.
+    #[inline]
+    fn linear(&self, [i, j]: [isize; 2], [u, v]: [f32; 2]) -> (Option<Vec3>, Vec3) {
         let (mut flat, mut normal, mut weight) = (Vec3::ZERO, Vec3::ZERO, 0.0);
         for (dx, dy, share) in corner_shares(u, v) {
             if let Some(k) = self.corner(i + dx, j + dy) {
@@ -196,11 +231,7 @@ impl<'a> Sheet<'a> {
                 weight += share;
             }
         }
-        if point.is_nan() {
-            // Beyond what is known: the nearest that is.
-            point = if weight > 1e-3 { flat / weight } else { self.nearest(x, y) };
-        }
-        (point, normal.normalize_or(Vec3::Y))
+        ((weight > 1e-3).then(|| flat / weight), normal.normalize_or(Vec3::Y))
     }
 
     fn nearest(&self, x: f32, y: f32) -> Vec3 {
@@ -216,6 +247,18 @@ impl<'a> Sheet<'a> {
 #[inline]
 fn corner_shares(u: f32, v: f32) -> [(isize, isize, f32); 4] {
     [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
+}
+
+/// How [`cubic`] changes with t.
+#[inline]
+fn cubic_slope(t: f32) -> [f32; 4] {
+    let t2 = t * t;
+    [
+        0.5 * (4.0 * t - 1.0 - 3.0 * t2),
+        0.5 * (9.0 * t2 - 10.0 * t),
+        0.5 * (1.0 + 8.0 * t - 9.0 * t2),
+        0.5 * (3.0 * t2 - 2.0 * t),
+    ]
 }
 
 /// Weights of four values in a row, between the second and the third: Catmull-Rom.

@@ -36,8 +36,13 @@ pub(super) struct Shapes {
     pub(super) reach: DVec2,
     /// Length of yarn of a stitch, mm.
     pub(super) length: f64,
-    /// The thickest yarn's diameter, mm.
+    /// How far apart the centre lines of yarns are that press on each other, mm: the thickest yarn's diameter if it is round.
     pub(super) diameter: f64,
+    /// The thickest yarn's own radius, mm, and half of the room that it takes where nothing presses it.
+    pub(super) radius: f64,
+    pub(super) half_room: f64,
+    /// The section of a yarn of a knit that lies behind its stitches, or goes from row to row.
+    pub(super) beside: Section,
     /// Between which heights the middles of yarns lie, mm.
     pub(super) heights: [f64; 2],
 }
@@ -55,14 +60,44 @@ pub(super) struct Shape {
     /// For each node all control points, shears of the same stretches side by side: stitches across and rows up from the
     /// tile's corner, mm out.
     control: Vec<Vec3>,
-    /// The section of each control point of a tile, the same at all strains: across, up and out; empty if it is round.
-    pub(super) sections: Vec<Section>,
+    /// The section of each control point, as `control`, or of one node where strain does not change it; empty if it is round.
+    sections: Vec<Mixed>,
+}
+
+/// A section that is mixed with others. Axes are across, up and out as on cloth that is not strained.
+#[derive(Clone, Copy)]
+struct Mixed {
+    half_width: f32,
+    /// Of the shorter axis to the longer one.
+    ratio: f32,
+    /// Direction of the shorter axis; the rounder, the shorter, for the less it means.
+    lead: Vec3,
+}
+
+impl Mixed {
+    fn new(section: Section) -> Self {
+        let ratio = section.short_axis.length();
+        let lead = (1.0 - ratio).max(NEARLY_ROUND) / ratio * section.short_axis;
+        Self { half_width: section.half_width, ratio, lead }
+    }
+
+    fn lerp(self, other: Self, t: f32) -> Self {
+        Self {
+            half_width: self.half_width + t * (other.half_width - self.half_width),
+            ratio: self.ratio + t * (other.ratio - self.ratio),
+            lead: self.lead.lerp(other.lead, t),
+        }
+    }
+
+    fn section(self) -> Section {
+        Section { half_width: self.half_width, short_axis: self.ratio * self.lead.normalize_or(Vec3::Z) }
+    }
 }
 
 impl Shape {
-    /// The section of control point k of a stitch, counted from the corner of a tile.
-    pub(super) fn section(&self, stitch: usize, k: usize) -> Section {
-        self.sections[(stitch * self.per_stitch + k) % self.count]
+    /// Whether it is pressed flat anywhere.
+    pub(super) fn is_pressed(&self) -> bool {
+        !self.sections.is_empty()
     }
 
     /// Along which axis of the panel it goes.
@@ -78,6 +113,8 @@ impl Shape {
     }
 }
 
+/// What the axis of a round section counts where sections are mixed.
+const NEARLY_ROUND: f32 = 1e-3;
 /// Rounds in which a strained tile settles.
 const ROUNDS: usize = 120;
 
@@ -124,7 +161,17 @@ impl Shapes {
                 };
                 let control = pulled.iter().flat_map(|t| t.as_ref().map_or_else(|| as_cut.clone(), moved)).collect();
                 let index = strand.index as usize;
-                let sections = strand.sections_at(&places);
+                let as_cut = strand.sections_at(&places);
+                let sections = if tile.flatten.is_some() && !as_cut.is_empty() {
+                    let of_node = |t: &Option<Tile>| match t {
+                        Some(t) => upright_sections(t, i, &places, (tile.stitch(), &as_cut)),
+                        None => as_cut.clone(),
+                    };
+                    pulled.iter().flat_map(of_node).collect()
+                } else {
+                    as_cut
+                };
+                let sections = sections.into_iter().map(Mixed::new).collect();
                 Shape { kind: strand.kind, index, radius: strand.radius, per_stitch, count, control, sections }
             })
             .collect();
@@ -137,6 +184,7 @@ impl Shapes {
         }
         let joins = || strands.iter().flat_map(Shape::joins);
         let heights = joins().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.z), h.max(p.z)]);
+        let half_room = tile.strands.iter().map(|s| s.radius * s.half_width).fold(0.0, f64::max);
         Ok(Self {
             counts,
             heights,
@@ -144,7 +192,10 @@ impl Shapes {
             nodes: nodes.map(|n| n.into_iter().map(|v| v as f32).collect()),
             reach,
             length: tile.length() / (counts[0] * counts[1]) as f64,
-            diameter: tile.diameter(),
+            radius: 0.5 * tile.diameter(),
+            half_room,
+            diameter: tile.pressing().map_or(2.0 * half_room, |yarn| yarn.pressed()),
+            beside: beside(tile),
         })
     }
 
@@ -164,20 +215,41 @@ impl Shapes {
         self.strands.iter().any(|s| s.axis() == axis)
     }
 
+    /// The section of control point k of a stitch, counted from the corner of a tile, where the cloth is strained so.
+    pub(super) fn section(&self, shape: &Shape, stitch: usize, k: usize, strain: Strain) -> Section {
+        let k = (stitch * shape.per_stitch + k) % shape.count;
+        if shape.sections.len() == shape.count {
+            return shape.sections[k].section();
+        }
+        self.mixed(&|node| shape.sections[node * shape.count + k], Mixed::lerp, strain).section()
+    }
+
     /// Control point k of the tile's yarn where the cloth is strained so.
     #[inline]
     pub(super) fn control(&self, shape: &Shape, k: usize, strain: Strain) -> Vec3 {
+        self.mixed(&|node| shape.control[node * shape.count + k], |a, b, t| a.lerp(b, t), strain)
+    }
+
+    /// What is known at nodes, mixed where the cloth is strained so.
+    #[inline]
+    fn mixed<T>(&self, of_node: &impl Fn(usize) -> T, lerp: impl Fn(T, T, f32) -> T, strain: Strain) -> T {
         let [(x, u), (y, v), (z, w)] = [0, 1, 2].map(|i| between(&self.nodes[i], strain[i]));
         let [columns, rows, shears] = [0, 1, 2].map(|i| self.nodes[i].len());
         let node = |i: usize, j: usize, l: usize| {
-            let place = (i.min(columns - 1) * rows + j.min(rows - 1)) * shears + l.min(shears - 1);
-            shape.control[place * shape.count + k]
+            of_node((i.min(columns - 1) * rows + j.min(rows - 1)) * shears + l.min(shears - 1))
         };
         let at = |l: usize| {
-            node(x, y, l).lerp(node(x + 1, y, l), u).lerp(node(x, y + 1, l).lerp(node(x + 1, y + 1, l), u), v)
+            let along = |j: usize| lerp(node(x, j, l), node(x + 1, j, l), u);
+            lerp(along(y), along(y + 1), v)
         };
-        if shears == 1 { at(0) } else { at(z).lerp(at(z + 1), w) }
+        if shears == 1 { at(0) } else { lerp(at(z), at(z + 1), w) }
     }
+}
+
+/// What presses on stitches presses the same yarns flat behind them.
+fn beside(tile: &Tile) -> Section {
+    let (radius, flatten) = (0.5 * tile.diameter(), tile.flatten.unwrap_or(1.0));
+    Section { half_width: (radius * flatten.sqrt()) as f32, short_axis: Vec3::Z / flatten as f32 }
 }
 
 /// Strains at which a tile is relaxed: as it is cut, and at the ends of what occurs.
@@ -202,9 +274,20 @@ fn strained(tile: &Tile, [across, up, sine]: [f64; 3]) -> Tile {
     tile.strained(tile.period * DVec2::new(across, up * cosine), sine / cosine, ROUNDS)
 }
 
+/// Sections of a strained tile's yarn at places, as they are drawn on stitches of the size as cut; each axis points to the side of the
+/// one there.
+fn upright_sections(tile: &Tile, strand: usize, places: &[f64], (stitch, as_cut): (DVec2, &[Section])) -> Vec<Section> {
+    let by = (stitch / tile.stitch()).extend(1.0).as_vec3();
+    let drawn = |(section, as_cut): (Section, &Section)| {
+        let axis = (section.short_axis * by).normalize_or(Vec3::Z) * section.short_axis.length();
+        Section { short_axis: if axis.dot(as_cut.short_axis) < 0.0 { -axis } else { axis }, ..section }
+    };
+    tile.strands[strand].sections_at(places).into_iter().zip(as_cut).map(drawn).collect()
+}
+
 /// Places of control points: as many in each stitch, evenly.
 fn places(strand: &TileStrand, count: usize, period: DVec2) -> Vec<f64> {
-    strand.evenly(count, period)
+    strand.closer_in_bends(count, period)
 }
 
 /// The node before a value, and how far it is to the next; held at both ends.

@@ -1,6 +1,6 @@
 //! Curves as people hand them over: control points in a basis, open or closed, with or without radii.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// How control points make a curve. All bases are uniform.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub struct Curve {
     /// How far the section is pressed flat, where it is: one vector for each point, along the section's short axis (across
     /// the curve; either of its two directions), as long as the ratio of the short axis to the long one, in (0, 1]. The
     /// radius is then half of the long axis: a round tube of that radius bounds the yarn.
-    pub flattening: Option<Vec<DVec3>>,
+    pub flattening: Option<Vec<Vec3>>,
 }
 
 impl Curve {
@@ -50,7 +50,7 @@ impl Curve {
     /// Gives sections that are pressed flat up for round ones of equal area, which is all that files can hold.
     pub fn make_round(&mut self) {
         if let (Some(radii), Some(axes)) = (&mut self.radii, self.flattening.take()) {
-            radii.iter_mut().zip(&axes).for_each(|(r, axis)| *r *= axis.length().sqrt());
+            radii.iter_mut().zip(&axes).for_each(|(r, axis)| *r *= f64::from(axis.length()).sqrt());
         }
     }
 }

@@ -258,7 +258,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
     let shift = usize::from(curve.basis == Basis::BSpline && !curve.closed);
     let wider = |segment: usize, u: f64, along: DVec3, radius: f64| {
         let axes = curve.flattening.as_deref().filter(|axes| !axes.is_empty())?;
-        let point = |i: usize| axes[if curve.closed { i % axes.len() } else { i.min(axes.len() - 1) }];
+        let point = |i: usize| axes[if curve.closed { i % axes.len() } else { i.min(axes.len() - 1) }].as_dvec3();
         let (from, to) = (point(segment + shift), point(segment + shift + 1));
         // An axis has no sign.
         let to = if from.dot(to) < 0.0 { -to } else { to };

@@ -24,12 +24,12 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 pub(crate) use self::colors::{Way, caught, in_use};
+pub(super) use self::pressed::{Alike, flatten_where_touching};
 use self::{
     cell::Cell,
     curl::Curl,
     loops::{Border, Loops},
     piece::{Laying, State, Surface, Thread, ease, settle, sheet::Sheet},
-    pressed::{Alike, flatten_where_touching},
 };
 pub use self::{
     colors::{Colors, Work},
@@ -261,7 +261,7 @@ impl Knit {
             }
         };
         let mut strands: Vec<_> = (0..self.rows as usize).map(row).collect();
-        flatten_where_touching(&mut strands, yarn, &Alike::Tile(size * diameter));
+        flatten_where_touching(&mut strands, yarn, &Alike::Tile { period: size * diameter, shear: 0.0 });
         Ok(Knitted { colors: vec![0; strands.len()], strands, gauge: [width * diameter, height * diameter] })
     }
 

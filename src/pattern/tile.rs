@@ -3,20 +3,20 @@
 //! Every maker of cloth can give one: a [`Knit`], a [`Weave`], a periodic curve file. A tile knows its stitches and its
 //! yarns and nothing of where they came from.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rstar::RTree;
 
 use super::{
-    StrandKind,
+    PatternStrand, StrandKind,
     chart::ChartError,
-    knit::Knit,
+    knit::{Alike, Knit, Thickness, flatten_where_touching},
     relax::{Ends, Relaxation, Rope, sheared},
     weave::{Extent, Impossible, Weave},
 };
 use crate::geometry::{
     chain::spline_through,
     curve::{Basis, Curve},
-    overlap::{Overlap, overlap},
+    overlap::{Overlap, overlap_of_plied},
     spline::evaluate,
 };
 
@@ -29,6 +29,9 @@ pub struct Tile {
     pub counts: [u32; 2],
     /// Its yarns, each once.
     pub strands: Vec<TileStrand>,
+    /// Width over height to which stitches press its yarns where they lie on each other: sections follow from where yarns are.
+    /// `None` where sections are as the tile's maker left them.
+    pub flatten: Option<f64>,
 }
 
 /// One yarn of a [`Tile`] from its start to where it repeats.
@@ -44,6 +47,9 @@ pub struct TileStrand {
     pub step: [i32; 2],
     /// Its outer radius where it is round.
     pub radius: f64,
+    /// Half of the room that it takes beside others, over its radius: see
+    /// [`mean_half_width`](crate::geometry::yarn::mean_half_width).
+    pub half_width: f64,
     /// Its section at each point; empty if it is round everywhere.
     pub sections: Vec<Section>,
     /// At each point its place in stitches and rows (ends and picks) from the tile's corner: what colours are laid by.
@@ -54,9 +60,9 @@ pub struct TileStrand {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// Half of its longer axis.
-    pub half_width: f64,
+    pub half_width: f32,
     /// Direction of its shorter axis times the ratio of the shorter to the longer one, as [`Curve::flattening`] has it.
-    pub short_axis: DVec3,
+    pub short_axis: Vec3,
 }
 
 /// A cell of a knit as its maker relaxes it: see [`Tile::of_rows`].
@@ -68,27 +74,59 @@ pub(super) struct RelaxedRows {
 }
 
 impl Tile {
-    /// The repeat of a knit at its own gauge, in the unit of `diameter`.
+    /// The repeat of a knit at its own gauge, of yarn that stitches press flat where they lie on each other.
     ///
     /// # Errors
     /// A chart that grows or shrinks has no repeat.
-    pub fn of_knit(knit: &Knit, diameter: f64) -> Result<Self, ChartError> {
-        Ok(Self::of_rows(knit.relaxed_rows()?, diameter))
+    pub fn of_knit(knit: &Knit, yarn: &Thickness) -> Result<Self, ChartError> {
+        let mut tile = Self::of_rows(knit.relaxed_rows()?, yarn);
+        tile.press(0.0);
+        Ok(tile)
     }
 
-    /// A tile of rows in units of the yarn's diameter.
-    fn of_rows(cell: RelaxedRows, diameter: f64) -> Self {
+    /// A tile of rows in units of a knit of such yarn, which is round.
+    fn of_rows(cell: RelaxedRows, yarn: &Thickness) -> Self {
+        let unit = yarn.pressed();
         let strand = |(row, points): (usize, Vec<(DVec3, [f32; 2])>)| TileStrand {
             kind: StrandKind::Course,
             index: row as u32,
-            points: points.iter().map(|(p, _)| *p * diameter).collect(),
+            points: points.iter().map(|(p, _)| *p * unit).collect(),
             step: [1, 0],
-            radius: 0.5 * diameter,
+            radius: yarn.radius,
+            half_width: yarn.half_width,
             sections: Vec::new(),
             coordinates: points.into_iter().map(|(_, at)| at).collect(),
         };
         let strands = cell.rows.into_iter().enumerate().map(strand).collect();
-        Self { period: cell.period * diameter, counts: cell.counts, strands }
+        Self { period: cell.period * unit, counts: cell.counts, strands, flatten: Some(yarn.flatten) }
+    }
+
+    /// How its yarns lie on each other, of a knit.
+    pub fn pressing(&self) -> Option<Thickness> {
+        let first = self.strands.first()?;
+        Some(Thickness { radius: first.radius, half_width: first.half_width, flatten: self.flatten? })
+    }
+
+    /// Presses the yarns of a knit flat where they lie on each other when it is sheared, see [`Self::strained`].
+    fn press(&mut self, shear: f64) {
+        let Some(yarn) = self.pressing() else { return };
+        let row = |strand: &TileStrand| {
+            let next = strand.points[0] + strand.jump(self.period);
+            let points = strand.points.iter().chain([&next]).map(|p| sheared(*p, shear)).collect();
+            let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
+            PatternStrand { curve, kind: strand.kind, index: strand.index, coordinates: Vec::new(), share: 1.0 }
+        };
+        let mut rows: Vec<PatternStrand> = self.strands.iter().map(row).collect();
+        flatten_where_touching(&mut rows, &yarn, &Alike::Tile { period: self.period, shear });
+        // Drawn back upright, as points are.
+        let section = |(half_width, axis): (&f64, &Vec3)| {
+            let upright = sheared(axis.as_dvec3(), -shear).as_vec3();
+            Section { half_width: *half_width as f32, short_axis: upright.normalize_or(Vec3::Z) * axis.length() }
+        };
+        for (strand, row) in self.strands.iter_mut().zip(&rows) {
+            let both = row.curve.radii.iter().flatten().zip(row.curve.flattening.iter().flatten());
+            strand.sections = both.map(section).take(strand.points.len()).collect();
+        }
     }
 
     /// The repeat of a weave, its yarns as flat as they lie in it and without pile; its numbers of warps and wefts do not
@@ -117,18 +155,21 @@ impl Tile {
             let inside = |c: &[f32; 2]| (from..from + along as f32).contains(&c[axis]);
             let both = strand.curve.points.iter().zip(&strand.coordinates).filter(|(_, c)| inside(c));
             let (widths, axes) = (strand.curve.radii.iter().flatten(), strand.curve.flattening.iter().flatten());
-            let sections = widths.zip(axes).map(|(&half_width, &short_axis)| Section { half_width, short_axis });
+            let sections = widths
+                .zip(axes)
+                .map(|(&half_width, &short_axis)| Section { half_width: half_width as f32, short_axis });
             strands.push(TileStrand {
                 kind: strand.kind,
                 index: strand.index - own,
                 points: both.clone().map(|(p, _)| *p - corner).collect(),
                 step: if is_warp { [0, 1] } else { [1, 0] },
                 radius: weave.yarn_radii()[usize::from(!is_warp)],
+                half_width: weave.half_width[usize::from(!is_warp)],
                 sections: sections.zip(&strand.coordinates).filter(|(_, c)| inside(c)).map(|(s, _)| s).collect(),
                 coordinates: both.map(|(_, c)| [c[0] - warps as f32, c[1] - wefts as f32]).collect(),
             });
         }
-        Ok(Self { period: DVec2::new(width, height), counts: [warps, wefts], strands })
+        Ok(Self { period: DVec2::new(width, height), counts: [warps, wefts], strands, flatten: None })
     }
 
     /// A tile of endless yarns of which nothing else is known: stitches and rows are counted from their shape.
@@ -175,7 +216,7 @@ impl Tile {
             strand.coordinates =
                 strand.points.iter().map(|p| [(p.x / stitch.x) as f32, (p.y / stitch.y) as f32]).collect();
         }
-        Self { period, counts, strands }
+        Self { period, counts, strands, flatten: None }
     }
 
     /// Width and height of a stitch.
@@ -199,7 +240,7 @@ impl Tile {
         for strand in &mut self.strands {
             strand.radius *= by;
             strand.points.iter_mut().for_each(|p| *p *= by);
-            strand.sections.iter_mut().for_each(|s| s.half_width *= by);
+            strand.sections.iter_mut().for_each(|s| s.half_width *= by as f32);
         }
         self
     }
@@ -223,7 +264,8 @@ impl Tile {
             }
         }
         let even = self.strands.iter().all(|s| (2.0 * s.radius - self.diameter()).abs() < 1e-6 * self.diameter());
-        let diameter = self.closest_crossing().unwrap_or_else(|| self.diameter());
+        let touching = self.pressing().map(|yarn| yarn.pressed());
+        let diameter = touching.or_else(|| self.closest_crossing()).unwrap_or_else(|| self.diameter());
         if !even || diameter <= 0.0 || self.strands.iter().any(|s| s.step[0] != 0 && s.step[1] != 0) {
             return out;
         }
@@ -239,6 +281,7 @@ impl Tile {
         for (strand, rope) in out.strands.iter_mut().zip(relaxation.ropes) {
             strand.points = rope.points.into_iter().map(|p| sheared(p, -shear) * diameter).collect();
         }
+        out.press(shear);
         out
     }
 
@@ -275,16 +318,17 @@ impl Tile {
         }
         let count = count.as_uvec2();
         let piece = self.repeated(count.x, count.y);
-        let curves: Vec<(Curve, Vec<f64>)> = piece
+        let curves: Vec<(Curve, Vec<f64>, f64)> = piece
             .strands
             .into_iter()
             .map(|s| {
                 let (radii, flattening) = s.radii_and_flattening();
                 let closed = s.step == [0, 0];
-                (Curve { basis: Basis::CatmullRom, closed, points: s.points, radii: None, flattening }, radii)
+                let curve = Curve { basis: Basis::CatmullRom, closed, points: s.points, radii: None, flattening };
+                (curve, radii, s.half_width)
             })
             .collect();
-        overlap(curves.iter().map(|(curve, radii)| (curve, radii.as_slice())))
+        overlap_of_plied(curves.iter().map(|(curve, radii, half_width)| (curve, radii.as_slice(), *half_width)))
     }
 
     /// So many tiles beside and above each other as one: what is relaxed must not meet its own images.
@@ -321,17 +365,17 @@ impl Tile {
             }
         }
         let period = self.period * DVec2::new(f64::from(across), f64::from(up));
-        Self { period, counts: [columns * across, rows * up], strands }
+        Self { period, counts: [columns * across, rows * up], strands, flatten: self.flatten }
     }
 }
 
 impl TileStrand {
     /// Half of the section's longer axis at each point, and what presses it flat there, if anything does.
-    fn radii_and_flattening(&self) -> (Vec<f64>, Option<Vec<DVec3>>) {
+    fn radii_and_flattening(&self) -> (Vec<f64>, Option<Vec<Vec3>>) {
         if self.sections.is_empty() {
             return (vec![self.radius; self.points.len()], None);
         }
-        let (widths, axes) = self.sections.iter().map(|s| (s.half_width, s.short_axis)).unzip();
+        let (widths, axes) = self.sections.iter().map(|s| (f64::from(s.half_width), s.short_axis)).unzip();
         (widths, Some(axes))
     }
 
@@ -373,7 +417,28 @@ impl TileStrand {
 
     /// Places of `count` points evenly along the yarn, in points from the first, the first among them.
     pub fn evenly(&self, count: usize, period: DVec2) -> Vec<f64> {
+        Self::shared_out(&self.lengths(period), count)
+    }
+
+    /// As [`Self::evenly`], but closer to each other where the yarn bends: a spline through them keeps closer to it.
+    pub fn closer_in_bends(&self, count: usize, period: DVec2) -> Vec<f64> {
         let lengths = self.lengths(period);
+        let steps = self.points.len() * STEPS;
+        let at = |k: usize| self.at((k / STEPS) as isize, (k % STEPS) as f64 / STEPS as f64, period);
+        let places: Vec<DVec3> = (0..=steps).map(at).collect();
+        let way = |k: usize| places[k + 1] - places[k];
+        let mut weighed = vec![0.0];
+        for k in 0..steps {
+            let (before, after) = (way((k + steps - 1) % steps), way((k + 1) % steps));
+            let length = lengths[k + 1] - lengths[k];
+            let bend = before.angle_between(after) / (2.0 * length).max(1e-300);
+            weighed.push(weighed[k] + length * (1.0 + 4.0 * self.radius * bend).sqrt());
+        }
+        Self::shared_out(&weighed, count)
+    }
+
+    /// Places between which a sum over steps grows by as much, the first at its start.
+    fn shared_out(lengths: &[f64], count: usize) -> Vec<f64> {
         let total = lengths[lengths.len() - 1];
         (0..count)
             .map(|k| {
@@ -393,25 +458,40 @@ impl TileStrand {
     }
 
     /// Sections at places, given in points from the first, as control points of the same spline have them; empty if it is
-    /// round.
+    /// round. Of those between two places the narrowest counts, so that nothing that presses is passed by.
     pub fn sections_at(&self, places: &[f64]) -> Vec<Section> {
         if self.sections.is_empty() {
             return Vec::new();
         }
         let n = self.sections.len();
-        let at = |place: &f64| {
-            let (i, u) = (place.floor() as usize, place.fract());
-            let (a, b) = (self.sections[i % n], self.sections[(i + 1) % n]);
+        let of = |i: isize| self.sections[i.rem_euclid(n as isize) as usize];
+        let at = |place: f64| {
+            let (i, u) = (place.floor() as isize, place.fract() as f32);
+            let (a, b) = (of(i), of(i + 1));
+            // An axis has no sign.
+            let next = if a.short_axis.dot(b.short_axis) < 0.0 { -b.short_axis } else { b.short_axis };
             Section {
                 half_width: a.half_width + u * (b.half_width - a.half_width),
-                short_axis: a.short_axis.lerp(b.short_axis, u),
+                short_axis: a.short_axis.lerp(next, u),
             }
         };
-        let mut sections: Vec<Section> = places.iter().map(at).collect();
-        // Widths follow the spline, axes are those of its knots.
-        let widths: Vec<DVec3> = sections.iter().map(|s| DVec3::X * s.half_width).collect();
-        for (section, width) in sections.iter_mut().zip(periodic_spline(&widths, DVec3::ZERO)) {
-            section.half_width = width.x;
+        let around = |k: usize| {
+            let place = |k: isize| {
+                let (turns, k) = (k.div_euclid(places.len() as isize), k.rem_euclid(places.len() as isize));
+                places[k as usize] + (turns * n as isize) as f64
+            };
+            let [before, own, after] = [-1, 0, 1].map(|by| place(k as isize + by));
+            let between = own.midpoint(before).floor() as isize..=own.midpoint(after).ceil() as isize;
+            let narrow = |s: &Section| s.half_width * s.short_axis.length();
+            between.map(of).fold(at(own), |a, b| if narrow(&b) < narrow(&a) { b } else { a })
+        };
+        let mut sections: Vec<Section> = (0..places.len()).map(around).collect();
+        // Widths and ratios follow the spline, directions are those of its knots.
+        let sizes = sections.iter().map(|s| DVec3::new(s.half_width.into(), s.short_axis.length().into(), 0.0));
+        let sizes: Vec<DVec3> = sizes.collect();
+        for (section, size) in sections.iter_mut().zip(periodic_spline(&sizes, DVec3::ZERO)) {
+            section.half_width = size.x as f32;
+            section.short_axis = section.short_axis.normalize_or(Vec3::Z) * (size.y as f32).clamp(FLATTEST, 1.0);
         }
         sections
     }
@@ -468,6 +548,7 @@ pub fn chain(link: f64) -> Vec<DVec3> {
         points: (0..LINKS).flat_map(|k| way.map(|[x, y, z]| DVec3::new(x + k as f64 * link, y, z))).collect(),
         step: [1, 0],
         radius: 0.5,
+        half_width: 1.0,
         sections: Vec::new(),
         coordinates: Vec::new(),
     };
@@ -489,6 +570,8 @@ pub fn chain(link: f64) -> Vec<DVec3> {
     relaxed.spline(&places, period).into_iter().take(POINTS).collect()
 }
 
+/// No section is flatter than this, as the ratio of its axes.
+const FLATTEST: f32 = 0.2;
 /// Steps between two points at which lengths are known.
 const STEPS: usize = 4;
 
@@ -516,7 +599,7 @@ mod tests {
             colors: None,
             flat: true,
         };
-        Tile::of_knit(&knit, 0.5).unwrap()
+        Tile::of_knit(&knit, &Thickness::round(0.25)).unwrap()
     }
 
     #[test]
@@ -626,7 +709,7 @@ mod tests {
                     (Curve { basis, closed: false, points: s.points, radii: None, flattening: None }, radii)
                 };
                 let curves: Vec<_> = cloth.strands.into_iter().map(curve).collect();
-                (length, overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap())
+                (length, crate::geometry::overlap::overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap())
             };
             let ((_, as_drawn), (length, found)) = (at(0), at(150));
             assert!((length - 1.0).abs() < 0.045, "{sine}: {length}");
@@ -635,6 +718,35 @@ mod tests {
         // Upright it is what pulling gives.
         let (a, b) = (tile.strained(tile.period, 0.0, 20), tile.pulled(tile.period, 20));
         assert!(a.strands.iter().zip(&b.strands).all(|(a, b)| a.points == b.points));
+    }
+
+    #[test]
+    fn yarns_of_a_knit_give_way_where_stitches_press_on_them_however_it_is_strained() {
+        let tile = crate::testing::pressed_stockinette();
+        for (x, y, shear) in [(1.0, 1.0, 0.0), (1.1, 0.95, 0.0), (1.0, 1.0, 0.35), (0.95, 1.05, -0.35)] {
+            let strained = tile.strained(tile.period * DVec2::new(x, y), shear, 120);
+            let sections = strained.strands.iter().flat_map(|s| &s.sections);
+            let flattest = sections.map(|s| s.short_axis.length()).fold(1.0, f32::min);
+            assert!(flattest < 0.85, "{flattest}");
+            let curves = |round: bool| {
+                let of = move |s: TileStrand| {
+                    let (radii, axes) = s.radii_and_flattening();
+                    // As it lies: axes are drawn upright with the points.
+                    let lies = |axis: &Vec3| sheared(axis.as_dvec3(), shear).normalize().as_vec3() * axis.length();
+                    let flattening = axes.filter(|_| !round).map(|axes| axes.iter().map(lies).collect());
+                    let radii = if round { vec![s.radius; s.points.len()] } else { radii };
+                    let points = s.points.into_iter().map(|p| sheared(p, shear)).collect();
+                    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
+                    (curve, radii, s.half_width)
+                };
+                strained.repeated(2, 2).strands.into_iter().map(of).collect::<Vec<_>>()
+            };
+            let share = |curves: &[(Curve, Vec<f64>, f64)]| {
+                overlap_of_plied(curves.iter().map(|(c, r, half_width)| (c, r.as_slice(), *half_width))).unwrap().share
+            };
+            let (round, pressed) = (share(&curves(true)), share(&curves(false)));
+            assert!(round > 0.5 && pressed < 0.03, "{round} {pressed}");
+        }
     }
 
     #[test]

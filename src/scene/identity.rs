@@ -270,7 +270,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
         let mut hash = Hash::default();
         let pressed = flattening.as_ref().map(Vec::len);
         hash.bytes(format!("{basis:?} {closed} {} {} {pressed:?}", points.len(), radii.len()).as_bytes());
-        flattening.iter().flatten().for_each(|v| hash.numbers(&v.to_array()));
+        flattening.iter().flatten().for_each(|v| hash.numbers(&v.as_dvec3().to_array()));
         points.iter().for_each(|p| hash.numbers(&p.to_array()));
         hash.numbers(radii);
         hash

@@ -73,6 +73,7 @@ pub(super) fn tile(bytes: &[u8]) -> Result<Tile, CurveFileError> {
             points: points.into_iter().map(|p| p * MILLIMETRES_PER_METRE).collect(),
             step,
             radius: cell.radius * MILLIMETRES_PER_METRE,
+            half_width: 1.0,
             sections: Vec::new(),
             coordinates: Vec::new(),
         })

@@ -392,7 +392,7 @@ impl<'a> Plies<'a> {
                     closed: false,
                     points: points.iter().map(|p| p.truncate().as_dvec3()).collect(),
                     radii: None,
-                    flattening: Some(sections.iter().map(|s| s.0).collect()),
+                    flattening: Some(sections.iter().map(|s| s.0.as_vec3()).collect()),
                 };
                 (curve, sections.iter().map(|s| s.1).collect())
             })

@@ -1,4 +1,4 @@
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 
 use super::{flyaway::Flyaways, *};
 use crate::geometry::{
@@ -32,7 +32,7 @@ fn arch(shape: &YarnShape) -> Strands {
 /// A straight yarn along z of radius 1 that is pressed along y, to axes of 1 : `ratio`.
 fn pressed(shape: &YarnShape, ratio: f64) -> Strands {
     let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.5 * f64::from(i))).collect();
-    let flattening = Some(vec![DVec3::Y * ratio; points.len()]);
+    let flattening = Some(vec![Vec3::Y * ratio as f32; points.len()]);
     let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
     let options = StrandOptions {
         basis: Basis::CatmullRom,
@@ -219,7 +219,7 @@ fn fibers_and_plies_are_pressed_flat_with_their_yarn() {
         for (vector, long) in flattening.iter().zip(radii) {
             assert!(*long <= r * 1.001 && *long > 0.5 * r && vector.length() <= 1.0);
             // Its area, cut at an angle.
-            let area = long * long * vector.length() / (0.5 * r * r);
+            let area = long * long * f64::from(vector.length()) / (0.5 * r * r);
             assert!(area < 1.001 && area > 0.9, "{area}");
         }
     }
@@ -278,7 +278,7 @@ fn ply_curves_run_through_the_middle_of_their_plies() {
     // A round ply cut across itself: as wide as it is towards the yarn's axis, narrower the other way.
     assert!((radii[3] - 0.5 * parameters[2].radius).abs() < 1e-4);
     let ratio = curve.flattening.as_ref().expect("a twisted ply is cut at an angle")[3].length();
-    assert!((ratio / 0.25f64.cos() - 1.0).abs() < 0.01, "{ratio}");
+    assert!((ratio / 0.25f32.cos() - 1.0).abs() < 0.01, "{ratio}");
     let tubes = Tubes::new(&[(curve.clone(), radii.clone())]);
     for segment in 0..tubes.segments().len() as u32 {
         let (place, p) = locate(&strands, tubes.place(segment, 0.5).centre);

@@ -164,7 +164,7 @@ fn of(curves: &[(Curve, Vec<f64>)]) -> Overlap {
 fn ribbon(through: DVec3, along: DVec3, short: DVec3) -> (Curve, Vec<f64>) {
     let points: Vec<DVec3> = (0..21).map(|i| through + along * (0.4 * f64::from(i) - 4.0)).collect();
     let count = points.len();
-    let flattening = Some(vec![0.5 * short; count]);
+    let flattening = Some(vec![0.5 * short.as_vec3(); count]);
     (Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening }, vec![1.0; count])
 }
 

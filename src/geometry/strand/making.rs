@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use glam::{DVec2, DVec3, DVec4, Vec2, Vec4};
+use glam::{DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -181,7 +181,7 @@ fn frames(wound: &[Winding], at_rest: &Winding, closed: bool, phase: f64, symmet
 }
 
 /// What presses a curve flat, at each knot of the chain made from it: the direction of the short axis, with the ratio of both axes.
-fn pressed_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]>) -> Vec<DVec4> {
+fn pressed_along(curve: &Curve, vectors: &[Vec3], knots: Option<&[(usize, f64)]>) -> Vec<DVec4> {
     assert_eq!(vectors.len(), curve.points.len(), "a curve is pressed flat at each of its points or at none");
     // An axis has no sign: each points to the side of the one before. Its direction and its ratio make a chain of their
     // own, which has its knots where the curve has them.
@@ -189,12 +189,12 @@ fn pressed_along(curve: &Curve, vectors: &[DVec3], knots: Option<&[(usize, f64)]
     let axes: Vec<DVec3> = vectors
         .iter()
         .map(|v| {
-            let v = v.try_normalize().unwrap_or(axis);
+            let v = v.as_dvec3().try_normalize().unwrap_or(axis);
             axis = if v.dot(axis) < 0.0 { -v } else { v };
             axis
         })
         .collect();
-    let ratios: Vec<f64> = vectors.iter().map(|v| v.length()).collect();
+    let ratios: Vec<f64> = vectors.iter().map(|v| f64::from(v.length())).collect();
     let chain = Chain::at_time(curve, &ratios, &axes);
     let ends = || (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]);
     let at: Vec<(usize, f64)> = knots.map_or_else(|| ends().collect(), <[_]>::to_vec);

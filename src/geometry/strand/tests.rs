@@ -120,7 +120,7 @@ fn a_flattened_section_keeps_its_axes_wherever_points_are_put() {
             let (axis, ratio) = short(p);
             axis * if i % 3 == 0 { -ratio } else { ratio }
         });
-        let flattening = Some(vectors.collect());
+        let flattening = Some(vectors.map(|v| v.as_vec3()).collect());
         let round = strands(curve.clone(), 0.5, &options(basis));
         let pose = vec![curve.points.iter().map(|p| *p + DVec3::X).collect()];
         let radii = vec![0.5; curve.points.len()];

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::Thickness;
 use crate::{
     geometry::contact::{Entry, PointGrid, Walk, nearest},
-    pattern::PatternStrand,
+    pattern::{PatternStrand, relax::sheared},
 };
 
 /// Along a yarn, nearer than this many diameters is not another strand.
@@ -88,13 +88,18 @@ impl Section {
 }
 
 /// Points that lie alike, with all that is around them.
-pub(super) enum Alike {
+pub(in crate::pattern) enum Alike {
     /// Nothing is known to repeat.
     No,
     /// For each point of the strands, one behind the other, what kind it is of; [`ALONE`] if it is by itself.
     Points(Vec<u64>),
-    /// The whole repeats, by so much across and up.
-    Tile(DVec2),
+    /// The whole repeats, by so much across and up; what is above begins `shear` times its height further along x.
+    Tile {
+        /// Width and height.
+        period: DVec2,
+        /// Tangent of the angle by which columns lean.
+        shear: f64,
+    },
 }
 
 /// The index of segments that are images of a tile's.
@@ -104,7 +109,7 @@ const IMAGE: u32 = u32::MAX;
 pub(super) const ALONE: u64 = u64::MAX;
 
 /// Presses yarns flat where they are nearer to each other than round yarns come: gives their curves radii and short axes.
-pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thickness, alike: &Alike) {
+pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thickness, alike: &Alike) {
     if yarn.flatten == 1.0 {
         return;
     }
@@ -118,8 +123,10 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
     let first_of = firsts(alike, strands, count);
     let asked = |i: u32| first_of.get(i as usize).is_none_or(|first| *first == i);
     let mut segments = segments(strands, &asked, reach, first_of.is_empty());
-    if let Alike::Tile(period) = alike {
-        add_images(&mut segments, *period, reach);
+    let mut last_of = Vec::new();
+    if let Alike::Tile { period, shear } = alike {
+        last_of = segments.chunk_by(|a, b| a.strand == b.strand).map(|own| own[own.len() - 1]).collect();
+        add_images(&mut segments, (*period, *shear), reach);
     }
     let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
     let grid = PointGrid::new(&middles, reach, None);
@@ -127,7 +134,12 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
     let section = |(walk, ways): &mut (Walk<'_>, Vec<DVec3>), i: usize| {
         let (own, after) = (&segments[i], middles[i]);
         let follows = |i: &usize| segments[*i].strand == own.strand && segments[*i].index + 1 == own.index;
-        let before = i.checked_sub(1).filter(follows).map_or(own.from, |i| middles[i]);
+        let before = match (i.checked_sub(1).filter(follows), last_of.get(own.strand as usize)) {
+            (Some(i), _) => middles[i],
+            // A row of a tile goes on before its first point as it ends.
+            (None, Some(last)) => last.middle() + (own.from - last.to),
+            (None, None) => own.from,
+        };
         ways.clear();
         walk.within(own.from, reach, |entry| {
             let other = &segments[entry.index as usize];
@@ -170,10 +182,11 @@ pub(super) fn flatten_where_touching(strands: &mut [PatternStrand], yarn: &Thick
         let (own, after) = rest.split_at(points.len().saturating_sub(1));
         rest = after;
         // A row of a tile ends as it begins, another strand as its last segment.
-        let last = if matches!(alike, Alike::Tile(_)) { own.first() } else { own.last() };
+        let repeats = matches!(alike, Alike::Tile { .. });
+        let last = if repeats { own.first() } else { own.last() };
         let own: Vec<Section> = own.iter().chain(last).copied().collect();
         strand.curve.radii = Some(own.iter().map(|s| f64::from(s.long) / yarn.half_width).collect());
-        strand.curve.flattening = Some(axes(points, &own));
+        strand.curve.flattening = Some(axes(points, &own, repeats));
     }
 }
 
@@ -204,18 +217,21 @@ fn firsts(alike: &Alike, strands: &[PatternStrand], count: usize) -> Vec<u32> {
 }
 
 /// Adds what lies around a tile, as far as it may matter: beside it rows go on, above and below it are other strands.
-fn add_images(segments: &mut Vec<Segment>, period: DVec2, reach: f64) {
+fn add_images(segments: &mut Vec<Segment>, (period, shear): (DVec2, f64), reach: f64) {
     let (low, high) = segments.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), s| {
         let at = s.middle().truncate();
         (low.min(at), high.max(at))
     });
-    let [across, up] = (reach / period).ceil().to_array().map(|n| n as i32);
+    let up = (reach / period.y).ceil();
+    // Those above are further along x.
+    let across = (reach + up * period.y * shear.abs()) / period.x;
+    let [across, up] = [across.ceil() as i32, up as i32];
     let (own, strands) = (segments.len(), segments.last().map_or(0, |s| s.strand + 1));
     let mut lengths = vec![0.0; strands as usize];
     segments.iter().for_each(|s| lengths[s.strand as usize] = s.along + s.from.distance(s.to));
     let shifts = (-up..=up).flat_map(|y| (-across..=across).map(move |x| (x, y))).filter(|shift| *shift != (0, 0));
     for (image, (x, y)) in (1..).zip(shifts) {
-        let by = (DVec2::new(x.into(), y.into()) * period).extend(0.0);
+        let by = sheared((DVec2::new(x.into(), y.into()) * period).extend(0.0), shear);
         for i in 0..own {
             let Segment { from, to, strand, along, .. } = segments[i];
             let (strand, along) = match y {
@@ -264,15 +280,18 @@ fn segments(strands: &[PatternStrand], asked: &dyn Fn(u32) -> bool, reach: f64, 
 }
 
 /// Short axes of the sections along a strand, as long as the ratio of both axes. Their directions are evened out, so that plies
-/// do not jump from one to the next.
-fn axes(points: &[DVec3], sections: &[Section]) -> Vec<DVec3> {
+/// do not jump from one to the next. A strand that `repeats` ends as it begins.
+fn axes(points: &[DVec3], sections: &[Section], repeats: bool) -> Vec<Vec3> {
     const ROUNDS: usize = 3;
+    let end = points.len() - 1;
+    let before = |i: usize| i.checked_sub(1).or(repeats.then(|| end.saturating_sub(1)));
+    let after = |i: usize| if i < end { Some(i + 1) } else { repeats.then(|| 1.min(end)) };
     let mut lead: Vec<Vec3> = sections.iter().map(|s| s.axis * (1.0 - s.ratio())).collect();
     for _ in 0..ROUNDS {
         // An axis has no sign: those beside point to its side.
         let even = |i: usize| {
             let beside = |k: Option<usize>| k.and_then(|k| lead.get(k)).copied().unwrap_or(Vec3::ZERO);
-            let (before, own, after) = (beside(i.checked_sub(1)), lead[i], beside(Some(i + 1)));
+            let (before, own, after) = (beside(before(i)), lead[i], beside(after(i)));
             let side = [own, before, after].into_iter().find(|v| *v != Vec3::ZERO).unwrap_or(Vec3::ZERO);
             let turned = |v: Vec3| if v.dot(side) < 0.0 { -v } else { v };
             0.5 * own + 0.25 * (turned(before) + turned(after))
@@ -280,11 +299,11 @@ fn axes(points: &[DVec3], sections: &[Section]) -> Vec<DVec3> {
         lead = (0..lead.len()).into_par_iter().with_min_len(CHUNK).map(even).collect();
     }
     let axis = |i: usize| {
-        let tangent = (points[(i + 1).min(points.len() - 1)] - points[i.saturating_sub(1)]).normalize_or(DVec3::X);
+        let tangent = (points[(i + 1).min(end)] - points[i.saturating_sub(1)]).normalize_or(DVec3::X);
         let across = lead[i].as_dvec3().reject_from_normalized(tangent).try_normalize();
         let ratio = if sections[i].axis == Vec3::ZERO { 1.0 } else { f64::from(sections[i].ratio()) };
         // Where nothing is pressed near, any direction does.
-        ratio * across.unwrap_or_else(|| tangent.any_orthonormal_vector())
+        (ratio * across.unwrap_or_else(|| tangent.any_orthonormal_vector())).as_vec3()
     };
     (0..points.len()).into_par_iter().with_min_len(CHUNK).map(axis).collect()
 }
@@ -353,7 +372,7 @@ mod tests {
         let made = knit("stockinette", Edges::Finished).pressed(&YARN).unwrap();
         let curve = &made.strands[0].curve;
         let (radii, axes) = (curve.radii.as_ref().unwrap(), curve.flattening.as_ref().unwrap());
-        let area = |(radius, axis): (&f64, &DVec3)| radius * radius * axis.length() / YARN.radius.powi(2);
+        let area = |(radius, axis): (&f64, &Vec3)| radius * radius * f64::from(axis.length()) / YARN.radius.powi(2);
         let areas: Vec<f64> = radii.iter().zip(axes).map(area).collect();
         assert!(areas.iter().all(|a| (0.3..1.001).contains(a)));
         let mean = areas.iter().sum::<f64>() / areas.len() as f64;
@@ -363,7 +382,7 @@ mod tests {
         assert!(radii.iter().all(|r| *r <= 1.001 * widest), "no section is wider than that of the flattest");
         // Short axes stand across the yarn.
         for (way, axis) in curve.points.windows(3).zip(&axes[1..]) {
-            assert!((way[2] - way[0]).normalize().dot(*axis).abs() < 1e-6);
+            assert!((way[2] - way[0]).normalize().dot(axis.as_dvec3()).abs() < 1e-6);
         }
     }
 

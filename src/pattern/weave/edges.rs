@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{Cloth, PatternStrand, StrandKind, strand};
 use crate::math::{sampler::hash2, special::smooth_step};
@@ -30,13 +30,13 @@ const HEM: [f64; 2] = [4.0, 3.0];
 const FOLDED: f64 = 1.3;
 
 /// A point of a yarn: where it is, half its width, its flattening, and its place in the cloth.
-pub(super) type Point = (DVec3, f64, DVec3, [f32; 2]);
+pub(super) type Point = (DVec3, f64, Vec3, [f32; 2]);
 
 /// The points of a strand, so that it can be cut and joined.
 pub(super) fn points(strand: &PatternStrand) -> Vec<Point> {
     let curve = &strand.curve;
     let radius = |i: usize| curve.radii.as_ref().map_or(0.0, |r| r[i]);
-    let flattening = |i: usize| curve.flattening.as_ref().map_or(DVec3::Z, |f| f[i]);
+    let flattening = |i: usize| curve.flattening.as_ref().map_or(Vec3::Z, |f| f[i]);
     (0..curve.points.len()).map(|i| (curve.points[i], radius(i), flattening(i), strand.coordinates[i])).collect()
 }
 
@@ -83,7 +83,7 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
                 let aside = spacing * (0.5 * lean * s + 0.7 * bend * (PI * s).sin()) * s;
                 let height = aim * ease.min(1.0) + 1.4 * radius * lift * ease;
                 let p = last.0 + DVec3::new(aside, away * length * cut * s, height);
-                way.push((p, last.1 + s * (radius - last.1), last.2.lerp(DVec3::Z, s), last.3));
+                way.push((p, last.1 + s * (radius - last.1), last.2.lerp(Vec3::Z, s as f32), last.3));
             }
             if end == 0 {
                 way.reverse();
@@ -100,7 +100,7 @@ pub(super) fn hem(strands: &mut [PatternStrand], half: f64, thickness: f64) {
         let flattening = strand.curve.flattening.as_mut();
         if let Some(axes) = flattening {
             for (axis, p) in axes.iter_mut().zip(&strand.curve.points) {
-                *axis = fold.turn(p.y, *axis);
+                *axis = fold.turn(p.y, axis.as_dvec3()).as_vec3();
             }
         }
         for p in &mut strand.curve.points {

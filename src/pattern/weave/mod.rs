@@ -426,7 +426,7 @@ impl Cloth<'_> {
         let flattening = |k: i64| {
             let tangent = (point(k + 1) - point(k - 1)).normalize();
             let [wide, high] = node(k).axes;
-            (DVec3::Z - tangent.z * tangent).normalize_or(DVec3::Z) * (high / wide)
+            ((DVec3::Z - tangent.z * tangent).normalize_or(DVec3::Z) * (high / wide)).as_vec3()
         };
         let kind = [StrandKind::Warp, StrandKind::Weft][side];
         let mut made = strand(kind, index, steps.clone().map(|k| (point(k), coordinates(k))));

@@ -94,7 +94,7 @@ impl Tuft {
                 let (p, radius, axis, coordinates) = way[i];
                 let tangent = (way[(i + 1).min(last)].0 - way[i.saturating_sub(1)].0).normalize_or(DVec3::Z);
                 let major = (self.across - self.across.dot(tangent) * tangent).normalize_or(self.across);
-                let minor = tangent.cross(major) * axis.length();
+                let minor = tangent.cross(major);
                 let (leg, s) = on_leg(i);
                 let [wide, long] = self.spread.map(|spread| (spread / radius - 1.0).max(0.0));
                 let bloom = ((1.0 + wide) * (1.0 + long)).sqrt().min(BLOOM_CUT) - 1.0;
@@ -105,7 +105,12 @@ impl Tuft {
                 let by_chance = DVec2::new(chance(leg, 0), chance(leg, 1)) * (UNEVEN * s);
                 let off = (at + by_chance) * radius;
                 let cut = tangent * (CUT * radius * chance(leg, 2) * s);
-                (p + off.x * major + off.y * minor + cut, thin * radius * thick, minor, coordinates)
+                (
+                    p + off.x * major + off.y * minor + cut,
+                    thin * radius * thick,
+                    minor.as_vec3() * axis.length(),
+                    coordinates,
+                )
             };
             let places: Vec<Point> = (0..=last).map(place).collect();
             let mut made = from_points(strand.kind, strand.index, &places, flat);
@@ -401,7 +406,7 @@ impl Raised<'_> {
     }
 
     fn at(&self, p: DVec3, bloom: f64, near: Point) -> Point {
-        (p, self.radius() * bloom, self.direction(1.0, 0.0, 0.0), near.3)
+        (p, self.radius() * bloom, self.direction(1.0, 0.0, 0.0).as_vec3(), near.3)
     }
 
     /// A leg that stands up from `from`, which is at `place` along the yarn, in crossings, and leans from the middle of its wale.

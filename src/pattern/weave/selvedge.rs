@@ -118,8 +118,9 @@ fn turn(way: &mut Vec<Point>, from: Point, to: Point, warp: &(f64, Vec<Point>), 
         let inwards = (half.length() * sin * DVec3::X - out * cos * half.normalize_or_zero()).normalize_or(DVec3::Z);
         // An axis has no sign; at both ends it is that of the pick.
         let pick = if 2 * k < TURN { from.2 } else { to.2 };
-        let flat = inwards * (1.0_f64).copysign(inwards.dot(pick)) * axis.length();
-        (p, wide, pick.lerp(flat, smooth_step(2.0 * share.min(1.0 - share))), coordinates)
+        let inwards = inwards.as_vec3();
+        let flat = inwards * 1.0_f32.copysign(inwards.dot(pick)) * axis.length();
+        (p, wide, pick.lerp(flat, smooth_step(2.0 * share.min(1.0 - share)) as f32), coordinates)
     }));
 }
 
@@ -419,7 +420,7 @@ impl Side<'_> {
 /// A point so far on the way from one to another.
 fn between(a: Point, b: Point, share: f64) -> Point {
     let coordinates = [0, 1].map(|k| a.3[k] + share as f32 * (b.3[k] - a.3[k]));
-    (a.0.lerp(b.0, share), a.1 + share * (b.1 - a.1), a.2.lerp(b.2, share), coordinates)
+    (a.0.lerp(b.0, share), a.1 + share * (b.1 - a.1), a.2.lerp(b.2, share as f32), coordinates)
 }
 
 /// Leads the way on to `next` and along it.
@@ -435,7 +436,7 @@ fn join(way: &mut Vec<Point>, next: &[Point], nodes: usize) {
         // Hermite's cubic.
         let p = t * t * ((1.0 + 2.0 * s) * from.0 + s * a) + s * s * ((1.0 + 2.0 * t) * to.0 - t * b);
         let coordinates = if s < 0.5 { from.3 } else { to.3 };
-        way.push((p, from.1 + s * (to.1 - from.1), from.2.lerp(to.2, s), coordinates));
+        way.push((p, from.1 + s * (to.1 - from.1), from.2.lerp(to.2, s as f32), coordinates));
     }
     way.extend(next);
 }

@@ -323,6 +323,11 @@ fn stranding(table: &Reader<'_>) -> Stranding {
     Stranding { catch: (catch > 0).then_some(catch), carry }
 }
 
+/// Width over height to which stitches press yarns.
+pub(super) fn flatten(table: &Reader<'_>) -> f64 {
+    table.f64_or("flatten", knit::FLATTEN, Range::between(1.0, 2.0))
+}
+
 /// How the colours of a knit on a garment are worked; `None` where one yarn changes its colour.
 pub(super) fn work_of_tile(table: &Reader<'_>) -> Option<Stranding> {
     let stranded = table.one_of_or("color_work", true, &[("stranded", true), ("printed", false)]);
@@ -354,8 +359,7 @@ fn counted(
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
     let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
     let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
-    let flatten = table.f64_or("flatten", knit::FLATTEN, Range::between(1.0, 2.0));
-    let yarn = yarns.thickness(flatten);
+    let yarn = yarns.thickness(flatten(table));
     let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
     let edges = table.one_of_or("edges", Edges::Finished, &kinds);
     let tile = table.bool_or("tile", false);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        super::{FabricMotion, GarmentFacts, Taken},
+        super::{FabricMotion, GarmentFacts, Taken, Yarn},
         Context,
         cloth::Detail,
         color::{ColorPlan, FabricCoordinates},
@@ -65,7 +65,7 @@ impl GarmentPlan {
         detail: &Detail,
         warnings: &mut Vec<String>,
     ) -> Option<(Vec<MadePanels>, GarmentFacts)> {
-        let cloths = self.cloths(radius, context, library, warnings);
+        let cloths = self.cloths((library.yarns.get(yarn), radius), context, library, warnings);
         let frames = Frames::find(&self.path, detail);
         let (read, own_unit) = self.read(&frames, context)?;
         let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
@@ -130,17 +130,18 @@ impl GarmentPlan {
         Some((self.made(first, [later, flow], at_rest, (&sizes, &extents, &names), own), facts))
     }
 
-    /// The relaxed tile of each rule, for yarns of `radius` where the rule names none.
+    /// The relaxed tile of each rule, of the garment's yarn of a radius where the rule names none.
     fn cloths(
         &self,
-        radius: f64,
+        own: (Option<&Yarn>, f64),
         context: &Context<'_>,
         library: &Library,
         warnings: &mut Vec<String>,
     ) -> Option<Vec<Cloth>> {
         let made = self.rules.iter().map(|rule| {
             let yarn = rule.yarn.as_ref().and_then(|name| library.yarns.get(name));
-            let tile = rule.cloth.tile(rule.stitch, yarn.map_or(radius, |yarn| yarn.radius), context, warnings)?;
+            let tile =
+                rule.cloth.tile(rule.stitch, yarn.map_or(own, |yarn| (Some(yarn), yarn.radius)), context, warnings)?;
             let (group, points) = (rule.group.clone(), rule.cloth.points);
             Some(Cloth { group, tile, grain: rule.grain, points, seam: rule.seam })
         });

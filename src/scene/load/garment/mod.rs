@@ -25,6 +25,7 @@ use crate::{
         tile::Tile,
         weave::{FLATTEN, Impossible, Weave},
     },
+    scene::Yarn,
 };
 
 /// Control points of a stitch unless asked otherwise.
@@ -38,6 +39,7 @@ enum Pattern {
     Knit {
         chart: Chart,
         yarn_per_stitch: Option<f64>,
+        flatten: f64,
         stranding: Option<Stranding>,
     },
     /// A draft, how its threads differ, the warp's share of the crimp, and how flat yarns are.
@@ -203,9 +205,10 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
     let made = match kind {
         Some(0) => {
             let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+            let flatten = pattern::flatten(&table);
             let stranding = pattern::work_of_tile(&table);
             let (name, chart, _) = pattern::chart(&table, context);
-            chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, stranding }))
+            chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, flatten, stranding }))
         }
         Some(1) => {
             let crimp = table.f64("crimp", Range::UNIT);
@@ -229,7 +232,8 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
         }
         Some(_) => {
             let stranding = pattern::work_of_tile(&table);
-            let knit = |chart| Pattern::Knit { chart, yarn_per_stitch: None, stranding };
+            let flatten = pattern::flatten(&table);
+            let knit = |chart| Pattern::Knit { chart, yarn_per_stitch: None, flatten, stranding };
             Chart::named("stockinette").map(|chart| ("stockinette".to_owned(), knit(chart)))
         }
         None => None,
@@ -240,35 +244,41 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
 }
 
 impl ClothPlan {
-    /// What repeats, mm, of yarn of a radius.
+    /// What repeats, mm, of yarn of a radius; fibres, which are no yarn, stay round.
     fn tile(
         &self,
         stitch: Option<DVec2>,
-        radius: f64,
+        (yarn, radius): (Option<&Yarn>, f64),
         context: &Context<'_>,
         warnings: &mut Vec<String>,
     ) -> Option<Tile> {
         let d = 2.0 * radius;
+        let half_width = yarn.map_or(1.0, Yarn::half_width);
+        let pressed = |flatten: f64| if yarn.is_some() { flatten } else { 1.0 };
         let tell = |problem: String, hint: &str| {
             context.error(self.span, problem, Some(hint.to_owned()));
             None
         };
         match &self.pattern {
-            Pattern::Knit { chart, yarn_per_stitch, .. } => {
+            Pattern::Knit { chart, yarn_per_stitch, flatten, .. } => {
+                let yarn = Thickness { radius, half_width, flatten: pressed(*flatten) };
+                let unit = yarn.pressed();
                 let length = yarn_per_stitch
-                    .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / d))
+                    .map(|diameters| diameters * d / unit)
+                    .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / unit))
                     .unwrap_or(knit::YARN_PER_STITCH);
                 if let Some(s) = stitch {
-                    if let Err(misfit) = fits_stitch(s.x / d, s.y / d, &Thickness::round(radius)) {
+                    if let Err(misfit) = fits_stitch(s.x / unit, s.y / unit, &yarn) {
                         return tell(misfit.problem, &misfit.hint);
                     }
-                    if length > LOOSEST {
+                    let diameters = length * unit / d;
+                    if diameters > LOOSEST {
                         warnings.push(format!(
                             "the yarn is thin for this gauge: a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, \
-                             {length:.1} diameters of {d:.3} mm; the cloth will be a net",
+                             {diameters:.1} diameters of {d:.3} mm; the cloth will be a net",
                             s.x,
                             s.y,
-                            length * d
+                            length * unit
                         ));
                     }
                 }
@@ -277,8 +287,8 @@ impl ClothPlan {
                     stitches: 1,
                     rows: 1,
                     form: Form::Flat,
-                    stitch_width: stitch.map(|s| s.x / d),
-                    row_height: stitch.map(|s| s.y / d),
+                    stitch_width: stitch.map(|s| s.x / unit),
+                    row_height: stitch.map(|s| s.y / unit),
                     yarn_per_stitch: Some(length.clamp(6.0, 60.0)),
                     edges: Edges::Live,
                     rims: knit::Rims::default(),
@@ -286,14 +296,14 @@ impl ClothPlan {
                     colors: None,
                     flat: true,
                 };
-                match Tile::of_knit(&knit, d) {
+                match Tile::of_knit(&knit, &yarn) {
                     Ok(tile) => Some(tile),
                     Err(error) => tell(error.problem, &error.hint),
                 }
             }
             Pattern::Weave { draft, threads, crimp, flatten } => {
                 let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
-                let own = Weave::of(draft.clone(), radius);
+                let own = Weave { half_width: [half_width; 2], ..Weave::of(draft.clone(), radius * half_width) };
                 let (crimp, flatten, threads) = (*crimp, *flatten, threads.clone());
                 let weave = Weave { warp_spacing, weft_spacing, crimp, flatten, threads, ..own };
                 match Tile::of_weave(&weave) {
