@@ -1,10 +1,9 @@
 //! How many fibres of a ply a line meets, and where along it (docs/model.md, section 2).
 //!
 //! A ply's fibres do not lie evenly: discs that must not overlap line up at the wall, and loosely spun fibres gather at
-//! the axis. One number says how much, the *crowding* q = 2 <r^2> / R_c^2 - 1 of the distances r of the fibres' centres
-//! from the ply's axis, where R_c is the radius within which they lie. It is 0 where they are even. For q > 0 a share q
-//! of the fibres is taken to lie on the circle r = R_c and the rest even; for q < 0 their density falls as
-//! 1 - 3 q (1 - 2 r^2 / R_c^2). Both have the second moment that was measured.
+//! the axis. The *crowding* q says how much. For q > 0 a share q of the fibres is taken to lie on a circle at the wall and the rest
+//! even; for q < 0 their density falls as 1 - 3 q (1 - 2 r^2 / R_c^2) with the distance r from the ply's axis, where R_c is the
+//! radius within which the centres lie. Either has the second moment 2 <r^2> / R_c^2 - 1 = q, if the circle is that of R_c.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
@@ -15,9 +14,13 @@ use super::yarn::PlyShape;
 pub struct PlyPacking {
     /// q, above -1 and at most 1; below -1/3 it counts as -1/3, where no fibre is left at the wall.
     pub crowding: f64,
+    /// How far inside R_c the circle lies on which fibres crowd, in fibre radii; 0 where q is not above 0.
+    pub depth: f64,
     /// How much more regular than chance what a line meets is, because fibres keep out of each other: the dead zone after each
     /// fibre, over the share of the line that lies inside fibres. 0 where they lie at random.
     pub regularity: f64,
+    /// The same of lines by the rim, where fibres lie in another order.
+    pub rim: f64,
 }
 
 /// What of [`PlyPacking`] is known, and not to be measured.
@@ -64,7 +67,15 @@ impl PlyShape {
         let mut ring = 0.0;
         if self.crowding > 0.0 {
             even *= 1.0 - self.crowding;
-            ring = self.crowding * (upper.angle - lower.angle);
+            let between = match self.depth {
+                0.0 => upper.angle - lower.angle,
+                depth => {
+                    let inverse = 1.0 / (core - depth * half_width).max(1e-3 * core);
+                    let angle = |u: f32| Segment::new(u * inverse).angle;
+                    angle(offset + half_width) - angle(offset - half_width)
+                }
+            };
+            ring = self.crowding * between;
         } else if self.crowding < 0.0 {
             even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper.cubic() - lower.cubic());
         }
@@ -80,12 +91,17 @@ impl PlyShape {
 
 impl PlyShape {
     /// The dead zone after each fibre that a chord of [`Self::chord`] meets, in expected fibres: the share of the whole line through
-    /// the ply that lies inside fibres, a mean chord pi / 2 r_f in each, times [`PlyPacking::regularity`]; at most 0.85.
+    /// the ply that lies inside fibres, a mean chord pi / 2 r_f in each, times [`PlyPacking::regularity`], or by the rim
+    /// [`PlyPacking::rim`]; at most 0.85.
     #[inline]
     pub fn dead_zone(&self, chord: &ChordFibers, offset: f32, length: f32) -> f32 {
         let line = 2.0 * (self.radius * self.radius - offset * offset).max(0.0).sqrt();
         let inside = FRAC_PI_2 * self.fiber_radius * chord.total() * length;
-        (self.regularity * inside / line.max(1e-12)).min(0.85)
+        // From two fibres below the rim on order is that of the inside.
+        let depth = (self.radius - offset.abs()) / self.fiber_radius;
+        let by_rim = (2.0 - 0.5 * depth).clamp(0.0, 1.0);
+        let regularity = self.regularity + by_rim * (self.rim - self.regularity);
+        (regularity * inside / line.max(1e-12)).min(0.85)
     }
 }
 

@@ -90,8 +90,12 @@ pub struct PlyShape {
     pub fiber_rate: f32,
     /// How much fibres crowd at the wall, or with a minus sign at the axis: see [`super::density`].
     pub crowding: f32,
+    /// How deep below the wall: [`PlyPacking::depth`].
+    pub depth: f32,
     /// How regularly a line meets fibres: [`PlyPacking::regularity`].
     pub regularity: f32,
+    /// The same by the rim: [`PlyPacking::rim`].
+    pub rim: f32,
 }
 
 /// The cross-section of a yarn and how it turns along it.
@@ -138,7 +142,9 @@ impl YarnShape {
                     fibers: p.fibers as f32,
                     fiber_rate: (p.fiber_twist.tan() / p.radius) as f32,
                     crowding: 0.0,
+                    depth: 0.0,
                     regularity: 1.0,
+                    rim: 1.0,
                 }
             })
             .collect();
@@ -166,7 +172,9 @@ impl YarnShape {
         assert_eq!(self.plies.len(), packings.len(), "one packing for each ply");
         for (ply, packing) in self.plies.iter_mut().zip(packings) {
             ply.crowding = packing.crowding as f32;
+            ply.depth = packing.depth as f32;
             ply.regularity = packing.regularity as f32;
+            ply.rim = packing.rim as f32;
         }
         self
     }

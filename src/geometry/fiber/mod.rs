@@ -412,22 +412,26 @@ fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
 }
 
 impl Placement {
-    /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.005 or so,
-    /// and the regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
+    /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.01 or so, and the
+    /// regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
     pub fn packing_of(self, ply: &PlyParameters, known: KnownPacking, stretch: f64) -> PlyPacking {
         if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
-            return PlyPacking { crowding, regularity };
+            return PlyPacking { crowding, depth: 0.0, regularity, rim: regularity };
         }
         let core = ply.radius - ply.fiber_radius;
         let fiber = ply.fiber_radius / core;
         let measured = match self {
-            _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, regularity: 1.0 },
+            _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 },
             Self::Regular => packing::measured(ply.fibers, fiber, stretch_of_both(stretch, ply.aspect.recip())),
-            Self::Measured(distribution) => PlyPacking { crowding: distribution.crowding(fiber), regularity: 0.0 },
+            Self::Measured(distribution) => {
+                PlyPacking { crowding: distribution.crowding(fiber), depth: 0.0, regularity: 0.0, rim: 0.0 }
+            }
         };
         PlyPacking {
             crowding: known.crowding.unwrap_or(measured.crowding),
+            depth: if known.crowding.is_some() { 0.0 } else { measured.depth },
             regularity: known.regularity.unwrap_or(measured.regularity),
+            rim: known.regularity.unwrap_or(measured.rim),
         }
     }
 }

@@ -8,9 +8,9 @@ use super::yielding::{Ellipse, Yielding};
 
 use crate::{
     geometry::{
-        density::PlyPacking,
+        density::{ChordFibers, PlyPacking},
         occluder::PlyGaps,
-        yarn::{PlyParameters, YarnShape},
+        yarn::{PlyParameters, PlyShape, YarnShape},
     },
     math::sampler::Stream,
 };
@@ -35,9 +35,10 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
 /// How the packings that [`hard_discs`] makes lie, from some of them; `radius` is in core radii. Where `stretch`, the long over
 /// the short axis of their ply's section, is above 1, discs have given way to each other as [`Yielding`] has it.
 ///
-/// The crowding is 2 <r^2> - 1 of the centres' distances r from the middle, in the ellipse that they fill. The regularity is that
-/// with which the gaps of [`PlyGaps`] pass as much as lines in all directions through the packings do, by least squares of the
-/// roots over the ply's width.
+/// The crowding and its depth are those with which lines by the rim meet as many discs as they do, by least squares of what would
+/// pass if these lay at random. The regularity is that with which the gaps of [`PlyGaps`] pass as much as pieces of lines away from the
+/// rim do; that by the rim with which they pass as much as lines in all directions through the packings, by least squares of the roots
+/// over the ply's width.
 ///
 /// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
@@ -47,7 +48,7 @@ pub fn measured(count: u32, radius: f64, stretch: f64) -> PlyPacking {
     // The same area fraction of the ply, whose radius is 1 + radius.
     let share = radius / (1.0 + radius) / fewer;
     if packed == 0 || share >= 1.0 {
-        return PlyPacking { crowding: 0.0, regularity: 1.0 };
+        return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 };
     }
     let radius = share / (1.0 - share);
     let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
@@ -58,11 +59,14 @@ pub fn measured(count: u32, radius: f64, stretch: f64) -> PlyPacking {
         None => packings,
         Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, ellipse)).collect(),
     };
+    let lines = Lines { radius, stretch: if pressed.is_some() { stretch } else { 1.0 } };
+    let mut ply = lines.ply(packed);
+    lines.fit_wall(&sections, &mut ply);
     let core = pressed.as_ref().map_or(DVec2::ONE, |ellipse| ellipse.core(share) / (1.0 - share));
-    let squares: f64 = sections.iter().flatten().map(|at| (at / core).length_squared()).sum();
-    let crowding = 2.0 * squares / (sections.len() as f64 * f64::from(packed)) - 1.0;
-    let stretch = if pressed.is_some() { stretch } else { 1.0 };
-    PlyPacking { crowding: crowding * fewer, regularity: regularity(&sections, radius, crowding, stretch) }
+    let regularity = lines.inside(&sections, core);
+    ply.regularity = regularity as f32;
+    let rim = lines.rim(&sections, &mut ply);
+    PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim }
 }
 
 /// A packing in an ellipse, at some turns; in core radii, as the packing. `share` is a disc's radius over the ply's.
@@ -84,72 +88,210 @@ const MOST_PACKINGS: u32 = 100;
 /// At how many turns a packing is squeezed.
 const TURNS: u32 = 4;
 
-/// Of sections whose long axis, x, is `stretch` times the short one.
-fn regularity(sections: &[Vec<DVec2>], radius: f64, crowding: f64, stretch: f64) -> f64 {
-    const LINES: usize = 24;
-    const ANGLES: usize = 64;
-    // In an ellipse, angles of one quarter are like those of another; in a circle all are alike.
-    const QUARTER: usize = ANGLES / 4 + 1;
-    let kind = |angle: usize| match angle % (ANGLES / 2) {
-        _ if stretch == 1.0 => 0,
-        half => half.min(ANGLES / 2 - half),
-    };
-    let root = stretch.sqrt();
-    let across = |angle: usize| DVec2::from_angle(TAU * angle as f64 / ANGLES as f64);
-    // How far the section reaches beside a line, and how much of the circle a unit of it passes, in radii of the circle.
-    let reach =
-        |across: DVec2| if stretch == 1.0 { 1.0 } else { DVec2::new(root * across.x, across.y / root).length() };
-    let offset = |line: usize| (1.0 + radius) * (line as f64 + 0.5) / LINES as f64;
-    let mut clear = [[0u32; LINES]; QUARTER];
-    let mut angles = [0u32; QUARTER];
-    for angle in 0..ANGLES {
-        let (across, clear) = (across(angle), &mut clear[kind(angle)]);
-        let reach = reach(across);
-        angles[kind(angle)] += 1;
-        for discs in sections {
-            let mut met = [false; LINES];
-            for disc in discs {
-                let at = disc.dot(across);
-                for (line, met) in met.iter_mut().enumerate() {
-                    *met |= (at - reach * offset(line)).abs() < radius;
+/// Lines in all directions through sections of discs of a radius whose long axis, x, is `stretch` times the short one; as seen in
+/// the circle of radius 1 that their centres fill when the axes are made equal.
+struct Lines {
+    radius: f64,
+    stretch: f64,
+}
+
+/// Directions of lines. In an ellipse those of one quarter are like those of another; in a circle all are alike.
+const ANGLES: usize = 64;
+const QUARTER: usize = ANGLES / 4 + 1;
+
+impl Lines {
+    /// A ply of so many discs that is such a section.
+    fn ply(&self, discs: u32) -> PlyShape {
+        let parameters = PlyParameters {
+            radius: 1.0 + self.radius,
+            aspect: 1.0,
+            distance: 0.0,
+            angle: 0.0,
+            fibers: discs,
+            fiber_radius: self.radius,
+            fiber_twist: 0.0,
+        };
+        YarnShape::new(&[parameters], 0.0, true).plies.remove(0)
+    }
+
+    /// Which directions are alike.
+    fn kind(&self, angle: usize) -> usize {
+        match angle % (ANGLES / 2) {
+            _ if self.stretch == 1.0 => 0,
+            half => half.min(ANGLES / 2 - half),
+        }
+    }
+
+    /// How many directions there are of each kind.
+    fn of_kind(&self) -> [u32; QUARTER] {
+        let mut angles = [0; QUARTER];
+        (0..ANGLES).for_each(|angle| angles[self.kind(angle)] += 1);
+        angles
+    }
+
+    fn across(angle: usize) -> DVec2 {
+        DVec2::from_angle(TAU * angle as f64 / ANGLES as f64)
+    }
+
+    /// How far the section reaches beside lines across which a direction is, in radii of the circle.
+    fn reach(&self, across: DVec2) -> f64 {
+        let root = self.stretch.sqrt();
+        if self.stretch == 1.0 { 1.0 } else { DVec2::new(root * across.x, across.y / root).length() }
+    }
+
+    /// What a line of a kind meets at a distance from the middle, its fibres counted as they are, and how much of the circle a unit
+    /// of it passes.
+    fn chord(&self, ply: &PlyShape, kind: usize, offset: f64) -> (ChordFibers, f32) {
+        let (root, reach) = (self.stretch.sqrt(), self.reach(Self::across(kind)));
+        let length = (root * reach) as f32;
+        (ply.chord(offset as f32, length, root.recip() as f32, reach.recip() as f32), length)
+    }
+
+    /// How many of a chord's fibres a line meets, which are thinner along it than the circle's.
+    fn met(&self, chord: &ChordFibers) -> f64 {
+        f64::from(chord.total()) * self.stretch.sqrt()
+    }
+
+    /// Looks at lines at some distances in all directions: tells the direction's kind, and for each line how many discs of a section
+    /// it meets.
+    fn look(&self, sections: &[Vec<DVec2>], offsets: &[f64], mut tell: impl FnMut(usize, &[u32])) {
+        let mut met = vec![0; offsets.len()];
+        for angle in 0..ANGLES {
+            let (across, kind) = (Self::across(angle), self.kind(angle));
+            let reach = self.reach(across);
+            for discs in sections {
+                met.fill(0);
+                for disc in discs {
+                    let at = disc.dot(across);
+                    for (offset, met) in offsets.iter().zip(&mut met) {
+                        *met += u32::from((at - reach * offset).abs() < self.radius);
+                    }
                 }
-            }
-            for (clear, met) in clear.iter_mut().zip(met) {
-                *clear += u32::from(!met);
+                tell(kind, &met);
             }
         }
     }
-    let parameters = PlyParameters {
-        radius: 1.0 + radius,
-        aspect: 1.0,
-        distance: 0.0,
-        angle: 0.0,
-        fibers: sections[0].len() as u32,
-        fiber_radius: radius,
-        fiber_twist: 0.0,
-    };
-    let mut ply = YarnShape::new(&[parameters], 0.0, true).plies.remove(0);
-    ply.crowding = crowding as f32;
-    let thin = root.recip() as f32;
-    let mut error = |regularity: f64| -> f64 {
-        ply.regularity = regularity as f32;
-        let of_kind = |kind: usize| {
-            let lines = sections.len() as f64 * f64::from(angles[kind]);
-            let length = (root * reach(across(kind))) as f32;
-            let off = |line: usize| {
-                let at = offset(line) as f32;
-                let chord = ply.chord(at, length, thin, reach(across(kind)).recip() as f32);
-                let gaps = PlyGaps::new(ply.dead_zone(&chord, at, length));
-                let passes = gaps.unscattered(chord.total() / thin);
-                f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / lines).sqrt()
+
+    /// Gives a ply the crowding with which lines by its rim meet as many fibres as they do.
+    fn fit_wall(&self, sections: &[Vec<DVec2>], ply: &mut PlyShape) {
+        // From the rim as far in as one fibre and a half reach, which is where light comes in and goes out.
+        const LINES: usize = 30;
+        const STEP: f64 = 0.1;
+        const DEPTHS: usize = 11;
+        const DEPTH_STEP: f64 = 0.05;
+        const MOST: f64 = 0.6;
+        let offsets: [f64; LINES] = std::array::from_fn(|line| 1.0 + self.radius * (1.0 - STEP * (line as f64 + 0.5)));
+        let mut met = [[0u64; LINES]; QUARTER];
+        self.look(sections, &offsets, |kind, counts| {
+            met[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u64::from(*count));
+        });
+        let angles = self.of_kind();
+        let mut error = |crowding: f64, depth: f64| -> f64 {
+            (ply.crowding, ply.depth) = (crowding as f32, depth as f32);
+            let of_kind = |kind: usize| {
+                let lines = sections.len() as f64 * f64::from(angles[kind]);
+                let off = |line: usize| {
+                    let found = self.met(&self.chord(ply, kind, offsets[line]).0);
+                    (-found).exp() - (-(met[kind][line] as f64) / lines).exp()
+                };
+                f64::from(angles[kind]) * (0..LINES).map(|line| off(line).powi(2)).sum::<f64>()
             };
-            f64::from(angles[kind]) * (0..LINES).map(|line| off(line).powi(2)).sum::<f64>()
+            (0..QUARTER).filter(|&kind| angles[kind] > 0).map(of_kind).sum()
         };
-        (0..QUARTER).filter(|&kind| angles[kind] > 0).map(of_kind).sum()
-    };
-    // The error has one least value; steps of a hundredth are finer than it is known.
-    let tries = (1..=300).map(|i| 0.01 * f64::from(i));
-    tries.map(|s| (s, error(s))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1.0, |best| best.0)
+        let mut best = (f64::INFINITY, 0.0, 0.0);
+        for depth in (0..DEPTHS).map(|k| DEPTH_STEP * k as f64) {
+            // For a depth the error has one least value.
+            let (mut low, mut high) = (0.0, MOST);
+            for _ in 0..24 {
+                let third = (high - low) / 3.0;
+                if error(low + third, depth) < error(high - third, depth) {
+                    high -= third;
+                } else {
+                    low += third;
+                }
+            }
+            let crowding = 0.5 * (low + high);
+            let found = error(crowding, depth);
+            if found < best.0 {
+                best = (found, crowding, depth);
+            }
+        }
+        (ply.crowding, ply.depth) = (best.1 as f32, best.2 as f32);
+    }
+
+    /// The regularity with which gaps between fibres pass as much as pieces of lines away from the rim do, or 1 where there is no room
+    /// for these. `core` has the semi-axes of what centres fill.
+    fn inside(&self, sections: &[Vec<DVec2>], core: DVec2) -> f64 {
+        // Pieces that meet about so many fibres: longer ones pass next to nothing.
+        const MET: [f64; 2] = [1.1, 2.2];
+        const PIECES: usize = 20_000;
+        // How far from the middle they reach, in core radii, and the longest of them.
+        const REACH: f64 = 0.75;
+        const LONGEST: f64 = 1.2;
+        let share = self.radius / (1.0 + self.radius);
+        let fraction = sections[0].len() as f64 * share * share;
+        let mut stream = Stream::new(0x51de);
+        let mut next = || f64::from(stream.next());
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for wanted in MET {
+            let length = wanted * 0.5 * PI * self.radius / fraction;
+            if length > LONGEST {
+                continue;
+            }
+            let (mut met, mut clear) = (0u64, 0u64);
+            for k in 0..PIECES {
+                let at = next().sqrt() * (REACH - 0.5 * length).max(0.1) * DVec2::from_angle(TAU * next()) * core;
+                let along = DVec2::from_angle(TAU * next());
+                let is_met = |disc: &&DVec2| {
+                    let way = **disc - at;
+                    way.dot(along).abs() < 0.5 * length && way.perp_dot(along).abs() < self.radius
+                };
+                let count = sections[k % sections.len()].iter().filter(is_met).count() as u64;
+                met += count;
+                clear += u64::from(count == 0);
+            }
+            let (met, clear) = (met as f64 / PIECES as f64, clear as f64 / PIECES as f64);
+            // What passes falls with the dead zone.
+            let (mut low, mut high) = (0.0, 0.95);
+            for _ in 0..24 {
+                let zone = 0.5 * (low + high);
+                let passes = f64::from(PlyGaps::new(zone as f32).unscattered(met as f32));
+                (low, high) = if passes > clear { (zone, high) } else { (low, zone) };
+            }
+            sum += 0.5 * (low + high) / fraction;
+            weight += 1.0;
+        }
+        if weight > 0.0 { sum / weight } else { 1.0 }
+    }
+
+    /// The regularity by the rim with which gaps between the fibres of a ply pass as much as lines through sections do.
+    fn rim(&self, sections: &[Vec<DVec2>], ply: &mut PlyShape) -> f64 {
+        const LINES: usize = 24;
+        let offsets: [f64; LINES] =
+            std::array::from_fn(|line| (1.0 + self.radius) * (line as f64 + 0.5) / LINES as f64);
+        let mut clear = [[0u32; LINES]; QUARTER];
+        self.look(sections, &offsets, |kind, counts| {
+            clear[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u32::from(*count == 0));
+        });
+        let angles = self.of_kind();
+        let mut error = |rim: f64| -> f64 {
+            ply.rim = rim as f32;
+            let of_kind = |kind: usize| {
+                let lines = sections.len() as f64 * f64::from(angles[kind]);
+                let off = |line: usize| {
+                    let (chord, length) = self.chord(ply, kind, offsets[line]);
+                    let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));
+                    let passes = gaps.unscattered(self.met(&chord) as f32);
+                    f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / lines).sqrt()
+                };
+                f64::from(angles[kind]) * (0..LINES).map(|line| off(line).powi(2)).sum::<f64>()
+            };
+            (0..QUARTER).filter(|&kind| angles[kind] > 0).map(of_kind).sum()
+        };
+        // The error has one least value; steps of a hundredth are finer than it is known.
+        let tries = (0..=300).map(|i| 0.01 * f64::from(i));
+        tries.map(|s| (s, error(s))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1.0, |best| best.0)
+    }
 }
 
 /// A point of the unit disc.
@@ -316,7 +458,44 @@ mod tests {
         let (loose, dense) = (of(100, 0.2), of(100, 0.6));
         assert!((1.2..1.7).contains(&loose) && (0.4..1.1).contains(&dense), "{loose} {dense}");
         // Thin fibres are packed as fewer thick ones of the same share.
-        assert_eq!(of(10_000, 0.4), of(1_000, 0.4));
+        assert!((of(10_000, 0.4) - of(1_000, 0.4)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
+        // Others than those that are measured, down to one fibre and a half below the rim.
+        for (count, density) in [(78u32, 0.2f64), (78, 0.4), (78, 0.6), (60, 0.35), (25, 0.5), (200, 0.55)] {
+            let fiber = (density / f64::from(count)).sqrt();
+            let radius = fiber / (1.0 - fiber);
+            let lines = Lines { radius, stretch: 1.0 };
+            let packing = measured(count, radius, 1.0);
+            let mut ply = lines.ply(count);
+            (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
+            (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
+            let packings: Vec<_> = (500..560).map(|seed| hard_discs(count, radius, &mut Stream::new(seed))).collect();
+            let offsets: Vec<f64> = (0..15).map(|k| 1.0 + radius * (0.9 - 0.2 * f64::from(k))).collect();
+            let (mut met, mut clear, mut looks) = (vec![0.0; 15], vec![0.0; 15], 0.0);
+            lines.look(&packings, &offsets, |_, counts| {
+                looks += 1.0;
+                for (k, count) in counts.iter().enumerate() {
+                    met[k] += f64::from(*count);
+                    clear[k] += f64::from(u8::from(*count == 0));
+                }
+            });
+            let (mut off, mut passed, mut found, mut want) = (0.0, 0.0, 0.0, 0.0);
+            for (k, offset) in offsets.iter().enumerate() {
+                let (chord, length) = lines.chord(&ply, 0, *offset);
+                let (model, counted) = ((-lines.met(&chord)).exp(), (-met[k] / looks).exp());
+                off += (model - counted).abs();
+                passed += counted;
+                let gaps = PlyGaps::new(ply.dead_zone(&chord, *offset as f32, length));
+                found += f64::from(gaps.unscattered(lines.met(&chord) as f32));
+                want += clear[k] / looks;
+            }
+            // By one number, the second moment, .05 to .25 off.
+            assert!(off < 0.08 * passed, "{count} at {density}: {off} of {passed}");
+            assert!((found / want - 1.0).abs() < 0.16, "{count} at {density}: {found} {want}");
+        }
     }
 
     #[test]
