@@ -21,8 +21,6 @@ mod calibrated {
     pub(super) const START_SHRINK: f64 = 0.4;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
-    /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
-    pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.5;
 }
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
@@ -182,8 +180,8 @@ impl PlyOptics {
         let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * extinction(c) * fiber;
         let escape = |c: usize| escape::past_itself(escape_probability_of_disc(radius_optical(c)), own_escape(c));
         let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
-        let taken_back = |neighbours: f64, c: usize| neighbours * (escape(c) * radius_optical(c) * PI / 2.0).min(1.0);
-        let escape_yarn = |c: usize| escape(c) * (1.0 - taken_back(neighbours, c));
+        let taken_back = |c: usize| neighbours * (escape(c) * radius_optical(c) * PI / 2.0).min(1.0);
+        let escape_yarn = |c: usize| escape(c) * (1.0 - taken_back(c));
         let closure = |escape: f64, c: usize| {
             let gain = albedo(c) * escape;
             // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
@@ -203,8 +201,7 @@ impl PlyOptics {
                 apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
                 albedo: (1.0 - absorbed).clamp(0.0, 1.0),
                 first: albedo(c),
-                sent_back: taken_back(calibrated::NEIGHBOURS_AT_ONCE * neighbours, c),
-                taken_back: taken_back(neighbours, c),
+                taken_back: taken_back(c),
             }
         });
         // Of what a fibre sends out of a chain: the share that it reflects, and of a ply's events: those that another follows.

@@ -10,6 +10,7 @@ use crate::scattering::testing::{material, section};
 fn around(fibers: u32, density: f64, m: &FiberMaterial) -> [[f64; 3]; 6] {
     let mut shape = crate::geometry::yarn::tests::touching_yarn(1, fibers, density, 0.0, 0.0);
     (shape.plies[0].crowding, shape.plies[0].regularity) = (0.05, 0.8);
+    shape.plies[0].rim = 0.8;
     let yarn = AggregatedYarn::new(shape, &[m]);
     let (mut sums, mut all) = ([[0.0; 3]; 6], [0.0; 3]);
     let mut stream = Stream::new(4);

@@ -6,16 +6,19 @@ use glam::{Vec2, Vec3A};
 
 use super::{
     super::{
-        escape::Outwards,
+        escape::{Leaving, Outwards},
         kernel::{DIFFUSE, normalised_kernel, sample_sine, sample_sine_diffuse},
         lobe::LobeFrame,
         medium::PlyOptics,
         mis_weight,
     },
-    View,
-    single::Node,
+    Spot, View,
+    single::{Met, Node},
 };
-use crate::math::{Rgb, sampler::Stream};
+use crate::{
+    geometry::section::{Inside, PlyAhead},
+    math::{Rgb, sampler::Stream},
+};
 
 /// Multiply scattered light of a vertex, made when first asked for: a path that goes on from the node may never do.
 #[derive(Clone, Debug)]
@@ -41,20 +44,33 @@ pub(super) struct Lobe {
     again: Option<Again>,
 }
 
-/// Light that left the node's ply in a direction drawn from its lobe, as far as other plies took it up.
+/// Light that left the node's ply in a direction drawn from its lobe, and what other plies gave off that took it up: the first of
+/// them, past others, and the one after it, whatever lies there.
 #[derive(Clone, Copy, Debug)]
 struct Again {
-    /// The direction, B's value over density there, and its density.
+    ways: [Drawn; 2],
+    meetings: [Meeting; 2],
+}
+
+/// A direction that light took.
+#[derive(Clone, Copy, Debug)]
+struct Drawn {
     direction: Vec3A,
+    /// Value there, past other plies, over density, and the density.
     weight: Rgb,
     pdf: f32,
-    /// Chance that it goes on in this direction.
+    /// Chance that it goes on so.
     open: f32,
-    /// Energy that other plies took up and give off.
-    energy: Rgb,
-    /// How they do, as the lobe's own.
+}
+
+/// Light that a ply gives off around the place on its rim where it came.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    spot: Spot,
+    /// As the lobe's own.
     axes: [Vec2; 2],
     outwards: Outwards,
+    energy: Rgb,
 }
 
 impl Backward {
@@ -81,20 +97,7 @@ impl Lobe {
         let axes = axes_across(&frame, axes);
         let mut lobe = Self { frame, axes, outwards, energy, chance: 1.0 - node.drawn.escape, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
-            let w = lobe.draw(optics, stream);
-            let (value, pdf) = lobe.value(view, node.spot.ply, w);
-            if pdf > 0.0 {
-                let (open, rim) = node.others(view, w, stream);
-                let weight = value / pdf;
-                let inside = &node.spot.inside;
-                let (place, axes) = optics.leaving.place(rim.unwrap_or(Vec2::X), inside.short_axis_within());
-                let outwards = optics.leaving.draw(&place, stream);
-                let energy = weight * (Rgb::ONE - open) * node.leaves_again;
-                let chance = node.chance_out(open, node.leaves_again);
-                let axes = axes_across(&frame, axes.map(|axis| inside.out_of(axis)));
-                lobe.again =
-                    Some(Again { direction: w, weight: weight * open, pdf, open: chance, energy, axes, outwards });
-            }
+            lobe.again = lobe.again(view, node, stream);
         }
         lobe
     }
@@ -109,32 +112,32 @@ impl Lobe {
             let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
             latitude += optics.mirrored * (m - latitude);
         }
-        let around = optics.leaving.towards(self.outwards, self.azimuth(self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
+        let around =
+            optics.leaving.towards(self.outwards, azimuth(&self.frame, self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
         (self.energy * latitude * around, latitude.mean() * around.mean())
     }
 
-    /// Cosine and sine of the azimuth of `w` against the lobe's axes, but for a factor.
-    #[inline]
-    fn azimuth(&self, axes: [Vec2; 2], w: Vec3A) -> Vec2 {
-        let across = Vec2::new(w.dot(self.frame.x), w.dot(self.frame.y));
-        Vec2::new(across.dot(axes[0]), across.dot(axes[1]))
-    }
-
-    /// A direction by the sine of its latitude and by its azimuth against the lobe's axes.
-    #[inline]
-    fn direction(&self, sin: f32, azimuth: Vec2, axes: [Vec2; 2]) -> Vec3A {
-        let across = azimuth.x * axes[0] + azimuth.y * axes[1];
-        let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        cos * (across.x * self.frame.x + across.y * self.frame.y) + sin * self.frame.z
-    }
-
-    /// What comes back from other plies leaves towards `w` by the diffuse lobe about the axis: value for an energy of one, and
-    /// density, per steradian.
-    #[inline]
-    fn sent_back(&self, view: &View<'_>, ply: usize, again: &Again, w: Vec3A) -> (Rgb, f32) {
-        let around = view.yarn.plies[ply].leaving.towards(again.outwards, self.azimuth(again.axes, w));
-        let value = around * (DIFFUSE * self.frame.latitudes(w).1 * (0.5 * FRAC_1_PI));
-        (value, value.mean())
+    /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
+    fn again(&self, view: &View<'_>, node: &Node, stream: &mut Stream) -> Option<Again> {
+        let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
+        let (value, pdf) = self.value(view, node.spot.ply, w);
+        let (open, met) = node.others(view, w, stream);
+        let (way, rest) = Drawn::new(view, node, (w, value, pdf), open)?;
+        let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
+        let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), stream, |of| rest * of.entering_past);
+        let w = first.draw(view, &self.frame, stream);
+        let (value, pdf) = first.value(view, &self.frame, w);
+        let mut met = Met { ply: first.spot.ply, distance: 0.0 };
+        let mut all = 0.0;
+        let open = first.open(view, w, |way, fibers| {
+            all += fibers;
+            if stream.next() * all < fibers {
+                met = Met::of(way, view);
+            }
+        });
+        let (next, rest) = Drawn::new(view, node, (w, value, pdf), open)?;
+        let last = Meeting::new(view, &self.frame, (&first.spot.inside, w, met), stream, |of| rest * of.entering);
+        Some(Again { ways: [way, next], meetings: [first, last] })
     }
 
     /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
@@ -154,10 +157,18 @@ impl Lobe {
         match &self.again {
             None => first * mis_weight(light_pdf, chance * pdf),
             Some(again) => {
+                let [first_meeting, last] = &again.meetings;
+                let left = chance * (1.0 - again.ways[0].open);
+                let left_again = left * (1.0 - again.ways[1].open);
                 let goes_on = node.chance_out(open, node.leaves_again);
-                let (even, even_pdf) = self.sent_back(view, node.spot.ply, again, w);
-                first * open * mis_weight(light_pdf, chance * goes_on * pdf)
-                    + again.energy * even * mis_weight(light_pdf, chance * (1.0 - again.open) * even_pdf)
+                let mut all = first * open * mis_weight(light_pdf, chance * goes_on * pdf);
+                let (value, pdf) = first_meeting.value(view, &self.frame, w);
+                if value.max_channel() > 0.0 {
+                    let open = first_meeting.open(view, w, |_, _| {});
+                    all += value * open * mis_weight(light_pdf, left * node.chance_out(open, node.leaves_again) * pdf);
+                }
+                let (value, pdf) = last.value(view, &self.frame, w);
+                all + value * mis_weight(light_pdf, left_again * pdf)
             }
         }
     }
@@ -171,18 +182,22 @@ impl Lobe {
                 let (value, pdf) = self.value(view, node.spot.ply, w);
                 (w, value, pdf)
             }
-            Some(again) if stream.next() < again.open => {
-                (again.direction, again.weight * again.pdf, again.pdf * again.open)
-            }
             Some(again) => {
-                let sin = sample_sine_diffuse(u);
-                let w = self.direction(
-                    sin,
-                    view.yarn.plies[node.spot.ply].leaving.azimuth(again.outwards, stream),
-                    again.axes,
-                );
-                let (even, pdf) = self.sent_back(view, node.spot.ply, again, w);
-                (w, again.energy * even, pdf * (1.0 - again.open))
+                let mut chance = 1.0;
+                let mut taken = None;
+                for way in &again.ways {
+                    if stream.next() < way.open {
+                        taken = Some((way.direction, way.weight * way.pdf, way.pdf * way.open * chance));
+                        break;
+                    }
+                    chance *= 1.0 - way.open;
+                }
+                taken.unwrap_or_else(|| {
+                    let last = &again.meetings[1];
+                    let w = last.draw_by(view, &self.frame, u, stream);
+                    let (value, pdf) = last.value(view, &self.frame, w);
+                    (w, value, pdf * chance)
+                })
             }
         };
         (direction, value, pdf * self.chance)
@@ -201,8 +216,81 @@ impl Lobe {
         } else {
             sample_sine_diffuse(lat)
         };
-        self.direction(sin, optics.leaving.azimuth(self.outwards, stream), self.axes)
+        direction(&self.frame, sin, optics.leaving.azimuth(self.outwards, stream), self.axes)
     }
+}
+
+impl Drawn {
+    /// Light of a direction, value and density, which other plies let pass so far, and what they do not. `None` if there is none.
+    fn new(view: &View<'_>, node: &Node, (direction, value, pdf): (Vec3A, Rgb, f32), open: Rgb) -> Option<(Self, Rgb)> {
+        let weight = (pdf > 0.0).then(|| value / pdf)?;
+        let stays = view.yarn.plies[node.spot.ply].leaving.entering;
+        let way = Self { direction, weight: weight * open, pdf, open: node.chance_out(open, stays) };
+        Some((way, weight * (Rgb::ONE - open)))
+    }
+}
+
+impl Meeting {
+    /// Where light from a place meets a ply; `energy` says how much that gives off.
+    fn new(
+        view: &View<'_>,
+        frame: &LobeFrame,
+        (from, w, met): (&Inside, Vec3A, Met),
+        stream: &mut Stream,
+        energy: impl Fn(&Leaving) -> Rgb,
+    ) -> Self {
+        let shape = view.yarn.occluder().shape();
+        let leaving = &view.yarn.plies[met.ply].leaving;
+        let inside = view.section.beyond(shape, from, Vec3A::ZERO, w, met.distance);
+        let rim = inside.in_ply(shape, met.ply).normalize_or(Vec2::X);
+        let (place, axes) = leaving.place(rim, inside.short_axis_within());
+        Self {
+            axes: axes_across(frame, axes.map(|axis| inside.out_of(axis))),
+            outwards: leaving.draw(&place, stream),
+            energy: energy(leaving),
+            spot: Spot::new(view, met.ply, 0.0, inside),
+        }
+    }
+
+    /// Value (with the cosine) and density, 1/steradian, of light that leaves the ply towards `w`, whatever lies there: by the
+    /// diffuse lobe about the node's axis.
+    #[inline]
+    fn value(&self, view: &View<'_>, frame: &LobeFrame, w: Vec3A) -> (Rgb, f32) {
+        let around = view.yarn.plies[self.spot.ply].leaving.towards(self.outwards, azimuth(frame, self.axes, w));
+        let value = around * (DIFFUSE * frame.latitudes(w).1 * (0.5 * FRAC_1_PI));
+        (self.energy * value, value.mean())
+    }
+
+    /// What other plies let pass of that; `other` is told of each, and of the fibres on its way.
+    #[inline]
+    fn open(&self, view: &View<'_>, w: Vec3A, other: impl FnMut(&PlyAhead, f32)) -> Rgb {
+        (-self.spot.past_own(view, w, other)).exp()
+    }
+
+    fn draw(&self, view: &View<'_>, frame: &LobeFrame, stream: &mut Stream) -> Vec3A {
+        self.draw_by(view, frame, [stream.next(), stream.next()], stream)
+    }
+
+    #[inline]
+    fn draw_by(&self, view: &View<'_>, frame: &LobeFrame, u: [f32; 2], stream: &mut Stream) -> Vec3A {
+        let around = view.yarn.plies[self.spot.ply].leaving.azimuth(self.outwards, stream);
+        direction(frame, sample_sine_diffuse(u), around, self.axes)
+    }
+}
+
+/// Cosine and sine of the azimuth of `w` against axes across a lobe's frame, but for a factor.
+#[inline]
+fn azimuth(frame: &LobeFrame, axes: [Vec2; 2], w: Vec3A) -> Vec2 {
+    let across = Vec2::new(w.dot(frame.x), w.dot(frame.y));
+    Vec2::new(across.dot(axes[0]), across.dot(axes[1]))
+}
+
+/// A direction by the sine of its latitude and by its azimuth against axes across a lobe's frame.
+#[inline]
+fn direction(frame: &LobeFrame, sin: f32, azimuth: Vec2, axes: [Vec2; 2]) -> Vec3A {
+    let across = azimuth.x * axes[0] + azimuth.y * axes[1];
+    let cos = (1.0 - sin * sin).max(0.0).sqrt();
+    cos * (across.x * frame.x + across.y * frame.y) + sin * frame.z
 }
 
 /// Two axes across a ply, which stand square on each other, as unit vectors across a lobe's frame.

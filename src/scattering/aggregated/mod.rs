@@ -30,7 +30,7 @@ use super::{
 use crate::{
     geometry::{
         occluder::{Occluder, Transparency},
-        section::{Crossings, Inside, PlyCrossing, Section},
+        section::{Crossings, Inside, PlyAhead, PlyCrossing, Section},
         yarn::YarnShape,
     },
     math::{Rgb, sampler::Stream},
@@ -158,6 +158,25 @@ impl Spot {
         let at = self.inside.in_ply(yarn.occluder().shape(), self.ply);
         let (place, axes) = yarn.plies[self.ply].leaving.place(at, self.inside.short_axis_within());
         (place, axes.map(|axis| self.inside.out_of(axis)))
+    }
+
+    /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
+    /// fibres on its way.
+    #[inline]
+    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead, f32)) -> Rgb {
+        let shape = view.yarn.occluder().shape();
+        let (thin, wide) = (view.section.thinness(), self.inside.wide(w));
+        let mut depth = Rgb::ZERO;
+        view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
+            if way.ply != self.ply {
+                let fibers = shape.plies[way.ply].chord(way.offset, way.length, thin, wide).ahead(-way.foot);
+                if fibers > 0.0 {
+                    depth += view.yarn.plies[way.ply].rho * fibers;
+                    other(&way, fibers);
+                }
+            }
+        });
+        depth * self.tilt(view.section, w)
     }
 
     /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the

@@ -247,21 +247,17 @@ impl Node {
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 
-    /// What other plies let pass in a direction, and where light meets one of them, if it does: the place on that ply's rim, as a unit vector
-    /// of the unwound yarn's round section. One of them, by the fibres in each.
+    /// What other plies let pass in a direction, and where light meets one of them, if it does: one of them, by the fibres in each.
     #[inline]
-    pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Vec2>) {
-        let shape = view.yarn.occluder().shape();
-        let ahead = self.spot.inside.round_across(w).normalize_or(Vec2::X);
-        let (mut all, mut at) = (0.0, None);
+    pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
+        let (mut all, mut met) = (0.0, None);
         let (_, others) = self.depth_by_plies(view, w, |way, fibers| {
             all += fibers;
             if fibers > 0.0 && stream.next() * all < fibers {
-                let beside = (way.offset / shape.plies[way.ply].radius).clamp(-1.0, 1.0);
-                at = Some(beside * ahead.perp() - (1.0 - beside * beside).sqrt() * ahead);
+                met = Some(Met::of(way, view));
             }
         });
-        ((-others).exp(), at)
+        ((-others).exp(), met)
     }
 
     /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
@@ -321,6 +317,23 @@ impl Node {
         let tilt = spot.tilt(view.section, w);
         others *= tilt;
         (own * tilt + others, others)
+    }
+}
+
+/// Where a way out meets another ply.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    pub(super) ply: usize,
+    /// Distance in the section to its rim.
+    pub(super) distance: f32,
+}
+
+impl Met {
+    #[inline]
+    pub(super) fn of(way: &PlyAhead, view: &View<'_>) -> Self {
+        let radius = view.yarn.occluder().shape().plies[way.ply].radius;
+        let half = (radius * radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
+        Self { ply: way.ply, distance: (way.foot - half).max(0.0) }
     }
 }
 

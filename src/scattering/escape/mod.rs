@@ -44,8 +44,6 @@ pub(crate) struct Medium {
     pub(crate) albedo: f64,
     /// What the first meeting keeps.
     pub(crate) first: f64,
-    /// The share of what leaves that other plies send back at once; where the rest of them takes it is followed by direction.
-    pub(crate) sent_back: f64,
     /// Of light that comes from other plies: the share of what leaves that returns to them.
     pub(crate) taken_back: f64,
 }
@@ -55,13 +53,12 @@ impl Medium {
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
         let kept = |albedo: f64| 1.0 - near(1.0 - albedo).min(1.0);
-        let Self { radius, apart, albedo, first, sent_back, taken_back } = *self;
+        let Self { radius, apart, albedo, first, taken_back } = *self;
         Self {
             radius: near(radius),
             apart: near(apart),
             albedo: kept(albedo),
             first: kept(first),
-            sent_back: near(sent_back).min(1.0),
             taken_back: near(taken_back).min(1.0),
         }
     }
@@ -102,20 +99,20 @@ impl Outgoing {
 /// next. One sector in a circle, where azimuths count from that of the place.
 struct Solved {
     sectors: Vec<[Outgoing; RINGS]>,
-    /// Of light that enters from all sides, the share that leaves at last.
-    entering: f64,
+    /// Of light that enters from all sides, the share that leaves at last: if other plies send some of it back, and past them.
+    entering: [f64; 2],
 }
 
 /// What leaves a ply of one channel: by sectors and rings, as [`Leaving`] holds it, and of light that enters from all sides.
 #[derive(Debug)]
 struct OfChannel {
     cells: Vec<Outgoing>,
-    entering: f64,
+    entering: [f64; 2],
 }
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<[u64; 7], Pending>>);
+pub struct Solutions(Mutex<HashMap<[u64; 6], Pending>>);
 
 /// What one thread solves and others wait for.
 type Pending = Arc<OnceLock<Arc<OfChannel>>>;
@@ -123,8 +120,8 @@ type Pending = Arc<OnceLock<Arc<OfChannel>>>;
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
         let medium = medium.rounded();
-        let Medium { radius, apart, albedo, first, sent_back, taken_back } = medium;
-        let key = [radius, apart, albedo, first, sent_back, taken_back, stretch].map(f64::to_bits);
+        let Medium { radius, apart, albedo, first, taken_back } = medium;
+        let key = [radius, apart, albedo, first, taken_back, stretch].map(f64::to_bits);
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let cell = Arc::clone(all.entry(key).or_default());
         drop(all);
@@ -141,8 +138,10 @@ pub(crate) struct Leaving {
     /// rim.
     shares: Vec<Rgb>,
     azimuths: Vec<[Rgb; AZIMUTHS]>,
-    /// Of light that comes from other plies, the share that leaves at last.
+    /// Of light that comes from other plies, the share that leaves them all at last.
     pub(crate) entering: Rgb,
+    /// The share that leaves this one, wherever it goes.
+    pub(crate) entering_past: Rgb,
 }
 
 impl Leaving {
@@ -158,7 +157,8 @@ impl Leaving {
             sectors: if stretch > NEARLY_ROUND { pressed::QUARTER } else { 1 },
             shares: cells.clone().map(|cell| rgb(&|out| out.share, cell)).collect(),
             azimuths: cells.map(azimuths).collect(),
-            entering: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering)),
+            entering: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering[0])),
+            entering_past: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering[1])),
         }
     }
 
@@ -178,7 +178,7 @@ impl Leaving {
                 if thicker > 1.0 { at(ring).towards(at(ring + 1), f64::from(part)) } else { *at(i) }
             }));
         }
-        OfChannel { cells, entering: solved.entering.clamp(0.0, 1.0) }
+        OfChannel { cells, entering: solved.entering.map(|share| share.clamp(0.0, 1.0)) }
     }
 
     /// Of light that comes from a place and meets something: the share that leaves at last.

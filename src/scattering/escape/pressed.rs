@@ -114,7 +114,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         .collect();
     let closed =
         |share: f64| -> Vec<Row> { rows.iter().enumerate().map(|(own, row)| row.closed(own, share)).collect() };
-    let near = closed(medium.sent_back);
+    let near = closed(0.0);
     let (out, first) = (leaving(&near, medium.albedo), medium.first());
     let mean = |weights: &[f64], out: &[f64], own: usize| {
         let sum: f64 = weights.iter().sum();
@@ -135,8 +135,12 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         })
         .collect();
     // What enters is met where what leaves would come from.
-    let outer = closed(medium.taken_back);
-    let other = if medium.taken_back > 0.0 { leaving(&outer, medium.albedo) } else { out };
-    let enters: Vec<f64> = outer.iter().map(|row| row.escape.iter().sum()).collect();
-    Solved { sectors, entering: mean(&enters, &other, CELLS - 1).share }
+    let entering = |taken_back: f64| {
+        let outer = closed(taken_back);
+        let enters: Vec<f64> = outer.iter().map(|row| row.escape.iter().sum()).collect();
+        let solved = (taken_back > 0.0).then(|| leaving(&outer, medium.albedo));
+        mean(&enters, solved.as_ref().unwrap_or(&out), CELLS - 1).share
+    };
+    let past = entering(0.0);
+    Solved { sectors, entering: [if medium.taken_back > 0.0 { entering(medium.taken_back) } else { past }, past] }
 }

@@ -104,7 +104,7 @@ fn outgoing(waves: [f64; HARMONICS]) -> Outgoing {
 
 pub(super) fn solve(medium: &Medium) -> Solved {
     let open = Transport::new(medium);
-    let transport = open.closed(medium.sent_back);
+    let transport = open.closed(0.0);
     let leaving = transport.leaving(medium.albedo);
     let first = medium.first();
     let rings = std::array::from_fn(|i| {
@@ -115,9 +115,12 @@ pub(super) fn solve(medium: &Medium) -> Solved {
         }))
     });
     // What enters is met where what leaves would come from.
-    let closed = open.closed(medium.taken_back);
-    let leaving = closed.leaving(medium.albedo)[0];
-    let enters: f64 = closed.escape[0].iter().sum();
-    let out: f64 = closed.escape[0].iter().zip(leaving).map(|(chance, out)| chance * out).sum();
-    Solved { sectors: vec![rings], entering: first * if enters > 0.0 { out / enters } else { leaving[RINGS - 1] } }
+    let entering = [medium.taken_back, 0.0].map(|taken_back| {
+        let closed = open.closed(taken_back);
+        let leaving = closed.leaving(medium.albedo)[0];
+        let enters: f64 = closed.escape[0].iter().sum();
+        let out: f64 = closed.escape[0].iter().zip(leaving).map(|(chance, out)| chance * out).sum();
+        first * if enters > 0.0 { out / enters } else { leaving[RINGS - 1] }
+    });
+    Solved { sectors: vec![rings], entering }
 }

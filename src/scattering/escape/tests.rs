@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 
 fn medium(radius: f64, albedo: f64, apart: f64) -> Medium {
-    Medium { radius, apart, albedo, first: albedo, sent_back: 0.0, taken_back: 0.0 }
+    Medium { radius, apart, albedo, first: albedo, taken_back: 0.0 }
 }
 
 fn solved(medium: &Medium, stretch: f64) -> Solved {
@@ -41,7 +41,9 @@ fn both_solutions_agree_where_the_section_is_nearly_round() {
     for (radius, albedo, apart) in [(2.0, 0.9, 0.0), (6.0, 0.9, 0.8), (6.0, 0.3, 0.4), (6.0, 1.0, 0.8)] {
         let medium = medium(radius, albedo, apart);
         let (round, pressed) = (round::solve(&medium), pressed::solve(&medium, 1.0));
-        assert!((round.entering - pressed.entering).abs() < 0.01, "{} {}", round.entering, pressed.entering);
+        for (a, b) in round.entering.into_iter().zip(pressed.entering) {
+            assert!((a - b).abs() < 0.01, "{a} {b}");
+        }
         for (i, (a, b)) in round.sectors[0].iter().zip(&pressed.sectors[0]).enumerate() {
             assert!((a.share - b.share).abs() < 0.01 * a.share + 1e-3, "{medium:?}, ring {i}: {} {}", a.share, b.share);
             for (a, b) in a.azimuths.iter().zip(b.azimuths) {
