@@ -21,6 +21,8 @@ mod calibrated {
     pub(super) const START_SHRINK: f64 = 0.4;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
+    /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
+    pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.25;
 }
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
@@ -201,6 +203,7 @@ impl PlyOptics {
                 apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
                 albedo: (1.0 - absorbed).clamp(0.0, 1.0),
                 first: albedo(c),
+                sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back(c),
                 taken_back: taken_back(c),
             }
         });

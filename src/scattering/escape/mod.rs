@@ -44,6 +44,8 @@ pub(crate) struct Medium {
     pub(crate) albedo: f64,
     /// What the first meeting keeps.
     pub(crate) first: f64,
+    /// The share of what leaves that other plies send back at once; where the rest of them takes it is followed by direction.
+    pub(crate) sent_back: f64,
     /// Of light that comes from other plies: the share of what leaves that returns to them.
     pub(crate) taken_back: f64,
 }
@@ -53,12 +55,13 @@ impl Medium {
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
         let kept = |albedo: f64| 1.0 - near(1.0 - albedo).min(1.0);
-        let Self { radius, apart, albedo, first, taken_back } = *self;
+        let Self { radius, apart, albedo, first, sent_back, taken_back } = *self;
         Self {
             radius: near(radius),
             apart: near(apart),
             albedo: kept(albedo),
             first: kept(first),
+            sent_back: near(sent_back).min(1.0),
             taken_back: near(taken_back).min(1.0),
         }
     }
@@ -112,7 +115,7 @@ struct OfChannel {
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<[u64; 6], Pending>>);
+pub struct Solutions(Mutex<HashMap<[u64; 7], Pending>>);
 
 /// What one thread solves and others wait for.
 type Pending = Arc<OnceLock<Arc<OfChannel>>>;
@@ -120,8 +123,8 @@ type Pending = Arc<OnceLock<Arc<OfChannel>>>;
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
         let medium = medium.rounded();
-        let Medium { radius, apart, albedo, first, taken_back } = medium;
-        let key = [radius, apart, albedo, first, taken_back, stretch].map(f64::to_bits);
+        let Medium { radius, apart, albedo, first, sent_back, taken_back } = medium;
+        let key = [radius, apart, albedo, first, sent_back, taken_back, stretch].map(f64::to_bits);
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let cell = Arc::clone(all.entry(key).or_default());
         drop(all);

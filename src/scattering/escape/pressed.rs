@@ -114,7 +114,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         .collect();
     let closed =
         |share: f64| -> Vec<Row> { rows.iter().enumerate().map(|(own, row)| row.closed(own, share)).collect() };
-    let near = closed(0.0);
+    let near = closed(medium.sent_back);
     let (out, first) = (leaving(&near, medium.albedo), medium.first());
     let mean = |weights: &[f64], out: &[f64], own: usize| {
         let sum: f64 = weights.iter().sum();
@@ -138,7 +138,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
     let entering = |taken_back: f64| {
         let outer = closed(taken_back);
         let enters: Vec<f64> = outer.iter().map(|row| row.escape.iter().sum()).collect();
-        let solved = (taken_back > 0.0).then(|| leaving(&outer, medium.albedo));
+        let solved = (taken_back != medium.sent_back).then(|| leaving(&outer, medium.albedo));
         mean(&enters, solved.as_ref().unwrap_or(&out), CELLS - 1).share
     };
     let past = entering(0.0);

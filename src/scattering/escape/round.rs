@@ -104,7 +104,7 @@ fn outgoing(waves: [f64; HARMONICS]) -> Outgoing {
 
 pub(super) fn solve(medium: &Medium) -> Solved {
     let open = Transport::new(medium);
-    let transport = open.closed(0.0);
+    let transport = open.closed(medium.sent_back);
     let leaving = transport.leaving(medium.albedo);
     let first = medium.first();
     let rings = std::array::from_fn(|i| {
