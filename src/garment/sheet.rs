@@ -144,15 +144,17 @@ impl<'a> Sheet<'a> {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (u, v) = (p.x - i, p.y - j);
         let (i, j) = (i as isize, j as isize);
-        let is_folded = !self.hems.is_empty() && self.corner(i, j).is_none_or(|k| self.hem(k).is_some());
-        let [point, across, up] =
-            self.bicubic([i, j], [(cubic(u), cubic(v)), (cubic_slope(u), cubic(v)), (cubic(u), cubic_slope(v))]);
-        if is_folded || point.is_nan() {
-            let at = self.place(p);
-            return (at, self.place(p + step) - at);
+        if self.hems.is_empty() || self.corner(i, j).is_some_and(|k| self.hem(k).is_none()) {
+            let weights = [(cubic(u), cubic(v)), (cubic_slope(u), cubic(v)), (cubic(u), cubic_slope(v))];
+            let [point, across, up] = self.bicubic([i, j], weights);
+            if !point.is_nan() {
+                let normal = self.linear([i, j], [u, v]).1;
+                return (point + normal * p.z, across * step.x + up * step.y + normal * step.z);
+            }
         }
-        let normal = self.linear([i, j], [u, v]).1;
-        (point + normal * p.z, across * step.x + up * step.y + normal * step.z)
+        // Where it is turned in, or beyond what is known.
+        let at = self.place(p);
+        (at, self.place(p + step) - at)
     }
 
     /// By how much a place, which is at `at` on the flat cloth, is moved from the seam and lies over it, if it is near a seam.

@@ -401,18 +401,15 @@ impl TileStrand {
         self.lengths(period).last().copied().unwrap_or(0.0)
     }
 
-    /// Length from the start to steps between points, [`STEPS`] each.
+    /// Where it is at steps between points, [`STEPS`] each, to its own continuation.
+    fn steps(&self, period: DVec2) -> Vec<DVec3> {
+        let of_point = |i: isize| (1..=STEPS).map(move |k| self.at(i, k as f64 / STEPS as f64, period));
+        std::iter::once(self.at(0, 0.0, period)).chain((0..self.points.len() as isize).flat_map(of_point)).collect()
+    }
+
+    /// Length from the start to each of its steps.
     fn lengths(&self, period: DVec2) -> Vec<f64> {
-        let mut lengths = vec![0.0];
-        let mut here = self.at(0, 0.0, period);
-        for i in 0..self.points.len() as isize {
-            for k in 1..=STEPS {
-                let next = self.at(i, k as f64 / STEPS as f64, period);
-                lengths.push(lengths[lengths.len() - 1] + next.distance(here));
-                here = next;
-            }
-        }
-        lengths
+        summed(self.steps(period).windows(2).map(|w| w[1].distance(w[0])))
     }
 
     /// Places of `count` points evenly along the yarn, in points from the first, the first among them.
@@ -422,19 +419,14 @@ impl TileStrand {
 
     /// As [`Self::evenly`], but closer to each other where the yarn bends: a spline through them keeps closer to it.
     pub fn closer_in_bends(&self, count: usize, period: DVec2) -> Vec<f64> {
-        let lengths = self.lengths(period);
-        let steps = self.points.len() * STEPS;
-        let at = |k: usize| self.at((k / STEPS) as isize, (k % STEPS) as f64 / STEPS as f64, period);
-        let places: Vec<DVec3> = (0..=steps).map(at).collect();
-        let way = |k: usize| places[k + 1] - places[k];
-        let mut weighed = vec![0.0];
-        for k in 0..steps {
-            let (before, after) = (way((k + steps - 1) % steps), way((k + 1) % steps));
-            let length = lengths[k + 1] - lengths[k];
+        let ways: Vec<DVec3> = self.steps(period).windows(2).map(|w| w[1] - w[0]).collect();
+        let weight = |k: usize| {
+            let (before, after) = (ways[(k + ways.len() - 1) % ways.len()], ways[(k + 1) % ways.len()]);
+            let length = ways[k].length();
             let bend = before.angle_between(after) / (2.0 * length).max(1e-300);
-            weighed.push(weighed[k] + length * (1.0 + 4.0 * self.radius * bend).sqrt());
-        }
-        Self::shared_out(&weighed, count)
+            length * (1.0 + 4.0 * self.radius * bend).sqrt()
+        };
+        Self::shared_out(&summed((0..ways.len()).map(weight)), count)
     }
 
     /// Places between which a sum over steps grows by as much, the first at its start.
@@ -504,6 +496,16 @@ impl TileStrand {
         let rises = (0..n).filter(|&i| self.points[i].y < middle && self.points[(i + 1) % n].y >= middle).count();
         rises.max(1) as u32
     }
+}
+
+/// Sums of the first none, one, two and so on.
+fn summed(parts: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums = parts.map(|part| {
+        sum += part;
+        sum
+    });
+    std::iter::once(0.0).chain(sums).collect()
 }
 
 /// Control points of the uniform cubic B-spline through knots that go on `jump` further with the first of them.

@@ -122,11 +122,15 @@ impl Lines {
         }
     }
 
-    /// How many directions there are of each kind.
-    fn of_kind(&self) -> [u32; QUARTER] {
-        let mut angles = [0; QUARTER];
-        (0..ANGLES).for_each(|angle| angles[self.kind(angle)] += 1);
-        angles
+    /// Sum over so many lines in all directions of squares of what is `off` of a direction's kind and a line, which was looked at so often.
+    fn squares(&self, sections: &[Vec<DVec2>], lines: usize, off: impl Fn(usize, usize, f64) -> f64) -> f64 {
+        let mut angles = [0.0; QUARTER];
+        (0..ANGLES).for_each(|angle| angles[self.kind(angle)] += 1.0);
+        let of_kind = |kind: usize| {
+            let looks = sections.len() as f64 * angles[kind];
+            angles[kind] * (0..lines).map(|line| off(kind, line, looks).powi(2)).sum::<f64>()
+        };
+        (0..QUARTER).filter(|&kind| angles[kind] > 0.0).map(of_kind).sum()
     }
 
     fn across(angle: usize) -> DVec2 {
@@ -185,18 +189,12 @@ impl Lines {
         self.look(sections, &offsets, |kind, counts| {
             met[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u64::from(*count));
         });
-        let angles = self.of_kind();
         let mut error = |crowding: f64, depth: f64| -> f64 {
             (ply.crowding, ply.depth) = (crowding as f32, depth as f32);
-            let of_kind = |kind: usize| {
-                let lines = sections.len() as f64 * f64::from(angles[kind]);
-                let off = |line: usize| {
-                    let found = self.met(&self.chord(ply, kind, offsets[line]).0);
-                    (-found).exp() - (-(met[kind][line] as f64) / lines).exp()
-                };
-                f64::from(angles[kind]) * (0..LINES).map(|line| off(line).powi(2)).sum::<f64>()
-            };
-            (0..QUARTER).filter(|&kind| angles[kind] > 0).map(of_kind).sum()
+            self.squares(sections, LINES, |kind, line, looks| {
+                let found = self.met(&self.chord(ply, kind, offsets[line]).0);
+                (-found).exp() - (-(met[kind][line] as f64) / looks).exp()
+            })
         };
         let mut best = (f64::INFINITY, 0.0, 0.0);
         for depth in (0..DEPTHS).map(|k| DEPTH_STEP * k as f64) {
@@ -273,20 +271,14 @@ impl Lines {
         self.look(sections, &offsets, |kind, counts| {
             clear[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u32::from(*count == 0));
         });
-        let angles = self.of_kind();
         let mut error = |rim: f64| -> f64 {
             ply.rim = rim as f32;
-            let of_kind = |kind: usize| {
-                let lines = sections.len() as f64 * f64::from(angles[kind]);
-                let off = |line: usize| {
-                    let (chord, length) = self.chord(ply, kind, offsets[line]);
-                    let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));
-                    let passes = gaps.unscattered(self.met(&chord) as f32);
-                    f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / lines).sqrt()
-                };
-                f64::from(angles[kind]) * (0..LINES).map(|line| off(line).powi(2)).sum::<f64>()
-            };
-            (0..QUARTER).filter(|&kind| angles[kind] > 0).map(of_kind).sum()
+            self.squares(sections, LINES, |kind, line, looks| {
+                let (chord, length) = self.chord(ply, kind, offsets[line]);
+                let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));
+                let passes = gaps.unscattered(self.met(&chord) as f32);
+                f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / looks).sqrt()
+            })
         };
         // The error has one least value; steps of a hundredth are finer than it is known.
         let tries = (0..=300).map(|i| 0.01 * f64::from(i));

@@ -85,13 +85,6 @@ impl Inside {
         })
     }
 
-    /// A vector of the section's frame across the unwound yarn, where the yarn is pressed flat in the round section.
-    #[inline]
-    pub fn round_across(&self, v: Vec3A) -> Vec2 {
-        let across = self.across(v);
-        self.pressed.map_or(across, |pressed| pressed.round(across))
-    }
-
     /// The tangent of a fibre of a ply there, in the section's frame: its part along the yarn is 1.
     #[inline]
     pub fn fiber_tangent(&self, shape: &YarnShape, section: &Section<'_>, ply: usize) -> Vec3A {

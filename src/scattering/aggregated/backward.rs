@@ -13,7 +13,7 @@ use super::{
         mis_weight,
     },
     Spot, View,
-    single::{Met, Node},
+    single::{Among, Met, Node},
 };
 use crate::{
     geometry::section::{Inside, PlyAhead},
@@ -48,13 +48,13 @@ pub(super) struct Lobe {
 /// them, past others, and the one after it, whatever lies there.
 #[derive(Clone, Copy, Debug)]
 struct Again {
-    ways: [Drawn; 2],
+    ways: [Taken; 2],
     meetings: [Meeting; 2],
 }
 
 /// A direction that light took.
 #[derive(Clone, Copy, Debug)]
-struct Drawn {
+struct Taken {
     direction: Vec3A,
     /// Value there, past other plies, over density, and the density.
     weight: Rgb,
@@ -122,20 +122,15 @@ impl Lobe {
         let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
         let (value, pdf) = self.value(view, node.spot.ply, w);
         let (open, met) = node.others(view, w, stream);
-        let (way, rest) = Drawn::new(view, node, (w, value, pdf), open)?;
+        let (way, rest) = Taken::new(node, (w, value, pdf), open)?;
         let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
         let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), stream, |of| rest * of.entering_past);
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
-        let mut met = Met { ply: first.spot.ply, distance: 0.0 };
-        let mut all = 0.0;
-        let open = first.open(view, w, |way, fibers| {
-            all += fibers;
-            if stream.next() * all < fibers {
-                met = Met::of(way, view);
-            }
-        });
-        let (next, rest) = Drawn::new(view, node, (w, value, pdf), open)?;
+        let mut among = Among::default();
+        let open = first.open(view, w, |way, fibers| among.offer(view, way, fibers, stream));
+        let (next, rest) = Taken::new(node, (w, value, pdf), open)?;
+        let met = among.met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
         let last = Meeting::new(view, &self.frame, (&first.spot.inside, w, met), stream, |of| rest * of.entering);
         Some(Again { ways: [way, next], meetings: [first, last] })
     }
@@ -220,12 +215,11 @@ impl Lobe {
     }
 }
 
-impl Drawn {
+impl Taken {
     /// Light of a direction, value and density, which other plies let pass so far, and what they do not. `None` if there is none.
-    fn new(view: &View<'_>, node: &Node, (direction, value, pdf): (Vec3A, Rgb, f32), open: Rgb) -> Option<(Self, Rgb)> {
+    fn new(node: &Node, (direction, value, pdf): (Vec3A, Rgb, f32), open: Rgb) -> Option<(Self, Rgb)> {
         let weight = (pdf > 0.0).then(|| value / pdf)?;
-        let stays = view.yarn.plies[node.spot.ply].leaving.entering;
-        let way = Self { direction, weight: weight * open, pdf, open: node.chance_out(open, stays) };
+        let way = Self { direction, weight: weight * open, pdf, open: node.chance_out(open, node.leaves_again) };
         Some((way, weight * (Rgb::ONE - open)))
     }
 }

@@ -250,14 +250,9 @@ impl Node {
     /// What other plies let pass in a direction, and where light meets one of them, if it does: one of them, by the fibres in each.
     #[inline]
     pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
-        let (mut all, mut met) = (0.0, None);
-        let (_, others) = self.depth_by_plies(view, w, |way, fibers| {
-            all += fibers;
-            if fibers > 0.0 && stream.next() * all < fibers {
-                met = Some(Met::of(way, view));
-            }
-        });
-        ((-others).exp(), met)
+        let mut among = Among::default();
+        let (_, others) = self.depth_by_plies(view, w, |way, fibers| among.offer(view, way, fibers, stream));
+        ((-others).exp(), among.met)
     }
 
     /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
@@ -328,12 +323,22 @@ pub(super) struct Met {
     pub(super) distance: f32,
 }
 
-impl Met {
+/// One of the plies on a way out, drawn by the fibres in each.
+#[derive(Default)]
+pub(super) struct Among {
+    fibers: f32,
+    pub(super) met: Option<Met>,
+}
+
+impl Among {
     #[inline]
-    pub(super) fn of(way: &PlyAhead, view: &View<'_>) -> Self {
-        let radius = view.yarn.occluder().shape().plies[way.ply].radius;
-        let half = (radius * radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
-        Self { ply: way.ply, distance: (way.foot - half).max(0.0) }
+    pub(super) fn offer(&mut self, view: &View<'_>, way: &PlyAhead, fibers: f32, stream: &mut Stream) {
+        self.fibers += fibers;
+        if fibers > 0.0 && stream.next() * self.fibers < fibers {
+            let radius = view.yarn.occluder().shape().plies[way.ply].radius;
+            let half = (radius * radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
+            self.met = Some(Met { ply: way.ply, distance: (way.foot - half).max(0.0) });
+        }
     }
 }
 

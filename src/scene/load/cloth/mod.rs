@@ -223,6 +223,14 @@ fn file_source(
     Source::File(CurveFile { path, rest, span, unit, options, up, colors })
 }
 
+/// How thick yarn of a radius is where it is pressed to a width over height of `flatten`; fibres, which are no yarn, stay round.
+pub(super) fn thickness(yarn: Option<&Yarn>, radius: f64, flatten: f64) -> Thickness {
+    match yarn {
+        Some(yarn) => Thickness { radius, half_width: yarn.half_width(), flatten },
+        None => Thickness::round(radius),
+    }
+}
+
 /// The yarns that a source may name.
 pub(super) struct Yarns<'a> {
     pub(super) library: &'a Library,
@@ -247,8 +255,7 @@ impl Yarns<'_> {
 
     /// How thick they are where stitches press them to a width over height of `flatten`; fibres stay round.
     pub(super) fn thickness(&self, flatten: f64) -> Thickness {
-        let flatten = if self.own.1.is_some() { flatten } else { 1.0 };
-        Thickness { radius: self.radius(), half_width: self.half_width(), flatten }
+        thickness(self.own.1, self.radius(), flatten)
     }
 
     /// Whether the fabric itself says it.

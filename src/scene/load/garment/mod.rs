@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     Context, Range, Reader, UNITS,
-    cloth::Yarns,
+    cloth::{Yarns, thickness},
     color::{self, ColorPlan},
     mesh::prim_pattern,
     pattern::{self, Stranding},
@@ -21,7 +21,7 @@ use crate::{
     pattern::{
         chart::Chart,
         draft::{Draft, Threads},
-        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, Thickness, fits_stitch},
+        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, fits_stitch},
         tile::Tile,
         weave::{FLATTEN, Impossible, Weave},
     },
@@ -253,15 +253,13 @@ impl ClothPlan {
         warnings: &mut Vec<String>,
     ) -> Option<Tile> {
         let d = 2.0 * radius;
-        let half_width = yarn.map_or(1.0, Yarn::half_width);
-        let pressed = |flatten: f64| if yarn.is_some() { flatten } else { 1.0 };
         let tell = |problem: String, hint: &str| {
             context.error(self.span, problem, Some(hint.to_owned()));
             None
         };
         match &self.pattern {
             Pattern::Knit { chart, yarn_per_stitch, flatten, .. } => {
-                let yarn = Thickness { radius, half_width, flatten: pressed(*flatten) };
+                let yarn = thickness(yarn, radius, *flatten);
                 let unit = yarn.pressed();
                 let length = yarn_per_stitch
                     .map(|diameters| diameters * d / unit)
@@ -303,6 +301,7 @@ impl ClothPlan {
             }
             Pattern::Weave { draft, threads, crimp, flatten } => {
                 let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
+                let half_width = yarn.map_or(1.0, Yarn::half_width);
                 let own = Weave { half_width: [half_width; 2], ..Weave::of(draft.clone(), radius * half_width) };
                 let (crimp, flatten, threads) = (*crimp, *flatten, threads.clone());
                 let weave = Weave { warp_spacing, weft_spacing, crimp, flatten, threads, ..own };
