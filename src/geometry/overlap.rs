@@ -122,6 +122,51 @@ pub fn overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64])>) -> Opti
 /// As [`overlap`] of yarns which in the mean are narrower than their radii, each by a factor: see
 /// [`mean_half_width`](super::yarn::mean_half_width).
 pub fn overlap_of_plied<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<Overlap> {
+    let (pieces, rings) = pieces(curves)?;
+    Some(Overlap::of(&pieces, &rings, Looked::All))
+}
+
+/// About [`Overlap::share`] of the same, by one in eight pieces: to warn of much.
+pub fn share_of_overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<f64> {
+    let (pieces, rings) = pieces(curves)?;
+    Some(Overlap::of(&pieces, &rings, Looked::Eighth).share)
+}
+
+/// The pieces that are looked at.
+#[derive(Clone, Copy, PartialEq)]
+enum Looked {
+    All,
+    /// One in eight, at steps that fall in with no period of the cloth.
+    Eighth,
+}
+
+impl Looked {
+    fn at(self, index: usize) -> bool {
+        // The golden ratio, in 32 bits.
+        self == Self::All || (index as u32).wrapping_mul(0x9e37_79b1) < u32::MAX / 8
+    }
+}
+
+impl Overlap {
+    /// Of the pieces that are looked at.
+    fn of(pieces: &[Piece], rings: &[f64], looked: Looked) -> Self {
+        let found = Near::of(pieces, rings, looked);
+        let (mut length, mut over, mut near) = (0.0, 0.0, f64::INFINITY);
+        for (_, (piece, distance)) in pieces.iter().zip(found).enumerate().filter(|(i, _)| looked.at(*i)) {
+            let (here, distance) = (piece.length(), f64::from(f32::from_bits(distance.into_inner())));
+            length += here;
+            near = near.min(distance);
+            if distance < 1.0 - TOLERATED {
+                over += here;
+            }
+        }
+        let share = if length > 0.0 { over / length } else { 0.0 };
+        Self { length, share, deepest: (1.0 - near).max(0.0), nearest: near }
+    }
+}
+
+/// Curves as straight pieces, and the length of each that is closed; infinite of others.
+fn pieces<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<(Vec<Piece>, Vec<f64>)> {
     let mut pieces = Vec::new();
     let mut rings = Vec::new();
     for (index, (curve, radii, half_width)) in curves.enumerate() {
@@ -135,22 +180,7 @@ pub fn overlap_of_plied<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], 
             return None;
         }
     }
-    let found = Near::of(&pieces, &rings);
-    let (mut length, mut over, mut near) = (0.0, 0.0, f64::INFINITY);
-    for (piece, distance) in pieces.iter().zip(found) {
-        let (here, distance) = (piece.length(), f64::from(f32::from_bits(distance.into_inner())));
-        length += here;
-        near = near.min(distance);
-        if distance < 1.0 - TOLERATED {
-            over += here;
-        }
-    }
-    Some(Overlap {
-        length,
-        share: if length > 0.0 { over / length } else { 0.0 },
-        deepest: (1.0 - near).max(0.0),
-        nearest: near,
-    })
+    Some((pieces, rings))
 }
 
 /// Looks for the nearest other strand of all pieces.
@@ -163,15 +193,17 @@ struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// How near another strand comes to each piece, in mean diameters: bits of single precision.
-    fn of(pieces: &'a [Piece], rings: &'a [f64]) -> Vec<AtomicU32> {
+    /// How near another strand comes to each piece, in mean diameters: bits of single precision. Of pieces that are
+    /// looked at: to others one may come nearer.
+    fn of(pieces: &'a [Piece], rings: &'a [f64], looked: Looked) -> Vec<AtomicU32> {
         let found = pieces.iter().map(|_| AtomicU32::new(f32::INFINITY.to_bits())).collect();
         let near = Self { pieces, rings, found };
-        // By thickness, so that a thin piece does not look at all within reach of a thick one.
+        // By thickness, so that a thin piece does not look at all within reach of a thick one. Where few look, they do.
+        let class = |piece: &Piece| if looked == Looked::All { piece.radius.log2().floor() as i32 } else { 0 };
         let mut classes: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
         for (i, piece) in pieces.iter().enumerate().filter(|(_, piece)| piece.radius > 0.0 && piece.radius.is_finite())
         {
-            classes.entry(piece.radius.log2().floor() as i32).or_default().push(i);
+            classes.entry(class(piece)).or_default().push(i);
         }
         // Longer pieces of thin yarns count for thick ones too.
         let mut longest = 0.0;
@@ -184,6 +216,17 @@ impl<'a> Near<'a> {
             }
             let middles: Vec<DVec3> = members.iter().map(|&i| pieces[i].middle()).collect();
             let grid = PointGrid::new(&middles, reach, None);
+            if looked != Looked::All {
+                (0..members.len()).into_par_iter().filter(|&own| looked.at(members[own])).for_each_init(
+                    || grid.walk(),
+                    |walk, own| {
+                        walk.within(middles[own], reach, |other| {
+                            near.pair(members[own], members[other.index as usize], reach);
+                        });
+                    },
+                );
+                continue;
+            }
             (0..members.len()).into_par_iter().with_min_len(CHUNK).for_each_init(
                 || grid.walk_ahead(),
                 |walk, own| {

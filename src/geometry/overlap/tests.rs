@@ -65,6 +65,23 @@ fn a_bend_is_no_overlap_but_a_loop_is() {
     assert!(measured(&[ring(3.0, 2.0)], 1.0).share > 0.9);
 }
 
+#[test]
+fn one_piece_in_eight_tells_about_how_much_overlaps() {
+    let mut shares = Vec::new();
+    // Thinner and thicker than they were woven, some of them twice as thick as others.
+    for by in [0.8, 1.05, 1.15, 1.3] {
+        let mut curves = woven("twill 2/1", 1.5, 24);
+        for (i, (_, radii)) in curves.iter_mut().enumerate() {
+            radii.iter_mut().for_each(|r| *r *= if i % 3 == 0 { 0.5 * by } else { by });
+        }
+        let all = of(&curves).share;
+        let some = share_of_overlap(curves.iter().map(|(c, r)| (c, r.as_slice(), 1.0))).unwrap();
+        assert!((all - some).abs() < 0.03, "{by}: {some} of {all}");
+        shares.push(all);
+    }
+    assert!(shares[0] < 0.02 && shares[3] > 0.3, "{shares:?}");
+}
+
 /// A section of a yarn as it is rendered.
 struct Section {
     frame: YarnFrame,

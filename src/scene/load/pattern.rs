@@ -9,7 +9,7 @@ use super::{
     knit_size::GivenSizes,
 };
 use crate::{
-    geometry::{curve::Curve, overlap::overlap_of_plied},
+    geometry::{curve::Curve, overlap::share_of_overlap},
     input::{
         diagnostic::{Span, unknown_name},
         document::Value,
@@ -107,18 +107,18 @@ impl KnitPlan {
                     radii: None,
                     flattening: curve.flattening.as_ref().map(|axes| axes[..ENOUGH].to_vec()),
                 };
-                overlap_of_plied(std::iter::once((&first, &radii[..ENOUGH], half_width)))
+                share_of_overlap(std::iter::once((&first, &radii[..ENOUGH], half_width)))
             }
-            _ => overlap_of_plied(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
+            _ => share_of_overlap(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
         };
-        if let Some(found) = found.filter(|f| f.share > MOST) {
+        if let Some(found) = found.filter(|share| *share > MOST) {
             let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
             let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
             warnings.push(format!(
                 "{}: {:.0} % of the yarn overlaps: too many stitches or rows for its size; this yarn knits to {own_across:.1} x \
                  {own_up:.1} in 10 cm by itself",
                 self.name,
-                100.0 * found.share
+                100.0 * found
             ));
         }
     }
