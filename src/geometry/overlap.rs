@@ -216,15 +216,19 @@ impl<'a> Near<'a> {
             }
             let middles: Vec<DVec3> = members.iter().map(|&i| pieces[i].middle()).collect();
             let grid = PointGrid::new(&middles, reach, None);
-            if looked != Looked::All {
-                (0..members.len()).into_par_iter().filter(|&own| looked.at(members[own])).for_each_init(
+            // Every piece within reach of those that look, each by itself.
+            let look = |looking: &[usize]| {
+                looking.par_iter().with_min_len(CHUNK).for_each_init(
                     || grid.walk(),
-                    |walk, own| {
-                        walk.within(middles[own], reach, |other| {
-                            near.pair(members[own], members[other.index as usize], reach);
+                    |walk, &own| {
+                        walk.within(pieces[own].middle(), reach, |other| {
+                            near.pair(own, members[other.index as usize], reach);
                         });
                     },
                 );
+            };
+            if looked == Looked::Eighth {
+                look(&members.iter().copied().filter(|&own| looked.at(own)).collect::<Vec<_>>());
                 continue;
             }
             (0..members.len()).into_par_iter().with_min_len(CHUNK).for_each_init(
@@ -238,16 +242,7 @@ impl<'a> Near<'a> {
                     });
                 },
             );
-            for thinner in classes.range(..class).map(|(_, thinner)| thinner) {
-                thinner.par_iter().with_min_len(CHUNK).for_each_init(
-                    || grid.walk(),
-                    |walk, &own| {
-                        walk.within(pieces[own].middle(), reach, |other| {
-                            near.pair(own, members[other.index as usize], reach);
-                        });
-                    },
-                );
-            }
+            classes.range(..class).for_each(|(_, thinner)| look(thinner));
         }
         near.found
     }
