@@ -31,7 +31,7 @@ use crate::{
     geometry::{
         curve::{Basis, Curve},
         density::{KnownPacking, PlyPacking},
-        fiber::{Placement, flyaway::Flyaways},
+        fiber::{Placement, flyaway::Flyaways, slopes::Twist},
         mesh::Mesh,
         yarn::{PlyParameters, YarnShape, mean_half_width},
     },
@@ -241,14 +241,15 @@ impl Yarn {
     /// it: some milliseconds.
     pub fn packings(&self, stretch: f64) -> Vec<PlyPacking> {
         let mut packings: Vec<PlyPacking> = Vec::with_capacity(self.plies.len());
+        let shape = self.shape();
         for (k, ply) in self.plies.iter().enumerate() {
-            let alike = |p: &PlyParameters| {
-                let of = |p: &PlyParameters| [p.radius, p.aspect, p.fiber_radius, f64::from(p.fibers)];
-                of(p) == of(ply)
-            };
+            let alike = |p: &PlyParameters| PlyParameters { angle: ply.angle, ..p.clone() } == *ply;
             let packing = match self.plies[..k].iter().position(alike) {
                 Some(same) => packings[same],
-                None => self.placement.packing_of(ply, self.known_packing, stretch),
+                None => {
+                    let twist = Twist::of(&shape.plies[k], shape.ply_rate);
+                    self.placement.packing_of(ply, twist, self.known_packing, stretch)
+                }
             };
             packings.push(packing);
         }

@@ -3,8 +3,9 @@
 //! Where fibres lie in a ply follows Zhao, Luan and Bala, "Fitting Procedural Yarn Models for Realistic Cloth
 //! Rendering", SIGGRAPH 2016: a distribution over the section, a helix, migration towards the axis and back, all on
 //! elliptical plies that wind around the yarn ([`Placement::Measured`]); or the packing that the aggregated model
-//! assumes, discs that do not overlap, even over the section ([`Placement::Regular`]), so that an error of the model can
-//! be told from a difference of the geometry. Where a section is pressed flat the discs of that packing give way to each other.
+//! assumes, fibres that do not overlap, even over the section ([`Placement::Regular`]), so that an error of the model can
+//! be told from a difference of the geometry. Where a section is pressed flat, or its plies lean, the fibres of that packing give
+//! way to each other.
 //! Fibres that leave the ply are in [`flyaway`].
 //!
 //! Everything is a function of (seed, yarn, ply, fibre). A fibre of a closed yarn begins and ends at the seam, where the
@@ -12,6 +13,7 @@
 
 pub mod flyaway;
 pub mod packing;
+pub mod slopes;
 mod yielding;
 
 use std::{f64::consts::TAU, sync::OnceLock};
@@ -30,13 +32,14 @@ use super::{
     yarn_frame::{Pressed, YarnFrame},
 };
 use crate::math::sampler::{Stream, hash2};
+use slopes::{Slopes, Twist};
 use yielding::{Ellipse, Yielding};
 
 /// Where the fibres of a ply lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placement {
-    /// Discs that do not overlap, at random and even over the ply; rigid along it where its section is a circle, and giving
-    /// way to each other where it is not.
+    /// Fibres that do not overlap, at random and even over the ply; rigid along it where its section is a circle and does not lean,
+    /// and giving way to each other where it is not or does.
     Regular,
     /// As measured by Zhao et al. 2016.
     Measured(Distribution),
@@ -233,8 +236,11 @@ impl<'a> Plies<'a> {
         let core = f64::from(shape.core_radius);
         let own_rate = f64::from(shape.fiber_rate - self.shape.ply_rate);
         let radius = parameters.fiber_radius as f32;
+        let twist = Twist::of(shape, self.shape.ply_rate);
         let regular = match placement {
-            Placement::Regular => packing::hard_discs(parameters.fibers, parameters.fiber_radius / core, &mut stream),
+            Placement::Regular => {
+                packing::hard_discs(parameters.fibers, parameters.fiber_radius / core, twist, &mut stream)
+            }
             Placement::Measured(_) => Vec::new(),
         };
         // On the circle that the ply's section becomes; then in the ply's own axes, then in the yarn's.
@@ -282,19 +288,25 @@ impl<'a> Plies<'a> {
         if centres.is_empty() {
             return Vec::new();
         }
-        let ellipses: Vec<Option<Ellipse>> = places.iter().map(|(_, place)| self.ellipse(place, shape)).collect();
-        let Some(flattest) = ellipses.iter().flatten().copied().reduce(Ellipse::flatter) else { return Vec::new() };
-        let yielding = Yielding::new(centres, parameters.fiber_radius / parameters.radius, &flattest);
+        let sections: Vec<Option<LeaningSection>> =
+            places.iter().map(|(_, place)| self.leaning_section(place, shape)).collect();
+        let Some(flattest) = sections.iter().flatten().map(|s| s.ellipse).reduce(Ellipse::flatter) else {
+            return Vec::new();
+        };
+        let fiber = parameters.fiber_radius / parameters.radius;
+        let twist = Twist::of(shape, self.shape.ply_rate);
+        let room = twist.room(parameters.fibers, fiber);
+        let yielding = Yielding::new(centres, fiber, &twist.scaled(room).in_core(fiber), &flattest);
         let mut knots = vec![Vec3::ZERO; centres.len() * steps];
         let mut at = Vec::with_capacity(centres.len());
-        for (step, ((along, place), ellipse)) in places.iter().zip(&ellipses).enumerate() {
-            let Some(ellipse) = ellipse else {
+        for (step, ((along, place), section)) in places.iter().zip(&sections).enumerate() {
+            let Some(section) = section else {
                 for (fiber, centre) in centres.iter().enumerate() {
                     knots[fiber * steps + step] = knot(*along, place, f64::from(shape.core_radius) * *centre);
                 }
                 continue;
             };
-            yielding.squeeze(turned(*along), ellipse, &mut at);
+            yielding.squeeze(turned(*along), &section.ellipse, &section.slopes.scaled(room), &mut at);
             let middle = place.point(shape.distance * self.axis(place, shape).as_vec2());
             let radius = place.round_radius() * shape.radius;
             let across = place.tangent.cross(place.normal);
@@ -306,15 +318,27 @@ impl<'a> Plies<'a> {
         knots
     }
 
-    /// What the circle of a ply's section is at a place; `None` if it is a circle.
-    fn ellipse(&self, place: &YarnFrame, ply: &PlyShape) -> Option<Ellipse> {
+    /// What the circle of a ply's section is at a place; `None` if it is a circle whose fibres lean alike however it turns.
+    fn leaning_section(&self, place: &YarnFrame, ply: &PlyShape) -> Option<LeaningSection> {
         let pressed = Pressed::new(place.flattening);
-        if pressed.is_none() && ply.stretch == Vec2::ONE {
+        let rate = f64::from(self.shape.ply_rate);
+        let middle = f64::from(ply.distance) * self.axis(place, ply);
+        if pressed.is_none() && ply.stretch == Vec2::ONE && rate * middle == DVec2::ZERO {
             return None;
         }
         let real = |at: DVec2| pressed.map_or(at, |pressed| pressed.real(at.as_vec2()).as_dvec2());
+        let real_of = |map: DMat2| DMat2::from_cols(real(map.x_axis), real(map.y_axis));
         let (axis, stretch) = (self.axis(place, ply), ply.stretch.as_dvec2());
-        Ellipse::of(DMat2::from_cols(real(axis / stretch.x), real(axis.perp() / stretch.y)))
+        // From the circle to the ply in the round yarn, and on to the yarn as it is pressed.
+        let in_yarn = DMat2::from_cols(axis / stretch.x, axis.perp() / stretch.y);
+        let map = real_of(in_yarn);
+        // The ply turns with the yarn, and the fibres in its circle with the rest of their rate.
+        let quarter = DMat2::from_cols(DVec2::Y, DVec2::NEG_X);
+        let turning = quarter * in_yarn * rate + in_yarn * quarter * (f64::from(ply.fiber_rate) - rate);
+        let unit = f64::from(ply.radius) * f64::from(place.round_radius() / place.radius);
+        let linear = if map.determinant() > 0.0 { unit * real_of(turning) * map.inverse() } else { DMat2::ZERO };
+        let slopes = Slopes { middle: real(rate * middle.perp()), linear, even: 0.0 };
+        Some(LeaningSection { ellipse: Ellipse::or_circle(map), slopes })
     }
 
     /// For each segment of so many curves along each yarn, the material index of the yarn's segment below it; nothing if
@@ -400,6 +424,14 @@ impl<'a> Plies<'a> {
     }
 }
 
+/// A ply's section at a place of the yarn.
+struct LeaningSection {
+    /// What its circle is.
+    ellipse: Ellipse,
+    /// How fibres lean at places in ply radii.
+    slopes: Slopes,
+}
+
 /// Two conjugate half axes of an ellipse, looked at along the unit vector `tangent`: the ellipse's short axis, as long as
 /// its ratio to the long one, and the length of half of the long one.
 fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
@@ -414,7 +446,7 @@ fn cut_across(halves: [DVec3; 2], tangent: DVec3) -> (DVec3, f64) {
 impl Placement {
     /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.01 or so, and the
     /// regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
-    pub fn packing_of(self, ply: &PlyParameters, known: KnownPacking, stretch: f64) -> PlyPacking {
+    pub fn packing_of(self, ply: &PlyParameters, twist: Twist, known: KnownPacking, stretch: f64) -> PlyPacking {
         if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
             return PlyPacking { crowding, depth: 0.0, regularity, rim: regularity };
         }
@@ -422,7 +454,7 @@ impl Placement {
         let fiber = ply.fiber_radius / core;
         let measured = match self {
             _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 },
-            Self::Regular => packing::measured(ply.fibers, fiber, stretch_of_both(stretch, ply.aspect.recip())),
+            Self::Regular => packing::measured(ply.fibers, fiber, twist, stretch_of_both(stretch, ply.aspect.recip())),
             Self::Measured(distribution) => {
                 PlyPacking { crowding: distribution.crowding(fiber), depth: 0.0, regularity: 0.0, rim: 0.0 }
             }

@@ -4,7 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat2, DVec2};
 
-use super::yielding::{Ellipse, Yielding};
+use super::{
+    slopes::{Slopes, Twist},
+    yielding::{Ellipse, Yielding},
+};
 
 use crate::{
     geometry::{
@@ -24,15 +27,23 @@ pub const DENSEST: f64 = 0.78;
 /// Discs are put down at random one after the other where there is room (random sequential addition). Where one finds none,
 /// above an area fraction of about 0.4, all are put down anywhere instead and pushed apart. Neither crowds discs at the
 /// outline, as a random walk to the equilibrium of hard discs would.
-pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
-    put_down(count, 2.0 * radius, stream).unwrap_or_else(|| {
+///
+/// Discs of fibres that lean against the section are the ellipses in which it cuts them.
+pub fn hard_discs(count: u32, radius: f64, twist: Twist, stream: &mut Stream) -> Vec<DVec2> {
+    let share = radius / (1.0 + radius);
+    leaning_discs(count, radius, &twist.scaled(twist.room(count, share)).in_core(share), stream)
+}
+
+/// [`hard_discs`] of fibres with known slopes at places in core radii.
+pub(super) fn leaning_discs(count: u32, radius: f64, slopes: &Slopes, stream: &mut Stream) -> Vec<DVec2> {
+    put_down(count, 2.0 * radius, slopes, stream).unwrap_or_else(|| {
         let mut centres: Vec<DVec2> = (0..count).map(|_| anywhere(stream)).collect();
-        push_apart(&mut centres, 2.0 * radius);
+        push_apart(&mut centres, 2.0 * radius, slopes);
         centres
     })
 }
 
-/// How the packings that [`hard_discs`] makes lie, from some of them; `radius` is in core radii. Where `stretch`, the long over
+/// How the packings that [`hard_discs`] makes of fibres with a twist lie, from some of them; `radius` is in core radii. Where `stretch`, the long over
 /// the short axis of their ply's section, is above 1, discs have given way to each other as [`Yielding`] has it.
 ///
 /// The crowding and its depth are those with which lines by the rim meet as many discs as they do, by least squares of what would
@@ -42,7 +53,7 @@ pub fn hard_discs(count: u32, radius: f64, stream: &mut Stream) -> Vec<DVec2> {
 ///
 /// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
-pub fn measured(count: u32, radius: f64, stretch: f64) -> PlyPacking {
+pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacking {
     let packed = count.min(MOST_MEASURED);
     let fewer = (f64::from(packed) / f64::from(count.max(1))).sqrt();
     // The same area fraction of the ply, whose radius is 1 + radius.
@@ -51,15 +62,19 @@ pub fn measured(count: u32, radius: f64, stretch: f64) -> PlyPacking {
         return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 };
     }
     let radius = share / (1.0 - share);
+    let slopes = twist.scaled(twist.room(packed, share)).in_core(share);
     let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
-        .map(|seed| hard_discs(packed, radius, &mut Stream::new(seed)))
+        .map(|seed| leaning_discs(packed, radius, &slopes, &mut Stream::new(seed)))
         .collect();
     let pressed = Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0)));
     let sections: Vec<Vec<DVec2>> = match &pressed {
         None => packings,
-        Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, ellipse)).collect(),
+        Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, &slopes, ellipse)).collect(),
     };
-    let lines = Lines { radius, stretch: if pressed.is_some() { stretch } else { 1.0 } };
+    let lines = match &pressed {
+        None => Lines { radius, stretch: 1.0, slopes },
+        Some(ellipse) => Lines { radius, stretch, slopes: ellipse.slopes_in(&slopes) },
+    };
     let mut ply = lines.ply(packed);
     lines.fit_wall(&sections, &mut ply);
     let core = pressed.as_ref().map_or(DVec2::ONE, |ellipse| ellipse.core(share) / (1.0 - share));
@@ -70,11 +85,17 @@ pub fn measured(count: u32, radius: f64, stretch: f64) -> PlyPacking {
 }
 
 /// A packing in an ellipse, at some turns; in core radii, as the packing. `share` is a disc's radius over the ply's.
-fn squeezed<'a>(discs: &'a [DVec2], share: f64, ellipse: &'a Ellipse) -> impl Iterator<Item = Vec<DVec2>> + 'a {
-    let yielding = Yielding::new(discs, share, ellipse);
+fn squeezed<'a>(
+    discs: &'a [DVec2],
+    share: f64,
+    slopes: &Slopes,
+    ellipse: &'a Ellipse,
+) -> impl Iterator<Item = Vec<DVec2>> + 'a {
+    let yielding = Yielding::new(discs, share, slopes, ellipse);
+    let slopes = ellipse.slopes_in(slopes).per_ply_radius(share);
     (0..TURNS).map(move |turn| {
         let mut out = Vec::with_capacity(discs.len());
-        yielding.squeeze(DVec2::from_angle(PI * f64::from(turn) / f64::from(TURNS)), ellipse, &mut out);
+        yielding.squeeze(DVec2::from_angle(PI * f64::from(turn) / f64::from(TURNS)), ellipse, &slopes, &mut out);
         out.iter_mut().for_each(|at| *at /= 1.0 - share);
         out
     })
@@ -93,6 +114,8 @@ const TURNS: u32 = 4;
 struct Lines {
     radius: f64,
     stretch: f64,
+    /// Of the fibres, at their places in the sections.
+    slopes: Slopes,
 }
 
 /// Directions of lines. In an ellipse those of one quarter are like those of another; in a circle all are alike.
@@ -157,18 +180,21 @@ impl Lines {
     }
 
     /// Looks at lines at some distances in all directions: tells the direction's kind, and for each line how many discs of a section
-    /// it meets.
-    fn look(&self, sections: &[Vec<DVec2>], offsets: &[f64], mut tell: impl FnMut(usize, &[u32])) {
-        let mut met = vec![0; offsets.len()];
+    /// it meets, as circles and as the ellipses of fibres that lean.
+    fn look(&self, sections: &[Vec<DVec2>], offsets: &[f64], mut tell: impl FnMut(usize, &[[u32; 2]])) {
+        let mut met = vec![[0; 2]; offsets.len()];
         for angle in 0..ANGLES {
             let (across, kind) = (Self::across(angle), self.kind(angle));
             let reach = self.reach(across);
             for discs in sections {
-                met.fill(0);
+                met.fill([0; 2]);
                 for disc in discs {
                     let at = disc.dot(across);
-                    for (offset, met) in offsets.iter().zip(&mut met) {
-                        *met += u32::from((at - reach * offset).abs() < self.radius);
+                    let half_width = self.radius * self.slopes.half_width(*disc, across);
+                    for (offset, [circles, ellipses]) in offsets.iter().zip(&mut met) {
+                        let off = (at - reach * offset).abs();
+                        *circles += u32::from(off < self.radius);
+                        *ellipses += u32::from(off < half_width);
                     }
                 }
                 tell(kind, &met);
@@ -187,7 +213,7 @@ impl Lines {
         let offsets: [f64; LINES] = std::array::from_fn(|line| 1.0 + self.radius * (1.0 - STEP * (line as f64 + 0.5)));
         let mut met = [[0u64; LINES]; QUARTER];
         self.look(sections, &offsets, |kind, counts| {
-            met[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u64::from(*count));
+            met[kind].iter_mut().zip(counts).for_each(|(sum, [circles, _])| *sum += u64::from(*circles));
         });
         let mut error = |crowding: f64, depth: f64| -> f64 {
             (ply.crowding, ply.depth) = (crowding as f32, depth as f32);
@@ -242,7 +268,8 @@ impl Lines {
                 let along = DVec2::from_angle(TAU * next());
                 let is_met = |disc: &&DVec2| {
                     let way = **disc - at;
-                    way.dot(along).abs() < 0.5 * length && way.perp_dot(along).abs() < self.radius
+                    let half_width = self.radius * self.slopes.half_width(**disc, along.perp());
+                    way.dot(along).abs() < 0.5 * length && way.perp_dot(along).abs() < half_width
                 };
                 let count = sections[k % sections.len()].iter().filter(is_met).count() as u64;
                 met += count;
@@ -267,16 +294,23 @@ impl Lines {
         const LINES: usize = 24;
         let offsets: [f64; LINES] =
             std::array::from_fn(|line| (1.0 + self.radius) * (line as f64 + 0.5) / LINES as f64);
+        // How often a line is clear, and how many discs it meets, as circles and as ellipses.
         let mut clear = [[0u32; LINES]; QUARTER];
+        let mut met = [[[0u64; 2]; LINES]; QUARTER];
         self.look(sections, &offsets, |kind, counts| {
-            clear[kind].iter_mut().zip(counts).for_each(|(sum, count)| *sum += u32::from(*count == 0));
+            for ((clear, met), [circles, ellipses]) in clear[kind].iter_mut().zip(&mut met[kind]).zip(counts) {
+                *clear += u32::from(*ellipses == 0);
+                met[0] += u64::from(*circles);
+                met[1] += u64::from(*ellipses);
+            }
         });
+        let wider = |[circles, ellipses]: [u64; 2]| if circles == 0 { 1.0 } else { ellipses as f64 / circles as f64 };
         let mut error = |rim: f64| -> f64 {
             ply.rim = rim as f32;
             self.squares(sections, LINES, |kind, line, looks| {
                 let (chord, length) = self.chord(ply, kind, offsets[line]);
                 let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));
-                let passes = gaps.unscattered(self.met(&chord) as f32);
+                let passes = gaps.unscattered((self.met(&chord) * wider(met[kind][line])) as f32);
                 f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / looks).sqrt()
             })
         };
@@ -292,11 +326,12 @@ fn anywhere(stream: &mut Stream) -> DVec2 {
 }
 
 /// Random sequential addition; `None` if a disc finds no room.
-fn put_down(count: u32, diameter: f64, stream: &mut Stream) -> Option<Vec<DVec2>> {
+fn put_down(count: u32, diameter: f64, slopes: &Slopes, stream: &mut Stream) -> Option<Vec<DVec2>> {
     let mut centres: Vec<DVec2> = Vec::with_capacity(count as usize);
-    let mut grid = DiscGrid::new(count as usize, diameter);
+    let mut grid = DiscGrid::new(count as usize, diameter * slopes.longest(1.0));
     for disc in 0..count {
-        let free = |at: &DVec2| grid.near(*at).all(|j| at.distance_squared(centres[j]) >= diameter * diameter);
+        let apart = |at: DVec2, other: DVec2| slopes.distance_squared(at, other) >= diameter * diameter;
+        let free = |at: &DVec2| grid.near(*at).all(|j| apart(*at, centres[j]));
         let at = (0..TRIES).map(|_| anywhere(stream)).find(free)?;
         grid.add(disc, at);
         centres.push(at);
@@ -347,11 +382,12 @@ impl DiscGrid {
 }
 
 /// Moves overlapping discs apart, each pair by half of what it overlaps, until none does or nothing more is gained.
-fn push_apart(centres: &mut [DVec2], diameter: f64) {
+fn push_apart(centres: &mut [DVec2], diameter: f64, slopes: &Slopes) {
     // A little farther than needed, or the last of them would take for ever.
     let wanted = diameter * 1.005;
+    let reach = wanted * slopes.longest(1.0);
     for round in 0..3000 {
-        let mut grid = DiscGrid::new(centres.len(), wanted);
+        let mut grid = DiscGrid::new(centres.len(), reach);
         for (i, &c) in centres.iter().enumerate() {
             grid.add(i as u32, c);
         }
@@ -363,7 +399,7 @@ fn push_apart(centres: &mut [DVec2], diameter: f64) {
                     continue;
                 }
                 let between = c - centres[j];
-                let distance = between.length();
+                let distance = slopes.distance_squared(c, centres[j]).sqrt();
                 if distance < wanted {
                     let direction = if distance > 1e-12 { between / distance } else { DVec2::from_angle(i as f64) };
                     moves[i] += 0.5 * (wanted - distance) * direction;
@@ -391,7 +427,7 @@ mod tests {
             let radius = fiber / (1.0 - fiber);
             let (mut inner, mut total) = (0.0, 0.0);
             for seed in 0..(3000 / count).clamp(3, 40) {
-                let discs = hard_discs(count, radius, &mut Stream::new(seed));
+                let discs = hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed));
                 assert_eq!(discs.len(), count as usize);
                 for (i, a) in discs.iter().enumerate() {
                     assert!(a.length() <= 1.0 + 1e-12);
@@ -412,7 +448,7 @@ mod tests {
     #[test]
     fn too_many_discs_overlap_and_do_not_hang() {
         for (count, radius) in [(50, 0.5), (3, 10.0), (0, 0.1), (1, 2.0), (400, 1e-9)] {
-            let discs = hard_discs(count, radius, &mut Stream::new(7));
+            let discs = hard_discs(count, radius, Twist::NONE, &mut Stream::new(7));
             assert_eq!(discs.len(), count as usize);
             assert!(discs.iter().all(|d| d.is_finite() && d.length() <= 1.0 + 1e-12));
         }
@@ -426,16 +462,16 @@ mod tests {
         };
         for (count, radius) in [of(33, 0.25), of(70, 0.5)] {
             let many: Vec<f64> = (1000..1060)
-                .flat_map(|seed| hard_discs(count, radius, &mut Stream::new(seed)))
+                .flat_map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed)))
                 .map(|at| at.length_squared())
                 .collect();
             let want = 2.0 * many.iter().sum::<f64>() / many.len() as f64 - 1.0;
-            let got = measured(count, radius, 1.0).crowding;
+            let got = measured(count, radius, Twist::NONE, 1.0).crowding;
             assert!((got - want).abs() < 0.03, "{count}: {got}, not {want}");
         }
         let (few, radius) = of(100, 0.5);
         let (many, smaller) = of(10_000, 0.5);
-        let crowding = |count, radius| measured(count, radius, 1.0).crowding;
+        let crowding = |count, radius| measured(count, radius, Twist::NONE, 1.0).crowding;
         assert!(crowding(many, smaller).abs() < 0.5 * crowding(few, radius).abs() + 0.01);
         assert_eq!(crowding(0, 0.1), 0.0);
         assert!(crowding(1, 1.0).is_finite() && crowding(u32::MAX, 1e-9).is_finite());
@@ -445,7 +481,7 @@ mod tests {
     fn lines_pass_loose_packings_more_regularly_than_dense_ones_that_are_pushed_apart() {
         let of = |count: u32, density: f64| {
             let fiber = (density / f64::from(count)).sqrt();
-            measured(count, fiber / (1.0 - fiber), 1.0).regularity
+            measured(count, fiber / (1.0 - fiber), Twist::NONE, 1.0).regularity
         };
         let (loose, dense) = (of(100, 0.2), of(100, 0.6));
         assert!((1.2..1.7).contains(&loose) && (0.4..1.1).contains(&dense), "{loose} {dense}");
@@ -459,17 +495,18 @@ mod tests {
         for (count, density) in [(78u32, 0.2f64), (78, 0.4), (78, 0.6), (60, 0.35), (25, 0.5), (200, 0.55)] {
             let fiber = (density / f64::from(count)).sqrt();
             let radius = fiber / (1.0 - fiber);
-            let lines = Lines { radius, stretch: 1.0 };
-            let packing = measured(count, radius, 1.0);
+            let lines = Lines { radius, stretch: 1.0, slopes: Slopes::NONE };
+            let packing = measured(count, radius, Twist::NONE, 1.0);
             let mut ply = lines.ply(count);
             (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
             (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
-            let packings: Vec<_> = (500..560).map(|seed| hard_discs(count, radius, &mut Stream::new(seed))).collect();
+            let packings: Vec<_> =
+                (500..560).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed))).collect();
             let offsets: Vec<f64> = (0..15).map(|k| 1.0 + radius * (0.9 - 0.2 * f64::from(k))).collect();
             let (mut met, mut clear, mut looks) = (vec![0.0; 15], vec![0.0; 15], 0.0);
             lines.look(&packings, &offsets, |_, counts| {
                 looks += 1.0;
-                for (k, count) in counts.iter().enumerate() {
+                for (k, [count, _]) in counts.iter().enumerate() {
                     met[k] += f64::from(*count);
                     clear[k] += f64::from(u8::from(*count == 0));
                 }
@@ -494,7 +531,7 @@ mod tests {
     fn packings_that_give_way_are_measured_as_they_lie_then() {
         let of = |density: f64, stretch: f64| {
             let fiber = (density / 70.0).sqrt();
-            measured(70, fiber / (1.0 - fiber), stretch)
+            measured(70, fiber / (1.0 - fiber), Twist::NONE, stretch)
         };
         for density in [0.25, 0.5] {
             let (round, nearly, flat) = (of(density, 1.0), of(density, 1.01), of(density, 2.0));
@@ -504,12 +541,15 @@ mod tests {
         }
         // Dense ones that were only pushed apart are in better order when they have given way to each other.
         assert!(of(0.5, 1.5).regularity > of(0.5, 1.0).regularity);
-        assert!(measured(1, 1.0, 4.0).crowding.is_finite() && measured(3, 0.9, 100.0).regularity.is_finite());
+        assert!(
+            measured(1, 1.0, Twist::NONE, 4.0).crowding.is_finite()
+                && measured(3, 0.9, Twist::NONE, 100.0).regularity.is_finite()
+        );
     }
 
     #[test]
     fn a_seed_gives_one_packing() {
-        let make = |seed| hard_discs(40, 0.08, &mut Stream::new(seed));
+        let make = |seed| hard_discs(40, 0.08, Twist::NONE, &mut Stream::new(seed));
         assert_eq!(make(5), make(5));
         assert_ne!(make(5), make(6));
     }

@@ -113,6 +113,83 @@ fn regular_fibers_do_not_cut_through_each_other() {
     }
 }
 
+/// A straight yarn along z of radius 1.
+fn straight(shape: &YarnShape) -> Strands {
+    pressed(shape, 1.0)
+}
+
+/// How much of the fibres' section lies in two of them, by circles across their common direction, at places along a yarn.
+fn overlap(tubes: &Tubes, fibers: usize) -> f64 {
+    let per_fiber = tubes.segments().len() / fibers;
+    let (mut twice, mut all) = (0.0, 0.0);
+    for step in (2..per_fiber - 2).step_by(3) {
+        for u in [0.0, 0.5] {
+            let at: Vec<_> = (0..fibers).map(|fiber| tubes.place((fiber * per_fiber + step) as u32, u)).collect();
+            for (i, a) in at.iter().enumerate() {
+                let radius = f64::from(a.radius);
+                all += std::f64::consts::PI * radius * radius;
+                for b in &at[..i] {
+                    let (between, along) = ((b.centre - a.centre).as_dvec3(), (a.tangent + b.tangent).as_dvec3());
+                    let apart = between.cross(along.normalize()).length() / (2.0 * radius);
+                    if apart < 1.0 {
+                        twice += 2.0 * radius * radius * (apart.acos() - apart * (1.0 - apart * apart).sqrt());
+                    }
+                }
+            }
+        }
+    }
+    twice / all
+}
+
+#[test]
+fn fibers_that_lean_do_not_lie_in_each_other() {
+    // As circles of the section they would by several percent.
+    for (plies, count, density, ply_twist, fiber_twist, most) in [
+        (1, 60, 0.6, 0.0, 30.0, 1e-4),
+        (1, 60, 0.3, 0.0, -45.0, 1e-4),
+        (2, 60, 0.6, 20.0, 0.0, 5e-4),
+        (2, 60, 0.6, 20.0, 20.0, 5e-4),
+        (2, 60, 0.6, 20.0, -20.0, 5e-4),
+        (3, 40, 0.5, 30.0, -30.0, 3e-3),
+    ] {
+        let [ply_twist, fiber_twist] = [ply_twist, fiber_twist].map(f64::to_radians);
+        let shape = touching_yarn(plies, count, density, ply_twist, fiber_twist);
+        let parameters = touching(plies, count, density, fiber_twist);
+        let strands = straight(&shape);
+        for seed in 0..2 {
+            let (tubes, _) = Plies::new(&strands, &parameters, &shape, seed).fibers(0, Placement::Regular);
+            let found = overlap(&tubes, count as usize);
+            assert!(found < most, "{plies} plies of {count} at {density}, {ply_twist} {fiber_twist}: {found}");
+        }
+    }
+}
+
+#[test]
+fn pressed_fibers_that_lean_do_not_lie_in_each_other() {
+    for (plies, density, twist) in [(1, 0.5, 30.0f64), (2, 0.5, 20.0)] {
+        let twist = twist.to_radians();
+        let shape = touching_yarn(plies, 50, density, twist, -twist);
+        let parameters = touching(plies, 50, density, -twist);
+        let strands = pressed(&shape, 0.6);
+        let (tubes, _) = Plies::new(&strands, &parameters, &shape, 3).fibers(0, Placement::Regular);
+        let found = overlap(&tubes, 50);
+        assert!(found < 5e-3, "{plies} plies at {density}: {found}");
+    }
+}
+
+#[test]
+fn more_fibers_than_there_is_room_for_lean_less_and_do_not_hang() {
+    for (count, density, twist) in [(200u32, 0.75f64, 60.0f64), (20, 0.77, 85.0), (1, 0.9, 89.0), (0, 0.0, 45.0)] {
+        let twist = Twist { fibers: twist.to_radians().tan(), plies: 1.0 };
+        let fiber = (density / f64::from(count.max(1))).sqrt();
+        let room = twist.room(count, fiber);
+        assert!((0.0..=1.0).contains(&room) && (room == 1.0) == (count == 0), "{room}");
+        let discs = packing::hard_discs(count, fiber / (1.0 - fiber), twist, &mut Stream::new(2));
+        assert!(discs.len() == count as usize && discs.iter().all(|d| d.length() <= 1.0 + 1e-12));
+        assert!(packing::measured(count, fiber / (1.0 - fiber), twist, 1.5).regularity.is_finite());
+    }
+}
+
 #[test]
 fn elliptical_plies_keep_their_short_axis_towards_the_yarn() {
     let shape_of = |parameters: &[PlyParameters]| YarnShape::new(parameters, 0.25, true);

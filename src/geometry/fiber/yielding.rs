@@ -1,21 +1,25 @@
-//! Fibres of a ply whose section is not a circle: they give way to each other instead of being squeezed together.
+//! Fibres of a ply whose section is not a circle, or leans: they give way to each other instead of being squeezed together.
 //!
 //! A packing of discs is squeezed with its section, but fibres stay as thick. Along the short axis they would come closer than
-//! two radii, and stick out of the ply. Here the packing is squeezed so that all fibres stay inside of the ply's ellipse, and
+//! two radii, and stick out of the ply. Where a ply winds around its yarn they are cut in ellipses, against which the packing turns.
+//! Here the packing is squeezed so that all fibres stay inside of the ply's ellipse, and
 //! those that overlap are pushed apart, pair after pair, a fixed number of times. What comes out is a continuous function of
 //! how the section is pressed and of how the packing is turned in it, so fibres stay smooth along the yarn; and it is the packing
 //! itself where the section is a circle.
 
 use glam::{DMat2, DVec2};
 
-use super::packing::{DENSEST, DiscGrid};
+use super::{
+    packing::{DENSEST, DiscGrid},
+    slopes::Slopes,
+};
 
 /// How often all pairs are pushed apart. At an area fraction of 0.5 and axes of 1.5 : 1 the area that lies in two fibres falls
 /// from 2.4 % to 0.001 %; in far denser packings more rounds make fibres wriggle along the yarn.
 const ROUNDS: usize = 16;
 /// By how much pairs are pushed farther than needed, because the last of them would take for ever, and because fibres are
-/// smooth between the places where they are: so much for each unit by which the long axis is longer than the radius of the
-/// circle, and the most.
+/// smooth between the places where they are: so much for each unit by which the long axis, or that of a leaning fibre's ellipse,
+/// is longer than the radius of the circle, and the most.
 const FARTHER: f64 = 0.1;
 const MOST_FARTHER: f64 = 0.02;
 /// How much farther apart than where they touch a pair may come to lie in the squeezed packing, in fibre radii, and still be
@@ -32,7 +36,7 @@ pub(super) struct Yielding<'a> {
     centres: &'a [DVec2],
     /// Radius of a fibre.
     fiber: f64,
-    /// How near two centres may come: two fibre radii, or less if they do in the packing.
+    /// How near the axes of two fibres may come: two fibre radii, or less if they do in the packing.
     contact: f64,
     /// Those after each fibre that it may meet, one fibre after the other; what comes out depends on their order.
     others: Vec<u32>,
@@ -52,22 +56,37 @@ pub(super) struct Ellipse {
 }
 
 impl Ellipse {
-    /// Of a map from the circle that keeps areas but for a factor; `None` if it leaves a circle.
+    /// Of a map from the circle that keeps areas but for a factor; `None` if it leaves a circle, or nothing.
     pub(super) fn of(map: DMat2) -> Option<Self> {
+        Some(Self::or_circle(map)).filter(|ellipse| ellipse.long > 1.0)
+    }
+
+    /// The same, and a turned circle of a map that leaves one; one that is not turned if the map leaves nothing.
+    pub(super) fn or_circle(map: DMat2) -> Self {
         let (x, y) = (map.x_axis, map.y_axis);
         // A turn times a stretch, and a mirrored one.
         let even = 0.5 * DVec2::new(x.x + y.y, x.y - y.x);
         let odd = 0.5 * DVec2::new(x.x - y.y, x.y + y.x);
         let (long, short) = (even.length() + odd.length(), even.length() - odd.length());
-        if long.partial_cmp(&(NEARLY_ROUND * short)) != Some(std::cmp::Ordering::Greater) || short <= 0.0 {
-            return None;
+        if !(long.is_finite() && short > 0.0) {
+            return Self { before: DVec2::X, long: 1.0, after: DVec2::X };
+        }
+        if long <= NEARLY_ROUND * short {
+            return Self { before: even / even.length(), long: 1.0, after: DVec2::X };
         }
         let (even, odd) = (even.to_angle(), odd.to_angle());
-        Some(Self {
+        Self {
             before: DVec2::from_angle(0.5 * (even - odd)),
             long: (long / short).sqrt(),
             after: DVec2::from_angle(0.5 * (even + odd)),
-        })
+        }
+    }
+
+    /// What slopes in the circle become in this ellipse, with its axes those of the place.
+    pub(super) fn slopes_in(&self, circle: &Slopes) -> Slopes {
+        let axes = DVec2::new(self.long, self.long.recip());
+        let (stretch, back) = (DMat2::from_diagonal(axes), DMat2::from_diagonal(axes.recip()));
+        Slopes { middle: stretch * circle.middle, linear: stretch * circle.linear * back, even: circle.even }
     }
 
     /// The flatter one of two.
@@ -82,11 +101,11 @@ impl Ellipse {
 }
 
 impl<'a> Yielding<'a> {
-    /// For fibres with `centres` in core radii, and a radius of `fiber` in ply radii. `flattest` is the ellipse with the shortest of
-    /// all short axes that they will be squeezed into.
-    pub(super) fn new(centres: &'a [DVec2], fiber: f64, flattest: &Ellipse) -> Self {
+    /// For fibres with `centres` in core radii, and a radius of `fiber` in ply radii, packed with `slopes` at these centres. `flattest`
+    /// is the ellipse with the shortest of all short axes that they will be squeezed into.
+    pub(super) fn new(centres: &'a [DVec2], fiber: f64, slopes: &Slopes, flattest: &Ellipse) -> Self {
         let core = 1.0 - fiber;
-        let reach = (2.0 + SLACK) * fiber / flattest.core(fiber).y;
+        let reach = (2.0 + SLACK) * fiber * slopes.longest(1.0) / flattest.core(fiber).y;
         let mut yielding = Self { centres, fiber, contact: 2.0 * fiber, others: Vec::new(), ends: Vec::new() };
         if centres.len() as f64 * fiber * fiber > DENSEST {
             // There is no room: they overlap in the packing as well.
@@ -102,7 +121,7 @@ impl<'a> Yielding<'a> {
             yielding.others.extend(near.map(|j| j as u32));
             let others = &mut yielding.others[from..];
             others.sort_unstable();
-            let distances = others.iter().map(|&j| core * centre.distance(centres[j as usize]));
+            let distances = others.iter().map(|&j| core * slopes.distance_squared(centre, centres[j as usize]).sqrt());
             yielding.contact = distances.fold(yielding.contact, f64::min);
             yielding.ends.push(yielding.others.len());
         }
@@ -110,13 +129,16 @@ impl<'a> Yielding<'a> {
     }
 
     /// Fills `out` with the fibres' places in the ellipse, in ply radii; the packing is turned by the angle of (cos, sin) first.
-    pub(super) fn squeeze(&self, turned: DVec2, ellipse: &Ellipse, out: &mut Vec<DVec2>) {
+    /// `slopes` are those at such places.
+    pub(super) fn squeeze(&self, turned: DVec2, ellipse: &Ellipse, slopes: &Slopes, out: &mut Vec<DVec2>) {
         let core = ellipse.core(self.fiber);
         let turned = ellipse.before.rotate(turned);
         out.clear();
         out.extend(self.centres.iter().map(|&centre| core * turned.rotate(centre)));
         let inverse = core.recip();
-        let contact = self.contact * (1.0 + (FARTHER * (ellipse.long - 1.0)).min(MOST_FARTHER));
+        let longer = ellipse.long * slopes.longest(0.0);
+        let contact = self.contact * (1.0 + (FARTHER * (longer - 1.0)).min(MOST_FARTHER));
+        let slopes = slopes.turned_back(ellipse.after);
         for _ in 0..ROUNDS {
             let mut moved = false;
             let mut from = 0;
@@ -126,7 +148,7 @@ impl<'a> Yielding<'a> {
                 for &j in &self.others[from..to] {
                     let there = &mut out[j as usize];
                     let between = *there - here;
-                    let square = between.length_squared();
+                    let square = slopes.distance_squared(here, *there);
                     if square < contact * contact {
                         let distance = square.sqrt();
                         let apart = between * (0.5 * (contact - distance) / distance.max(1e-9));
@@ -157,7 +179,10 @@ impl<'a> Yielding<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{geometry::fiber::packing::hard_discs, math::sampler::Stream};
+    use crate::{
+        geometry::fiber::{packing::hard_discs, slopes::Twist},
+        math::sampler::Stream,
+    };
 
     /// Of a circle that is pressed to axes of `stretch` : 1 along an axis at an angle.
     fn pressed(stretch: f64, angle: f64) -> Ellipse {
@@ -168,7 +193,7 @@ mod tests {
 
     fn packing(count: u32, density: f64, seed: u32) -> (Vec<DVec2>, f64) {
         let fiber = (density / f64::from(count)).sqrt();
-        (hard_discs(count, fiber / (1.0 - fiber), &mut Stream::new(seed)), fiber)
+        (hard_discs(count, fiber / (1.0 - fiber), Twist::NONE, &mut Stream::new(seed)), fiber)
     }
 
     /// Pairs for each fibre that overlap by more than a thousandth, and how deep they do on the mean and at most, over two radii.
@@ -207,7 +232,7 @@ mod tests {
 
     fn yielding(centres: &[DVec2], fiber: f64, turned: DVec2, ellipse: &Ellipse) -> Vec<DVec2> {
         let mut out = Vec::new();
-        Yielding::new(centres, fiber, ellipse).squeeze(turned, ellipse, &mut out);
+        Yielding::new(centres, fiber, &Slopes::NONE, ellipse).squeeze(turned, ellipse, &Slopes::NONE, &mut out);
         out
     }
 
@@ -320,7 +345,7 @@ mod tests {
     #[test]
     fn fibers_without_room_are_left_as_they_are() {
         for (count, fiber) in [(50, 0.5), (3, 0.9), (1, 0.999), (0, 0.1), (400, 1e-9), (2, 0.6)] {
-            let centres = hard_discs(count, fiber / (1.0 - fiber), &mut Stream::new(7));
+            let centres = hard_discs(count, fiber / (1.0 - fiber), Twist::NONE, &mut Stream::new(7));
             for stretch in [1.2, 4.0, 100.0] {
                 let at = yielding(&centres, fiber, DVec2::Y, &pressed(stretch, 0.2));
                 assert!(at.len() == count as usize && at.iter().all(|at| at.is_finite()));

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::{
         geometry::{
-            fiber::packing::hard_discs,
+            fiber::{packing::hard_discs, slopes::Twist},
             section::Crossings,
             yarn::tests::touching_yarn,
             yarn_frame::{ROUND, YarnFrame},
@@ -166,7 +166,7 @@ mod tests {
             let radius = share / (1.0 - share);
             let (mut seen, mut wide) = (0.0, 0.0);
             for seed in 0..8 {
-                let discs = hard_discs(count, radius, &mut Stream::new(seed));
+                let discs = hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed));
                 let first = |y: f64| {
                     let front = |disc: &DVec2| {
                         let off = (disc.y - y) / radius;
