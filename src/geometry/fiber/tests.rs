@@ -147,9 +147,9 @@ fn fibers_that_lean_do_not_lie_in_each_other() {
     for (plies, count, density, ply_twist, fiber_twist, most) in [
         (1, 60, 0.6, 0.0, 30.0, 1e-4),
         (1, 60, 0.3, 0.0, -45.0, 1e-4),
-        (2, 60, 0.6, 20.0, 0.0, 5e-4),
-        (2, 60, 0.6, 20.0, 20.0, 5e-4),
-        (2, 60, 0.6, 20.0, -20.0, 5e-4),
+        (2, 60, 0.6, 20.0, 0.0, 1e-3),
+        (2, 60, 0.6, 20.0, 20.0, 1e-3),
+        (2, 60, 0.6, 20.0, -20.0, 1e-3),
         (3, 40, 0.5, 30.0, -30.0, 3e-3),
     ] {
         let [ply_twist, fiber_twist] = [ply_twist, fiber_twist].map(f64::to_radians);
