@@ -21,7 +21,13 @@ pub struct PlyPacking {
     pub regularity: f64,
     /// The same of lines by the rim, where fibres lie in another order.
     pub rim: f64,
+    /// How many expected fibres light that passed one meets no other within: where it goes straight on, and where it is turned in the
+    /// section by [`TURNED`] or more. `None` if that is the mean dead zone.
+    pub after: Option<[f64; 2]>,
 }
+
+/// The turn of [`PlyPacking::after`], radians: 30 degrees.
+pub(crate) const TURNED: f64 = std::f64::consts::FRAC_PI_6;
 
 /// What of [`PlyPacking`] is known, and not to be measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -96,6 +96,8 @@ pub struct PlyShape {
     pub regularity: f32,
     /// The same by the rim: [`PlyPacking::rim`].
     pub rim: f32,
+    /// What is free of others after a fibre: [`PlyPacking::after`].
+    pub after: Option<[f64; 2]>,
 }
 
 /// The cross-section of a yarn and how it turns along it.
@@ -145,6 +147,7 @@ impl YarnShape {
                     depth: 0.0,
                     regularity: 1.0,
                     rim: 1.0,
+                    after: None,
                 }
             })
             .collect();
@@ -175,6 +178,7 @@ impl YarnShape {
             ply.depth = packing.depth as f32;
             ply.regularity = packing.regularity as f32;
             ply.rim = packing.rim as f32;
+            ply.after = packing.after;
         }
         self
     }

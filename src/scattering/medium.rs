@@ -17,8 +17,6 @@ use crate::{
 
 /// Constants of the aggregated model that were calibrated on explicit fibres (untwisted single plies only).
 mod calibrated {
-    /// How much of pi/4 fibre radii between a fibre's centre and its surface dense packing takes away.
-    pub(super) const START_SHRINK: f64 = 0.4;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
@@ -27,10 +25,6 @@ mod calibrated {
 
 /// Share of the surroundings of a ply that an equal ply which touches it takes.
 const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
-
-/// What the strip that the camera's ray has cleared leaves out straight on from a node, in expected fibres over the area fraction: half of
-/// two fibre radii, less the way within the fibre itself, (1 - pi/4 + (pi/4)^2 / 4) 2 / pi.
-const CLEARED_AHEAD: f32 = 0.235;
 
 /// Below this ratio of their variances R is much narrower than TT.
 const SHARP: f64 = 0.3;
@@ -126,8 +120,6 @@ pub(crate) struct PlyOptics {
     pub events: Rgb,
     /// The share that has met none falls so fast with the fibres passed,
     pub untouched: Rgb,
-    /// and is this, but at most one, where a chain that came from outside ends at once.
-    pub first: Rgb,
     /// Squares of the fibre's widths.
     pub beta_r_squared: f32,
     /// As above.
@@ -136,14 +128,10 @@ pub(crate) struct PlyOptics {
     pub beta_n: f32,
     /// The width of one event of TT.
     pub tt: TtWidth,
-    /// Expected fibres that a node's own chord keeps away straight on, beyond those in the strip that the camera's ray has cleared.
-    pub own_chord: f32,
-    /// How far outside a fibre's centre the way of the light begins.
-    pub shift: f32,
+    /// [`PlyPacking::after`](crate::geometry::density::PlyPacking::after), in full.
+    pub after: [f32; 2],
     /// How much longer the way of the light is than measured between cores.
     pub lead: f32,
-    /// Mean chord of a fibre, pi / 2 of its radius: light that goes on forward is inside its fibre that long.
-    pub fiber_chord: f32,
 }
 
 /// The least extinction per fibre. Where TT loses nothing at all a chain ends nowhere; which place is then drawn for an end
@@ -222,7 +210,6 @@ impl PlyOptics {
         let hit = |c: usize| if ended(c) > 1e-9 { rho(c) / ended(c) } else { 1.0 };
         let events = |c: usize| chain(c) * hit(c);
         let untouched = |c: usize| (f64::from(gaps.rate) - rho(c)).max(0.0);
-        let first = |c: usize| f64::from(gaps.rate) / hit(c);
         // Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
         // often, and there are three flights and more.
         let mirrored_variance = |c: usize| {
@@ -250,38 +237,43 @@ impl PlyOptics {
             sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
             events: per_channel(&events),
             untouched: per_channel(&untouched),
-            first: per_channel(&first),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
             beta_tt_squared,
             beta_n,
             tt: TtWidth::new(1.0, beta_tt_squared, beta_n),
-            own_chord: (gaps.dead_zone - CLEARED_AHEAD * density as f32).max(0.0),
-            shift: (FRAC_PI_4 * (1.0 - calibrated::START_SHRINK * density).max(0.0) * fiber) as f32,
+            after: ply.after.map_or([gaps.dead_zone; 2], |after| after.map(|free| free as f32)),
             lead: (FRAC_PI_4 * fiber) as f32,
-            fiber_chord: (2.0 * FRAC_PI_4 * fiber) as f32,
         }
     }
 }
 
 impl PlyOptics {
+    /// How many expected fibres light that passed one meets no other within, by the cosine of its turn in the section.
+    #[inline]
+    pub(crate) fn free_after(&self, turn: f32) -> f32 {
+        const TURNED_COS: f32 = 0.866_025_4;
+        let [straight, turned] = self.after;
+        turned + (straight - turned) * ((turn - TURNED_COS) / (1.0 - TURNED_COS)).clamp(0.0, 1.0)
+    }
+
     /// The width of so many events of TT.
     #[inline]
     pub(crate) fn tt_width(&self, events: f32) -> TtWidth {
         TtWidth::new(events, self.beta_tt_squared, self.beta_n)
     }
 
-    /// Of light that passes so many fibres in chains before its node, and so many after: the share that meets none, if R tells
+    /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells
     /// it from the rest, and how many TT events the rest has on the mean.
     #[inline]
     pub(crate) fn touched(&self, before: f32, after: Rgb) -> (Rgb, Rgb) {
-        let events = self.events * (after + before);
+        let events = self.events * after + Rgb::splat(before);
         if !self.sharp {
             return (Rgb::ZERO, events);
         }
-        let into = (self.first * (self.untouched * -before).exp()).min(Rgb::ONE);
-        // No other fibre is within the node's own.
-        let beyond = (after - Rgb::splat(self.gaps.dead_zone)).max(Rgb::ZERO);
-        let untouched = into * (-(self.untouched * beyond)).exp();
+        if before > 0.0 {
+            return (Rgb::ZERO, events.max(Rgb::ONE));
+        }
+        let untouched = (-(self.untouched * after)).exp();
         (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
     }
 }

@@ -448,15 +448,18 @@ impl Placement {
     /// regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
     pub fn packing_of(self, ply: &PlyParameters, twist: Twist, known: KnownPacking, stretch: f64) -> PlyPacking {
         if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
-            return PlyPacking { crowding, depth: 0.0, regularity, rim: regularity };
+            return PlyPacking { crowding, depth: 0.0, regularity, rim: regularity, after: None };
         }
         let core = ply.radius - ply.fiber_radius;
         let fiber = ply.fiber_radius / core;
         let measured = match self {
-            _ if ply.fibers == 0 || core <= 0.0 => PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 },
+            _ if ply.fibers == 0 || core <= 0.0 => {
+                PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0, after: None }
+            }
             Self::Regular => packing::measured(ply.fibers, fiber, twist, stretch_of_both(stretch, ply.aspect.recip())),
             Self::Measured(distribution) => {
-                PlyPacking { crowding: distribution.crowding(fiber), depth: 0.0, regularity: 0.0, rim: 0.0 }
+                let crowding = distribution.crowding(fiber);
+                PlyPacking { crowding, depth: 0.0, regularity: 0.0, rim: 0.0, after: None }
             }
         };
         PlyPacking {
@@ -464,6 +467,7 @@ impl Placement {
             depth: if known.crowding.is_some() { 0.0 } else { measured.depth },
             regularity: known.regularity.unwrap_or(measured.regularity),
             rim: known.regularity.unwrap_or(measured.rim),
+            after: if known.regularity.is_some() { None } else { measured.after },
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Discs at random in a circle that do not overlap.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use glam::{DMat2, DVec2};
 
@@ -11,7 +11,7 @@ use super::{
 
 use crate::{
     geometry::{
-        density::{ChordFibers, PlyPacking},
+        density::{ChordFibers, PlyPacking, TURNED},
         occluder::PlyGaps,
         yarn::{PlyParameters, PlyShape, YarnShape},
     },
@@ -49,7 +49,8 @@ pub(super) fn leaning_discs(count: u32, radius: f64, slopes: &Slopes, stream: &m
 /// The crowding and its depth are those with which lines by the rim meet as many discs as they do, by least squares of what would
 /// pass if these lay at random. The regularity is that with which the gaps of [`PlyGaps`] pass as much as pieces of lines away from the
 /// rim do; that by the rim with which they pass as much as lines in all directions through the packings, by least squares of the roots
-/// over the ply's width.
+/// over the ply's width. What is free after a fibre is that with which as much light leaves that met one as on lines from the place
+/// where it did.
 ///
 /// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
@@ -59,7 +60,7 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacki
     // The same area fraction of the ply, whose radius is 1 + radius.
     let share = radius / (1.0 + radius) / fewer;
     if packed == 0 || share >= 1.0 {
-        return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0 };
+        return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0, after: None };
     }
     let radius = share / (1.0 - share);
     let slopes = twist.scaled(twist.room(packed, share)).in_core(share);
@@ -81,7 +82,8 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacki
     let regularity = lines.inside(&sections, core);
     ply.regularity = regularity as f32;
     let rim = lines.rim(&sections, &mut ply);
-    PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim }
+    let after = Some([0.0, TURNED].map(|turn| lines.after(&sections, &ply, turn)));
+    PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim, after }
 }
 
 /// A packing in an ellipse, at some turns; in core radii, as the packing. `share` is a disc's radius over the ply's.
@@ -154,6 +156,81 @@ impl Lines {
             angles[kind] * (0..lines).map(|line| off(kind, line, looks).powi(2)).sum::<f64>()
         };
         (0..QUARTER).filter(|&kind| angles[kind] > 0.0).map(of_kind).sum()
+    }
+
+    /// How many expected fibres light that has passed one meets no other within, if it is turned by an angle there.
+    fn after(&self, sections: &[Vec<DVec2>], ply: &PlyShape, turn: f64) -> f64 {
+        const RAYS: usize = 20_000;
+        const STEPS: usize = 80;
+        const STEP: f64 = 0.0125;
+        let mut stream = Stream::new(0xaf7e);
+        let mut next = || f64::from(stream.next());
+        let lead = FRAC_PI_4 * self.radius;
+        let root = self.stretch.sqrt();
+        let in_circle = |at: DVec2| DVec2::new(at.x / root, at.y * root);
+        let turns = [DVec2::from_angle(turn), DVec2::from_angle(-turn)];
+        let mut out = 0.0;
+        // Expected fibres ahead where there are some in the ply, and the rays that are out at once.
+        let (mut ahead, mut clear) = (Vec::with_capacity(2 * RAYS), 0.0);
+        for ray in 0..RAYS {
+            let discs = &sections[ray % sections.len()];
+            let along = DVec2::from_angle(TAU * next());
+            let across = along.perp();
+            let offset = (2.0 * next() - 1.0) * (self.reach(across) + self.radius);
+            let mut first: Option<(f64, usize, f64)> = None;
+            for (k, disc) in discs.iter().enumerate() {
+                let off = disc.dot(across) - offset;
+                let half = self.radius * self.slopes.half_width(*disc, across);
+                if off.abs() < half {
+                    let lies = disc.dot(along);
+                    let enter = lies - self.radius * (1.0 - (off / half).powi(2)).sqrt();
+                    if first.is_none_or(|(least, ..)| enter < least) {
+                        first = Some((enter, k, lies));
+                    }
+                }
+            }
+            let Some((enter, met, lies)) = first else { continue };
+            let at = |lies: f64| lies * along + offset * across;
+            let tilt = self.slopes.half_width(discs[met], across);
+            for turn in turns {
+                let w = turn.rotate(along);
+                let is_free = |(k, disc): (usize, &DVec2)| {
+                    let way = *disc - at(enter);
+                    let half = self.radius * self.slopes.half_width(*disc, w.perp());
+                    k == met || way.dot(w) < 0.0 || way.dot(w.perp()).abs() >= half
+                };
+                out += f64::from(u8::from(discs.iter().enumerate().all(is_free)));
+                // As the model has it: abreast of the fibre's centre, and from where the light came.
+                let from = at(lies) + lead * (along.dot(w) * w - along);
+                let (beside, reach) = (from.dot(w.perp()), self.reach(w.perp()));
+                if beside.abs() >= reach * (1.0 + self.radius) {
+                    clear += 1.0;
+                    continue;
+                }
+                // The middle of the line's way through the section.
+                let [from, to] = [from, w].map(in_circle);
+                let foot = -from.dot(to) / to.length_squared();
+                let chord = ply.chord(
+                    (beside / reach) as f32,
+                    (root * reach) as f32,
+                    root.recip() as f32,
+                    reach.recip() as f32,
+                );
+                ahead.push((f64::from(chord.ahead((-foot / root) as f32)), tilt));
+            }
+        }
+        let rate = (1.0 - ply.mean_dead_zone()).recip();
+        let passes = |free: f64| -> f64 {
+            clear
+                + ahead.iter().map(|(fibers, tilt)| (-rate * tilt * (root * fibers - free).max(0.0)).exp()).sum::<f64>()
+        };
+        // More passes the more is free.
+        let (mut low, mut high) = (0, STEPS);
+        while high - low > 1 {
+            let middle = (low + high) / 2;
+            (low, high) = if passes(STEP * middle as f64) > out { (low, middle) } else { (middle, high) };
+        }
+        STEP * (low as f64 + 0.5)
     }
 
     fn across(angle: usize) -> DVec2 {

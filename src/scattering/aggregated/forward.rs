@@ -11,7 +11,7 @@ use super::{
         lobe::LobeFrame,
         medium::TtWidth,
     },
-    Spot, View,
+    Spot, View, across,
 };
 use crate::{
     geometry::{
@@ -39,11 +39,25 @@ pub(super) struct Forward {
     pub(super) fibers: ArrayVec<Fiber, FOLLOWED>,
     /// What meets more after the last of them.
     pub(super) more: Option<More>,
-    /// What may leave from a node where F does not, and the path's weight: they decide between both.
+    /// About the share of light that leaves from a node where F does not, and the path's weight: they decide between both.
     pub(super) gain: Rgb,
     pub(super) weight: Rgb,
     /// A direction drawn from the lobe.
     pub(super) drawn: Drawn,
+}
+
+/// A place where light ends its chain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChainEnd {
+    pub(super) spot: Spot,
+    /// Where the light came from, in the section.
+    pub(super) back: Vec3A,
+    /// The camera's ray in the ply, or in the first one if it does not meet this.
+    pub(super) crossing: PlyCrossing,
+    /// Fibres that have passed it on before.
+    pub(super) before: f32,
+    /// Its energy there over the chance that it was drawn.
+    pub(super) amplitude: Rgb,
 }
 
 /// A fibre on the way of F.
@@ -54,6 +68,8 @@ pub(super) struct Fiber {
     frame: LobeFrame,
     /// What this fibre and those before it pass on.
     passed: Rgb,
+    /// Of what those before it pass on: what ends its chain here.
+    ended: Rgb,
     /// The width of its TT.
     pub(super) width: TtWidth,
     /// Where the light came from, in the section.
@@ -143,53 +159,50 @@ struct Way {
     shift: Vec3A,
     /// How many more fibres it meets than one across the yarn.
     tilt: f32,
+    /// How many expected fibres of the own ply it meets none within.
+    free: f32,
 }
 
 impl Forward {
-    /// Draws the first fibre that a ray meets, and a way out from there. `gain` is [`super::chain::ChainEnd::gain`], `weight` the
-    /// path's; `u_first` draws the first fibre. `None` if nothing passes fibres.
+    /// Draws the first fibre that a ray meets, and a way out from there. `weight` is the path's; `u_first` draws the first fibre. `None`
+    /// if there is none.
     #[inline]
     pub(super) fn draw(
         view: &View<'_>,
         crossings: &Crossings,
         unscattered: f32,
-        gain: Rgb,
         (weight, lit): (Rgb, bool),
         u_first: f32,
         stream: &mut Stream,
     ) -> Option<Self> {
         let (first, met) = first_fiber(crossings, unscattered, u_first)?;
         let crossing = &crossings[first];
-        if view.yarn.plies[crossing.ply].chain.max_channel() <= 0.0 {
-            return None;
-        }
         let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
         let fiber = Fiber::new(view, spot, view.camera, Rgb::ONE);
         let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
-        Some(Self::follow(view, fiber, gain, weight, little, stream))
+        Some(Self::follow(view, fiber, weight, little, stream))
     }
 
     /// Follows light from a fibre to the next, and so on, until it is out or ends by chance, which it may where `little` is passed on.
     #[inline]
-    pub(super) fn follow(
-        view: &View<'_>,
-        first: Fiber,
-        gain: Rgb,
-        weight: Rgb,
-        little: f32,
-        stream: &mut Stream,
-    ) -> Self {
+    pub(super) fn follow(view: &View<'_>, first: Fiber, weight: Rgb, little: f32, stream: &mut Stream) -> Self {
+        let gain = view.yarn.node_gain[first.spot.ply];
         let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
         let mut next = Some(first);
-        while let Some(mut fiber) = next {
-            let keep = (fiber.passed * weight).max_channel() / little;
-            if keep < 1.0 {
-                if stream.next() >= keep {
-                    break;
+        while let Some(mut fiber) = next.take() {
+            let passed = (fiber.passed * weight).max_channel();
+            if passed < little {
+                if stream.next() * little >= passed {
+                    // It may end here, and goes on no farther.
+                    fiber.passed = Rgb::ZERO;
+                } else {
+                    fiber.passed *= little / passed;
                 }
-                fiber.passed /= keep;
             }
-            forward.fibers.push(fiber);
+            if fiber.passed.max_channel() <= 0.0 {
+                forward.fibers.push(fiber);
+                break;
+            }
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
             let way = fiber.way(view, fiber.direction(&fiber.width, stream));
@@ -200,17 +213,42 @@ impl Forward {
             if left < ahead.through {
                 let (lobe, around) = fiber.lobe(&fiber.width, way.w);
                 forward.drawn = Drawn::new(way.w, &forward.alone(view, &fiber, lobe, around, &ahead));
-                break;
-            }
-            if forward.fibers.is_full() {
+            } else if forward.fibers.len() + 1 == FOLLOWED {
                 let more = More::new(view, &fiber, &ahead, weight);
                 forward.more = Some(more);
                 forward.drawn = forward.draw_bent(view, &fiber, &more, stream);
-                break;
+            } else {
+                next = fiber.next(view, &way, &mut stretches, left);
             }
-            next = fiber.next(view, &way, &mut stretches, left);
+            if next.is_none() {
+                // What F does not send out.
+                fiber.ended = (fiber.ended + fiber.passed - forward.drawn.share).max(Rgb::ZERO);
+            }
+            forward.fibers.push(fiber);
         }
         forward
+    }
+
+    /// A fibre at which light ends its chain, which `u` draws: where, how many fibres passed it on before, and its energy over the chance to
+    /// draw it. `None` if no light leaves.
+    #[inline]
+    pub(super) fn end(&self, view: &View<'_>, crossings: &Crossings, u: f32) -> Option<ChainEnd> {
+        let leaves = |fiber: &Fiber| (fiber.ended * view.yarn.node_gain[fiber.spot.ply]).weighted_mean(self.weight);
+        let energies: ArrayVec<f32, FOLLOWED> = self.fibers.iter().map(leaves).collect();
+        let total: f32 = energies.iter().sum();
+        let mut left = u * total;
+        let (mut drawn, mut energy) = (None, 0.0);
+        for (before, &own) in energies.iter().enumerate().filter(|(_, own)| **own > 0.0) {
+            (drawn, energy) = (Some(before), own);
+            if left < own {
+                break;
+            }
+            left -= own;
+        }
+        let before = drawn?;
+        let Fiber { spot, back, ended, .. } = self.fibers[before];
+        let crossing = *crossings.iter().find(|crossing| crossing.ply == spot.ply).or(crossings.first())?;
+        Some(ChainEnd { spot, back, crossing, before: before as f32, amplitude: ended * (total / energy) })
     }
 
     /// A direction of light that others bend after the last fibre.
@@ -290,6 +328,7 @@ impl Fiber {
             spot,
             frame: LobeFrame::new(spot.tangent, from),
             passed: passed * optics.chain,
+            ended: passed * (Rgb::ONE - optics.chain),
             width: optics.tt,
             back: across(from),
         }
@@ -322,9 +361,11 @@ impl Fiber {
     #[inline]
     fn way(&self, view: &View<'_>, w: Vec3A) -> Way {
         let out = across(w);
-        let lead = view.section.thinness() * view.yarn.plies[self.spot.ply].lead;
-        let shift = lead * (self.back + (-self.back.dot(out)).max(0.0) * out);
-        Way { w, shift, tilt: self.spot.tilt(view.section, w) }
+        let optics = &view.yarn.plies[self.spot.ply];
+        let turn = -self.back.dot(out);
+        let shift = view.section.thinness() * optics.lead * (self.back + turn.max(0.0) * out);
+        let tilt = self.spot.tilt(view.section, w);
+        Way { w, shift, tilt, free: tilt / view.section.squeeze() * optics.free_after(turn) }
     }
 
     /// What is between the fibre and the outside in the direction `w`.
@@ -344,7 +385,7 @@ impl Fiber {
             let gaps = &optics.gaps;
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
-            let fibers = way.tilt * (chord.ahead(-ahead.foot) - if own { gaps.dead_zone } else { 0.0 }).max(0.0);
+            let fibers = (way.tilt * chord.ahead(-ahead.foot) - if own { way.free } else { 0.0 }).max(0.0);
             let through = if own { (-gaps.rate * fibers).exp() } else { gaps.unscattered(fibers) };
             all.chains += optics.rho * fibers;
             all.through *= through;
@@ -375,12 +416,6 @@ impl Fiber {
         let spot = Spot::new(view, stretch.ply, self.spot.depth, inside);
         Some(Self::new(view, spot, -way.w, self.passed))
     }
-}
-
-/// The part of a direction in the section, of unit length; zero along the yarn.
-#[inline]
-fn across(v: Vec3A) -> Vec3A {
-    Vec3A::new(v.x, v.y, 0.0).normalize_or_zero()
 }
 
 impl More {

@@ -36,12 +36,10 @@ use crate::{
     math::{Rgb, sampler::Stream},
 };
 use backward::Backward;
-use chain::ChainEnd;
 use forward::Forward;
 use single::LateNode;
 
 mod backward;
-mod chain;
 mod forward;
 mod single;
 
@@ -52,9 +50,6 @@ pub struct AggregatedYarn {
     plies: Vec<PlyOptics>,
     /// Expected energy of a node in each ply, for choosing between plies.
     node_gain: Vec<Rgb>,
-    /// The model's plain form, as first specified for straight yarns: even fibres, neighbouring plies by their cores. Only
-    /// for comparison with reference values of that form.
-    plain: bool,
 }
 
 impl AggregatedYarn {
@@ -83,7 +78,7 @@ impl AggregatedYarn {
         let plies = shape.plies.iter().zip(materials);
         let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, count, stretch, solutions)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, node_gain, plain: false }
+        Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, node_gain }
     }
 
     /// The yarn without its colours: what rays see that only ask whether they pass.
@@ -126,11 +121,7 @@ impl<'a> View<'a> {
     /// The depth in a ply before which the share `x` of the fibres on the chord lies.
     #[inline]
     fn depth(&self, crossing: &PlyCrossing, x: f32) -> f32 {
-        if self.yarn.plain {
-            crossing.enter + (crossing.exit - crossing.enter) * x
-        } else {
-            (crossing.foot - crossing.chord.place(x) / self.section.cos).max(0.0)
-        }
+        (crossing.foot - crossing.chord.place(x) / self.section.cos).max(0.0)
     }
 
     /// The place there.
@@ -188,6 +179,12 @@ impl Spot {
     }
 }
 
+/// The part of a direction in the section, of unit length; zero along the yarn.
+#[inline]
+fn across(v: Vec3A) -> Vec3A {
+    Vec3A::new(v.x, v.y, 0.0).normalize_or_zero()
+}
+
 /// One place of scattering, for one camera direction: see the module's notes.
 #[derive(Clone, Debug)]
 pub struct Vertex<'a> {
@@ -213,15 +210,12 @@ impl<'a> Vertex<'a> {
         let view = View::new(yarn, section);
         let Arrival { throughput, lit, first_fiber } = arrival.into();
         let weight = throughput.max(Rgb::splat(1e-20));
-        let end = ChainEnd::draw(yarn, crossings, weight, [u[0], u[1]], first_fiber);
-        let gain = end.as_ref().map_or(Rgb::ZERO, |end| end.gain);
-        // Each has even numbers of its own: F takes an unknown number of them.
+        let first = first_fiber.unwrap_or(u[1]);
+        // It takes an unknown number of them.
         let mut of_forward = stream.branch();
-        let drawn = of_forward.next();
-        let first = first_fiber.unwrap_or(drawn);
-        let forward = Forward::draw(&view, crossings, unscattered, gain, (weight, lit), first, &mut of_forward);
-        let kept = forward.as_ref().map_or(Rgb::ONE, |f| Rgb::ONE - f.drawn.share);
-        let node = LateNode::new(end, kept, weight, [u[2], u[3]], stream.branch());
+        let forward = Forward::draw(&view, crossings, unscattered, (weight, lit), first, &mut of_forward);
+        let end = forward.as_ref().and_then(|forward| forward.end(&view, crossings, u[0]));
+        let node = LateNode::new(end, weight, [u[2], u[3]], stream.branch());
         Self { view, forward, node, backward: Backward::later(stream) }
     }
 
@@ -298,7 +292,7 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of the node's lobes and of B leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
-        self.node.end().map_or(0.0, |end| self.view.depth(&end.crossing, end.x))
+        self.node.end().map_or(0.0, |end| end.spot.depth)
     }
 
     /// Depth from which light of F leaves: that of the first fibre.

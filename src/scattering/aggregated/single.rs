@@ -5,7 +5,7 @@ use std::{
     f32::consts::{FRAC_1_PI, TAU},
 };
 
-use glam::{Vec2, Vec3A};
+use glam::Vec3A;
 
 use super::{
     super::{
@@ -13,19 +13,20 @@ use super::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
     },
-    Spot, View,
-    chain::ChainEnd,
+    Spot, View, across,
+    forward::ChainEnd,
 };
 use crate::{
-    geometry::section::{PlyAhead, PlyCrossing},
+    geometry::{
+        density::ChordFibers,
+        section::{PlyAhead, PlyCrossing},
+    },
     math::{Rgb, sampler::Stream},
 };
 
 /// Fibres more than counted on the camera's side by which the node's lobes are widened for sampling, so that the
 /// light's side, unknown then, does not make the true lobe wider than the sampled one.
 const SAMPLING_WIDENING: f32 = 1.2;
-/// The power of half the versed angle from straight on with which light finds a fibre's own chord free of others.
-const STRAIGHT_ON: i32 = 4;
 
 /// A place inside a ply where light ends its chain.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +37,9 @@ pub(super) struct Node {
     /// Sine and cosine of the camera's latitude against the fibre.
     sin: f32,
     cos: f32,
-    /// Expected fibres between the camera and the node.
+    /// Where the light came from, in the section.
+    back: Vec3A,
+    /// Fibres that have passed it on before the node.
     before: f32,
     /// Weight of an event here, before any albedo.
     pub(super) amplitude: Rgb,
@@ -58,8 +61,6 @@ pub(super) struct Node {
 #[derive(Clone, Debug)]
 pub(super) struct LateNode {
     end: Option<ChainEnd>,
-    /// The share of light that ends its chain at all.
-    kept: Rgb,
     /// The path's weight.
     weight: Rgb,
     u: [f32; 2],
@@ -70,8 +71,8 @@ pub(super) struct LateNode {
 impl LateNode {
     /// Nothing yet, of the arguments of [`Node::draw`].
     #[inline]
-    pub(super) fn new(end: Option<ChainEnd>, kept: Rgb, weight: Rgb, u: [f32; 2], stream: Stream) -> Self {
-        Self { end, kept, weight, u, stream, node: OnceCell::new() }
+    pub(super) fn new(end: Option<ChainEnd>, weight: Rgb, u: [f32; 2], stream: Stream) -> Self {
+        Self { end, weight, u, stream, node: OnceCell::new() }
     }
 
     /// Where its chain ends, if any light leaves from there.
@@ -83,7 +84,7 @@ impl LateNode {
     /// The node, always the same one.
     #[inline]
     pub(super) fn get(&self, view: &View<'_>) -> Option<&Node> {
-        let draw = || Node::draw(view, self.end.as_ref()?, self.kept, self.weight, self.u, &mut self.stream.clone());
+        let draw = || Node::draw(view, self.end.as_ref()?, self.weight, self.u, &mut self.stream.clone());
         self.node.get_or_init(draw).as_ref()
     }
 }
@@ -125,18 +126,10 @@ impl NodeValue {
 }
 
 impl Node {
-    /// The node at a chain's end, with a direction drawn from its lobes. `kept` is the share of light that ends its chain at
-    /// all. `None` if its fibres are black.
+    /// The node at a chain's end, with a direction drawn from its lobes. `None` if its fibres are black.
     #[inline]
-    pub(super) fn draw(
-        view: &View<'_>,
-        end: &ChainEnd,
-        kept: Rgb,
-        weight: Rgb,
-        u: [f32; 2],
-        stream: &mut Stream,
-    ) -> Option<Self> {
-        let mut node = Self::at(view, &end.crossing, end.x, end.weight * kept, weight);
+    pub(super) fn draw(view: &View<'_>, end: &ChainEnd, weight: Rgb, u: [f32; 2], stream: &mut Stream) -> Option<Self> {
+        let mut node = Self::at(view, end, weight);
         if node.chance.iter().sum::<f32>() <= 0.0 {
             return None;
         }
@@ -155,13 +148,12 @@ impl Node {
         Some(node)
     }
 
-    /// The node at the share `x` of the fibres on a ply's chord, without a direction.
+    /// The node at a chain's end, without a direction.
     #[inline]
-    pub(super) fn at(view: &View<'_>, crossing: &PlyCrossing, x: f32, amplitude: Rgb, throughput: Rgb) -> Self {
-        let optics = &view.yarn.plies[crossing.ply];
-        let spot = view.spot(crossing, x);
+    pub(super) fn at(view: &View<'_>, end: &ChainEnd, throughput: Rgb) -> Self {
+        let ChainEnd { spot, back, crossing, before, amplitude } = *end;
+        let optics = &view.yarn.plies[spot.ply];
         let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
-        let before = crossing.fibers * x;
         let weight = throughput * amplitude;
         let leaves = optics.leaving.share(&spot.place(view.yarn).0);
         let (untouched, events) = optics.touched(before, Rgb::splat(SAMPLING_WIDENING));
@@ -170,7 +162,8 @@ impl Node {
         let beta_tt = optics.beta_tt_squared;
         Self {
             spot,
-            crossing: *crossing,
+            crossing,
+            back,
             sin,
             cos: (1.0 - sin * sin).sqrt(),
             before,
@@ -178,7 +171,7 @@ impl Node {
             kappa: kappa_of_variance(Rgb::from([
                 optics.beta_r_squared + events.max_channel() * beta_tt,
                 optics.beta_r_squared,
-                (1.0 + (optics.events * (before + SAMPLING_WIDENING)).max_channel()) * beta_tt,
+                (1.0 + before + (optics.events * SAMPLING_WIDENING).max_channel()) * beta_tt,
             ])),
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
@@ -225,7 +218,7 @@ impl Node {
         }
         value.r = optics.single_r * scale * r;
         if p_tt > 0.0 {
-            let m = kernel(kappa_of_variance((optics.events * (after + self.before) + 1.0) * beta_tt), at);
+            let m = kernel(kappa_of_variance((optics.events * after + Rgb::splat(1.0 + self.before)) * beta_tt), at);
             value.tt = optics.single_tt * scale * m;
             value.pdf += p_tt * bent;
         }
@@ -242,8 +235,9 @@ impl Node {
     /// The chance that light goes out where `open` of it may, and of the rest `stays` goes on inside.
     #[inline]
     pub(super) fn chance_out(&self, open: Rgb, stays: Rgb) -> f32 {
-        let out = open.weighted_mean(self.weight);
-        let stay = ((Rgb::ONE - open) * stays).weighted_mean(self.weight);
+        // By the channel that has most of each, so that none has a large weight.
+        let out = (open * self.weight).max_channel();
+        let stay = ((Rgb::ONE - open) * stays * self.weight).max_channel();
         if out + stay > 0.0 { out / (out + stay) } else { 1.0 }
     }
 
@@ -258,8 +252,8 @@ impl Node {
     /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
     /// plies, and of all but the node's own.
     ///
-    /// Near its own fibre the way is clearer than the mean medium: the camera's ray has already swept a strip as wide
-    /// as a fibre (the "hot spot"), and the light starts at the fibre's surface, not at its centre.
+    /// The way begins as that of F does, and no other fibre is met at once ([`PlyOptics::free_after`]). Where it goes back the way that the light
+    /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot".
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
         self.depth_by_plies(view, w, |_, _| {})
@@ -271,47 +265,30 @@ impl Node {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
-        let ahead = Vec2::new(w.x, w.y) / (1.0 - w.z * w.z).max(1e-12).sqrt();
         let thin = view.section.thinness();
-        let shift = thin * optics.shift * Vec3A::new(1.0 + ahead.x, ahead.y, 0.0);
-        let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, ahead);
-        // Light that goes on is inside its own fibre first; light that turns back is not.
-        let hole = thin * optics.fiber_chord * 0.5 * (1.0 - ahead.x);
-        let lead = thin * optics.lead;
+        let out = across(w);
+        let turn = -self.back.dot(out);
+        let shift = thin * optics.lead * (self.back + turn.max(0.0) * out);
+        let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
-        // Straight on, no other fibre lies within its own chord; aside, others do, as the mean medium has it.
-        let alone = (0.5 * (1.0 - ahead.x)).powi(STRAIGHT_ON);
+        let tilt = spot.tilt(view.section, w);
+        // What the strip clears is not free twice.
+        let free = tilt / view.section.squeeze() * optics.free_after(turn) * (1.0 + turn).min(1.0).powi(2);
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
-            let (ply, passed) = (&shape.plies[way.ply], &yarn.plies[way.ply]);
-            if yarn.plain {
-                let depth = passed.rho * plain_fibers(ply, &way, &strip, lead);
-                if way.ply == spot.ply {
-                    own += depth
-                } else {
-                    others += depth
-                }
-                return;
-            }
-            let chord = ply.chord(way.offset, way.length, thin, wide);
+            let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             if way.ply == spot.ply {
-                let (from, to) = ((way.foot - chord.half).max(0.0), way.foot + chord.half);
-                if to > 0.0 {
-                    let even = strip.length(from + lead, to + lead) / (2.0 * chord.half);
-                    let ring = ((to - hole) / chord.zone).clamp(0.0, 1.0);
-                    let fibers = chord.even * even + 0.5 * chord.ring * ring - alone * passed.own_chord;
-                    own += passed.rho * fibers.max(0.0);
-                }
+                let fibers = if turn > 0.0 { chord.ahead(-way.foot) } else { strip.fibers(&chord, way.foot) };
+                own += optics.rho * (tilt * fibers - free).max(0.0);
             } else {
                 let fibers = chord.ahead(-way.foot);
-                others += passed.rho * fibers;
+                others += yarn.plies[way.ply].rho * fibers;
                 other(&way, fibers);
             }
         });
-        let tilt = spot.tilt(view.section, w);
         others *= tilt;
-        (own * tilt + others, others)
+        (own + others, others)
     }
 }
 
@@ -342,30 +319,35 @@ impl Among {
     }
 }
 
-/// The strip as wide as a fibre that the camera's ray has swept on its way to the node, as the light's way leaves it.
-struct ClearedStrip {
+/// The strip as wide as a fibre that light has swept on its way to the node, as the way back leaves it.
+pub(super) struct ClearedStrip {
     /// The length after which the way has left the strip.
     cleared: f32,
 }
 
 impl ClearedStrip {
+    /// For light that is turned by an angle of a cosine.
     #[inline]
-    fn new(width: f32, ahead: Vec2) -> Self {
-        Self { cleared: if ahead.x > 0.0 { width / ahead.y.abs().max(1e-6) } else { width } }
+    pub(super) fn new(width: f32, turn: f32) -> Self {
+        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
+        Self { cleared: if turn < 0.0 { width / aside } else { width } }
+    }
+
+    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
+    #[inline]
+    fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
+        let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);
+        if to <= 0.0 {
+            return 0.0;
+        }
+        let ring = (to / chord.zone).clamp(0.0, 1.0);
+        chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
     }
 
     /// The length between two distances along the way, less what lies in the strip.
     #[inline]
-    fn length(&self, from: f32, to: f32) -> f32 {
+    pub(super) fn length(&self, from: f32, to: f32) -> f32 {
         let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
         outside(to) - outside(from)
     }
-}
-
-/// The fibres ahead in a ply in the plain form: even over the core, which alone is passed.
-fn plain_fibers(ply: &crate::geometry::yarn::PlyShape, way: &PlyAhead, strip: &ClearedStrip, lead: f32) -> f32 {
-    let sigma = 2.0 * ply.fiber_radius * ply.fibers * FRAC_1_PI / (ply.core_radius * ply.core_radius);
-    let half = (ply.core_radius * ply.core_radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
-    let (from, to) = ((way.foot - half).max(0.0), (way.foot + half).max(0.0));
-    if half > 0.0 { sigma * strip.length(from + lead, to + lead) } else { 0.0 }
 }

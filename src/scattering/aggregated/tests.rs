@@ -7,7 +7,7 @@ use std::{
 
 use glam::Vec2;
 
-use super::{forward::More, single::Node, *};
+use super::{forward::More, single::ClearedStrip, *};
 use crate::{
     geometry::{
         yarn::{PlyParameters, touching_plies},
@@ -15,7 +15,7 @@ use crate::{
     },
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
     scattering::{
-        kernel::{DIFFUSE, kappa_of_variance, kernel, normalisation, normalised_kernel},
+        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, normalisation, normalised_kernel},
         lobe::LobeFrame,
         medium::extinction_rate,
         testing::{SILK, lossless, material, section, silk, sphere},
@@ -56,14 +56,16 @@ fn quadrature(
                 let (d, e) = (depth.to_array()[channel], ended.to_array()[channel]);
                 let x = if d > 1e-6 { -(-(u as f32) * e).ln_1p() / d } else { u as f32 };
                 let amplitude = reaching * ended * (weight as f32);
-                let node = Node::at(&view, c, x, amplitude, Rgb::ONE);
+                let at = c.enter + (c.exit - c.enter) * x;
+                let inside = section.inside(yarn.occluder().shape(), section.point(at), c.travel_at(at));
+                let node = (Spot::new(&view, c.ply, at, inside), c.fibers * x);
                 for (w, out) in directions.iter().zip(&mut out) {
-                    out[0] += node.toward(&view, *w).lobes().0 * only;
+                    out[0] += amplitude * plain_lobes(&view, &node, *w).0 * only;
                 }
                 let mean = (0..32)
                     .map(|i| {
                         let (s, c) = ((i as f32 + 0.5) / 32.0 * TAU).sin_cos();
-                        node.toward(&view, Vec3A::new(c, s, 0.0)).clear
+                        plain_lobes(&view, &node, Vec3A::new(c, s, 0.0)).1
                     })
                     .fold(Rgb::ZERO, |a, b| a + b)
                     / 32.0;
@@ -77,6 +79,39 @@ fn quadrature(
         reaching *= (-depth).exp();
     }
     out
+}
+
+/// R, TT and D of the plain form for a node with so many expected fibres before it, and what of them passes on the way out: past fibres that
+/// are even over the core, which alone is passed.
+fn plain_lobes(view: &View<'_>, (spot, before): &(Spot, f32), w: Vec3A) -> (Rgb, Rgb) {
+    const SHRINK: f32 = 0.4;
+    let shape = view.yarn.occluder().shape();
+    let optics = &view.yarn.plies[spot.ply];
+    let ply = &shape.plies[spot.ply];
+    let out = across(w);
+    let shift = optics.lead * (1.0 - SHRINK * ply.density() as f32).max(0.0) * (Vec3A::X + out);
+    let strip = ClearedStrip::new(2.0 * ply.fiber_radius, -out.x);
+    let mut depth = Rgb::ZERO;
+    view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
+        let ply = &shape.plies[way.ply];
+        let sigma = 2.0 * ply.fiber_radius * ply.fibers / (PI * ply.core_radius * ply.core_radius);
+        let half = (ply.core_radius * ply.core_radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
+        let (from, to) = ((way.foot - half).max(0.0), (way.foot + half).max(0.0));
+        if half > 0.0 {
+            let length = strip.length(from + optics.lead, to + optics.lead);
+            depth += view.yarn.plies[way.ply].rho * (sigma * length);
+        }
+    });
+    let depth = depth * spot.tilt(view.section, w);
+    let sines = [view.camera, w].map(|v| v.dot(spot.tangent).clamp(-1.0, 1.0));
+    let cosines = sines.map(|sin| (1.0 - sin * sin).sqrt());
+    let at = Latitudes::new(sines[0], cosines[0], sines[1], cosines[1]);
+    let events = optics.events * (depth / optics.rho + Rgb::splat(*before));
+    let lobe = |own: Rgb| kernel(kappa_of_variance(events * optics.beta_tt_squared + own), at);
+    let [r, tt] = [optics.beta_r_squared, optics.beta_tt_squared].map(|own| lobe(Rgb::splat(own)));
+    let clear = (-depth).exp();
+    let lobes = optics.single_r * r + optics.single_tt * tt + optics.single_d * DIFFUSE;
+    (lobes * clear * (cosines[1] / TAU), clear)
 }
 
 /// B of the plain form: a share of it, by the ply's thickness, leans as (1 + cos phi) / 2 pi from where the camera looks. The program
@@ -186,7 +221,6 @@ fn values_agree_with_the_reference_vectors() {
             .collect();
         let shape = YarnShape::new(&parameters, 0.0, true);
         let mut yarn = AggregatedYarn::new(shape, &vec![&m; count as usize]);
-        yarn.plain = true;
         for ply in &mut yarn.plies {
             // Chains widen R by their mean, and what was only ever reflected is as wide as two reflections.
             (ply.sharp, ply.events) = (false, ply.chain);
@@ -390,7 +424,7 @@ fn densities_match(pressed: Option<Pressed>) {
     let mut counts = [[0f64; 96]; 3];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
-        let again = Forward::follow(view, first, forward.gain, forward.weight, 0.0, &mut stream);
+        let again = Forward::follow(view, first, forward.weight, 0.0, &mut stream);
         if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
             counts[0][cell(again.drawn.direction)] += 1.0;
         }
