@@ -93,7 +93,7 @@ fn fibers_that_are_told_apart_leave_the_mean_as_it_is() {
     let noise = difference(&smooth, &render(&close(1.5, false), &["--seed", "1"]));
     eprintln!("mean ratio {ratio:.4?}, relative RMSE {seen:.4}, of noise {noise:.4}");
     assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.02), "{ratio:?}");
-    assert!(seen > 1.3 * noise, "{seen} where noise is {noise}");
+    assert!(seen > 1.2 * noise, "{seen} where noise is {noise}");
     // From far away nobody can tell.
     assert_eq!(difference(&render(&close(600.0, false), &[]), &render(&close(600.0, true), &[])), 0.0);
 }

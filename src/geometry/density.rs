@@ -21,13 +21,47 @@ pub struct PlyPacking {
     pub regularity: f64,
     /// The same of lines by the rim, where fibres lie in another order.
     pub rim: f64,
-    /// How many expected fibres light that passed one meets no other within: where it goes straight on, and where it is turned in the
-    /// section by [`TURNED`] or more. `None` if that is the mean dead zone.
+    /// How many expected fibres light that met one meets no other within: where it goes straight on, and where it is turned in the section by
+    /// [`TURNED`] up to a right angle. `None` if that is the mean dead zone.
     pub after: Option<[f64; 2]>,
 }
 
 /// The turn of [`PlyPacking::after`], radians: 30 degrees.
 pub(crate) const TURNED: f64 = std::f64::consts::FRAC_PI_6;
+
+/// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClearedStrip {
+    /// The length after which the way has left the strip.
+    cleared: f32,
+}
+
+impl ClearedStrip {
+    /// For light that is turned by an angle of a cosine.
+    #[inline]
+    pub(crate) fn new(width: f32, turn: f32) -> Self {
+        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
+        Self { cleared: if turn < 0.0 { width / aside } else { width } }
+    }
+
+    /// The length between two distances along the way, less what lies in the strip.
+    #[inline]
+    pub(crate) fn length(&self, from: f32, to: f32) -> f32 {
+        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
+        outside(to) - outside(from)
+    }
+
+    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
+    #[inline]
+    pub(crate) fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
+        let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);
+        if to <= 0.0 {
+            return 0.0;
+        }
+        let ring = (to / chord.zone).clamp(0.0, 1.0);
+        chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
+    }
+}
 
 /// What of [`PlyPacking`] is known, and not to be measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -17,6 +17,9 @@ use crate::{
 
 /// Constants of the aggregated model that were calibrated on explicit fibres (untwisted single plies only).
 mod calibrated {
+    /// How much of what is free of other fibres after one the swept strip leaves where light goes straight back; the square of what the
+    /// cosine of its turn is above -1, where that is more.
+    pub(super) const LEFT_BESIDE_STRIP: f32 = 0.1;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
@@ -254,6 +257,12 @@ impl PlyOptics {
         const TURNED_COS: f32 = 0.866_025_4;
         let [straight, turned] = self.after;
         turned + (straight - turned) * ((turn - TURNED_COS) / (1.0 - TURNED_COS)).clamp(0.0, 1.0)
+    }
+
+    /// The same of light that goes back, beside the strip that it has swept, which is a part of what is free.
+    #[inline]
+    pub(crate) fn free_back(&self, turn: f32) -> f32 {
+        self.after[1] * (1.0 + turn).powi(2).max(calibrated::LEFT_BESIDE_STRIP)
     }
 
     /// The width of so many events of TT.

@@ -201,7 +201,7 @@ impl Lines {
                 };
                 out += f64::from(u8::from(discs.iter().enumerate().all(is_free)));
                 // As the model has it: abreast of the fibre's centre, and from where the light came.
-                let from = at(lies) + lead * (along.dot(w) * w - along);
+                let from = at(lies) + lead * (along.dot(w).max(0.0) * w - along);
                 let (beside, reach) = (from.dot(w.perp()), self.reach(w.perp()));
                 if beside.abs() >= reach * (1.0 + self.radius) {
                     clear += 1.0;
@@ -601,6 +601,32 @@ mod tests {
             // By one number, the second moment, .05 to .25 off.
             assert!(off < 0.08 * passed, "{count} at {density}: {off} of {passed}");
             assert!((found / want - 1.0).abs() < 0.16, "{count} at {density}: {found} {want}");
+        }
+    }
+
+    #[test]
+    fn as_much_light_leaves_after_a_fiber_as_in_other_packings() {
+        for (count, density, stretch) in [(60u32, 0.3f64, 1.0), (60, 0.45, 1.0), (60, 0.6, 1.0), (100, 0.4, 1.5)] {
+            let share = (density / f64::from(count)).sqrt();
+            let radius = share / (1.0 - share);
+            let packing = measured(count, radius, Twist::NONE, stretch);
+            let lines = Lines { radius, stretch, slopes: Slopes::NONE };
+            let mut ply = lines.ply(count);
+            (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
+            ply.regularity = packing.regularity as f32;
+            let packings: Vec<_> =
+                (500..620).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed))).collect();
+            let sections = match Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0))) {
+                None => packings,
+                Some(ellipse) => packings.iter().flat_map(|p| squeezed(p, share, &Slopes::NONE, &ellipse)).collect(),
+            };
+            let [straight, turned] = packing.after.unwrap();
+            for (turn, after) in [(0.0, straight), (TURNED, turned)] {
+                let other = lines.after(&sections, &ply, turn);
+                assert!((after - other).abs() < 0.09, "{count} at {density}, {turn}: {after}, not {other}");
+            }
+            // A little more than the share of a line that is inside fibres.
+            assert!([straight, turned].iter().all(|after| (0.9..1.6).contains(&(after / density))), "{packing:?}");
         }
     }
 

@@ -4,7 +4,7 @@
 //! * meets no fibre at all (the unscattered share T0, a delta, [`Occluder::transparency`]),
 //! * or meets a first fibre. From there it passes on forward as TT through that one and all it meets on its own way out
 //!   (lobe F, `forward`),
-//! * or ends its chain of TT at a *node*: a place on the chord where R, D or the wide part of TT sends it towards the
+//! * or ends its chain of TT at a *node*: one of these fibres, where R, D or the wide part of TT sends it towards the
 //!   light (`single`). On the way there it is dimmed by the plies ahead; what stays scatters on and leaves in the
 //!   end as lobe B (`backward`).
 //!
@@ -12,8 +12,8 @@
 //! scattering that R and D already hold (Eqs. 12 to 14); the paper counts that twice and can double the energy.
 //!
 //! # Estimation
-//! A [`Vertex`] draws a first fibre and one direction of F from it, a node, and one direction from that. The share of F
-//! in its direction decides between F and the node, and is what the node's light is less; whether the node's direction
+//! A [`Vertex`] draws a first fibre and one way of F from it, a node of the fibres on that way, and one direction from that. The
+//! share of F in its direction decides between F and the node, and is what the nodes' light is less; whether the node's direction
 //! escapes decides between R/D/TT and B, as it would for a photon: with white fibres weights are near 1, and 1 on the mean. The directions
 //! also serve as one-sample estimates of the shares that stay, so that no table of them is needed, in memory or in
 //! set-up time. Each of the components (F, node lobes, B) is an integral of its own, with its own weight between light

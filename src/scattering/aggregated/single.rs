@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     geometry::{
-        density::ChordFibers,
+        density::ClearedStrip,
         section::{PlyAhead, PlyCrossing},
     },
     math::{Rgb, sampler::Stream},
@@ -272,14 +272,14 @@ impl Node {
         let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
         let tilt = spot.tilt(view.section, w);
-        // What the strip clears is not free twice.
-        let free = tilt / view.section.squeeze() * optics.free_after(turn) * (1.0 + turn).min(1.0).powi(2);
+        let free = if turn < 0.0 { optics.free_back(turn) } else { optics.free_after(turn) };
+        let free = tilt / view.section.squeeze() * free;
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             if way.ply == spot.ply {
-                let fibers = if turn > 0.0 { chord.ahead(-way.foot) } else { strip.fibers(&chord, way.foot) };
+                let fibers = if turn < 0.0 { strip.fibers(&chord, way.foot) } else { chord.ahead(-way.foot) };
                 own += optics.rho * (tilt * fibers - free).max(0.0);
             } else {
                 let fibers = chord.ahead(-way.foot);
@@ -316,38 +316,5 @@ impl Among {
             let half = (radius * radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
             self.met = Some(Met { ply: way.ply, distance: (way.foot - half).max(0.0) });
         }
-    }
-}
-
-/// The strip as wide as a fibre that light has swept on its way to the node, as the way back leaves it.
-pub(super) struct ClearedStrip {
-    /// The length after which the way has left the strip.
-    cleared: f32,
-}
-
-impl ClearedStrip {
-    /// For light that is turned by an angle of a cosine.
-    #[inline]
-    pub(super) fn new(width: f32, turn: f32) -> Self {
-        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
-        Self { cleared: if turn < 0.0 { width / aside } else { width } }
-    }
-
-    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
-    #[inline]
-    fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
-        let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);
-        if to <= 0.0 {
-            return 0.0;
-        }
-        let ring = (to / chord.zone).clamp(0.0, 1.0);
-        chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
-    }
-
-    /// The length between two distances along the way, less what lies in the strip.
-    #[inline]
-    pub(super) fn length(&self, from: f32, to: f32) -> f32 {
-        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
-        outside(to) - outside(from)
     }
 }

@@ -7,9 +7,10 @@ use std::{
 
 use glam::Vec2;
 
-use super::{forward::More, single::ClearedStrip, *};
+use super::{forward::More, *};
 use crate::{
     geometry::{
+        density::ClearedStrip,
         yarn::{PlyParameters, touching_plies},
         yarn_frame::Pressed,
     },
