@@ -28,6 +28,8 @@ pub struct PlyPacking {
 
 /// The turn of [`PlyPacking::after`], radians: 30 degrees.
 pub(crate) const TURNED: f64 = std::f64::consts::FRAC_PI_6;
+/// Its cosine.
+pub(crate) const TURNED_COS: f32 = 0.866_025_4;
 
 /// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
 #[derive(Clone, Copy, Debug)]

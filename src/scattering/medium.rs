@@ -11,7 +11,7 @@ use super::{
     kernel::{kappa_of_variance, normalisation},
 };
 use crate::{
-    geometry::{occluder::PlyGaps, yarn::PlyShape},
+    geometry::{density::TURNED_COS, occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 
@@ -254,7 +254,6 @@ impl PlyOptics {
     /// How many expected fibres light that passed one meets no other within, by the cosine of its turn in the section.
     #[inline]
     pub(crate) fn free_after(&self, turn: f32) -> f32 {
-        const TURNED_COS: f32 = 0.866_025_4;
         let [straight, turned] = self.after;
         turned + (straight - turned) * ((turn - TURNED_COS) / (1.0 - TURNED_COS)).clamp(0.0, 1.0)
     }

@@ -269,6 +269,9 @@ impl Forward {
                 visit(self.alone(view, fiber, lobe, around, &fiber.ahead(view, w)));
             }
         }
+        if last.passed == Rgb::ZERO {
+            return;
+        }
         let (lobe, around) = last.lobe(&last.width, w);
         let often = self.more.map_or(0.0, |more| last.lobe(&more.width, w).0);
         if lobe < FORWARD_TAIL && often < FORWARD_TAIL {
@@ -356,16 +359,13 @@ impl Fiber {
         (along * cos * around, around)
     }
 
-    /// The way in the direction `w`. Light starts where it met the fibre, on the side where it came from, and is inside of it first if it
-    /// goes on forward.
+    /// The way in the direction `w`.
     #[inline]
     fn way(&self, view: &View<'_>, w: Vec3A) -> Way {
-        let out = across(w);
-        let optics = &view.yarn.plies[self.spot.ply];
-        let turn = -self.back.dot(out);
-        let shift = view.section.thinness() * optics.lead * (self.back + turn.max(0.0) * out);
+        let (turn, shift) = self.spot.turned(view, self.back, w);
         let tilt = self.spot.tilt(view.section, w);
-        Way { w, shift, tilt, free: tilt / view.section.squeeze() * optics.free_after(turn) }
+        let free = tilt / view.section.squeeze() * view.yarn.plies[self.spot.ply].free_after(turn);
+        Way { w, shift, tilt, free }
     }
 
     /// What is between the fibre and the outside in the direction `w`.

@@ -151,6 +151,16 @@ impl Spot {
         (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 
+    /// How light that came from `back`, in the section, goes on from here towards `w`: the cosine of its turn in the section, and the way from
+    /// this place to where it starts. Light starts where it met the fibre, on the side where it came from, and is inside of it first if it
+    /// goes on forward.
+    #[inline]
+    fn turned(&self, view: &View<'_>, back: Vec3A, w: Vec3A) -> (f32, Vec3A) {
+        let out = across(w);
+        let turn = -back.dot(out);
+        (turn, view.section.thinness() * view.yarn.plies[self.ply].lead * (back + turn.max(0.0) * out))
+    }
+
     /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
     /// fibres on its way.
     #[inline]
@@ -292,7 +302,8 @@ impl<'a> Vertex<'a> {
     /// Depth from which light of the node's lobes and of B leaves.
     #[inline]
     pub fn node_start(&self) -> f32 {
-        self.node.end().map_or(0.0, |end| end.spot.depth)
+        // That of the first fibre, which is the camera's ray's.
+        self.forward_start()
     }
 
     /// Depth from which light of F leaves: that of the first fibre.

@@ -13,7 +13,7 @@ use super::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
     },
-    Spot, View, across,
+    Spot, View,
     forward::ChainEnd,
 };
 use crate::{
@@ -73,12 +73,6 @@ impl LateNode {
     #[inline]
     pub(super) fn new(end: Option<ChainEnd>, weight: Rgb, u: [f32; 2], stream: Stream) -> Self {
         Self { end, weight, u, stream, node: OnceCell::new() }
-    }
-
-    /// Where its chain ends, if any light leaves from there.
-    #[inline]
-    pub(super) fn end(&self) -> Option<&ChainEnd> {
-        self.end.as_ref()
     }
 
     /// The node, always the same one.
@@ -266,9 +260,7 @@ impl Node {
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
         let thin = view.section.thinness();
-        let out = across(w);
-        let turn = -self.back.dot(out);
-        let shift = thin * optics.lead * (self.back + turn.max(0.0) * out);
+        let (turn, shift) = spot.turned(view, self.back, w);
         let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
         let tilt = spot.tilt(view.section, w);
