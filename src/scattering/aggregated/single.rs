@@ -246,7 +246,8 @@ impl Node {
     /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
     /// plies, and of all but the node's own.
     ///
-    /// The way begins as that of F does, and no other fibre is met at once ([`PlyOptics::free_after`]). Where it goes back the way that the light
+    /// The way begins as that of F does, and no other fibre is met at once
+    /// ([`free_after`](crate::scattering::medium::PlyOptics::free_after)). Where it goes back the way that the light
     /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot".
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
