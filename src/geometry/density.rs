@@ -7,6 +7,8 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
+use wide::f32x4;
+
 use super::yarn::PlyShape;
 
 /// How the fibres of a ply lie.
@@ -102,24 +104,21 @@ impl PlyShape {
         let half_width = (self.fiber_radius * wide).min(0.999 * self.radius);
         let core = self.radius - half_width;
         let inverse = 1.0 / core;
-        let upper = Segment::new((offset + half_width) * inverse);
-        let lower = Segment::new((offset - half_width) * inverse);
+        let circle = if self.depth == 0.0 { inverse } else { 1.0 / (core - self.depth * half_width).max(1e-3 * core) };
+        let (upper, lower) = (offset + half_width, offset - half_width);
+        // In the circle of all centres, and in that on which they crowd.
+        let at = Segments::new([upper * inverse, lower * inverse, upper * circle, lower * circle]);
         let count = self.fibers * FRAC_1_PI / (length * wide);
-        let mut even = upper.area() - lower.area();
+        let [upper, lower, ..] = at.areas();
+        let mut even = upper - lower;
         let mut ring = 0.0;
         if self.crowding > 0.0 {
             even *= 1.0 - self.crowding;
-            let between = match self.depth {
-                0.0 => upper.angle - lower.angle,
-                depth => {
-                    let inverse = 1.0 / (core - depth * half_width).max(1e-3 * core);
-                    let angle = |u: f32| Segment::new(u * inverse).angle;
-                    angle(offset + half_width) - angle(offset - half_width)
-                }
-            };
-            ring = self.crowding * between;
+            let [.., upper, lower] = at.angles();
+            ring = self.crowding * (upper - lower);
         } else if self.crowding < 0.0 {
-            even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper.cubic() - lower.cubic());
+            let [upper, lower, ..] = at.cubics();
+            even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper - lower);
         }
         // The line meets a fibre whose centre lies up to a fibre's radius beside it: half of that on the mean.
         let beside = ((offset.abs() - 0.5 * half_width).max(0.0) * inverse).min(1.0);
@@ -183,19 +182,21 @@ impl ChordFibers {
     }
 }
 
-/// What lies on one side of a chord of the unit circle at distance u, clamped to [-1, 1], from its centre.
-struct Segment {
-    u: f32,
+/// What lies on one side of each of four chords of the unit circle at distances u, clamped to [-1, 1], from its centre.
+struct Segments {
+    u: f32x4,
     /// sqrt(1 - u^2)
-    cos: f32,
+    cos: f32x4,
     /// asin(u)
-    angle: f32,
+    angle: f32x4,
 }
 
-impl Segment {
+impl Segments {
     #[inline]
-    fn new(u: f32) -> Self {
-        let a = u.abs().min(1.0);
+    fn new(u: [f32; 4]) -> Self {
+        let one = f32x4::ONE;
+        let u = f32x4::from(u);
+        let a = u.abs().fast_min(one);
         // asin(a) = pi/2 - sqrt(1 - a) poly(a), |error| < 2e-8 (Abramowitz and Stegun 4.4.46).
         const C: [f32; 8] = [
             -0.001_262_491_1,
@@ -205,23 +206,28 @@ impl Segment {
             -0.050_174_303,
             0.088_978_99,
             -0.214_598_8,
-            std::f32::consts::FRAC_PI_2,
+            FRAC_PI_2,
         ];
-        let poly = C[1..].iter().fold(C[0], |p, &c| p * a + c);
-        let asin = std::f32::consts::FRAC_PI_2 - (1.0 - a).sqrt() * poly;
-        Self { u: a.copysign(u), cos: (1.0 - a * a).sqrt(), angle: asin.copysign(u) }
+        let poly = C[1..].iter().fold(f32x4::splat(C[0]), |p, &c| p * a + f32x4::splat(c));
+        let asin = f32x4::splat(FRAC_PI_2) - (one - a).sqrt() * poly;
+        Self { u: a.copysign(u), cos: (one - a * a).sqrt(), angle: asin.copysign(u) }
     }
 
-    /// Area of the disc below the chord, less pi / 2.
+    /// Areas of the disc below the chords, less pi / 2.
     #[inline]
-    fn area(&self) -> f32 {
-        self.u * self.cos + self.angle
+    fn areas(&self) -> [f32; 4] {
+        (self.u * self.cos + self.angle).to_array()
+    }
+
+    #[inline]
+    fn angles(&self) -> [f32; 4] {
+        self.angle.to_array()
     }
 
     /// u (1 - u^2)^(3/2): the integral of (1 - 4 u^2) sqrt(1 - u^2).
     #[inline]
-    fn cubic(&self) -> f32 {
-        self.u * self.cos * self.cos * self.cos
+    fn cubics(&self) -> [f32; 4] {
+        (self.u * self.cos * self.cos * self.cos).to_array()
     }
 }
 
@@ -305,7 +311,9 @@ mod tests {
         for i in 0..=2000 {
             let u = -1.0 + f64::from(i) * 1e-3;
             let want = u * (1.0 - u * u).max(0.0).sqrt() + u.clamp(-1.0, 1.0).asin();
-            assert!((f64::from(Segment::new(u as f32).area()) - want).abs() < 4e-7, "u = {u}");
+            let got = Segments::new([u as f32, 0.0, 2.0, -2.0]).areas();
+            assert!((f64::from(got[0]) - want).abs() < 4e-7, "u = {u}");
+            assert_eq!(got[1..], [0.0, FRAC_PI_2, -FRAC_PI_2]);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{cell::OnceCell, f32::consts::FRAC_1_PI};
 
+use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3A};
 
 use super::{
@@ -29,7 +30,7 @@ pub(super) struct Backward {
 }
 
 /// Multiply scattered light of the node's ply.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Lobe {
     frame: LobeFrame,
     /// The axes against which azimuths count, as unit vectors across the frame's.
@@ -44,12 +45,14 @@ pub(super) struct Lobe {
     again: Option<Again>,
 }
 
-/// Light that left the node's ply in a direction drawn from its lobe, and what other plies gave off that took it up: the first of
-/// them, past others, and the one after it, whatever lies there.
-#[derive(Clone, Copy, Debug)]
+/// Light that left the node's ply in a direction drawn from its lobe, and what other plies gave off that took it up.
+#[derive(Clone, Debug)]
 struct Again {
-    ways: [Taken; 2],
-    meetings: [Meeting; 2],
+    /// At least one.
+    ways: ArrayVec<Taken, 2>,
+    /// Where each way that meets another ply does so. What the first gives off passes others, what the second does passes whatever
+    /// lies there.
+    meetings: ArrayVec<Meeting, 2>,
 }
 
 /// A direction that light took.
@@ -123,16 +126,25 @@ impl Lobe {
         let (value, pdf) = self.value(view, node.spot.ply, w);
         let (open, met) = node.others(view, w, stream);
         let (way, rest) = Taken::new(node, (w, value, pdf), open)?;
+        let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
+        if rest.max_channel() <= 0.0 {
+            return Some(again);
+        }
         let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
         let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), stream, |of| rest * of.entering_past);
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
         let open = first.open(view, w, |way, fibers| among.offer(view, way, fibers, stream));
-        let (next, rest) = Taken::new(node, (w, value, pdf), open)?;
-        let met = among.met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
-        let last = Meeting::new(view, &self.frame, (&first.spot.inside, w, met), stream, |of| rest * of.entering);
-        Some(Again { ways: [way, next], meetings: [first, last] })
+        let (way, rest) = Taken::new(node, (w, value, pdf), open)?;
+        again.ways.push(way);
+        again.meetings.push(first);
+        if rest.max_channel() > 0.0 {
+            let met = among.met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
+            let from = (&first.spot.inside, w, met);
+            again.meetings.push(Meeting::new(view, &self.frame, from, stream, |of| rest * of.entering));
+        }
+        Some(again)
     }
 
     /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
@@ -152,18 +164,22 @@ impl Lobe {
         match &self.again {
             None => first * mis_weight(light_pdf, chance * pdf),
             Some(again) => {
-                let [first_meeting, last] = &again.meetings;
-                let left = chance * (1.0 - again.ways[0].open);
-                let left_again = left * (1.0 - again.ways[1].open);
-                let goes_on = node.chance_out(open, node.leaves_again);
-                let mut all = first * open * mis_weight(light_pdf, chance * goes_on * pdf);
-                let (value, pdf) = first_meeting.value(view, &self.frame, w);
-                if value.max_channel() > 0.0 {
-                    let open = first_meeting.open(view, w, |_, _| {});
-                    all += value * open * mis_weight(light_pdf, left * node.chance_out(open, node.leaves_again) * pdf);
+                let goes_on = |open: Rgb| node.chance_out(open, node.leaves_again);
+                let mut all = first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf);
+                let mut left = chance * (1.0 - again.ways[0].open);
+                for (i, meeting) in again.meetings.iter().enumerate() {
+                    let (value, pdf) = meeting.value(view, &self.frame, w);
+                    let Some(next) = again.ways.get(i + 1) else {
+                        all += value * mis_weight(light_pdf, left * pdf);
+                        break;
+                    };
+                    if value.max_channel() > 0.0 {
+                        let open = meeting.open(view, w, |_, _| {});
+                        all += value * open * mis_weight(light_pdf, left * goes_on(open) * pdf);
+                    }
+                    left *= 1.0 - next.open;
                 }
-                let (value, pdf) = last.value(view, &self.frame, w);
-                all + value * mis_weight(light_pdf, left_again * pdf)
+                all
             }
         }
     }
@@ -187,11 +203,13 @@ impl Lobe {
                     }
                     chance *= 1.0 - way.open;
                 }
-                taken.unwrap_or_else(|| {
-                    let last = &again.meetings[1];
-                    let w = last.draw_by(view, &self.frame, u, stream);
-                    let (value, pdf) = last.value(view, &self.frame, w);
-                    (w, value, pdf * chance)
+                taken.unwrap_or_else(|| match again.meetings.get(again.ways.len() - 1) {
+                    Some(last) => {
+                        let w = last.draw_by(view, &self.frame, u, stream);
+                        let (value, pdf) = last.value(view, &self.frame, w);
+                        (w, value, pdf * chance)
+                    }
+                    None => (Vec3A::Z, Rgb::ZERO, 0.0),
                 })
             }
         };
