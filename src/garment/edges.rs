@@ -6,7 +6,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{fold::Fold, lay::LaidYarn, surface::Pose};
-use crate::pattern::{StrandKind, tile::chain};
+use crate::{
+    math::special::hermite,
+    pattern::{StrandKind, tile::chain},
+};
 
 /// How panels are sewn together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,15 +97,11 @@ impl Rail<'_> {
         let ((a, na), (b, nb)) = (vertex(i), vertex(i + 1));
         let direction = |k: isize| (vertex(k + 1).0 - vertex(k - 1).0).normalize_or(DVec3::X);
         let along = direction(i).lerp(direction(i + 1), t.clamp(0.0, 1.0)).normalize_or(DVec3::X);
-        // Smoothly through the vertices: Hermite with directions of both ends.
+        // Smoothly through the vertices, with directions of both ends.
         let chord = a.distance(b);
         let (h, t1) = (t.clamp(0.0, 1.0), t - t.clamp(0.0, 1.0));
-        let (h2, h3) = (h * h, h * h * h);
-        let at = a * (2.0 * h3 - 3.0 * h2 + 1.0)
-            + b * (3.0 * h2 - 2.0 * h3)
-            + direction(i) * chord * (h3 - 2.0 * h2 + h)
-            + direction(i + 1) * chord * (h3 - h2)
-            + along * (t1 * chord);
+        let slopes = [i, i + 1].map(|k| chord * direction(k));
+        let at = hermite([a, b], slopes, h) + along * (t1 * chord);
         let out = na.lerp(nb, h);
         let out = (out - out.dot(along) * along).normalize_or(DVec3::Y);
         [at, along, out.cross(along), out]

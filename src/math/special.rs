@@ -2,10 +2,18 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
+use glam::DVec3;
+
 /// From 0 to 1 as x does, level at both ends and beyond them.
 pub(crate) fn smooth_step(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
+}
+
+/// The cubic that leaves `from` with one slope and comes to `to` with another, at `t` in 0..1: Hermite's.
+pub(crate) fn hermite([from, to]: [DVec3; 2], [start, end]: [DVec3; 2], t: f64) -> DVec3 {
+    let s = 1.0 - t;
+    s * s * ((1.0 + 2.0 * t) * from + t * start) + t * t * ((1.0 + 2.0 * s) * to - s * end)
 }
 
 /// e^-x I1(x), the scaled modified Bessel function of the first kind, order 1, for x >= 0.

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use crate::math::special::hermite;
+
 /// A path with the number of a frame in it: `####` becomes `0007`, `{frame}` becomes `7`. `None` for a path that has
 /// no place for a number, and so is the same for all frames.
 pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
@@ -102,11 +104,7 @@ impl Track {
         let ((t0, v0), (t1, v1)) = (keys[next - 1], keys[next]);
         let span = t1 - t0;
         let s = (time - t0) / span;
-        let (s2, s3) = (s * s, s * s * s);
-        (2.0 * s3 - 3.0 * s2 + 1.0) * v0
-            + (s3 - 2.0 * s2 + s) * span * slope(next - 1)
-            + (3.0 * s2 - 2.0 * s3) * v1
-            + (s3 - s2) * span * slope(next)
+        hermite([v0, v1], [next - 1, next].map(|i| span * slope(i)), s)
     }
 }
 

@@ -14,7 +14,7 @@ use super::{
     edges::{Point, from_points, points},
     unit_cell::{CellOptions, Node, UnitCell},
 };
-use crate::math::special::smooth_step;
+use crate::math::special::{hermite, smooth_step};
 
 /// Points of a turn of the weft.
 const TURN: usize = 12;
@@ -432,9 +432,7 @@ fn join(way: &mut Vec<Point>, next: &[Point], nodes: usize) {
     let [a, b] = [from.0 - before.0, onwards.0 - to.0].map(|d| d.normalize_or_zero() * length);
     for k in 1..steps {
         let s = k as f64 / steps as f64;
-        let t = 1.0 - s;
-        // Hermite's cubic.
-        let p = t * t * ((1.0 + 2.0 * s) * from.0 + s * a) + s * s * ((1.0 + 2.0 * t) * to.0 - t * b);
+        let p = hermite([from.0, to.0], [a, b], s);
         let coordinates = if s < 0.5 { from.3 } else { to.3 };
         way.push((p, from.1 + s * (to.1 - from.1), from.2.lerp(to.2, s as f32), coordinates));
     }

@@ -11,7 +11,7 @@ use super::super::{
     },
     shape::Place,
 };
-use crate::geometry::spline::catmull_rom;
+use crate::{geometry::spline::catmull_rom, math::special::hermite};
 
 /// Stiffness of the net against shear and against bending, over that against stretching: it is blocked, and bulges only where
 /// it must.
@@ -208,11 +208,7 @@ impl Column {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(n - 1));
             (self.at[after] - self.at[before]) / (self.levels[after] - self.levels[before]) * span
         };
-        let (t2, t3) = (t * t, t * t * t);
-        a * (2.0 * t3 - 3.0 * t2 + 1.0)
-            + slope(k) * (t3 - 2.0 * t2 + t)
-            + b * (3.0 * t2 - 2.0 * t3)
-            + slope(k + 1) * (t3 - t2)
+        hermite([a, b], [k, k + 1].map(slope), t)
     }
 }
 
