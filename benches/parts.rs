@@ -113,7 +113,7 @@ fn vertex(bencher: Bencher<'_, '_>, model: &Model) {
             let (u, [a, b, c, _]) = (sampler.next4(), sampler.next4());
             let mut stream = sampler.even_stream();
             let vertex = scatterer.vertex(section, &crossings, passed, Rgb::ONE, u, &mut stream);
-            sum += vertex.evaluate(section.to_local(light), 1.0).lobes.sum();
+            sum += vertex.evaluate(section.to_local(light), 1.0, 0.5).lobes.sum();
             sum += vertex.sample([a, b, c], &mut stream).map_or(Rgb::ZERO, |next| next.weight);
         }
         sum

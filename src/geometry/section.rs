@@ -188,10 +188,16 @@ impl<'a> Section<'a> {
         Vec3A::new(self.enter, self.h, 0.0) + depth * self.direction()
     }
 
+    /// The world position of a point of this frame.
+    #[inline]
+    pub fn point_in_world(&self, point: Vec3A) -> Vec3A {
+        self.centre + self.radius * self.to_world(point)
+    }
+
     /// The world position of the point on the ray at a depth.
     #[inline]
     pub fn point_on_ray(&self, depth: f32) -> Vec3A {
-        self.centre + self.radius * self.to_world(self.point(depth))
+        self.point_in_world(self.point(depth))
     }
 
     /// How many more fibres lie on a chord than on that of the round section, by its length there: fibres are closer to each

@@ -355,13 +355,12 @@ impl<'a> Integrator<'a> {
         let arrival = Arrival { throughput: path.throughput, lit: !self.lights.is_empty(), first_fiber };
         let vertex = yarn.vertex(section, &scratch.crossings, unscattered, arrival, u, &mut stream);
 
-        let node = section.point_on_ray(vertex.node_start());
+        let place = section.point_in_world(vertex.place());
         let u_start = stream.next();
         let light = [u_light_choice, u_light_x, u_light_y];
-        self.next_event(node, light, path, sample, scratch, counters, |direction, pdf| {
-            let direct = vertex.evaluate(section.to_local(direction), pdf);
-            let forward = u_start < direct.forward_share;
-            let start = if forward { section.point_on_ray(vertex.forward_start()) } else { node };
+        self.next_event(place, light, path, sample, scratch, counters, |direction, pdf| {
+            let direct = vertex.evaluate(section.to_local(direction), pdf, u_start);
+            let start = section.point_in_world(direct.start?);
             let done = DoneWith::only(hit.yarn_place());
             Some(Response { value: Scattered::Cloth(direct.lobes), weight: 1.0, start, done })
         });
@@ -370,8 +369,8 @@ impl<'a> Integrator<'a> {
         path.shares.get_or_insert(next.shares);
         path.pdf = next.pdf;
         let done = DoneWith::only(hit.yarn_place());
-        path.ray = Ray { done, ..Ray::new(section.point_on_ray(next.start), section.to_world(next.direction)) };
-        (self.survives(path, node, next.weight, u_roulette, ROULETTE_AFTER), true)
+        path.ray = Ray { done, ..Ray::new(section.point_in_world(next.start), section.to_world(next.direction)) };
+        (self.survives(path, place, next.weight, u_roulette, ROULETTE_AFTER), true)
     }
 
     /// Notes of what cloth a camera path met first.

@@ -3,6 +3,7 @@
 use glam::Vec3A;
 
 use super::Light;
+use crate::math::sampler::OneOf;
 
 /// Chooses between lights by what each can give at a place: power over distance, cone and facing, without what stands
 /// in the way. A light that gives nothing there is not chosen.
@@ -29,29 +30,16 @@ impl<'a> LightChooser<'a> {
 
     /// Draws a light for the place `at` by `u` in [0, 1), with the chance that it had; `None` if none gives anything.
     #[inline]
-    pub fn choose(&self, at: Vec3A, mut u: f32) -> Option<(&'a Light, f32)> {
+    pub fn choose(&self, at: Vec3A, u: f32) -> Option<(&'a Light, f32)> {
         if let &[light] = self.lights.as_slice() {
             return Some((light, 1.0));
         }
-        let mut total = 0.0;
-        let mut chosen = None;
-        // Of all so far each is held by its share, for which one number serves: what is left of it is even again.
+        let mut one = OneOf::new(u);
         for &light in &self.lights {
             let given = light.most_at(at);
-            if given <= 0.0 {
-                continue;
-            }
-            total += given;
-            let share = given / total;
-            if u < share {
-                chosen = Some((light, given));
-                u /= share;
-            } else {
-                u = (u - share) / (1.0 - share);
-            }
-            u = u.clamp(0.0, 0.999_999_94);
+            one.offer(given, (light, given));
         }
-        chosen.map(|(light, given)| (light, given / total))
+        one.drawn.map(|(light, given)| (light, given / one.total))
     }
 
     /// The chance of a light, by [`Self::index_of`], in [`Self::choose`] at a place.

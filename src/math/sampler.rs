@@ -93,6 +93,42 @@ impl Sampler {
     }
 }
 
+/// One of several things, drawn by their weights as they come, by one number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OneOf<T> {
+    /// The one drawn of those so far; `None` before any has weight.
+    pub(crate) drawn: Option<T>,
+    /// The weights so far.
+    pub(crate) total: f32,
+    u: f32,
+}
+
+impl<T> OneOf<T> {
+    /// Of none so far; `u` in [0, 1).
+    #[inline]
+    pub(crate) fn new(u: f32) -> Self {
+        Self { drawn: None, total: 0.0, u }
+    }
+
+    /// One more; never drawn unless its weight is above 0.
+    #[inline]
+    pub(crate) fn offer(&mut self, weight: f32, one: T) {
+        if weight <= 0.0 {
+            return;
+        }
+        self.total += weight;
+        // Of all so far each is held by its share, for which one number serves: what is left of it is even again.
+        let share = weight / self.total;
+        if self.u < share {
+            self.drawn = Some(one);
+            self.u /= share;
+        } else {
+            self.u = (self.u - share) / (1.0 - share);
+        }
+        self.u = self.u.clamp(0.0, 0.999_999_94);
+    }
+}
+
 /// Random numbers without end: plain ones by a counter and a hash, behind those of [`Sampler::even_stream`], if any.
 #[derive(Clone, Debug)]
 pub struct Stream {

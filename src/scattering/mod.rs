@@ -111,8 +111,8 @@ impl From<Rgb> for Arrival {
 pub struct Direct {
     /// Value with the cosine, 1/steradian, each lobe weighted against direction sampling.
     pub lobes: LobeValues,
-    /// The share of F, which leaves from elsewhere.
-    pub forward_share: f32,
+    /// One of the places from which it leaves, drawn by what leaves from each, in the section's frame; `None` where nothing does.
+    pub start: Option<Vec3A>,
 }
 
 /// Where a path goes on.
@@ -126,8 +126,8 @@ pub struct Continuation {
     pub pdf: f32,
     /// To which lobes the light that comes from there belongs; the shares sum to 1.
     pub shares: LobeValues,
-    /// Depth on the camera's ray, in yarn radii, at which the path leaves it.
-    pub start: f32,
+    /// Where the path leaves from, in the section's frame.
+    pub start: Vec3A,
 }
 
 /// The balance heuristic for a light sample; an infinite density means that only light sampling can find this light.

@@ -85,10 +85,10 @@ impl YarnScatterer {
 impl YarnVertex<'_> {
     /// The value for light from `w`; see [`Vertex::evaluate`].
     #[inline]
-    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32, u_start: f32) -> Direct {
         match self {
-            Self::Aggregated(v) => v.evaluate(w, light_pdf),
-            Self::Chord(v) => v.evaluate(w, light_pdf),
+            Self::Aggregated(v) => v.evaluate(w, light_pdf, u_start),
+            Self::Chord(v) => v.evaluate(w, light_pdf, u_start),
         }
     }
 
@@ -109,21 +109,12 @@ impl YarnVertex<'_> {
         }
     }
 
-    /// Depth on the camera's ray, in yarn radii, from which light of the node leaves.
+    /// About where light is scattered, in the section's frame: the place of the node, or of the first fibre where there is none.
     #[inline]
-    pub fn node_start(&self) -> f32 {
+    pub fn place(&self) -> Vec3A {
         match self {
-            Self::Aggregated(v) => v.node_start(),
-            Self::Chord(v) => v.node_start(),
-        }
-    }
-
-    /// Depth on the camera's ray, in yarn radii, from which light of lobe F leaves.
-    #[inline]
-    pub fn forward_start(&self) -> f32 {
-        match self {
-            Self::Aggregated(v) => v.forward_start(),
-            Self::Chord(v) => v.forward_start(),
+            Self::Aggregated(v) => v.place(),
+            Self::Chord(v) => v.place(),
         }
     }
 }

@@ -127,7 +127,7 @@ impl Prepared {
                 let u = sampler.next4();
                 let mut stream = sampler.stream(sampler.position());
                 let vertex = yarn.vertex(&section, &crossings, unscattered, Rgb::ONE, u, &mut stream);
-                vertex.evaluate(w, f32::INFINITY).lobes.scaled(Rgb::splat(1.0 - unscattered))
+                vertex.evaluate(w, f32::INFINITY, 0.5).lobes.scaled(Rgb::splat(1.0 - unscattered))
             }
         }
     }

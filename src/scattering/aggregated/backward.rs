@@ -147,58 +147,65 @@ impl Lobe {
         Some(again)
     }
 
-    /// The lobe's value towards `w`, weighted against direction sampling; `open` is what the other plies let pass, `at_node`
-    /// the chance that the path goes on from the node.
+    /// The lobe's value towards `w`, weighted against direction sampling, by the places from which it leaves; `open` is what the other
+    /// plies let pass, `at_node` the chance that the path goes on from the node.
     #[inline]
     pub(super) fn evaluate(
         &self,
         view: &View<'_>,
         node: &Node,
-        w: Vec3A,
+        (w, light_pdf): (Vec3A, f32),
         open: Rgb,
         at_node: f32,
-        light_pdf: f32,
-    ) -> Rgb {
+        mut visit: impl FnMut(&Spot, Rgb),
+    ) {
         let (first, pdf) = self.value(view, node.spot.ply, w);
         let chance = at_node * self.chance;
         match &self.again {
-            None => first * mis_weight(light_pdf, chance * pdf),
+            None => visit(&node.spot, first * mis_weight(light_pdf, chance * pdf)),
             Some(again) => {
                 let goes_on = |open: Rgb| node.chance_out(open, node.leaves_again);
-                let mut all = first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf);
+                visit(&node.spot, first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf));
                 let mut left = chance * (1.0 - again.ways[0].open);
                 for (i, meeting) in again.meetings.iter().enumerate() {
                     let (value, pdf) = meeting.value(view, &self.frame, w);
                     let Some(next) = again.ways.get(i + 1) else {
-                        all += value * mis_weight(light_pdf, left * pdf);
+                        visit(&meeting.spot, value * mis_weight(light_pdf, left * pdf));
                         break;
                     };
                     if value.max_channel() > 0.0 {
                         let open = meeting.open(view, w, |_, _| {});
-                        all += value * open * mis_weight(light_pdf, left * goes_on(open) * pdf);
+                        visit(&meeting.spot, value * open * mis_weight(light_pdf, left * goes_on(open) * pdf));
                     }
                     left *= 1.0 - next.open;
                 }
-                all
             }
         }
     }
 
-    /// Draws a direction: with its value, and its density with the chance of B.
+    /// Draws a direction: with its value, its density with the chance of B, and the place from which it leaves.
     #[inline]
-    pub(super) fn sample(&self, view: &View<'_>, node: &Node, u: [f32; 2], stream: &mut Stream) -> (Vec3A, Rgb, f32) {
-        let (direction, value, pdf) = match &self.again {
+    pub(super) fn sample(
+        &self,
+        view: &View<'_>,
+        node: &Node,
+        u: [f32; 2],
+        stream: &mut Stream,
+    ) -> (Vec3A, Rgb, f32, Vec3A) {
+        let (direction, value, pdf, spot) = match &self.again {
             None => {
                 let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
                 let (value, pdf) = self.value(view, node.spot.ply, w);
-                (w, value, pdf)
+                (w, value, pdf, &node.spot)
             }
             Some(again) => {
                 let mut chance = 1.0;
                 let mut taken = None;
-                for way in &again.ways {
+                for (way, from) in
+                    again.ways.iter().zip([&node.spot].into_iter().chain(again.meetings.iter().map(|m| &m.spot)))
+                {
                     if stream.next() < way.open {
-                        taken = Some((way.direction, way.weight * way.pdf, way.pdf * way.open * chance));
+                        taken = Some((way.direction, way.weight * way.pdf, way.pdf * way.open * chance, from));
                         break;
                     }
                     chance *= 1.0 - way.open;
@@ -207,13 +214,13 @@ impl Lobe {
                     Some(last) => {
                         let w = last.draw_by(view, &self.frame, u, stream);
                         let (value, pdf) = last.value(view, &self.frame, w);
-                        (w, value, pdf * chance)
+                        (w, value, pdf * chance, &last.spot)
                     }
-                    None => (Vec3A::Z, Rgb::ZERO, 0.0),
+                    None => (Vec3A::Z, Rgb::ZERO, 0.0, &node.spot),
                 })
             }
         };
-        (direction, value, pdf * self.chance)
+        (direction, value, pdf * self.chance, spot.inside.point)
     }
 
     /// Draws a direction from the lobe.
@@ -260,7 +267,7 @@ impl Meeting {
             axes: axes_across(frame, axes.map(|axis| inside.out_of(axis))),
             outwards: leaving.draw(&place, stream),
             energy: energy(leaving),
-            spot: Spot::new(view, met.ply, 0.0, inside),
+            spot: Spot::new(view, met.ply, inside),
         }
     }
 

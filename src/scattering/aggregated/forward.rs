@@ -259,14 +259,14 @@ impl Forward {
         Drawn::new(w, &self.bent(last, more, last.lobe(&more.width, w).0, &ahead))
     }
 
-    /// F towards `w`: what leaves from each of the fibres, and what others bend that come after the last.
+    /// F towards `w`: what leaves from the place of each of the fibres, and what others bend that come after the last.
     #[inline]
-    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(Part)) {
+    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(&Spot, Part)) {
         let Some((last, before)) = self.fibers.split_last() else { return };
         for fiber in before {
             let (lobe, around) = fiber.lobe(&fiber.width, w);
             if lobe >= FORWARD_TAIL {
-                visit(self.alone(view, fiber, lobe, around, &fiber.ahead(view, w)));
+                visit(&fiber.spot, self.alone(view, fiber, lobe, around, &fiber.ahead(view, w)));
             }
         }
         if last.passed == Rgb::ZERO {
@@ -278,16 +278,16 @@ impl Forward {
             return;
         }
         let ahead = last.ahead(view, w);
-        visit(self.alone(view, last, lobe, around, &ahead));
+        visit(&last.spot, self.alone(view, last, lobe, around, &ahead));
         if let Some(more) = &self.more {
-            visit(self.bent(last, more, often, &ahead));
+            visit(&last.spot, self.bent(last, more, often, &ahead));
         }
     }
 
     /// The density with which a path goes on as F towards `w`, whichever of its parts that belongs to, 1/steradian.
     pub(super) fn density(&self, view: &View<'_>, w: Vec3A) -> f32 {
         let mut density = 0.0;
-        self.toward(view, w, |part| density += part.density());
+        self.toward(view, w, |_, part| density += part.density());
         density
     }
 
@@ -413,7 +413,7 @@ impl Fiber {
         let distance = (stretch.foot + at).max(0.0);
         let shape = view.yarn.occluder().shape();
         let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
-        let spot = Spot::new(view, stretch.ply, self.spot.depth, inside);
+        let spot = Spot::new(view, stretch.ply, inside);
         Some(Self::new(view, spot, -way.w, self.passed))
     }
 }

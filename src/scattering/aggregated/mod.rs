@@ -33,7 +33,10 @@ use crate::{
         section::{Crossings, Inside, PlyAhead, PlyCrossing, Section},
         yarn::YarnShape,
     },
-    math::{Rgb, sampler::Stream},
+    math::{
+        Rgb,
+        sampler::{OneOf, Stream},
+    },
 };
 use backward::Backward;
 use forward::Forward;
@@ -102,8 +105,6 @@ struct View<'a> {
 struct Spot {
     /// The ply.
     ply: usize,
-    /// Depth on the camera's ray.
-    depth: f32,
     /// Where that is.
     inside: Inside,
     /// Unit tangent of the fibre there.
@@ -130,17 +131,17 @@ impl<'a> View<'a> {
         let Self { yarn, section, .. } = self;
         let depth = self.depth(crossing, x);
         let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
-        Spot::new(self, crossing.ply, depth, inside)
+        Spot::new(self, crossing.ply, inside)
     }
 }
 
 impl Spot {
-    /// A place in a ply, seen from a depth on the camera's ray.
+    /// A place in a ply.
     #[inline]
-    fn new(view: &View<'_>, ply: usize, depth: f32, inside: Inside) -> Self {
+    fn new(view: &View<'_>, ply: usize, inside: Inside) -> Self {
         let tangent = inside.fiber_tangent(view.yarn.occluder().shape(), view.section, ply);
         let stretch = tangent.length();
-        Self { ply, depth, inside, tangent: tangent / stretch, stretch }
+        Self { ply, inside, tangent: tangent / stretch, stretch }
     }
 
     /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count.
@@ -237,16 +238,17 @@ impl<'a> Vertex<'a> {
 
     /// The value of the lobes for light from `w` (section frame), in 1/steradian, with the cosine, over 1 - T0; each
     /// component weighted against direction sampling, where `light_pdf` is the density (1/steradian) of drawing `w`,
-    /// or infinite for light that no sampled direction can meet.
+    /// or infinite for light that no sampled direction can meet. `u_start` draws where it leaves from.
     #[inline]
-    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32, u_start: f32) -> Direct {
         let mut lobes = LobeValues::default();
-        let mut forward_part = 0.0;
+        let mut start = OneOf::new(u_start);
         if let Some(forward) = &self.forward {
-            forward.toward(&self.view, w, |part| {
-                lobes.f += part.value * mis_weight(light_pdf, part.density());
+            forward.toward(&self.view, w, |spot, part| {
+                let value = part.value * mis_weight(light_pdf, part.density());
+                start.offer(value.mean(), spot.inside.point);
+                lobes.f += value;
             });
-            forward_part = lobes.f.mean();
         }
         if let Some(node) = self.node.get(&self.view) {
             let at_node = 1.0 - self.forward_chance();
@@ -255,10 +257,20 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            lobes.b = self.backward.of(&self.view, node).evaluate(&self.view, node, w, value.open, at_node, light_pdf);
+            start.offer((lobes.r + lobes.tt + lobes.d).mean(), node.spot.inside.point);
+            self.backward.of(&self.view, node).evaluate(
+                &self.view,
+                node,
+                (w, light_pdf),
+                value.open,
+                at_node,
+                |spot, value| {
+                    start.offer(value.mean(), spot.inside.point);
+                    lobes.b += value;
+                },
+            );
         }
-        let total = lobes.sum().mean();
-        Direct { lobes, forward_share: if total > 0.0 { forward_part / total } else { 0.0 } }
+        Direct { lobes, start: start.drawn }
     }
 
     /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of
@@ -275,41 +287,38 @@ impl<'a> Vertex<'a> {
             && u[0] < forward_chance
         {
             let drawn = &forward.drawn;
+            // The last fibre that it met.
+            let start = forward.fibers.last().map_or(self.place(), |fiber| fiber.spot.inside.point);
             return Some(Continuation {
                 direction: drawn.direction,
                 weight: drawn.share / forward_chance,
                 pdf: drawn.pdf * forward_chance,
                 shares: LobeValues { f: Rgb::ONE, ..LobeValues::default() },
-                start: self.forward_start(),
+                start,
             });
         }
         let node = self.node.get(&self.view)?;
         let at_node = 1.0 - forward_chance;
         let again = (u[0] - forward_chance) / at_node;
-        let start = self.node_start();
         if again < node.drawn.escape {
             let (sum, shares) = node.drawn.value.lobes();
             let pdf = node.drawn.value.pdf * at_node * node.drawn.escape;
             let direction = node.drawn.direction;
+            let start = node.spot.inside.point;
             return (pdf > 0.0).then(|| Continuation { direction, weight: sum / pdf, pdf, shares, start });
         }
-        let (direction, value, pdf) = self.backward.of(&self.view, node).sample(&self.view, node, [u[1], u[2]], stream);
+        let lobe = self.backward.of(&self.view, node);
+        let (direction, value, pdf, start) = lobe.sample(&self.view, node, [u[1], u[2]], stream);
         let pdf = pdf * at_node;
         let shares = LobeValues { b: Rgb::ONE, ..LobeValues::default() };
         (pdf > 0.0).then(|| Continuation { direction, weight: value / pdf, pdf, shares, start })
     }
 
-    /// Depth from which light of the node's lobes and of B leaves.
+    /// The place of the first fibre, in the section's frame: about where light is scattered.
     #[inline]
-    pub fn node_start(&self) -> f32 {
-        // That of the first fibre, which is the camera's ray's.
-        self.forward_start()
-    }
-
-    /// Depth from which light of F leaves: that of the first fibre.
-    #[inline]
-    pub fn forward_start(&self) -> f32 {
-        self.forward.as_ref().and_then(|f| f.fibers.first()).map_or(0.0, |first| first.spot.depth)
+    pub fn place(&self) -> Vec3A {
+        let first = self.forward.as_ref().and_then(|forward| forward.fibers.first());
+        first.map_or_else(|| self.view.section.point(0.0), |first| first.spot.inside.point)
     }
 }
 

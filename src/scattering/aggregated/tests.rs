@@ -59,7 +59,7 @@ fn quadrature(
                 let amplitude = reaching * ended * (weight as f32);
                 let at = c.enter + (c.exit - c.enter) * x;
                 let inside = section.inside(yarn.occluder().shape(), section.point(at), c.travel_at(at));
-                let node = (Spot::new(&view, c.ply, at, inside), c.fibers * x);
+                let node = (Spot::new(&view, c.ply, inside), c.fibers * x);
                 for (w, out) in directions.iter().zip(&mut out) {
                     out[0] += amplitude * plain_lobes(&view, &node, *w).0 * only;
                 }
@@ -331,7 +331,7 @@ fn samples_estimate_the_integral_with_bounded_weights_and_light_weighting_loses_
                 let (s, c) = (TAU * stream.next()).sin_cos();
                 let r = (1.0 - z * z).max(0.0).sqrt();
                 let uniform = 1.0 / (4.0 * PI);
-                let light = vertex.evaluate(Vec3A::new(r * c, r * s, z), uniform).lobes.sum().mean() / uniform;
+                let light = vertex.evaluate(Vec3A::new(r * c, r * s, z), uniform, 0.5).lobes.sum().mean() / uniform;
                 let u = [0; 3].map(|_| stream.next());
                 let own = vertex.sample(u, &mut stream).map_or(0.0, |c| c.weight.mean() * mis_weight(c.pdf, uniform));
                 let value = f64::from(light + own);
@@ -372,7 +372,7 @@ fn light_finds_as_much_of_f_as_directions_do() {
             let z = 2.0 * stream.next() - 1.0;
             let (s, c) = (TAU * stream.next()).sin_cos();
             let r = (1.0 - z * z).max(0.0).sqrt();
-            let lit = vertex.evaluate(Vec3A::new(r * c, r * s, z), f32::INFINITY).lobes.f * (4.0 * PI);
+            let lit = vertex.evaluate(Vec3A::new(r * c, r * s, z), f32::INFINITY, 0.5).lobes.f * (4.0 * PI);
             let drawn = vertex.forward.as_ref().map_or(Rgb::ZERO, |f| f.drawn.share);
             for (k, value) in [lit, drawn].into_iter().enumerate() {
                 for (c, value) in value.to_array().into_iter().enumerate() {
@@ -509,7 +509,7 @@ fn black_empty_and_extreme_yarns_stay_finite_and_dark() {
                         let u = [0; 4].map(|_| stream.next());
                         let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
                         let w = Vec3A::new(stream.next() - 0.5, stream.next() - 0.5, stream.next() - 0.5).normalize();
-                        let direct = vertex.evaluate(w, 1.0);
+                        let direct = vertex.evaluate(w, 1.0, 0.5);
                         assert!(direct.lobes.sum().is_finite() && direct.lobes.sum().min_channel() >= 0.0);
                         if let Some(c) = vertex.sample([0; 3].map(|_| stream.next()), &mut stream) {
                             assert!(c.weight.is_finite() && c.weight.min_channel() >= 0.0, "{:?}", c.weight);

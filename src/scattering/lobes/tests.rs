@@ -282,16 +282,21 @@ fn samples_average_to_the_energies_and_light_sampling_joins_without_loss() {
                     for (sum, share) in shares.iter_mut().zip(c.shares.to_array()) {
                         *sum += f64::from((share * c.weight).mean()) / f64::from(n);
                     }
-                    let (front, back) = (crossings[0].enter, crossings.last().unwrap().exit);
-                    assert!(c.start >= front && c.start <= back, "start {} in {front}..{back}", c.start);
+                    let [front, back] = [crossings[0].enter, crossings.last().unwrap().exit].map(|d| section.point(d));
+                    let chord = front.distance(back) + 1e-5;
+                    assert!(
+                        c.start.distance(front) <= chord && c.start.distance(back) <= chord,
+                        "start {} in {front}..{back}",
+                        c.start
+                    );
                     // Drawing and evaluating say the same, with a light of any density.
-                    let direct = vertex.evaluate(c.direction, f32::INFINITY);
+                    let direct = vertex.evaluate(c.direction, f32::INFINITY, 0.5);
                     assert!(
                         (direct.lobes.sum().mean() - c.weight.mean() * c.pdf).abs() <= 1e-4 * direct.lobes.sum().mean()
                     );
                 }
                 let even = 0.25 * FRAC_1_PI;
-                let light = vertex.evaluate(uniform(&mut stream), even).lobes.sum().mean() / even;
+                let light = vertex.evaluate(uniform(&mut stream), even, 0.5).lobes.sum().mean() / even;
                 let own = vertex
                     .sample([0; 3].map(|_| stream.next()), &mut stream)
                     .map_or(0.0, |c| c.weight.mean() * mis_weight(c.pdf, even));
@@ -428,10 +433,10 @@ fn black_empty_and_extreme_yarns_stay_finite() {
                         for _ in 0..20 {
                             let u = [0; 4].map(|_| stream.next());
                             let vertex = ChordVertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
-                            assert!(vertex.node_start().is_finite() && vertex.forward_start().is_finite());
-                            let direct = vertex.evaluate(uniform(&mut stream), 1.0);
+                            assert!(vertex.place().is_finite());
+                            let direct = vertex.evaluate(uniform(&mut stream), 1.0, stream.next());
                             assert!(direct.lobes.sum().is_finite() && direct.lobes.sum().min_channel() >= 0.0);
-                            assert!((0.0..=1.0).contains(&direct.forward_share));
+                            assert!(direct.start.is_none_or(|start| start.is_finite()));
                             if let Some(c) = vertex.sample([0; 3].map(|_| stream.next()), &mut stream) {
                                 assert!(c.weight.is_finite() && c.weight.min_channel() >= 0.0, "{:?}", c.weight);
                                 assert!(c.direction.is_finite() && c.pdf > 0.0 && c.pdf.is_finite());

@@ -7,7 +7,12 @@ use glam::Vec3A;
 use super::ChordYarn;
 use crate::{
     geometry::section::{PlyCrossing, Section},
-    math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
+    math::{
+        Rgb,
+        sampler::{OneOf, Stream},
+        special::wrapped_normal,
+        warp::normal,
+    },
     scattering::{
         Arrival, Continuation, Direct, LobeValues,
         kernel::{DIFFUSE, MIN_VARIANCE, kappa_of_variance, kernel, kernel_scalar, sample_sine, sample_sine_diffuse},
@@ -35,8 +40,9 @@ pub struct ChordVertex<'a> {
     /// Chances of the channels in drawing F and B.
     channel_f: [f32; 3],
     channel_b: [f32; 3],
-    node: f32,
-    middle: f32,
+    /// Where light of R, D and B leaves from, and that of F, in the section's frame.
+    node: Vec3A,
+    middle: Vec3A,
 }
 
 impl<'a> ChordVertex<'a> {
@@ -68,8 +74,8 @@ impl<'a> ChordVertex<'a> {
                 kappa_b: Rgb::ONE,
                 channel_f: [0.0; 3],
                 channel_b: [0.0; 3],
-                node: 0.0,
-                middle: 0.0,
+                node: section.point(0.0),
+                middle: section.point(0.0),
             };
         };
         let out = yarn.aggregate(crossings.iter().map(|c| (c.ply, yarn.fibers(c))));
@@ -96,8 +102,8 @@ impl<'a> ChordVertex<'a> {
             kappa_b: kappa_of_variance(variance(out.back_latitude)),
             channel_f: normalised((energy.f * weight).to_array()),
             channel_b: normalised((energy.b * weight).to_array()),
-            node: depth_after(yarn, crossings, first),
-            middle: depth_after(yarn, crossings, 0.5 * total),
+            node: section.point(depth_after(yarn, crossings, first)),
+            middle: section.point(depth_after(yarn, crossings, 0.5 * total)),
         }
     }
 
@@ -144,13 +150,15 @@ impl<'a> ChordVertex<'a> {
 
     /// The value of the lobes for light from `w` (section frame), in 1/steradian, with the cosine, over 1 - T0, weighted
     /// against direction sampling; `light_pdf` is the density (1/steradian) of drawing `w`, or infinite for light that
-    /// no sampled direction can meet.
+    /// no sampled direction can meet. `u_start` draws where it leaves from.
     #[inline]
-    pub fn evaluate(&self, w: Vec3A, light_pdf: f32) -> Direct {
+    pub fn evaluate(&self, w: Vec3A, light_pdf: f32, u_start: f32) -> Direct {
         let (value, pdf) = self.values(w);
-        let total = value.sum().mean();
+        let mut start = OneOf::new(u_start);
+        start.offer(value.f.mean(), self.middle);
+        start.offer((value.sum() - value.f).mean(), self.node);
         let lobes = value.scaled(Rgb::splat(mis_weight(light_pdf, pdf)));
-        Direct { lobes, forward_share: if total > 0.0 { value.f.mean() / total } else { 0.0 } }
+        Direct { lobes, start: start.drawn }
     }
 
     /// Draws where the path goes on. `u` are three fresh numbers: which lobe, and the direction.
@@ -195,16 +203,10 @@ impl<'a> ChordVertex<'a> {
         })
     }
 
-    /// Depth from which light of R, D and B leaves.
+    /// Where light of R, D and B leaves from, in the section's frame.
     #[inline]
-    pub fn node_start(&self) -> f32 {
+    pub fn place(&self) -> Vec3A {
         self.node
-    }
-
-    /// Depth from which light of F leaves: the middle of the fibres on the chord.
-    #[inline]
-    pub fn forward_start(&self) -> f32 {
-        self.middle
     }
 }
 

@@ -126,7 +126,7 @@ fn count(yarn: &Yarn, model: Model, (theta, h): (f64, f32), n: u32, seed: u32) -
         let v = vertex(&mut stream);
         for cell in (0..BINS * BINS).filter(|_| i % SAMPLES_PER_SUM == 0) {
             let w = within(cell, [stream.next(), stream.next()]);
-            let (full, weighted) = (v.evaluate(w, f32::INFINITY).lobes, v.evaluate(w, 1.0).lobes);
+            let (full, weighted) = (v.evaluate(w, f32::INFINITY, 0.5).lobes, v.evaluate(w, 1.0, 0.5).lobes);
             let density =
                 |part: fn(&LobeValues) -> Rgb| density_of(part(&full).max_channel(), part(&weighted).max_channel());
             // Parts of F are weighed by themselves: their density is asked for.
