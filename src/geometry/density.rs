@@ -23,12 +23,21 @@ pub struct PlyPacking {
     pub regularity: f64,
     /// The same of lines by the rim, where fibres lie in another order.
     pub rim: f64,
-    /// How many expected fibres light that met one meets no other within: where it goes straight on, and where it is turned in the section by
-    /// [`TURNED`] up to a right angle. `None` if that is the mean dead zone.
-    pub after: Option<[f64; 2]>,
+    /// What is free of other fibres after one. `None` if that is the mean dead zone.
+    pub after: Option<FreeAfter>,
 }
 
-/// The turn of [`PlyPacking::after`], radians: 30 degrees.
+/// How many expected fibres light that met one meets no other within: on ways along the long axis of a pressed section and on ways along
+/// the short one, which are alike where it is round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeAfter {
+    /// Where it goes straight on.
+    pub straight: [f64; 2],
+    /// Where it is turned in the section by [`TURNED`] up to a right angle.
+    pub turned: [f64; 2],
+}
+
+/// The turn of [`FreeAfter::turned`], radians: 30 degrees.
 pub(crate) const TURNED: f64 = std::f64::consts::FRAC_PI_6;
 /// Its cosine.
 pub(crate) const TURNED_COS: f32 = 0.866_025_4;

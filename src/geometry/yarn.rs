@@ -6,7 +6,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3A};
 
-use super::{density::PlyPacking, way::FourPlies};
+use super::{
+    density::{FreeAfter, PlyPacking},
+    way::FourPlies,
+};
 
 /// The most plies a yarn can have.
 pub const MAX_PLIES: usize = 64;
@@ -97,7 +100,7 @@ pub struct PlyShape {
     /// The same by the rim: [`PlyPacking::rim`].
     pub rim: f32,
     /// What is free of others after a fibre: [`PlyPacking::after`].
-    pub after: Option<[f64; 2]>,
+    pub after: Option<FreeAfter>,
 }
 
 /// The cross-section of a yarn and how it turns along it.

@@ -131,8 +131,8 @@ pub(crate) struct PlyOptics {
     pub beta_n: f32,
     /// The width of one event of TT.
     pub tt: TtWidth,
-    /// [`PlyPacking::after`](crate::geometry::density::PlyPacking::after), in full.
-    pub after: [f32; 2],
+    /// [`FreeAfter`](crate::geometry::density::FreeAfter): straight on and turned, for ways along the long axis and along the short one.
+    pub after: [[f32; 2]; 2],
     /// How much longer the way of the light is than measured between cores.
     pub lead: f32,
 }
@@ -244,24 +244,28 @@ impl PlyOptics {
             beta_tt_squared,
             beta_n,
             tt: TtWidth::new(1.0, beta_tt_squared, beta_n),
-            after: ply.after.map_or([gaps.dead_zone; 2], |after| after.map(|free| free as f32)),
+            after: ply.after.map_or([[gaps.dead_zone; 2]; 2], |after| {
+                [after.straight, after.turned].map(|free| free.map(|free| free as f32))
+            }),
             lead: (FRAC_PI_4 * fiber) as f32,
         }
     }
 }
 
 impl PlyOptics {
-    /// How many expected fibres light that passed one meets no other within, by the cosine of its turn in the section.
+    /// How many expected fibres light that passed one meets no other within, by the cosine of its turn in the section and by how much its way
+    /// is along the section's short axis, from 0 to 1.
     #[inline]
-    pub(crate) fn free_after(&self, turn: f32) -> f32 {
-        let [straight, turned] = self.after;
+    pub(crate) fn free_after(&self, turn: f32, short: f32) -> f32 {
+        let [straight, turned] = self.after.map(|after| after[0] + short * (after[1] - after[0]));
         turned + (straight - turned) * ((turn - TURNED_COS) / (1.0 - TURNED_COS)).clamp(0.0, 1.0)
     }
 
     /// The same of light that goes back, beside the strip that it has swept, which is a part of what is free.
     #[inline]
-    pub(crate) fn free_back(&self, turn: f32) -> f32 {
-        self.after[1] * (1.0 + turn).powi(2).max(calibrated::LEFT_BESIDE_STRIP)
+    pub(crate) fn free_back(&self, turn: f32, short: f32) -> f32 {
+        let [along, across] = self.after[1];
+        (along + short * (across - along)) * (1.0 + turn).powi(2).max(calibrated::LEFT_BESIDE_STRIP)
     }
 
     /// The width of so many events of TT.

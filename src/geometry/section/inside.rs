@@ -63,6 +63,16 @@ impl Inside {
         self.pressed.map_or(Vec2::X, |pressed| pressed.axis)
     }
 
+    /// How much a direction of the section's frame is along the short axis of the section there: the square of a cosine, and a half where that is
+    /// round.
+    #[inline]
+    pub fn along_short_axis(&self, w: Vec3A) -> f32 {
+        self.pressed.map_or(0.5, |pressed| {
+            let across = self.across(w);
+            across.dot(pressed.axis).powi(2) / across.length_squared().max(1e-12)
+        })
+    }
+
     /// A vector across the unwound yarn in the section's frame.
     #[inline]
     pub fn out_of(&self, v: Vec2) -> Vec3A {

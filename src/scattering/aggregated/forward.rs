@@ -364,7 +364,8 @@ impl Fiber {
     fn way(&self, view: &View<'_>, w: Vec3A) -> Way {
         let (turn, shift) = self.spot.turned(view, self.back, w);
         let tilt = self.spot.tilt(view.section, w);
-        let free = tilt / view.section.squeeze() * view.yarn.plies[self.spot.ply].free_after(turn);
+        let free = view.yarn.plies[self.spot.ply].free_after(turn, self.spot.inside.along_short_axis(w));
+        let free = tilt / view.section.squeeze() * free;
         Way { w, shift, tilt, free }
     }
 

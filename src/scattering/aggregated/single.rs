@@ -265,7 +265,8 @@ impl Node {
         let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
         let tilt = spot.tilt(view.section, w);
-        let free = if turn < 0.0 { optics.free_back(turn) } else { optics.free_after(turn) };
+        let short = spot.inside.along_short_axis(w);
+        let free = if turn < 0.0 { optics.free_back(turn, short) } else { optics.free_after(turn, short) };
         let free = tilt / view.section.squeeze() * free;
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
