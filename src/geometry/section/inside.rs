@@ -57,6 +57,13 @@ impl Inside {
         circle / ply.core_radius
     }
 
+    /// The point of a ply's axis abreast of this one, in the section's frame.
+    #[inline]
+    pub fn axis_of(&self, shape: &YarnShape, ply: usize) -> Vec3A {
+        let off = shape.plies[ply].distance * shape.plies[ply].direction - self.at;
+        self.point + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
+    }
+
     /// The short axis of the section there, as a unit vector of the unwound yarn; any where it is round.
     #[inline]
     pub fn short_axis_within(&self) -> Vec2 {

@@ -220,7 +220,7 @@ impl Lobe {
                 })
             }
         };
-        (direction, value, pdf * self.chance, spot.inside.point)
+        (direction, value, pdf * self.chance, spot.middle(view))
     }
 
     /// Draws a direction from the lobe.

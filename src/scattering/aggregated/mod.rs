@@ -162,6 +162,12 @@ impl Spot {
         (turn, view.section.thinness() * view.yarn.plies[self.ply].lead * (back + turn.max(0.0) * out))
     }
 
+    /// About where light that is scattered often leaves its ply, which may be anywhere on it: from the middle, in the section's frame.
+    #[inline]
+    fn middle(&self, view: &View<'_>) -> Vec3A {
+        self.inside.axis_of(view.yarn.occluder().shape(), self.ply)
+    }
+
     /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
     /// fibres on its way.
     #[inline]
@@ -265,7 +271,7 @@ impl<'a> Vertex<'a> {
                 value.open,
                 at_node,
                 |spot, value| {
-                    start.offer(value.mean(), spot.inside.point);
+                    start.offer(value.mean(), spot.middle(&self.view));
                     lobes.b += value;
                 },
             );
