@@ -44,7 +44,7 @@ pub(super) fn materials(root: &Reader<'_>, context: &Context<'_>) -> Materials {
 }
 
 fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
-    let kind = table.kind_or("type", 0, &[("diffuse", 0), ("coated", 1)]);
+    let coated = table.kind_or("type", false, &[("diffuse", false), ("coated", true)]);
     let repeat = table.vec2("repeat", Range::POSITIVE).unwrap_or([1.0; 2]);
     let texture = table.string("texture").map(|path| {
         let span = table.span("texture").unwrap_or(table.header());
@@ -52,7 +52,7 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
     });
     let plain = if texture.is_some() { 1.0 } else { defaults::ALBEDO };
     let albedo = table.rgb_or("albedo", [plain; 3], Range::UNIT);
-    let coat = (kind == Some(1)).then(|| {
+    let coat = (coated == Some(true)).then(|| {
         // A perfectly smooth coat would be a mirror, in which no light of no size is ever found.
         let roughness = table.f64_or("roughness", defaults::ROUGHNESS, Range::between(0.03, 1.0));
         (roughness, table.f64_or("ior", defaults::IOR, Range::between(1.01, 4.0)))

@@ -30,6 +30,17 @@ pub(super) fn camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, numb
     read_camera(root, context, frame, number).map(|setup| CameraSetup { faces_cloth: frame, ..setup })
 }
 
+/// How a camera is told.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CameraKind {
+    /// From a direction, so that it sees all cloth.
+    Frame,
+    Perspective,
+    Orthographic,
+    /// One of a stage.
+    Stage,
+}
+
 fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u32) -> Option<CameraSetup> {
     let Some(node) = root.node("camera") else { return Some(CameraSetup::default()) };
     if let Value::String(word) = &node.value {
@@ -43,12 +54,17 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u3
         return Some(CameraSetup::default());
     }
     let table = root.table("camera")?;
-    let kinds = [("frame", 0), ("perspective", 1), ("orthographic", 2), ("usd", 3)];
-    let Some(kind) = table.kind_or("type", 0, &kinds) else {
+    let kinds = [
+        ("frame", CameraKind::Frame),
+        ("perspective", CameraKind::Perspective),
+        ("orthographic", CameraKind::Orthographic),
+        ("usd", CameraKind::Stage),
+    ];
+    let Some(kind) = table.kind_or("type", CameraKind::Frame, &kinds) else {
         table.finish();
         return None;
     };
-    if kind == 3 {
+    if kind == CameraKind::Stage {
         let setup = stage_camera::camera(&table, context, number);
         table.finish();
         return setup.map(|s| if frame { CameraSetup { margin: Some(defaults::MARGIN), aim: None, ..s } } else { s });
@@ -61,7 +77,7 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u3
             Range::above(0.0).and_below(180.0),
         )))
     };
-    let plan = if kind == 0 {
+    let plan = if kind == CameraKind::Frame {
         let direction = DVec3::from(table.vec3_or("direction", defaults::VIEW_FROM, Range::FINITE));
         let margin = table.f64_or("margin", defaults::MARGIN, Range::between(-5.0, 0.45));
         let flat = table.one_of_or("projection", false, &[("perspective", false), ("orthographic", true)]);
@@ -76,7 +92,7 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u3
     } else {
         let position = table.required_vec3("position", Range::FINITE);
         let target = table.vec3_or("target", [0.0; 3], Range::FINITE);
-        let projection = if kind == 1 {
+        let projection = if kind == CameraKind::Perspective {
             fov(&table)
         } else {
             Projection::Orthographic(table.required_f64("size", Range::POSITIVE).unwrap_or(1.0) * context.unit)
@@ -136,6 +152,9 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
     (diameter > 0.0).then_some(LensSetup { radius: 0.5 * diameter, focus })
 }
 
+/// What light may be.
+const BRIGHT: Range = Range::at_least(0.0);
+
 /// A light whose image is not read yet.
 pub(super) enum LightPlan {
     Ready(Light),
@@ -148,91 +167,99 @@ pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<Lig
 }
 
 fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
-    let bright = Range::at_least(0.0);
-    let kinds =
-        [("environment", 0), ("distant", 1), ("point", 2), ("spot", 3), ("rectangle", 4), ("disk", 5), ("sphere", 6)];
-    let kind = table.kind("type", &kinds);
-    // Radiant intensity is per square of the scene's unit.
-    let intensity =
-        || table.rgb_or("intensity", [defaults::RADIANCE; 3], bright).map(|i| i * context.unit * context.unit);
-    let plan = match kind {
-        Some(0) => {
-            let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], bright));
-            let environment = Environment { radiance, image: None, visible: table.bool_or("visible", true) };
-            let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE)) as f32;
-            match table.string("image") {
-                None => Some(LightPlan::Ready(Light::Environment(environment))),
-                Some(path) => {
-                    let span = table.span("image").unwrap_or(table.header());
-                    let rotation = Mat3A::from_rotation_y(-turn);
-                    Some(LightPlan::Image { path: context.resolve(path, span), span, environment, rotation })
-                }
-            }
-        }
-        Some(1) => {
-            let towards = table.required_vec3("towards", Range::FINITE);
-            let angle = radians(table.f64_or("angular_radius", 0.0, Range::between(0.0, 90.0)));
-            let irradiance = Rgb::from(table.rgb_or("irradiance", [defaults::IRRADIANCE; 3], bright));
-            towards.and_then(|t| {
-                let unit = DVec3::from(t).try_normalize();
-                if unit.is_none() {
-                    table.error_at("towards", "the direction towards a light cannot be zero", None);
-                }
-                // 1 - cos, without the cancellation of small angles.
-                let one_minus_cos = (2.0 * (0.5 * angle).sin().powi(2)) as f32;
-                // Rays exactly across a straight curve make Embree offer one hit hundreds of times; a tilt of a millionth,
-                // far below any shadow's edge, does not.
-                let tilted = unit.map(|u| (u + 1e-6 * DVec3::new(0.57, 0.31, 0.76)).normalize());
-                tilted.map(|u| LightPlan::Ready(Light::Distant { towards: u.as_vec3a(), one_minus_cos, irradiance }))
-            })
-        }
-        Some(2) => {
-            let position = table.required_vec3("position", Range::FINITE);
-            let intensity = Rgb::from(intensity());
-            position.map(|p| {
-                let position: Vec3A = context.position(p).as_vec3a();
-                LightPlan::Ready(Light::Point { position, intensity })
-            })
-        }
-        Some(3) => {
-            let aim = aim(&table, context);
-            let intensity = Rgb::from(intensity());
-            let angle = table.f64_or("angle", defaults::SPOT_ANGLE, Range::above(0.0).and_at_most(180.0));
-            let edge = table.f64_or("edge", defaults::SPOT_EDGE * angle, Range::at_least(0.0));
-            if edge > angle {
-                table.error_at("edge", format!("`edge` must be at most `angle`, {angle}"), None);
-            }
-            aim.map(|(position, axis)| {
-                let cos = |degrees: f64| radians(degrees).cos() as f32;
-                let (cos_inner, cos_outer) = (cos((angle - edge).max(0.0)), cos(angle));
-                LightPlan::Ready(Light::Spot { position, axis, intensity, cos_inner, cos_outer })
-            })
-        }
-        Some(kind @ 4..=6) => {
-            let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], bright));
-            let visible = table.bool_or("visible", true);
-            let two_sided = kind != 6 && table.bool_or("two_sided", false);
-            let shape = match kind {
-                4 => rectangle(&table, context),
-                5 => {
-                    let aim = aim(&table, context);
-                    let radius = table.required_f64("radius", Range::POSITIVE).map(|r| (r * context.unit) as f32);
-                    aim.zip(radius).map(|((centre, normal), radius)| Shape::Disk { centre, normal, radius })
-                }
-                _ => {
-                    let position = table.required_vec3("position", Range::FINITE);
-                    let radius = table.required_f64("radius", Range::POSITIVE).map(|r| (r * context.unit) as f32);
-                    position
-                        .zip(radius)
-                        .map(|(p, radius)| Shape::Sphere { centre: context.position(p).as_vec3a(), radius })
-                }
-            };
-            shape.map(|shape| LightPlan::Ready(Light::Area(AreaLight { shape, radiance, two_sided, visible })))
-        }
-        _ => None,
-    };
+    type Read = fn(&Reader<'_>, &Context<'_>) -> Option<LightPlan>;
+    let kinds: [(&str, Read); 7] = [
+        ("environment", environment),
+        ("distant", distant),
+        ("point", point),
+        ("spot", spot),
+        ("rectangle", |table, context| area(table, rectangle(table, context), true)),
+        ("disk", |table, context| area(table, disk(table, context), true)),
+        ("sphere", |table, context| area(table, sphere(table, context), false)),
+    ];
+    let plan = table.kind("type", &kinds).and_then(|read| read(&table, context));
     table.finish();
     plan
+}
+
+fn environment(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
+    let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], BRIGHT));
+    let environment = Environment { radiance, image: None, visible: table.bool_or("visible", true) };
+    let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE)) as f32;
+    let Some(path) = table.string("image") else {
+        return Some(LightPlan::Ready(Light::Environment(environment)));
+    };
+    let span = table.span("image").unwrap_or(table.header());
+    let rotation = Mat3A::from_rotation_y(-turn);
+    Some(LightPlan::Image { path: context.resolve(path, span), span, environment, rotation })
+}
+
+fn distant(table: &Reader<'_>, _: &Context<'_>) -> Option<LightPlan> {
+    let towards = table.required_vec3("towards", Range::FINITE);
+    let angle = radians(table.f64_or("angular_radius", 0.0, Range::between(0.0, 90.0)));
+    let irradiance = Rgb::from(table.rgb_or("irradiance", [defaults::IRRADIANCE; 3], BRIGHT));
+    let Some(unit) = DVec3::from(towards?).try_normalize() else {
+        table.error_at("towards", "the direction towards a light cannot be zero", None);
+        return None;
+    };
+    // 1 - cos, without the cancellation of small angles.
+    let one_minus_cos = (2.0 * (0.5 * angle).sin().powi(2)) as f32;
+    // Rays exactly across a straight curve make Embree offer one hit hundreds of times; a tilt of a millionth,
+    // far below any shadow's edge, does not.
+    let tilted = (unit + 1e-6 * DVec3::new(0.57, 0.31, 0.76)).normalize();
+    Some(LightPlan::Ready(Light::Distant { towards: tilted.as_vec3a(), one_minus_cos, irradiance }))
+}
+
+fn point(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
+    let position = table.required_vec3("position", Range::FINITE);
+    let intensity = intensity(table, context);
+    Some(LightPlan::Ready(Light::Point { position: context.position(position?).as_vec3a(), intensity }))
+}
+
+fn spot(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
+    let aim = aim(table, context);
+    let intensity = intensity(table, context);
+    let angle = table.f64_or("angle", defaults::SPOT_ANGLE, Range::above(0.0).and_at_most(180.0));
+    let edge = table.f64_or("edge", defaults::SPOT_EDGE * angle, Range::at_least(0.0));
+    if edge > angle {
+        table.error_at("edge", format!("`edge` must be at most `angle`, {angle}"), None);
+    }
+    let (position, axis) = aim?;
+    let cos = |degrees: f64| radians(degrees).cos() as f32;
+    let (cos_inner, cos_outer) = (cos((angle - edge).max(0.0)), cos(angle));
+    Some(LightPlan::Ready(Light::Spot { position, axis, intensity, cos_inner, cos_outer }))
+}
+
+/// A shape that shines; what is `flat` may do so to both sides.
+fn area(table: &Reader<'_>, shape: Option<Shape>, flat: bool) -> Option<LightPlan> {
+    let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], BRIGHT));
+    let visible = table.bool_or("visible", true);
+    let two_sided = flat && table.bool_or("two_sided", false);
+    Some(LightPlan::Ready(Light::Area(AreaLight { shape: shape?, radiance, two_sided, visible })))
+}
+
+fn disk(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
+    let aim = aim(table, context);
+    let radius = radius(table, context);
+    let (centre, normal) = aim?;
+    Some(Shape::Disk { centre, normal, radius: radius? })
+}
+
+fn sphere(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
+    let position = table.required_vec3("position", Range::FINITE);
+    let radius = radius(table, context);
+    Some(Shape::Sphere { centre: context.position(position?).as_vec3a(), radius: radius? })
+}
+
+/// Radius of a round light.
+fn radius(table: &Reader<'_>, context: &Context<'_>) -> Option<f32> {
+    table.required_f64("radius", Range::POSITIVE).map(|r| (r * context.unit) as f32)
+}
+
+/// Radiant intensity, which is per square of the scene's unit.
+fn intensity(table: &Reader<'_>, context: &Context<'_>) -> Rgb {
+    let intensity = table.rgb_or("intensity", [defaults::RADIANCE; 3], BRIGHT);
+    Rgb::from(intensity.map(|i| i * context.unit * context.unit))
 }
 
 /// `position` and the unit vector from there to `target`.

@@ -269,6 +269,18 @@ impl Yarns<'_> {
     }
 }
 
+/// What a fabric's curves come from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum SourceKind {
+    File,
+    Knit,
+    Weave,
+    Straight,
+    /// Short for a flat knit of that pattern.
+    Stockinette,
+    Garment,
+}
+
 fn source(
     table: Reader<'_>,
     fabric: &Reader<'_>,
@@ -276,11 +288,18 @@ fn source(
     yarns: &Yarns<'_>,
     curves: Option<&Path>,
 ) -> Option<Source> {
-    let kinds = [("file", 0), ("knit", 1), ("weave", 2), ("straight", 3), ("stockinette", 4), ("garment", 5)];
+    let kinds = [
+        ("file", SourceKind::File),
+        ("knit", SourceKind::Knit),
+        ("weave", SourceKind::Weave),
+        ("straight", SourceKind::Straight),
+        ("stockinette", SourceKind::Stockinette),
+        ("garment", SourceKind::Garment),
+    ];
     let kind = table.kind("type", &kinds);
     let header = table.header();
     let made = match kind {
-        Some(0) => {
+        Some(SourceKind::File) => {
             let unit = table.one_of("unit", &UNITS);
             let named = table.string("path");
             let path = match (curves, named) {
@@ -300,19 +319,22 @@ fn source(
             let source = file_source(path.clone().unwrap_or_default(), span, unit, Some(&table), by_option, context);
             path.map(|_| source)
         }
-        Some(1) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
-        Some(2) => weave::weave(&table, fabric, context, yarns).map(|plan| Source::Weave(Box::new(plan))),
-        // Short for a flat knit of that pattern.
-        Some(4) => pattern::stockinette(&table, fabric, context, yarns).map(Source::Knit),
-        Some(5) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
-        Some(3) => Some(Source::Straight {
+        Some(SourceKind::Knit) => pattern::knit(&table, fabric, context, yarns).map(Source::Knit),
+        Some(SourceKind::Weave) => {
+            weave::weave(&table, fabric, context, yarns).map(|plan| Source::Weave(Box::new(plan)))
+        }
+        Some(SourceKind::Stockinette) => pattern::stockinette(&table, fabric, context, yarns).map(Source::Knit),
+        Some(SourceKind::Garment) => garment::garment(&table, fabric, context, yarns).map(Source::Garment),
+        Some(SourceKind::Straight) => Some(Source::Straight {
             count: table.u64_or("count", 1, 1..=1_000_000) as u32,
             length: table.f64_or("length", 10.0, Range::POSITIVE) * context.unit,
             spacing: table.f64("spacing", Range::POSITIVE).map_or(2.0 * yarns.radius(), |s| s * context.unit),
         }),
-        _ => None,
+        None => None,
     };
-    if let (Some(path), Some(1..)) = (curves, kind) {
+    if let Some(path) = curves
+        && kind.is_some_and(|kind| kind != SourceKind::File)
+    {
         table.finish();
         return Some(file_source(path.to_owned(), header, None, None, true, context));
     }

@@ -197,20 +197,35 @@ pub(super) fn stitch(table: &Reader<'_>, outer: Option<f64>) -> Option<DVec2> {
     Some(own / DVec2::from(gauge))
 }
 
+/// What lies on a garment.
+#[derive(Clone, Copy)]
+enum ClothKind {
+    Knit,
+    Weave,
+    File,
+    Stockinette,
+}
+
 /// Reads `cloth = { .. }`.
 fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
     let span = table.header();
     let points = table.u64_or("points", POINTS, 4..=200) as usize;
-    let kind = table.kind("type", &[("knit", 0), ("weave", 1), ("file", 2), ("stockinette", 3)]);
+    let kinds = [
+        ("knit", ClothKind::Knit),
+        ("weave", ClothKind::Weave),
+        ("file", ClothKind::File),
+        ("stockinette", ClothKind::Stockinette),
+    ];
+    let kind = table.kind("type", &kinds);
     let made = match kind {
-        Some(0) => {
+        Some(ClothKind::Knit) => {
             let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
             let flatten = pattern::flatten(&table);
             let stranding = pattern::work_of_tile(&table);
             let (name, chart, _) = pattern::chart(&table, context);
             chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, flatten, stranding }))
         }
-        Some(1) => {
+        Some(ClothKind::Weave) => {
             let crimp = table.f64("crimp", Range::UNIT);
             let flatten = table.f64_or("flatten", FLATTEN, Range::between(1.0, 4.0));
             let (name, drafted) = weave::draft(&table, context);
@@ -223,14 +238,14 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
                 (name, Pattern::Weave { draft: d.draft, threads, crimp, flatten })
             })
         }
-        Some(2) => {
+        Some(ClothKind::File) => {
             let path = table.required_string("path");
             path.map(|p| {
                 let path = context.resolve(p, table.span("path").unwrap_or(span));
                 (path.display().to_string(), Pattern::File(path))
             })
         }
-        Some(_) => {
+        Some(ClothKind::Stockinette) => {
             let stranding = pattern::work_of_tile(&table);
             let flatten = pattern::flatten(&table);
             let knit = |chart| Pattern::Knit { chart, yarn_per_stitch: None, flatten, stranding };
