@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("latitude     model: back  forward     fibres: back  forward   (blue channel, shares of the light)");
     for degrees in [0.0, 30.0, 60.0] {
         // Rays over the whole width of the yarn, its plies at any phase.
-        let view = View { theta: f64::to_radians(degrees), offset: None, phase: None };
+        let view = View { theta: f64::to_radians(degrees), ..View::default() };
         let model = measure(&Specimen::Yarn(&yarn, Model::Aggregated), &view, Effort { paths: 100_000, seed: 1 });
         let fibers = truth(&yarn, &view, Effort { paths: 20_000, seed: 1 })?;
         let [(back, forward), (true_back, true_forward)] = [model.energies(), fibers.energies()];

@@ -49,6 +49,8 @@ fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
         (&["scatter", "silk2x"][..], "did you mean \"silk2\"?"),
         (&["scatter", "silk1", "--theta", "90"], "between -90 and 90"),
         (&["scatter", "silk1", "--offset", "1.1"], "from -1 to 1"),
+        (&["scatter", "silk1", "--flatten", "0.5"], "from 1 to 4"),
+        (&["scatter", "silk1", "--flatten", "1.5", "--phase", "3", "--truth", "9"], "leave it out"),
         (&["scatter", "silk1", "--ply", "3"], "3 plies"),
         (&["scatter", "silk1", "--sweep", "density=0.1"], "KEY=A..B:N"),
         (&["scatter", "silk1", "--sweep", "nonsense=1..2:2"], "unknown key `nonsense`"),

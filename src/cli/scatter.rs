@@ -37,6 +37,7 @@ const EXAMPLES: &str = "Examples:
   yarnray scatter silk1 --light 0,150                              the value for light from one direction
   yarnray scatter --fiber wool --theta 60                          a single fibre
   yarnray scatter silk1 --truth 1000000                            beside paths through explicit fibres
+  yarnray scatter silk1 --flatten 1.5 --truth 1000000              the same pressed flat, as in a weave
   yarnray scatter silk1 --sweep density=0.1..0.7:7 -o sweep.svg    over any parameter";
 
 #[derive(Args, Debug)]
@@ -69,6 +70,9 @@ pub(super) struct ScatterArgs {
     /// Azimuth of the first ply, degrees, 0 towards the camera. Default: averaged over all.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     phase: Option<f64>,
+    /// Width over height of a yarn that is pressed flat, as in cloth, and seen along its short axis.
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, conflicts_with = "fiber")]
+    flatten: f64,
     /// Also the value, with the cosine, for light from this latitude and azimuth, degrees (0,0 is the camera's side).
     #[arg(long, value_name = "THETA,PHI", value_parser = pair, allow_hyphen_values = true)]
     light: Option<(f64, f64)>,
@@ -78,7 +82,7 @@ pub(super) struct ScatterArgs {
     /// Samples of the model.
     #[arg(long, value_name = "N", default_value_t = 400_000)]
     samples: u64,
-    /// Measure over a range of a parameter: `theta`, `offset`, `phase`, a key of the yarn or its fibre, or a dotted path.
+    /// Measure over a range of a parameter: `theta`, `offset`, `phase`, `flatten`, a key of the yarn or its fibre, or a dotted path.
     #[arg(long, value_name = "KEY=A..B:N")]
     sweep: Option<String>,
     /// Override a key of the yarn or its fibre, or any key by its dotted path (repeatable).
@@ -102,6 +106,9 @@ fn pair(text: &str) -> Result<(f64, f64), String> {
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or("expected two numbers");
     Ok((number(a)?, number(b)?))
 }
+
+/// The most that a yarn can be pressed flat: as in weaves.
+const MOST_FLATTENED: f64 = 4.0;
 
 /// The name of the measurement of explicit fibres.
 const TRUTH: &str = "truth";
@@ -196,9 +203,38 @@ impl ScatterArgs {
         Ok(definitions.yarn(&name)?)
     }
 
+    fn check(&self, view: &View) -> Result<(), Failure> {
+        if view.theta.is_nan() || view.theta.abs() >= std::f64::consts::FRAC_PI_2 {
+            return Err(input(format!(
+                "theta {}: expected an angle between -90 and 90 degrees",
+                view.theta.to_degrees()
+            )));
+        }
+        if view.offset.is_some_and(|h| !(-1.0..=1.0).contains(&h)) {
+            return Err(input(format!("offset {}: expected a number from -1 to 1", view.offset.unwrap_or_default())));
+        }
+        if view.phase.is_some_and(|p| !p.is_finite()) {
+            return Err(input("phase: expected an angle"));
+        }
+        if !(1.0..=MOST_FLATTENED).contains(&view.flatten) {
+            return Err(input(format!("flatten {}: expected a ratio from 1 to {MOST_FLATTENED}", view.flatten)));
+        }
+        if view.flatten > 1.0 && view.phase.is_some() && self.truth.is_some() {
+            return Err(input(
+                "--phase: explicit fibres that are pressed flat are seen with plies at any azimuth: leave it out",
+            ));
+        }
+        Ok(())
+    }
+
     fn view(&self) -> Result<View, Failure> {
-        let view = View { theta: self.theta.to_radians(), offset: self.offset, phase: self.phase.map(f64::to_radians) };
-        check(&view)?;
+        let view = View {
+            theta: self.theta.to_radians(),
+            offset: self.offset,
+            phase: self.phase.map(f64::to_radians),
+            flatten: self.flatten,
+        };
+        self.check(&view)?;
         Ok(view)
     }
 
@@ -209,6 +245,7 @@ impl ScatterArgs {
             "theta" => view.theta = at.to_radians(),
             "offset" => view.offset = Some(at),
             "phase" => view.phase = Some(at.to_radians()),
+            "flatten" => view.flatten = at,
             _ => {
                 let path = self.path_of(&sweep.key)?;
                 let whole = matches!(path.rsplit('.').next(), Some("fibers" | "plies"));
@@ -218,7 +255,7 @@ impl ScatterArgs {
                 return Ok(Job { definitions: self.load(set, Some((path, value, label)))?, view });
             }
         }
-        check(&view)?;
+        self.check(&view)?;
         Ok(Job { definitions: self.load(set, None)?, view })
     }
 
@@ -268,19 +305,6 @@ impl ScatterArgs {
         }
         Ok(Found { all, values: at_light, title: format!("yarn {}", yarn.name) })
     }
-}
-
-fn check(view: &View) -> Result<(), Failure> {
-    if view.theta.is_nan() || view.theta.abs() >= std::f64::consts::FRAC_PI_2 {
-        return Err(input(format!("theta {}: expected an angle between -90 and 90 degrees", view.theta.to_degrees())));
-    }
-    if view.offset.is_some_and(|h| !(-1.0..=1.0).contains(&h)) {
-        return Err(input(format!("offset {}: expected a number from -1 to 1", view.offset.unwrap_or_default())));
-    }
-    if view.phase.is_some_and(|p| !p.is_finite()) {
-        return Err(input("phase: expected an angle"));
-    }
-    Ok(())
 }
 
 pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
@@ -354,6 +378,7 @@ fn report_json(args: &ScatterArgs, job: &Job, found: &Found) -> Value {
     report["theta"] = json!(args.theta);
     report["offset"] = json!(job.view.offset);
     report["phase"] = json!(args.phase);
+    report["flatten"] = json!(args.flatten);
     if let (Some(values), Some((theta, phi))) = (&found.values, args.light) {
         let by_lobe = LOBES.iter().zip(values).map(|(n, v)| ((*n).to_owned(), json!(v.map(|m| m.mean))));
         report["value"] = json!({"light": [theta, phi], "lobes": Value::Object(by_lobe.collect())});

@@ -27,7 +27,12 @@ pub enum Scatterers {
 
 /// A round yarn with one of the models.
 pub fn scatterer(yarn: &Yarn, model: Model) -> YarnScatterer {
-    of_shape(shape_for(yarn, model, 1.0), &materials(yarn), model, 1.0, &Solutions::default())
+    pressed_scatterer(yarn, model, 1.0)
+}
+
+/// The same of one that is pressed to axes of `stretch` : 1.
+pub fn pressed_scatterer(yarn: &Yarn, model: Model, stretch: f64) -> YarnScatterer {
+    of_shape(shape_for(yarn, model, stretch), &materials(yarn), model, stretch, &Solutions::default())
 }
 
 /// Whole yarns, pressed to axes of `stretch` : 1 on the mean. Variants whose plies are the same share one shape.

@@ -19,7 +19,7 @@ use crate::{
 };
 use curves::{Given, Piece, Preparation};
 pub use estimate::{BuildError, Estimate};
-pub use material::{Scatterers, scatterer};
+pub use material::{Scatterers, pressed_scatterer, scatterer};
 pub use outgoing::curves;
 
 /// The cloth and meshes of a scene, ready for rays, with what their light needs.

@@ -32,6 +32,15 @@ pub struct View {
     pub offset: Option<f64>,
     /// Azimuth of the first ply from the camera's side; `None` for any.
     pub phase: Option<f64>,
+    /// Width over height of the section of a yarn, at least 1: pressed flat it is seen along its short axis.
+    pub flatten: f64,
+}
+
+impl Default for View {
+    /// Straight at a round yarn, evenly over its width and all around.
+    fn default() -> Self {
+        Self { theta: 0.0, offset: None, phase: None, flatten: 1.0 }
+    }
 }
 
 /// How much is spent.
@@ -238,7 +247,7 @@ pub(crate) fn in_batches(effort: Effort, lobes: bool, run: impl Fn(u64, u64, &mu
 
 /// Measures what the specimen's model says.
 pub fn measure(specimen: &Specimen<'_>, view: &View, effort: Effort) -> Measurement {
-    let prepared = specimen.prepare();
+    let prepared = specimen.prepare(view);
     in_batches(effort, true, |batch, count, tally| {
         for index in 0..count {
             let mut sampler = Sampler::new(effort.seed, batch as u32, 0, index as u32);
@@ -250,7 +259,7 @@ pub fn measure(specimen: &Specimen<'_>, view: &View, effort: Effort) -> Measurem
 /// The value of the scattering for light from one direction: S cos(theta) in 1/steradian by lobe, averaged over what the
 /// view leaves open.
 pub fn value(specimen: &Specimen<'_>, view: &View, light: (f64, f64), effort: Effort) -> [[Mean; 3]; 5] {
-    let prepared = specimen.prepare();
+    let prepared = specimen.prepare(view);
     let (theta, phi) = light;
     let w = Vec3A::new((theta.cos() * phi.cos()) as f32, (theta.cos() * phi.sin()) as f32, theta.sin() as f32);
     let batches: Vec<[[f64; 3]; 5]> = (0..BATCHES)

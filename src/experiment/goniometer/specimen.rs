@@ -1,13 +1,13 @@
 //! What can be put on the goniometer.
 
-use glam::Vec3A;
+use glam::{Vec2, Vec3A};
 
 use super::{Outcome, View};
 use crate::{
-    cloth::scatterer,
+    cloth::pressed_scatterer,
     geometry::{
         section::{Crossings, Section},
-        yarn_frame::{ROUND, YarnFrame},
+        yarn_frame::{Pressed, ROUND, YarnFrame},
     },
     math::{Rgb, sampler::Sampler},
     scattering::{
@@ -47,10 +47,10 @@ pub fn ply_alone(yarn: &Yarn, ply: usize) -> Yarn {
 }
 
 impl Specimen<'_> {
-    pub(crate) fn prepare(&self) -> Prepared {
+    pub(crate) fn prepare(&self, view: &View) -> Prepared {
         match self {
             Self::Fiber(material) => Prepared::Fiber(FiberBcsdf::new(material)),
-            Self::Yarn(yarn, model) => Prepared::Yarn(scatterer(yarn, *model)),
+            Self::Yarn(yarn, model) => Prepared::Yarn(pressed_scatterer(yarn, *model, view.flatten)),
         }
     }
 }
@@ -79,7 +79,9 @@ impl Prepared {
         let [u_offset, u_phase, _, _] = sampler.next4();
         let h = view.offset.map_or(2.0 * u_offset - 1.0, |h| h as f32);
         let phase = view.phase.unwrap_or(f64::from(u_phase) * std::f64::consts::TAU);
-        let section = straight_section(view.theta, h, phase, yarn.shape().tilted);
+        // The short axis points to the camera.
+        let pressed = Pressed::new(Vec2::new(view.flatten.recip() as f32, 0.0));
+        let section = Section { pressed, ..straight_section(view.theta, h, phase, yarn.shape().tilted) };
         let mut crossings = Crossings::new();
         section.crossings(yarn.shape(), &mut crossings);
         let unscattered = yarn.transparency(&crossings);

@@ -22,7 +22,7 @@ fn total(m: &Measurement) -> [f64; 3] {
     std::array::from_fn(|c| m.scattered.forward[c].mean + m.scattered.backward[c].mean)
 }
 
-const AVERAGED: View = View { theta: 0.0, offset: None, phase: None };
+const AVERAGED: View = View { theta: 0.0, offset: None, phase: None, flatten: 1.0 };
 
 #[test]
 fn a_fiber_returns_its_albedos() {
@@ -54,7 +54,7 @@ fn a_fiber_returns_its_albedos() {
 fn energies_are_the_same_by_cells_by_lobes_and_by_values() {
     let definitions = library(&[]);
     let specimen = Specimen::Yarn(definitions.yarn("silk1").unwrap(), Model::Aggregated);
-    let view = View { theta: 0.5, offset: None, phase: None };
+    let view = View { theta: 0.5, ..AVERAGED };
     let effort = Effort { paths: 60_000, seed: 3 };
     let m = measure(&specimen, &view, effort);
     for c in 0..3 {
@@ -82,9 +82,9 @@ fn energies_are_the_same_by_cells_by_lobes_and_by_values() {
 fn white_yarns_lose_nothing() {
     let definitions =
         library(&["fiber.silk.r=[0.2,0.2,0.2]", "fiber.silk.tt=[0.5,0.5,0.5]", "fiber.silk.d=[0.3,0.3,0.3]"]);
-    for name in ["silk1", "knitting"] {
+    for (name, flatten) in [("silk1", 1.0), ("silk1", 2.0), ("knitting", 1.0)] {
         let specimen = Specimen::Yarn(definitions.yarn(name).unwrap(), Model::Aggregated);
-        let m = measure(&specimen, &View { theta: 0.4, ..AVERAGED }, Effort { paths: 60_000, seed: 4 });
+        let m = measure(&specimen, &View { theta: 0.4, flatten, ..AVERAGED }, Effort { paths: 60_000, seed: 4 });
         let all = m.unscattered.mean + total(&m)[1];
         assert!((all - 1.0).abs() < 0.02, "{name}: {all}");
     }
@@ -160,7 +160,7 @@ fn configuration(v: &serde_json::Value) -> (Yarn, View) {
         ..library(&[]).yarn("silk1").unwrap().clone()
     };
     let phase = number("ply_phase");
-    let view = View { theta: number("theta_deg").to_radians(), offset: None, phase: (phase > -100.0).then_some(phase) };
+    let view = View { theta: number("theta_deg").to_radians(), phase: (phase > -100.0).then_some(phase), ..AVERAGED };
     (yarn, view)
 }
 
@@ -274,13 +274,35 @@ fn a_new_truth_agrees_with_the_table() {
 }
 
 #[test]
+fn pressed_yarns_agree_with_pressed_fibers() {
+    let definitions = library(&[]);
+    let yarn = definitions.yarn("silk1").unwrap();
+    let view = View { flatten: 1.75, ..AVERAGED };
+    let ours = measure(&Specimen::Yarn(yarn, Model::Aggregated), &view, Effort { paths: 60_000, seed: 6 });
+    let fibers = truth(yarn, &view, Effort { paths: 24_000, seed: 6 }).unwrap();
+    assert!((ours.unscattered.mean - fibers.unscattered.mean).abs() < 0.01 + 4.0 * fibers.unscattered.se);
+    for ((got, want), bound) in [(ours.energies().0, fibers.energies().0), (ours.energies().1, fibers.energies().1)]
+        .into_iter()
+        .zip([0.05, 0.04])
+    {
+        for c in 0..3 {
+            let off = (got[c].mean / want[c].mean).ln().abs();
+            assert!(off < bound + 4.0 * want[c].se / want[c].mean, "channel {c}: {:?}, not {:?}", got[c], want[c]);
+        }
+    }
+    // As wide as when it was round, it is less deep.
+    let round = measure(&Specimen::Yarn(yarn, Model::Aggregated), &AVERAGED, Effort { paths: 20_000, seed: 6 });
+    assert!(ours.unscattered.mean > round.unscattered.mean, "{:?} {:?}", ours.unscattered, round.unscattered);
+}
+
+#[test]
 fn white_fibers_return_all_light_whatever_their_packing() {
     let (definitions, _) = table();
     let mut yarn = definitions.yarn("three").unwrap().clone();
     for (_, fiber) in &mut yarn.fibers {
         (fiber.r, fiber.tt, fiber.d) = ([0.2; 3], [0.5; 3], [0.3; 3]);
     }
-    let view = View { theta: 0.3, offset: Some(0.2), phase: Some(0.4) };
+    let view = View { theta: 0.3, offset: Some(0.2), phase: Some(0.4), ..AVERAGED };
     let m = truth(&yarn, &view, Effort { paths: 4_000, seed: 1 }).unwrap();
     let all = m.unscattered.mean + total(&m)[0];
     assert!((all - 1.0).abs() < 1e-4, "{all}");

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::{Effort, Measurement, Outcome, Tally, View};
@@ -66,7 +66,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         closed: false,
         points: (0..=points).map(at).collect(),
         radii: None,
-        flattening: None,
+        flattening: (view.flatten > 1.0).then(|| vec![Vec3::new(view.flatten.recip() as f32, 0.0, 0.0); points + 1]),
     };
     let radii = vec![1.0; curve.points.len()];
     let options = StrandOptions {
@@ -75,14 +75,17 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         longest_segment: 3.0,
         ply_rate: f64::from(shape.ply_rate),
         symmetry: shape.symmetry,
-        phases: vec![0.0],
+        phases: Vec::new(),
         distances: false,
         unevenness: None,
     };
-    let strands = Strands::new(&[(curve, radii)], &options);
+    let curves = [(curve, radii)];
     let mut tallies = Vec::new();
     for packing in 0..PACKINGS.min(effort.paths) {
         let seed = hash2(effort.seed ^ 0x7275_7468, packing as u32);
+        // A round yarn is looked at from all sides; one that is pressed from one side, at plies that lie anyhow.
+        let phase = if view.flatten > 1.0 { TAU * f64::from(Stream::new(seed).next()) } else { 0.0 };
+        let strands = Strands::new(&curves, &StrandOptions { phases: vec![phase], ..options.clone() });
         let plies = Plies::new(&strands, &yarn.plies, &shape, seed);
         let (geometries, fibers) = (0..yarn.plies.len())
             .filter(|&ply| yarn.plies[ply].fibers > 0)
@@ -129,6 +132,8 @@ impl Sample<'_> {
         let z = HALF_START * (2.0 * f64::from(stream.next()) - 1.0);
         let turn = f64::from(stream.next());
         let azimuth = match self.view.phase {
+            // Along the short axis.
+            None if self.view.flatten > 1.0 => 0.0,
             None => TAU * turn,
             Some(phase) => self.azimuth_of_plies(z) - phase,
         };

@@ -379,7 +379,7 @@ fn energy(scale: Scale, checks: &mut Checks) {
             for theta in [0.0, 0.6, 1.2, 1.5] {
                 for model in [Model::Aggregated, Model::TwoStream, Model::Paper] {
                     let yarn = yarn(plies, 60, density, ply_twist, fiber_twist, &white());
-                    let view = View { theta, offset: None, phase: None };
+                    let view = View { theta, ..View::default() };
                     let m = goniometer::measure(&Specimen::Yarn(&yarn, model), &view, effort);
                     let (back, on) = m.energies();
                     let total = back[1].mean + on[1].mean;
