@@ -378,7 +378,7 @@ fn report_json(args: &ScatterArgs, job: &Job, found: &Found) -> Value {
     report["theta"] = json!(args.theta);
     report["offset"] = json!(job.view.offset);
     report["phase"] = json!(args.phase);
-    report["flatten"] = json!(args.flatten);
+    report["flatten"] = json!(job.view.flatten);
     if let (Some(values), Some((theta, phi))) = (&found.values, args.light) {
         let by_lobe = LOBES.iter().zip(values).map(|(n, v)| ((*n).to_owned(), json!(v.map(|m| m.mean))));
         report["value"] = json!({"light": [theta, phi], "lobes": Value::Object(by_lobe.collect())});

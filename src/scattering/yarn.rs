@@ -109,7 +109,7 @@ impl YarnVertex<'_> {
         }
     }
 
-    /// About where light is scattered, in the section's frame: the place of the node, or of the first fibre where there is none.
+    /// About where light is scattered, in the section's frame: at the first fibre that the ray meets.
     #[inline]
     pub fn place(&self) -> Vec3A {
         match self {

@@ -22,8 +22,6 @@ fn total(m: &Measurement) -> [f64; 3] {
     std::array::from_fn(|c| m.scattered.forward[c].mean + m.scattered.backward[c].mean)
 }
 
-const AVERAGED: View = View { theta: 0.0, offset: None, phase: None, flatten: 1.0 };
-
 #[test]
 fn a_fiber_returns_its_albedos() {
     let material = FiberMaterial {
@@ -35,7 +33,7 @@ fn a_fiber_returns_its_albedos() {
         beta_n: 0.35,
     };
     for theta in [0.0, 0.7, 1.4] {
-        let view = View { theta, ..AVERAGED };
+        let view = View { theta, ..View::default() };
         let m = measure(&Specimen::Fiber(&material), &view, Effort { paths: 50_000, seed: 1 });
         let lobes = m.lobes.unwrap();
         for (lobe, albedo) in [material.r, material.tt, material.d].into_iter().enumerate() {
@@ -54,7 +52,7 @@ fn a_fiber_returns_its_albedos() {
 fn energies_are_the_same_by_cells_by_lobes_and_by_values() {
     let definitions = library(&[]);
     let specimen = Specimen::Yarn(definitions.yarn("silk1").unwrap(), Model::Aggregated);
-    let view = View { theta: 0.5, ..AVERAGED };
+    let view = View { theta: 0.5, ..View::default() };
     let effort = Effort { paths: 60_000, seed: 3 };
     let m = measure(&specimen, &view, effort);
     for c in 0..3 {
@@ -84,7 +82,7 @@ fn white_yarns_lose_nothing() {
         library(&["fiber.silk.r=[0.2,0.2,0.2]", "fiber.silk.tt=[0.5,0.5,0.5]", "fiber.silk.d=[0.3,0.3,0.3]"]);
     for (name, flatten) in [("silk1", 1.0), ("silk1", 2.0), ("knitting", 1.0)] {
         let specimen = Specimen::Yarn(definitions.yarn(name).unwrap(), Model::Aggregated);
-        let m = measure(&specimen, &View { theta: 0.4, flatten, ..AVERAGED }, Effort { paths: 60_000, seed: 4 });
+        let m = measure(&specimen, &View { theta: 0.4, flatten, ..View::default() }, Effort { paths: 60_000, seed: 4 });
         let all = m.unscattered.mean + total(&m)[1];
         assert!((all - 1.0).abs() < 0.02, "{name}: {all}");
     }
@@ -96,7 +94,7 @@ fn results_do_not_depend_on_threads() {
     let specimen = Specimen::Yarn(definitions.yarn("silk1").unwrap(), Model::Aggregated);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| measure(&specimen, &AVERAGED, Effort { paths: 2000, seed: 5 }).distribution.energy)
+        pool.install(|| measure(&specimen, &View::default(), Effort { paths: 2000, seed: 5 }).distribution.energy)
     };
     assert_eq!(run(1), run(3));
 }
@@ -160,7 +158,8 @@ fn configuration(v: &serde_json::Value) -> (Yarn, View) {
         ..library(&[]).yarn("silk1").unwrap().clone()
     };
     let phase = number("ply_phase");
-    let view = View { theta: number("theta_deg").to_radians(), phase: (phase > -100.0).then_some(phase), ..AVERAGED };
+    let view =
+        View { theta: number("theta_deg").to_radians(), phase: (phase > -100.0).then_some(phase), ..View::default() };
     (yarn, view)
 }
 
@@ -216,7 +215,7 @@ fn table() -> (Definitions, Vec<serde_json::Value>) {
 }
 
 fn seen(row: &serde_json::Value) -> View {
-    View { theta: row["theta"].as_f64().unwrap().to_radians(), ..AVERAGED }
+    View { theta: row["theta"].as_f64().unwrap().to_radians(), ..View::default() }
 }
 
 #[test]
@@ -277,7 +276,7 @@ fn a_new_truth_agrees_with_the_table() {
 fn pressed_yarns_agree_with_pressed_fibers() {
     let definitions = library(&[]);
     let yarn = definitions.yarn("silk1").unwrap();
-    let view = View { flatten: 1.75, ..AVERAGED };
+    let view = View { flatten: 1.75, ..View::default() };
     let ours = measure(&Specimen::Yarn(yarn, Model::Aggregated), &view, Effort { paths: 60_000, seed: 6 });
     let fibers = truth(yarn, &view, Effort { paths: 24_000, seed: 6 }).unwrap();
     assert!((ours.unscattered.mean - fibers.unscattered.mean).abs() < 0.01 + 4.0 * fibers.unscattered.se);
@@ -291,7 +290,7 @@ fn pressed_yarns_agree_with_pressed_fibers() {
         }
     }
     // As wide as when it was round, it is less deep.
-    let round = measure(&Specimen::Yarn(yarn, Model::Aggregated), &AVERAGED, Effort { paths: 20_000, seed: 6 });
+    let round = measure(&Specimen::Yarn(yarn, Model::Aggregated), &View::default(), Effort { paths: 20_000, seed: 6 });
     assert!(ours.unscattered.mean > round.unscattered.mean, "{:?} {:?}", ours.unscattered, round.unscattered);
 }
 
@@ -302,7 +301,7 @@ fn white_fibers_return_all_light_whatever_their_packing() {
     for (_, fiber) in &mut yarn.fibers {
         (fiber.r, fiber.tt, fiber.d) = ([0.2; 3], [0.5; 3], [0.3; 3]);
     }
-    let view = View { theta: 0.3, offset: Some(0.2), phase: Some(0.4), ..AVERAGED };
+    let view = View { theta: 0.3, offset: Some(0.2), phase: Some(0.4), ..View::default() };
     let m = truth(&yarn, &view, Effort { paths: 4_000, seed: 1 }).unwrap();
     let all = m.unscattered.mean + total(&m)[0];
     assert!((all - 1.0).abs() < 1e-4, "{all}");

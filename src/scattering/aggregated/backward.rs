@@ -58,6 +58,8 @@ struct Again {
 /// A direction that light took.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
+    /// Where it leaves from, in the section's frame.
+    start: Vec3A,
     direction: Vec3A,
     /// Value there, past other plies, over density, and the density.
     weight: Rgb,
@@ -125,7 +127,7 @@ impl Lobe {
         let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
         let (value, pdf) = self.value(view, node.spot.ply, w);
         let (open, met) = node.others(view, w, stream);
-        let (way, rest) = Taken::new(node, (w, value, pdf), open)?;
+        let (way, rest) = Taken::new(node, (node.spot.middle(view), w, value, pdf), open)?;
         let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
         if rest.max_channel() <= 0.0 {
             return Some(again);
@@ -136,7 +138,7 @@ impl Lobe {
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
         let open = first.open(view, w, |way, fibers| among.offer(view, way, fibers, stream));
-        let (way, rest) = Taken::new(node, (w, value, pdf), open)?;
+        let (way, rest) = Taken::new(node, (first.spot.middle(view), w, value, pdf), open)?;
         again.ways.push(way);
         again.meetings.push(first);
         if rest.max_channel() > 0.0 {
@@ -192,20 +194,18 @@ impl Lobe {
         u: [f32; 2],
         stream: &mut Stream,
     ) -> (Vec3A, Rgb, f32, Vec3A) {
-        let (direction, value, pdf, spot) = match &self.again {
+        let (direction, value, pdf, start) = match &self.again {
             None => {
                 let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
                 let (value, pdf) = self.value(view, node.spot.ply, w);
-                (w, value, pdf, &node.spot)
+                (w, value, pdf, node.spot.middle(view))
             }
             Some(again) => {
                 let mut chance = 1.0;
                 let mut taken = None;
-                for (way, from) in
-                    again.ways.iter().zip([&node.spot].into_iter().chain(again.meetings.iter().map(|m| &m.spot)))
-                {
+                for way in &again.ways {
                     if stream.next() < way.open {
-                        taken = Some((way.direction, way.weight * way.pdf, way.pdf * way.open * chance, from));
+                        taken = Some((way.direction, way.weight * way.pdf, way.pdf * way.open * chance, way.start));
                         break;
                     }
                     chance *= 1.0 - way.open;
@@ -214,13 +214,13 @@ impl Lobe {
                     Some(last) => {
                         let w = last.draw_by(view, &self.frame, u, stream);
                         let (value, pdf) = last.value(view, &self.frame, w);
-                        (w, value, pdf * chance, &last.spot)
+                        (w, value, pdf * chance, last.spot.middle(view))
                     }
-                    None => (Vec3A::Z, Rgb::ZERO, 0.0, &node.spot),
+                    None => (Vec3A::Z, Rgb::ZERO, 0.0, node.spot.middle(view)),
                 })
             }
         };
-        (direction, value, pdf * self.chance, spot.middle(view))
+        (direction, value, pdf * self.chance, start)
     }
 
     /// Draws a direction from the lobe.
@@ -241,10 +241,10 @@ impl Lobe {
 }
 
 impl Taken {
-    /// Light of a direction, value and density, which other plies let pass so far, and what they do not. `None` if there is none.
-    fn new(node: &Node, (direction, value, pdf): (Vec3A, Rgb, f32), open: Rgb) -> Option<(Self, Rgb)> {
+    /// Light of a start, direction, value and density, which other plies let pass so far, and what they do not. `None` if there is none.
+    fn new(node: &Node, (start, direction, value, pdf): (Vec3A, Vec3A, Rgb, f32), open: Rgb) -> Option<(Self, Rgb)> {
         let weight = (pdf > 0.0).then(|| value / pdf)?;
-        let way = Self { direction, weight: weight * open, pdf, open: node.chance_out(open, node.leaves_again) };
+        let way = Self { start, direction, weight: weight * open, pdf, open: node.chance_out(open, node.leaves_again) };
         Some((way, weight * (Rgb::ONE - open)))
     }
 }
