@@ -77,12 +77,11 @@ pub(crate) struct TtWidth {
 }
 
 impl TtWidth {
-    /// That of so many events, each with these widths, radians squared and radians.
-    #[inline]
-    fn new(events: f32, beta_tt_squared: f32, beta_n: f32) -> Self {
-        let kappa = kappa_of_variance(Rgb::splat(events * beta_tt_squared));
+    /// That of these widths, radians squared and radians.
+    fn new(beta_tt_squared: f32, beta_n: f32) -> Self {
+        let kappa = kappa_of_variance(Rgb::splat(beta_tt_squared));
         let [factor, ..] = normalisation(kappa).to_array();
-        Self { kappa: kappa.to_array()[0], factor, sigma: events.sqrt() * beta_n }
+        Self { kappa: kappa.to_array()[0], factor, sigma: beta_n }
     }
 }
 
@@ -127,8 +126,6 @@ pub(crate) struct PlyOptics {
     pub beta_r_squared: f32,
     /// As above.
     pub beta_tt_squared: f32,
-    /// Azimuthal width of TT, radians.
-    pub beta_n: f32,
     /// The width of one event of TT.
     pub tt: TtWidth,
     /// [`FreeAfter`](crate::geometry::density::FreeAfter): straight on and turned, for ways along the long axis and along the short one.
@@ -242,8 +239,7 @@ impl PlyOptics {
             untouched: per_channel(&untouched),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
             beta_tt_squared,
-            beta_n,
-            tt: TtWidth::new(1.0, beta_tt_squared, beta_n),
+            tt: TtWidth::new(beta_tt_squared, beta_n),
             after: ply.after.map_or([[gaps.dead_zone; 2]; 2], |after| {
                 [after.straight, after.turned].map(|free| free.map(|free| free as f32))
             }),
@@ -266,12 +262,6 @@ impl PlyOptics {
     pub(crate) fn free_back(&self, turn: f32, short: f32) -> f32 {
         let [along, across] = self.after[1];
         (along + short * (across - along)) * (1.0 + turn).powi(2).max(calibrated::LEFT_BESIDE_STRIP)
-    }
-
-    /// The width of so many events of TT.
-    #[inline]
-    pub(crate) fn tt_width(&self, events: f32) -> TtWidth {
-        TtWidth::new(events, self.beta_tt_squared, self.beta_n)
     }
 
     /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells

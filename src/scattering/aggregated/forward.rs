@@ -24,8 +24,10 @@ use crate::{
 /// Density (1/steradian) of F's directions below which the lobe ends. What little it would have there ends its chain
 /// instead, and most light that comes from elsewhere pays nothing for F.
 const FORWARD_TAIL: f32 = 1e-4;
-/// Fibres to which light is followed one by one. What meets more goes on along a straight way, in one wider lobe.
-const FOLLOWED: usize = 4;
+/// The most fibres to which light is followed, one by one. The last lets all out that it passes on.
+const FOLLOWED: usize = 16;
+/// Its index.
+const LAST: usize = FOLLOWED - 1;
 /// Below such a share of what the first fibre passes on, light is followed farther by chance only: where light is sampled at
 /// the vertex, which sees all of F, and where it is not. There a path takes one way on whether F ends before or is not chosen.
 const LITTLE: [f32; 2] = [0.25, 1.0];
@@ -37,8 +39,6 @@ const STRETCHES: usize = 16;
 pub(super) struct Forward {
     /// The fibres that it meets, one after the other: at least one.
     pub(super) fibers: ArrayVec<Fiber, FOLLOWED>,
-    /// What meets more after the last of them.
-    pub(super) more: Option<More>,
     /// About the share of light that leaves from a node where F does not, and the path's weight: they decide between both.
     pub(super) gain: Rgb,
     pub(super) weight: Rgb,
@@ -71,19 +71,9 @@ pub(super) struct Fiber {
     /// Of what those before it pass on: what ends its chain here.
     ended: Rgb,
     /// The width of its TT.
-    pub(super) width: TtWidth,
+    width: TtWidth,
     /// Where the light came from, in the section.
     back: Vec3A,
-}
-
-/// Light that meets further fibres after the last one that was followed.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct More {
-    /// The share that they pass on of what meets any, over what the last one does.
-    share: Rgb,
-    /// Optical depth of chains in the direction in which light left the last one.
-    depth: Rgb,
-    width: TtWidth,
 }
 
 /// A direction of F.
@@ -123,17 +113,6 @@ impl Part {
     pub(super) fn density(&self) -> f32 {
         self.chance * self.pdf
     }
-}
-
-/// What is ahead of a fibre in a direction.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ahead {
-    /// Optical depth of chains.
-    chains: Rgb,
-    /// The share of light that meets no fibre.
-    through: f32,
-    /// Expected fibres.
-    fibers: f32,
 }
 
 /// A ply on a way out.
@@ -187,7 +166,7 @@ impl Forward {
     #[inline]
     pub(super) fn follow(view: &View<'_>, first: Fiber, weight: Rgb, little: f32, stream: &mut Stream) -> Self {
         let gain = view.yarn.node_gain[first.spot.ply];
-        let mut forward = Self { fibers: ArrayVec::new(), more: None, gain, weight, drawn: Drawn::NOTHING };
+        let mut forward = Self { fibers: ArrayVec::new(), gain, weight, drawn: Drawn::NOTHING };
         let mut next = Some(first);
         while let Some(mut fiber) = next.take() {
             let passed = (fiber.passed * weight).max_channel();
@@ -205,18 +184,17 @@ impl Forward {
             }
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
-            let way = fiber.way(view, fiber.direction(&fiber.width, stream));
+            let way = fiber.way(view, fiber.direction(stream));
             let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
-            let ahead = fiber.follow_way(view, &way, |stretch| {
-                let _ = stretches.try_push(stretch);
-            });
-            if left < ahead.through {
-                let (lobe, around) = fiber.lobe(&fiber.width, way.w);
-                forward.drawn = Drawn::new(way.w, &forward.alone(view, &fiber, lobe, around, &ahead));
-            } else if forward.fibers.len() + 1 == FOLLOWED {
-                let more = More::new(view, &fiber, &ahead, weight);
-                forward.more = Some(more);
-                forward.drawn = forward.draw_bent(view, &fiber, &more, stream);
+            let through = if forward.fibers.len() == LAST {
+                1.0
+            } else {
+                fiber.follow_way(view, &way, |stretch| {
+                    let _ = stretches.try_push(stretch);
+                })
+            };
+            if left < through {
+                forward.drawn = Drawn::new(way.w, &forward.part(view, &fiber, fiber.lobe(way.w), through));
             } else {
                 next = fiber.next(view, &way, &mut stretches, left);
             }
@@ -251,36 +229,15 @@ impl Forward {
         Some(ChainEnd { spot, back, crossing, before: before as f32, amplitude: ended * (total / energy) })
     }
 
-    /// A direction of light that others bend after the last fibre.
-    #[inline]
-    pub(super) fn draw_bent(&self, view: &View<'_>, last: &Fiber, more: &More, stream: &mut Stream) -> Drawn {
-        let w = last.direction(&more.width, stream);
-        let ahead = last.ahead(view, w);
-        Drawn::new(w, &self.bent(last, more, last.lobe(&more.width, w).0, &ahead))
-    }
-
-    /// F towards `w`: what leaves from the place of each of the fibres, and what others bend that come after the last.
+    /// F towards `w`: what leaves from the place of each of the fibres.
     #[inline]
     pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(&Spot, Part)) {
-        let Some((last, before)) = self.fibers.split_last() else { return };
-        for fiber in before {
-            let (lobe, around) = fiber.lobe(&fiber.width, w);
-            if lobe >= FORWARD_TAIL {
-                visit(&fiber.spot, self.alone(view, fiber, lobe, around, &fiber.ahead(view, w)));
+        for (index, fiber) in self.fibers.iter().enumerate() {
+            let lobe = fiber.lobe(w);
+            if lobe.0 >= FORWARD_TAIL && fiber.passed != Rgb::ZERO {
+                let through = if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w), |_| {}) };
+                visit(&fiber.spot, self.part(view, fiber, lobe, through));
             }
-        }
-        if last.passed == Rgb::ZERO {
-            return;
-        }
-        let (lobe, around) = last.lobe(&last.width, w);
-        let often = self.more.map_or(0.0, |more| last.lobe(&more.width, w).0);
-        if lobe < FORWARD_TAIL && often < FORWARD_TAIL {
-            return;
-        }
-        let ahead = last.ahead(view, w);
-        visit(&last.spot, self.alone(view, last, lobe, around, &ahead));
-        if let Some(more) = &self.more {
-            visit(&last.spot, self.bent(last, more, often, &ahead));
         }
     }
 
@@ -291,34 +248,20 @@ impl Forward {
         density
     }
 
-    /// What leaves from a fibre: nothing else is met on the way out.
+    /// What leaves from a fibre by its lobe, of which the share `through` meets no other on the way out.
     #[inline]
-    fn alone(&self, view: &View<'_>, fiber: &Fiber, lobe: f32, around: f32, ahead: &Ahead) -> Part {
-        let share = view.yarn.plies[fiber.spot.ply].chain_share;
-        let pdf = lobe * ahead.through;
-        let even = (1.0 - share) / TAU;
-        self.part(fiber.passed * (pdf * (1.0 - even / around).max(0.0) / share), pdf)
-    }
-
-    /// What others bend too.
-    #[inline]
-    fn bent(&self, fiber: &Fiber, more: &More, lobe: f32, ahead: &Ahead) -> Part {
-        let way = (more.depth - ahead.chains).min(Rgb::ZERO).exp();
-        self.part(fiber.passed * more.share * way * lobe, lobe)
-    }
-
-    /// A part of F, by its value and its density.
-    #[inline]
-    fn part(&self, value: Rgb, pdf: f32) -> Part {
+    fn part(&self, view: &View<'_>, fiber: &Fiber, (lobe, around): (f32, f32), through: f32) -> Part {
+        let pdf = lobe * through;
         if pdf < FORWARD_TAIL {
             return Part::default();
         }
+        let share = view.yarn.plies[fiber.spot.ply].chain_share;
+        let even = (1.0 - share) / TAU;
         // What is drawn for all channels together holds the lobe of each but for rare directions.
-        let value = value.min(Rgb::splat(pdf));
-        let share = value / pdf;
+        let share = (fiber.passed * ((1.0 - even / around).max(0.0) / share)).min(Rgb::ONE);
         let passed = share.weighted_mean(self.weight);
         let ended = ((Rgb::ONE - share) * self.gain).weighted_mean(self.weight);
-        Part { value, pdf, chance: if passed > 0.0 { passed / (passed + ended) } else { 0.0 } }
+        Part { value: share * pdf, pdf, chance: if passed > 0.0 { passed / (passed + ended) } else { 0.0 } }
     }
 }
 
@@ -337,18 +280,19 @@ impl Fiber {
         }
     }
 
-    /// A direction of one of the lobes.
+    /// A direction of its lobe.
     #[inline]
-    pub(super) fn direction(&self, width: &TtWidth, stream: &mut Stream) -> Vec3A {
+    fn direction(&self, stream: &mut Stream) -> Vec3A {
         let u_azimuth = stream.next();
         let u = [stream.next(), stream.next()];
-        let sin = sample_sine(width.kappa, self.frame.sin, self.frame.cos, u, stream);
-        self.frame.direction(sin, PI + width.sigma * normal(u_azimuth))
+        let sin = sample_sine(self.width.kappa, self.frame.sin, self.frame.cos, u, stream);
+        self.frame.direction(sin, PI + self.width.sigma * normal(u_azimuth))
     }
 
-    /// A lobe of TT about this fibre with the cosine, 1/steradian, and its part around the fibre, 1/radian.
+    /// Its lobe of TT with the cosine, 1/steradian, and the part around the fibre, 1/radian.
     #[inline]
-    fn lobe(&self, width: &TtWidth, w: Vec3A) -> (f32, f32) {
+    fn lobe(&self, w: Vec3A) -> (f32, f32) {
+        let width = &self.width;
         let (at, cos) = self.frame.latitudes(w);
         let [along, ..] = normalised_kernel(Rgb::splat(width.kappa), Rgb::splat(width.factor), at).to_array();
         if along * cos < FORWARD_TAIL * 1e-4 {
@@ -369,28 +313,20 @@ impl Fiber {
         Way { w, shift, tilt, free }
     }
 
-    /// What is between the fibre and the outside in the direction `w`.
+    /// The share of light on a way that meets no other fibre; `visit` is told of the plies there, in no order. The fibre's own chord keeps
+    /// others away.
     #[inline]
-    pub(super) fn ahead(&self, view: &View<'_>, w: Vec3A) -> Ahead {
-        self.follow_way(view, &self.way(view, w), |_| {})
-    }
-
-    /// The same on a way, ply by ply, in no order: the fibre's own chord keeps others away.
-    #[inline]
-    fn follow_way(&self, view: &View<'_>, way: &Way, mut visit: impl FnMut(Stretch)) -> Ahead {
+    fn follow_way(&self, view: &View<'_>, way: &Way, mut visit: impl FnMut(Stretch)) -> f32 {
         let (yarn, spot, thin) = (view.yarn, &self.spot, view.section.thinness());
         let (shape, wide) = (yarn.occluder().shape(), spot.inside.wide(way.w));
-        let mut all = Ahead { chains: Rgb::ZERO, through: 1.0, fibers: 0.0 };
+        let mut all = 1.0;
         view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
-            let optics = &yarn.plies[ahead.ply];
-            let gaps = &optics.gaps;
+            let gaps = &yarn.plies[ahead.ply].gaps;
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
             let fibers = (way.tilt * chord.ahead(-ahead.foot) - if own { way.free } else { 0.0 }).max(0.0);
             let through = if own { (-gaps.rate * fibers).exp() } else { gaps.unscattered(fibers) };
-            all.chains += optics.rho * fibers;
-            all.through *= through;
-            all.fibers += fibers;
+            all *= through;
             visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, fibers, through, chord });
         });
         all
@@ -416,25 +352,6 @@ impl Fiber {
         let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
         let spot = Spot::new(view, stretch.ply, inside);
         Some(Self::new(view, spot, -way.w, self.passed))
-    }
-}
-
-impl More {
-    /// Of light that left `fiber` in a direction with so much `ahead`: what is left of the chains, and how many events they are. They
-    /// are met in the renewal process of [`crate::geometry::occluder::PlyGaps`], and each passes on the same share.
-    #[inline]
-    pub(super) fn new(view: &View<'_>, fiber: &Fiber, ahead: &Ahead, weight: Rgb) -> Self {
-        let optics = &view.yarn.plies[fiber.spot.ply];
-        let none = ahead.through;
-        let kept = (-ahead.chains).exp();
-        let several = (kept - Rgb::splat(none)).max(Rgb::ZERO);
-        let share = (several / (1.0 - none).max(1e-6)).min(Rgb::ONE);
-        let loss = Rgb::splat(optics.gaps.rate) - optics.rho;
-        let mean = loss * ahead.fibers / (loss * optics.gaps.dead_zone + 1.0);
-        let count = (mean * kept / several.max(Rgb::splat(1e-6))).max(Rgb::ONE).min(Rgb::splat(32.0));
-        // One for all channels, by what each passes so often.
-        let often = (share * fiber.passed * weight).max(Rgb::splat(1e-20));
-        Self { share, depth: ahead.chains, width: optics.tt_width(1.0 + count.weighted_mean(often) / often.mean()) }
     }
 }
 

@@ -7,7 +7,7 @@ use std::{
 
 use glam::Vec2;
 
-use super::{forward::More, *};
+use super::*;
 use crate::{
     geometry::{
         density::ClearedStrip,
@@ -156,7 +156,7 @@ fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec
     let value = |w: &Vec3A| {
         let (at, cos) = frame.latitudes(*w);
         let off = w.dot(frame.y).atan2(w.dot(frame.x)) - PI;
-        let around = Rgb::from((events.sqrt() * optics.beta_n).to_array().map(|s| wrapped_normal(off, s)));
+        let around = Rgb::from((events.sqrt() * optics.tt.sigma).to_array().map(|s| wrapped_normal(off, s)));
         let m = kernel(kappa_of_variance(events * optics.beta_tt_squared), at);
         (passed - unscattered).max(Rgb::ZERO) * m * around * cos
     };
@@ -413,25 +413,16 @@ fn densities_match(pressed: Option<Pressed>) {
     let mut stream = Stream::new(77);
     let (view, node, forward) =
         (&vertex.view, vertex.node.get(&vertex.view).unwrap(), vertex.forward.as_ref().unwrap());
-    // F hangs on the fibres that light met: what leaves from the first, and what others bend were that the last, after a
-    // direction that is the same for all samples.
+    // F hangs on the fibres that light met: what leaves from the first.
     let first = forward.fibers[0];
-    let fixed = first.direction(&first.width, &mut stream);
-    let more = More::new(view, &first, &first.ahead(view, fixed), Rgb::ONE);
-    let (mut alone, mut bent) = (forward.clone(), forward.clone());
+    let mut alone = forward.clone();
     alone.fibers.truncate(1);
-    bent.fibers.truncate(1);
-    (alone.more, bent.more) = (None, Some(more));
-    let mut counts = [[0f64; 96]; 3];
+    let mut counts = [[0f64; 96]; 2];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
         let again = Forward::follow(view, first, forward.weight, 0.0, &mut stream);
         if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
             counts[0][cell(again.drawn.direction)] += 1.0;
-        }
-        let drawn = bent.draw_bent(view, &first, &more, &mut stream);
-        if stream.next() < drawn.chance {
-            counts[2][cell(drawn.direction)] += 1.0;
         }
         let u = [0; 3].map(|_| stream.next());
         if let Some(c) = vertex.sample(u, &mut stream)
@@ -440,16 +431,16 @@ fn densities_match(pressed: Option<Pressed>) {
             counts[1][cell(c.direction)] += 1.0;
         }
     }
-    let mut expected = [[0f64; 96]; 3];
+    let mut expected = [[0f64; 96]; 2];
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
-        let (alone, with_bent) = (alone.density(view, w), bent.density(view, w));
+        let alone = alone.density(view, w);
         let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
-        for (k, density) in [alone, b, with_bent - alone].into_iter().enumerate() {
+        for (k, density) in [alone, b].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
         }
     }
-    for k in 0..3 {
+    for k in 0..2 {
         let (mut chi2, mut cells) = (0.0, 0.0);
         for (&got, &want) in counts[k].iter().zip(&expected[k]) {
             if want > 10.0 {
