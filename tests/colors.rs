@@ -35,6 +35,19 @@ fn cell(picture: &Picture, at: [usize; 2], columns: usize, rows: usize) -> [f64;
     mean(&(0..w * h).filter(inside).map(|i| colors[i]).collect::<Vec<_>>())
 }
 
+#[test]
+fn lobes_are_left_out_of_yarns_of_all_colors() {
+    let shown = |setting: &str| {
+        let scene =
+            yarns("rows = [\"red\", \"white\", \"blue\"]").replace("spp = 16,", &format!("spp = 16, {setting}"));
+        mean(&render(&scene, &[]).colors())
+    };
+    let [all, fewer] = [shown(""), shown("without = [\"D\", \"TT\"],")];
+    // What is left reflects a twentieth in every colour.
+    let [low, high] = [fewer.iter().copied().fold(f64::INFINITY, f64::min), fewer.iter().copied().fold(0.0, f64::max)];
+    assert!(high < 0.3 * all[0] && high < 1.05 * low, "{all:?} {fewer:?}");
+}
+
 const LETTER: [&str; 5] = ["####", "#...", "###.", "#...", "#..."];
 
 /// Whether a picture shows the letter in red on white, filling it.

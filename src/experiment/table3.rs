@@ -155,7 +155,7 @@ impl Renderer for Processes<'_> {
             .stdin(Stdio::null())
             .output()
             .map_err(|e| BenchError::Suite(format!("error: cannot run this program: {e}")))?;
-        if self.interrupt.load(Ordering::Relaxed) || output.status.code() == Some(130) {
+        if self.interrupt.load(Ordering::Relaxed) || matches!(output.status.code(), Some(129 | 130 | 143)) {
             return Err(BenchError::Interrupted);
         }
         if !output.status.success() {
@@ -240,8 +240,10 @@ pub(crate) fn run(
     // All scenes are looked at before anything takes long.
     let mut keys = Vec::new();
     for case in &suite.cases {
-        let mut parts =
-            vec![format!("{} {} {} {} {threads:?}", suite.target, suite.repeats, suite.converged, suite.max_spp)];
+        let mut parts = vec![format!(
+            "{} {} {} {} {threads:?} {}",
+            suite.target, suite.repeats, suite.converged, suite.max_spp, suite.min_seconds
+        )];
         for (method, set) in ways(suite) {
             parts.push(renderer.fingerprint(suite, case, method, set)?);
         }

@@ -144,10 +144,13 @@ impl Film {
         self.tiles[0].scale
     }
 
-    /// Adds another film's samples; its pixels must lie within this one's, its layers and its unit of light must
+    /// Adds another film's samples and what they cost; its pixels must lie within this one's, its layers and its unit of light must
     /// be the same.
     pub fn add(&mut self, other: &Self) {
         for tile in &other.tiles {
+            let [x, y] = [tile.x - self.origin[0], tile.y - self.origin[1]];
+            let first = &mut self.tiles[(y / TILE * self.columns + x / TILE) as usize];
+            first.rays = std::array::from_fn(|k| first.rays[k].saturating_add(tile.rays[k]));
             for y in 0..tile.height {
                 for x in 0..tile.width {
                     let (px, py) = (tile.x + x - self.origin[0], tile.y + y - self.origin[1]);

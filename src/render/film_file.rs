@@ -193,7 +193,7 @@ fn read_tiles(
         let mut length = [0; 4];
         file.read_exact(&mut length).map_err(|e| unreadable_or_short(path, &e, at))?;
         let rest = u64::from(u32::from_le_bytes(length));
-        if rest < TILE_EXTRA as u64 || rest > size - at {
+        if rest < TILE_EXTRA as u64 || rest > size.saturating_sub(at + length.len() as u64) {
             return Err(damaged("a length that the file does not have"));
         }
         bytes.clear();

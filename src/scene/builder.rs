@@ -5,8 +5,8 @@ use std::{collections::HashSet, f64::consts::TAU, fmt};
 use glam::{DAffine3, DVec3};
 
 use super::{
-    CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Mode, Object, RenderSettings, Scene,
-    Storage, Taken, Yarn, bounds, defaults, force, identity,
+    CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene, Storage,
+    Taken, Yarn, bounds, defaults, force, identity,
     view::{CameraSetup, Views},
 };
 use crate::{
@@ -378,9 +378,11 @@ fn tell_names_apart(fabrics: &mut [Fabric]) {
 
 /// Leaves out the lobes of single fibres that the settings name.
 fn remove_lobes(scene: &mut Scene) {
-    for lobe in &scene.render.without {
-        let of_yarns = scene.yarns.iter_mut().flat_map(|y| &mut y.fibers);
-        for (_, fiber) in of_yarns.chain(&mut scene.fibers) {
+    for lobe in scene.render.without.clone() {
+        let Scene { yarns, fabrics, fibers, .. } = &mut *scene;
+        let variants = fabrics.iter_mut().flat_map(|fabric| &mut fabric.variants);
+        let of_yarns = yarns.iter_mut().chain(variants).flat_map(|yarn| &mut yarn.fibers);
+        for (_, fiber) in of_yarns.chain(fibers) {
             lobe.remove_from(fiber);
         }
     }
@@ -407,9 +409,6 @@ fn keep_used(scene: &mut Scene) {
 
 /// Explicit fibres that do not fit their ply overlap.
 fn warn_about_density(scene: &mut Scene) {
-    if scene.render.mode != Mode::Fiber {
-        return;
-    }
     for yarn in &scene.yarns {
         let fullest = yarn.plies.iter().map(|p| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2));
         let fullest = fullest.fold(0.0, f64::max);

@@ -32,7 +32,7 @@ use crate::{
         stage::{self, PrimPattern, Stage},
         unreadable::hindrance,
     },
-    geometry::curve::{Basis, CurveSet},
+    geometry::curve::{Basis, Curve, CurveSet},
     pattern::tile::Tile,
 };
 
@@ -41,6 +41,9 @@ pub use hair::write_hair;
 pub use obj_lines::write_obj_lines;
 pub use text::write_text;
 pub use yarns::write_yarns;
+
+/// The largest coordinate that is believed, in the file's own unit: beyond it no unit makes cloth of it.
+const FARTHEST: f64 = 1e12;
 
 /// What the file itself cannot say.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,7 +168,7 @@ impl std::error::Error for CurveFileError {}
 /// # Errors
 /// The file cannot be read, is of no known format, or breaks the rules of its format.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    read_unnamed(path, options).map_err(|error| error.in_file(path))
+    read_unnamed(path, options).and_then(within_reach).map_err(|error| error.in_file(path))
 }
 
 /// Reads a periodic curve file (PYP) as the tile that it repeats, millimetres.
@@ -194,7 +197,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
 /// # Errors
 /// The stage is damaged, or has no visible curves that are chosen.
 pub fn read_stage(stage: &Stage, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    staged::read_open(stage, options).map_err(|error| error.in_file(stage.path()))
+    staged::read_open(stage, options).and_then(within_reach).map_err(|error| error.in_file(stage.path()))
 }
 
 fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
@@ -220,6 +223,20 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
         .hint("name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .usda, .usdc, .usdz or .abc after its content")
     })?;
     parse(&bytes, format, options)
+}
+
+/// The curves, unless they reach so far that no picture of them could be made.
+fn within_reach(set: CurveSet) -> Result<CurveSet, CurveFileError> {
+    let far = |(number, curve): (usize, &Curve)| {
+        let point = curve.points.iter().position(|point| point.abs().max_element() > FARTHEST)?;
+        Some((number, point, curve.points[point]))
+    };
+    let Some((curve, point, at)) = set.curves.iter().enumerate().find_map(far) else { return Ok(set) };
+    let problem = format!(
+        "point {point} of curve {curve} is at [{:e}, {:e}, {:e}]; coordinates may be at most {FARTHEST:e}",
+        at.x, at.y, at.z
+    );
+    Err(CurveFileError::new(FileLocation::File, problem).hint("is the file damaged?"))
 }
 
 fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {

@@ -61,7 +61,14 @@ pub(super) fn tile(bytes: &[u8]) -> Result<Tile, CurveFileError> {
     let strand = |yarn: Yarn| {
         let points = yarn.stops.iter().map(|&(vertex, offset)| place(&cell, vertex, offset));
         let mut points: Vec<DVec3> = points.collect::<Result<_, _>>()?;
-        let mut step = yarn.shift.map(|s| s as i32);
+        let cells = |shift: i64| {
+            // The least number has no positive one.
+            i32::try_from(shift).ok().filter(|cells| *cells > i32::MIN).ok_or_else(|| {
+                let problem = format!("a yarn repeats {shift} cells farther on; {} is the most", i32::MAX);
+                CurveFileError::new(FileLocation::File, problem)
+            })
+        };
+        let mut step = [cells(yarn.shift[0])?, cells(yarn.shift[1])?];
         // Which way the file walks along a yarn does not matter.
         if step[0] < 0 || (step[0] == 0 && step[1] < 0) {
             points.reverse();
@@ -447,6 +454,16 @@ mod tests {
         assert!(tiled(&text, [3, 3]).curves.is_empty());
         let text = file(&[[1.0, 1.0], [2.0, 2.0]], &[[0, 1, far, 0], [1, 0, -far - 1, 0]]);
         assert_eq!(tiled(&text, [2, 1]).curves[0].points[1].x, 12.0 + far as f64 * 10.0);
+    }
+
+    #[test]
+    fn a_tile_of_endless_shift_is_an_error() {
+        let far = i64::from(i32::MIN);
+        let text = file(&[[1.0, 1.0], [2.0, 2.0]], &[[0, 1, far, 0], [1, 0, far, 0]]);
+        let message = tile(text.as_bytes()).unwrap_err().to_string();
+        assert_eq!(message, "a yarn repeats -4294967296 cells farther on; 2147483647 is the most");
+        let text = file(&[[1.0, 1.0], [2.0, 2.0]], &[[0, 1, far, 0], [1, 0, 0, 0]]);
+        assert!(tile(text.as_bytes()).is_err());
     }
 
     #[test]

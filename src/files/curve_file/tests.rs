@@ -51,6 +51,14 @@ fn errors_name_the_file() {
 }
 
 #[test]
+fn points_beyond_all_reach_are_an_error() {
+    let (_folder, path) = scratch("far.txt", b"0 0 0\n1 0 0\n\n0 0 0\n0 -1e300 0\n");
+    let error = read(&path, &ReadOptions::default()).expect_err("too far").to_string();
+    let problem = "point 1 of curve 1 is at [0e0, -1e300, 0e0]; coordinates may be at most 1e12; is the file damaged?";
+    assert_eq!(error, format!("{}: {problem}", path.display()));
+}
+
+#[test]
 fn options_without_effect_are_noted() {
     let options = ReadOptions { basis: Some(Basis::Linear), tile: [2, 1], ..ReadOptions::default() };
     let notes = parse(&small_bcc(), Format::Bcc, &options).expect("BCC").notes;

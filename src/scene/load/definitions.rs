@@ -51,6 +51,22 @@ fn find<'a, T>(all: &'a BTreeMap<String, T>, kind: &str, name: &str) -> Result<&
     })
 }
 
+/// Names of yarns (`kind` "yarn") or fibres ("fiber") of the library inside the program.
+pub(super) fn built_in_names(kind: &str) -> impl Iterator<Item = &'static str> + Clone + use<'_> {
+    BUILT_IN
+        .lines()
+        .filter_map(move |line| line.strip_prefix('[')?.strip_prefix(kind)?.strip_prefix('.')?.strip_suffix(']'))
+        // Not the tables within them.
+        .filter(|name| !name.contains('.'))
+}
+
+/// A fibre of the library inside the program.
+pub(super) fn built_in_fiber(name: &str) -> Option<FiberMaterial> {
+    // Nothing is read for a name that it does not have.
+    built_in_names("fiber").find(|of| *of == name)?;
+    load_definitions(None, &LoadOptions::default()).ok()?.fibers.remove(name)
+}
+
 /// Adds yarns and fibres of the library inside the program that fabrics name and that nothing else defines. `fabrics` is
 /// what stands under `fabric`.
 pub(super) fn add_built_in(library: &mut Library, fabrics: Option<&Node>, tilted: bool) {
@@ -58,10 +74,9 @@ pub(super) fn add_built_in(library: &mut Library, fabrics: Option<&Node>, tilted
     texts(fabrics, &mut named);
     let unknown = |names: &[String], name: &str| !names.iter().any(|n| n == name);
     named.retain(|name| unknown(&library.yarn_names, name) || unknown(&library.fiber_names, name));
-    let defines =
-        |name: &&&str| BUILT_IN.contains(&format!("[yarn.{name}]")) || BUILT_IN.contains(&format!("[fiber.{name}]"));
+    let defines = |name: &str| ["yarn", "fiber"].iter().any(|kind| built_in_names(kind).any(|of| of == name));
     // Nothing is read that no fabric names.
-    if !named.iter().any(|name| defines(&name)) {
+    if !named.iter().any(|name| defines(name)) {
         return;
     }
     let Ok(built_in) = load_definitions(None, &LoadOptions::default()) else { return };

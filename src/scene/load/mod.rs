@@ -143,10 +143,17 @@ impl Context<'_> {
         }
     }
 
+    /// Tells of a yarn or a fibre (`kind`) that neither the scene nor the library inside the program has.
+    fn unknown_thread<'n>(&self, span: Span, kind: &'n str, name: &str, names: &'n [String]) {
+        let built_in = definitions::built_in_names(kind).filter(|of| !names.iter().any(|name| name == of));
+        let built_in = built_in.map(|of| -> &'n str { of });
+        self.unknown(span, kind, name, names.iter().map(String::as_str).chain(built_in));
+    }
+
     /// Tells where no yarn has such a name.
     fn check_yarn(&self, span: Span, name: &str, library: &yarns::Library) {
         if !library.yarn_names.iter().any(|n| n == name) {
-            self.unknown(span, "yarn", name, library.yarn_names.iter().map(String::as_str));
+            self.unknown_thread(span, "yarn", name, &library.yarn_names);
         }
     }
 

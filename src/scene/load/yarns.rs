@@ -83,7 +83,7 @@ struct PlyKeys {
 impl PlyKeys {
     fn read(table: &Reader<'_>, behind: Option<&PlyKeys>, sources: &Sources) -> Self {
         let mut fiber_radius = table.f64("fiber_radius", Range::POSITIVE);
-        let mut density = table.f64("density", Range::above(0.0).and_at_most(100.0));
+        let mut density = table.f64("density", Range::above(0.0).and_at_most(1.0));
         // An option of one takes the place of the other in a file.
         let option = |key| table.span(key).is_some_and(|s| sources.is_option(s.source()));
         match (option("fiber_radius"), option("density")) {
@@ -107,7 +107,7 @@ impl PlyKeys {
                 Range::above(0.0).and_at_most(1.0),
             ),
             fiber: table.string("fiber").map(str::to_owned).or_else(|| behind.and_then(|b| b.fiber.clone())),
-            fibers: table.u64("fibers", 0..=1_000_000).or(behind.and_then(|b| b.fibers)),
+            fibers: table.u64("fibers", 1..=1_000_000).or(behind.and_then(|b| b.fibers)),
             fiber_radius: fiber_radius.or(if own { None } else { behind.and_then(|b| b.fiber_radius) }),
             density: density.or(if own { None } else { behind.and_then(|b| b.density) }),
             fiber_twist: table.f64_or("fiber_twist", behind.map_or(0.0, |b| b.fiber_twist), TWIST),
@@ -252,7 +252,7 @@ impl PlyMaker<'_> {
             fiber_radius,
             fiber_twist: radians(keys.fiber_twist),
         };
-        Some((ply, (name.to_owned(), material.clone())))
+        Some((ply, (name.to_owned(), material)))
     }
 
     /// Radius of each of `n` fibres, in yarn radii.
@@ -284,7 +284,7 @@ impl PlyMaker<'_> {
     }
 
     /// Name and material of the ply's fibre.
-    fn fiber<'k>(&self, keys: &'k PlyKeys, place: &Reader<'_>) -> Option<(&'k str, &FiberMaterial)> {
+    fn fiber<'k>(&self, keys: &'k PlyKeys, place: &Reader<'_>) -> Option<(&'k str, FiberMaterial)> {
         let Some(name) = keys.fiber.as_deref() else {
             if !place.has("fiber") {
                 let message = format!("missing key `fiber` in {}", place.title());
@@ -292,10 +292,11 @@ impl PlyMaker<'_> {
             }
             return None;
         };
-        let material = self.fibers.get(name);
+        let material = self.fibers.get(name).cloned().or_else(|| super::definitions::built_in_fiber(name));
         if material.is_none() {
             let span = place.span("fiber").unwrap_or(place.header());
-            self.context.unknown(span, "fiber", name, self.fibers.keys().map(String::as_str));
+            let names: Vec<String> = self.fibers.keys().cloned().collect();
+            self.context.unknown_thread(span, "fiber", name, &names);
         }
         Some((name, material?))
     }

@@ -144,7 +144,7 @@ pub(super) fn plan(
             && !names.contains(name)
         {
             let span = table.span(key).unwrap_or(table.header());
-            context.unknown(span, key, name, names.iter().map(String::as_str));
+            context.unknown_thread(span, key, name, names);
         }
     }
     if yarn.is_some() && fiber.is_some() {
@@ -170,6 +170,8 @@ pub(super) fn plan(
         None if curves.is_some() => {
             curves.map(|path| file_source(path.to_owned(), table.header(), None, None, true, context))
         }
+        // What is there and no table is told already.
+        None if table.has("source") => None,
         None => {
             table.error(
                 "missing table `source`: where the curves come from",
