@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Picture, directory, project, render_file, shared, write, yarnray};
+use crate::support::{Picture, directory, mean, project, render, render_file, shared, write, yarnray};
 
 /// No channel may hold what is not a number, and somewhere there must be cloth.
 #[track_caller]
@@ -114,4 +114,14 @@ fn the_sweater_needs_little_memory() {
     );
     assert!(peak < 150.0, "{peak} MB");
     assert!(per_point < 120.0, "{per_point} bytes a control point");
+}
+
+#[test]
+fn cloth_of_three_lines_has_light_unless_none_is_wanted() {
+    let scene = "[[fabric]]\nyarn = \"wool\"\nsource = { type = \"stockinette\", stitches = 4, rows = 4 }\n";
+    let small = ["--width", "24", "--height", "18", "--spp", "4"];
+    let lit = mean(&render(scene, &small).colors());
+    assert!(lit.iter().all(|v| (0.1..1.0).contains(v)), "{lit:?}");
+    let dark = render(&format!("light = []\n{scene}"), &small).colors();
+    assert!(dark.iter().flatten().all(|v| *v == 0.0));
 }

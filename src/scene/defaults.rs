@@ -55,6 +55,15 @@ pub const IOR: f64 = 1.5;
 /// Segments around a mesh of revolution.
 pub const MESH_SEGMENTS: u32 = 128;
 
+/// The lights of a scene that says nothing of any: radiance of the sky, and direction, irradiance and angular radius (degrees) of the sun.
+pub const SKY: [f64; 3] = [0.30, 0.33, 0.38];
+/// As above.
+pub const SUN_TOWARDS: [f64; 3] = [-0.8, 0.55, 0.55];
+/// As above.
+pub const SUN_IRRADIANCE: [f64; 3] = [4.2, 4.0, 3.6];
+/// As above.
+pub const SUN_RADIUS: f64 = 1.0;
+
 /// Radiance of environment and area lights; radiant intensity of points and spots, per square of the file's unit.
 pub const RADIANCE: f64 = 1.0;
 /// Irradiance of a distant light: that of an environment of radiance 1.

@@ -161,8 +161,14 @@ pub(super) enum LightPlan {
     Image { path: PathBuf, span: Span, environment: Environment, rotation: Mat3A },
 }
 
-/// Reads every `[[light]]`.
+/// Reads every `[[light]]`. Where nothing is said of light, not even `light = []`, cloth and meshes have a sky and a sun.
 pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<LightPlan>> {
+    if !root.has("light") && (root.has("fabric") || root.has("mesh")) {
+        let sky = Environment { radiance: Rgb::from(defaults::SKY), image: None, visible: true };
+        let towards = DVec3::from(defaults::SUN_TOWARDS).normalize();
+        let sun = sun(towards, radians(defaults::SUN_RADIUS), Rgb::from(defaults::SUN_IRRADIANCE));
+        return [Light::Environment(sky), sun].map(|light| Some(LightPlan::Ready(light))).into();
+    }
     root.tables("light").into_iter().map(|table| light(table, context)).collect()
 }
 
@@ -202,12 +208,17 @@ fn distant(table: &Reader<'_>, _: &Context<'_>) -> Option<LightPlan> {
         table.error_at("towards", "the direction towards a light cannot be zero", None);
         return None;
     };
+    Some(LightPlan::Ready(sun(unit, angle, irradiance)))
+}
+
+/// A distant light in the direction of a unit vector, with an angular radius in radians.
+fn sun(towards: DVec3, angle: f64, irradiance: Rgb) -> Light {
     // 1 - cos, without the cancellation of small angles.
     let one_minus_cos = (2.0 * (0.5 * angle).sin().powi(2)) as f32;
     // Rays exactly across a straight curve make Embree offer one hit hundreds of times; a tilt of a millionth,
     // far below any shadow's edge, does not.
-    let tilted = (unit + 1e-6 * DVec3::new(0.57, 0.31, 0.76)).normalize();
-    Some(LightPlan::Ready(Light::Distant { towards: tilted.as_vec3a(), one_minus_cos, irradiance }))
+    let tilted = (towards + 1e-6 * DVec3::new(0.57, 0.31, 0.76)).normalize();
+    Light::Distant { towards: tilted.as_vec3a(), one_minus_cos, irradiance }
 }
 
 fn point(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
