@@ -34,6 +34,19 @@ fn pixels_are_found_again_and_average() {
     assert!(0.0 < noise.low && noise.low < noise.estimate && noise.estimate < noise.high, "{noise:?}");
 }
 
+#[test]
+fn added_samples_bring_what_they_cost() {
+    let [mut whole, mut part] =
+        [[0, 0, 64, 64], [32, 32, 64, 64]].map(|crop| Film::new(crop, Layers::NONE, 1.0).unwrap());
+    let rays =
+        |film: &Film| film.tiles().iter().fold([0; 2], |sum, tile| [sum[0] + tile.rays[0], sum[1] + tile.rays[1]]);
+    whole.tiles_mut().iter_mut().for_each(|tile| tile.rays = [2, 3]);
+    part.tiles_mut().iter_mut().for_each(|tile| tile.rays = [70, 500]);
+    let [before, added] = [rays(&whole), rays(&part)];
+    whole.add(&part);
+    assert_eq!(rays(&whole), [before[0] + added[0], before[1] + added[1]]);
+}
+
 /// Over many renders the interval must be about as wide as the estimates differ, or wider where the picture has edges.
 #[test]
 fn the_interval_of_the_noise_is_as_wide_as_estimates_differ() {

@@ -407,7 +407,7 @@ fn keep_used(scene: &mut Scene) {
     scene.fibers = fibers.into_iter().map(|f| scene.fibers[f].clone()).collect();
 }
 
-/// Explicit fibres that do not fit their ply overlap.
+/// Fibres that do not fit their ply: explicit ones overlap, and the model is held to none.
 fn warn_about_density(scene: &mut Scene) {
     for yarn in &scene.yarns {
         let fullest = yarn.plies.iter().map(|p| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2));

@@ -62,8 +62,6 @@ struct Pieces {
 }
 
 const SKY: &str = "[[light]]\ntype = \"environment\"\nradiance = 1\n";
-/// A light that gives none: a scene that names none has one by itself.
-const DARK: &str = "[[light]]\ntype = \"environment\"\nradiance = 0\n";
 const PATCH: &str = "[[fabric]]\nyarn = \"y\"\nsource = { type = \"straight\", count = 5, length = 12 }\n";
 
 impl Pieces {
@@ -309,13 +307,15 @@ fn depths(scale: Scale, checks: &mut Checks) {
 fn nothing(_: Scale, checks: &mut Checks) {
     let fixed = "[camera]\ntype = \"perspective\"\nposition = [0, 0, 30]\ntarget = [0, 0, 0]\nfov = 30";
     for (name, cloth, lights, value) in
-        [("no cloth", "", SKY, Some(1.0)), ("no light", PATCH, DARK, Some(0.0)), ("neither", "", DARK, Some(0.0))]
+        [("no cloth", "", SKY, Some(1.0)), ("no light", PATCH, "", Some(0.0)), ("neither", "", "", Some(0.0))]
     {
         for camera in [fixed, "camera = \"frame\""] {
             let mut pieces = Pieces::new();
             pieces.cloth = cloth.to_owned();
             pieces.lights = lights.to_owned();
-            camera.clone_into(&mut pieces.camera);
+            // Cloth of which nothing is said has light.
+            let none = if lights.is_empty() { "light = []\n" } else { "" };
+            pieces.camera = format!("{none}{camera}");
             let at = || format!("{name}, {}", camera.split('\n').next().unwrap_or(""));
             let picture = pieces.picture();
             picture.sound(checks, &at);

@@ -117,7 +117,7 @@ impl Part {
 
 /// A ply on a way out.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stretch {
+struct Stretch {
     ply: usize,
     /// Whether the way begins in it, at a fibre.
     own: bool,

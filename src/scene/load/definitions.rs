@@ -1,6 +1,6 @@
 //! Fibres and yarns alone: what a goniometer needs of a scene or library file.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
 use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns, yarns::Library};
 use crate::{
@@ -16,6 +16,9 @@ use crate::{
 const BUILT_IN: &str = include_str!("../../../scenes/yarns.toml");
 /// What messages call it.
 const BUILT_IN_NAME: &str = "the built-in library";
+/// What it defines: read once, when something is asked for that a scene does not define.
+static BUILT_IN_DEFINITIONS: LazyLock<Option<Definitions>> =
+    LazyLock::new(|| load_definitions(None, &LoadOptions::default()).ok());
 
 /// What a file says of fibres and yarns.
 #[derive(Clone, Debug)]
@@ -64,7 +67,7 @@ pub(super) fn built_in_names(kind: &str) -> impl Iterator<Item = &'static str> +
 pub(super) fn built_in_fiber(name: &str) -> Option<FiberMaterial> {
     // Nothing is read for a name that it does not have.
     built_in_names("fiber").find(|of| *of == name)?;
-    load_definitions(None, &LoadOptions::default()).ok()?.fibers.remove(name)
+    BUILT_IN_DEFINITIONS.as_ref()?.fibers.get(name).cloned()
 }
 
 /// Adds yarns and fibres of the library inside the program that fabrics name and that nothing else defines. `fabrics` is
@@ -79,7 +82,7 @@ pub(super) fn add_built_in(library: &mut Library, fabrics: Option<&Node>, tilted
     if !named.iter().any(|name| defines(name)) {
         return;
     }
-    let Ok(built_in) = load_definitions(None, &LoadOptions::default()) else { return };
+    let Some(built_in) = &*BUILT_IN_DEFINITIONS else { return };
     for name in named {
         if let Some(yarn) = built_in.yarns.get(name).filter(|_| unknown(&library.yarn_names, name)) {
             library.yarns.insert(name.to_owned(), Yarn { tilted, ..yarn.clone() });
