@@ -5,7 +5,10 @@
 //! even; for q < 0 their density falls as 1 - 3 q (1 - 2 r^2 / R_c^2) with the distance r from the ply's axis, where R_c is the
 //! radius within which the centres lie. Either has the second moment 2 <r^2> / R_c^2 - 1 = q, if the circle is that of R_c.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::{
+    f32::consts::{FRAC_1_PI, FRAC_PI_2},
+    f64::consts::{FRAC_PI_6, PI},
+};
 
 use wide::f32x4;
 
@@ -23,24 +26,76 @@ pub struct PlyPacking {
     pub regularity: f64,
     /// The same of lines by the rim, where fibres lie in another order.
     pub rim: f64,
-    /// What is free of other fibres after one. `None` if that is the mean dead zone.
-    pub after: Option<FreeAfter>,
+    /// What light meets after a fibre. `None` if no other is within the mean dead zone, and those beyond lie at random.
+    pub after: Option<AfterFiber>,
 }
 
-/// How many expected fibres light that met one meets no other within: on ways along the long axis of a pressed section and on ways along
-/// the short one, which are alike where it is round.
+/// How many fibres fewer than at random places light meets on its way out after one that it met, by how many it is expected to meet:
+/// others are kept away by the first, and then follow all the closer. Such a row is of so many times [`AfterFiber::STEP`] expected
+/// fibres, and the last one of more.
+///
+/// Of a row's four numbers two are of light that is turned in the section by one angle, on ways along the long axis of a pressed section
+/// and along the short one, and two of light that is turned by another: by [`TURNS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FreeAfter {
-    /// Where it goes straight on.
-    pub straight: [f64; 2],
-    /// Where it is turned in the section by [`TURNED`] up to a right angle.
-    pub turned: [f64; 2],
+pub struct AfterFiber {
+    /// Of light that goes on after the first fibre on its way into the ply.
+    pub first: [[f32; 4]; AfterFiber::KNOTS],
+    /// Of light that goes on after another one.
+    pub later: [[f32; 4]; AfterFiber::KNOTS],
+    /// Of light that goes back, where those in the [`ClearedStrip`] are not expected.
+    pub back: [[f32; 4]; AfterFiber::KNOTS],
 }
 
-/// The turn of [`FreeAfter::turned`], radians: 30 degrees.
-pub(crate) const TURNED: f64 = std::f64::consts::FRAC_PI_6;
-/// Its cosine.
-pub(crate) const TURNED_COS: f32 = 0.866_025_4;
+/// By how much the light of [`AfterFiber`] is turned, radians: 0 and 30 degrees, as which all up to a right angle counts; 95 and 150.
+pub(crate) const TURNS: [[f64; 2]; 2] = [[0.0, FRAC_PI_6], [PI * 95.0 / 180.0, PI - FRAC_PI_6]];
+/// Their cosines.
+const TURN_COSINES: [[f32; 2]; 2] = [[1.0, 0.866_025_4], [-0.087_155_744, -0.866_025_4]];
+
+impl AfterFiber {
+    pub(crate) const KNOTS: usize = 8;
+    /// Expected fibres from one knot to the next.
+    pub(crate) const STEP: f32 = 0.4;
+
+    /// Of fibres of which none is within so many expected ones of light that goes on, and of light that goes back but in the strip.
+    pub(crate) fn free(fibers: f32) -> Self {
+        let knots = |free: f32| std::array::from_fn(|knot| [free.min(Self::STEP * knot as f32); 4]);
+        Self { first: knots(fibers), later: knots(fibers), back: knots(0.0) }
+    }
+
+    /// That of light by whether it met others before the fibre, by the cosine of its turn across it and by how much its way is along the
+    /// section's short axis, from 0 to 1.
+    #[inline]
+    pub(crate) fn turned(&self, later: bool, turn: f32, short: f32) -> AfterTurn<'_> {
+        let (rows, [little, much]) = match later {
+            _ if turn < 0.0 => (&self.back, TURN_COSINES[1]),
+            false => (&self.first, TURN_COSINES[0]),
+            true => (&self.later, TURN_COSINES[0]),
+        };
+        let less = ((turn - much) / (little - much)).clamp(0.0, 1.0);
+        let [long, more] = [1.0 - short, 1.0 - less];
+        AfterTurn { rows, shares: f32x4::new([less * long, less * short, more * long, more * short]) }
+    }
+}
+
+/// [`AfterFiber`] on one way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AfterTurn<'a> {
+    rows: &'a [[f32; 4]; AfterFiber::KNOTS],
+    /// How much of each number of a row holds.
+    shares: f32x4,
+}
+
+impl AfterTurn<'_> {
+    /// How many fibres light meets where so many are expected.
+    #[inline]
+    pub(crate) fn met(&self, expected: f32) -> f32 {
+        let at = (expected * AfterFiber::STEP.recip()).min((AfterFiber::KNOTS - 1) as f32);
+        let below = (at as usize).min(AfterFiber::KNOTS - 2);
+        let [from, to] = [below, below + 1].map(|knot| f32x4::new(self.rows[knot]));
+        let missing = from + (to - from) * f32x4::splat(at - below as f32);
+        (expected - (missing * self.shares).reduce_add()).max(0.0)
+    }
+}
 
 /// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
 #[derive(Clone, Copy, Debug)]
@@ -290,6 +345,27 @@ mod tests {
             let at = |share: f32| ply.chord(ply.radius - share * wide * ply.fiber_radius, 1.0, 1.0, wide).total();
             assert!(at(0.0) < 1e-3 && at(0.5) > 0.3 * at(1.0) && at(1.0) > 0.5, "{} {} {}", at(0.0), at(0.5), at(1.0));
         }
+    }
+
+    #[test]
+    fn after_a_fiber_no_more_are_met_than_are_expected_and_the_more_the_more_are() {
+        let free = AfterFiber::free(0.5);
+        assert!((free.turned(true, 1.0, 0.3).met(2.0) - 1.5).abs() < 1e-6);
+        let rows = std::array::from_fn(|knot| [0.4, 0.3, 0.2, 0.1].map(|step: f32| step * knot as f32));
+        let after = AfterFiber { first: rows, later: rows, back: [[0.0; 4]; AfterFiber::KNOTS] };
+        for (turn, short) in [(1.0, 0.0), (0.9, 0.5), (0.3, 1.0), (0.0, 0.2)] {
+            let turned = after.turned(false, turn, short);
+            let mut before = 0.0;
+            for i in 1..=200 {
+                let expected = 0.02 * i as f32;
+                let met = turned.met(expected);
+                assert!(met >= before - 1e-6 && met <= expected, "{turn} {short}: {met} of {expected}");
+                before = met;
+            }
+        }
+        assert!(after.turned(false, 1.0, 0.0).met(1.0).abs() < 1e-6, "straight on none is met");
+        assert!((after.turned(false, 0.5, 1.0).met(1.0) - 0.75).abs() < 1e-6, "turned and across, a quarter fewer");
+        assert_eq!(after.turned(true, -0.5, 1.0).met(1.0), 1.0);
     }
 
     #[test]

@@ -60,6 +60,17 @@ impl PlyGaps {
         let open = 1.0 - self.dead_zone;
         if passed > open { 1.0 - passed } else { self.dead_zone - (passed / open).max(1e-30).ln() * open }
     }
+
+    /// Of light that meets another fibre after one and within so many expected `fibers`: after how many the share `met` has met it.
+    #[inline]
+    pub fn fibers_to_next(&self, fibers: f32, met: f32) -> f32 {
+        let within = fibers - self.dead_zone;
+        if within <= 0.0 {
+            return met * fibers;
+        }
+        let left = 1.0 - met * -(-self.rate * within).exp_m1();
+        (self.dead_zone - left.max(1e-30).ln() / self.rate).min(fibers)
+    }
 }
 
 /// What light finds between the fibres of a yarn.
@@ -127,6 +138,19 @@ mod tests {
                 assert!((gaps.fibers_passed(passed) - n).abs() < 1e-3, "density {density}, {n} fibres");
                 before = passed;
             }
+        }
+    }
+
+    #[test]
+    fn from_one_fiber_to_the_next_one_is_expected_on_the_mean() {
+        for density in [0.0, 0.2, 0.5, 0.7] {
+            let gaps = PlyGaps::new(density);
+            let mean = |fibers: f32| {
+                let drawn = (0..4000).map(|i| gaps.fibers_to_next(fibers, (i as f32 + 0.5) / 4000.0));
+                drawn.inspect(|n| assert!((0.0..=fibers).contains(n))).sum::<f32>() / 4000.0
+            };
+            assert!((mean(1e3) - 1.0).abs() < 2e-3, "density {density}: {}", mean(1e3));
+            assert!(mean(1.0) < 1.0 && mean(0.1) <= 0.1 && mean(0.0) == 0.0);
         }
     }
 }

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{Vec2, Vec3A};
 
 use super::{
-    density::{FreeAfter, PlyPacking},
+    density::{AfterFiber, PlyPacking},
     way::FourPlies,
 };
 
@@ -100,7 +100,7 @@ pub struct PlyShape {
     /// The same by the rim: [`PlyPacking::rim`].
     pub rim: f32,
     /// What is free of others after a fibre: [`PlyPacking::after`].
-    pub after: Option<FreeAfter>,
+    pub after: Option<AfterFiber>,
 }
 
 /// The cross-section of a yarn and how it turns along it.

@@ -11,15 +11,12 @@ use super::{
     kernel::{kappa_of_variance, normalisation},
 };
 use crate::{
-    geometry::{density::TURNED_COS, occluder::PlyGaps, yarn::PlyShape},
+    geometry::{density::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 
 /// Constants of the aggregated model that were calibrated on explicit fibres (untwisted single plies only).
 mod calibrated {
-    /// How much of what is free of other fibres after one the swept strip leaves where light goes straight back; the square of what the
-    /// cosine of its turn is above -1, where that is more.
-    pub(super) const LEFT_BESIDE_STRIP: f32 = 0.1;
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
@@ -128,10 +125,15 @@ pub(crate) struct PlyOptics {
     pub beta_tt_squared: f32,
     /// The width of one event of TT.
     pub tt: TtWidth,
-    /// [`FreeAfter`](crate::geometry::density::FreeAfter): straight on and turned, for ways along the long axis and along the short one.
-    pub after: [[f32; 2]; 2],
+    /// What light meets after a fibre.
+    pub after: AfterFiber,
     /// How much longer the way of the light is than measured between cores.
     pub lead: f32,
+    /// Of light that wanders about: its mean way, in core radii, and how fast what is lost makes it fade with the distance, per core radius;
+    /// means of the channels.
+    pub mean_way: f32,
+    /// As above.
+    pub fading: f32,
 }
 
 /// The least extinction per fibre. Where TT loses nothing at all a chain ends nowhere; which place is then drawn for an end
@@ -220,6 +222,9 @@ impl PlyOptics {
         };
         let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
         let (beta_tt_squared, beta_n) = ((material.beta_tt * material.beta_tt) as f32, material.beta_n as f32);
+        // The length of diffusion, by which light fades, is the mean way over the root of 3 (1 - albedo).
+        let fading = per_channel(&|c| radius_optical(c) * (3.0 * (1.0 - albedo(c))).max(0.0).sqrt());
+        let radius_optical = per_channel(&radius_optical);
         Self {
             gaps,
             chain_share: f as f32,
@@ -240,30 +245,15 @@ impl PlyOptics {
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
             beta_tt_squared,
             tt: TtWidth::new(beta_tt_squared, beta_n),
-            after: ply.after.map_or([[gaps.dead_zone; 2]; 2], |after| {
-                [after.straight, after.turned].map(|free| free.map(|free| free as f32))
-            }),
+            after: ply.after.unwrap_or(AfterFiber::free(gaps.dead_zone)),
             lead: (FRAC_PI_4 * fiber) as f32,
+            mean_way: radius_optical.mean().recip().min(10.0),
+            fading: fading.mean(),
         }
     }
 }
 
 impl PlyOptics {
-    /// How many expected fibres light that passed one meets no other within, by the cosine of its turn in the section and by how much its way
-    /// is along the section's short axis, from 0 to 1.
-    #[inline]
-    pub(crate) fn free_after(&self, turn: f32, short: f32) -> f32 {
-        let [straight, turned] = self.after.map(|after| after[0] + short * (after[1] - after[0]));
-        turned + (straight - turned) * ((turn - TURNED_COS) / (1.0 - TURNED_COS)).clamp(0.0, 1.0)
-    }
-
-    /// The same of light that goes back, beside the strip that it has swept, which is a part of what is free.
-    #[inline]
-    pub(crate) fn free_back(&self, turn: f32, short: f32) -> f32 {
-        let [along, across] = self.after[1];
-        (along + short * (across - along)) * (1.0 + turn).powi(2).max(calibrated::LEFT_BESIDE_STRIP)
-    }
-
     /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells
     /// it from the rest, and how many TT events the rest has on the mean.
     #[inline]

@@ -64,6 +64,21 @@ impl Inside {
         self.point + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
     }
 
+    /// Unit vector square to the rim of a ply where that faces the direction `w` of the section's frame most, in the axes of [`Self::in_ply`].
+    #[inline]
+    pub fn facing(&self, w: Vec3A) -> Vec2 {
+        let across = self.across(w);
+        self.pressed.map_or(across, |pressed| pressed.round(across)).normalize_or(Vec2::X)
+    }
+
+    /// The point of a ply's outline abreast of this one, by its direction from the ply's axis in the axes of [`Self::in_ply`], in the section's
+    /// frame.
+    #[inline]
+    pub fn outline(&self, shape: &YarnShape, ply: usize, direction: Vec2) -> Vec3A {
+        let off = shape.plies[ply].radius * direction;
+        self.axis_of(shape, ply) + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
+    }
+
     /// The short axis of the section there, as a unit vector of the unwound yarn; any where it is round.
     #[inline]
     pub fn short_axis_within(&self) -> Vec2 {

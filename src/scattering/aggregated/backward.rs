@@ -1,9 +1,13 @@
 //! Lobe B: light that was scattered more than once (docs/model.md, section 7).
 
-use std::{cell::OnceCell, f32::consts::FRAC_1_PI};
+use std::{
+    cell::OnceCell,
+    f32::consts::{FRAC_1_PI, PI},
+};
 
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3A};
+use wide::f32x8;
 
 use super::{
     super::{
@@ -20,6 +24,12 @@ use crate::{
     geometry::section::{Inside, PlyAhead},
     math::{Rgb, sampler::Stream},
 };
+
+/// Cosines and sines of angles from -90 to 90 degrees, in the middle of eight equal parts.
+const OUTLINE: [[f32; 8]; 2] = [
+    [0.195_090, 0.555_570, 0.831_470, 0.980_785, 0.980_785, 0.831_470, 0.555_570, 0.195_090],
+    [-0.980_785, -0.831_470, -0.555_570, -0.195_090, 0.195_090, 0.555_570, 0.831_470, 0.980_785],
+];
 
 /// Multiply scattered light of a vertex, made when first asked for: a path that goes on from the node may never do.
 #[derive(Clone, Debug)]
@@ -41,6 +51,8 @@ pub(super) struct Lobe {
     energy: Rgb,
     /// Chance that the node's drawn direction does not escape.
     pub(super) chance: f32,
+    /// Draws where on a ply's outline it leaves.
+    u_start: f32,
     /// In a yarn of several plies: light that leaves the ply and meets another one.
     again: Option<Again>,
 }
@@ -100,7 +112,8 @@ impl Lobe {
         let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
         let outwards = optics.leaving.draw(&place, stream);
         let axes = axes_across(&frame, axes);
-        let mut lobe = Self { frame, axes, outwards, energy, chance: 1.0 - node.drawn.escape, again: None };
+        let u_start = stream.next();
+        let mut lobe = Self { frame, axes, outwards, energy, chance: 1.0 - node.drawn.escape, u_start, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             lobe.again = lobe.again(view, node, stream);
         }
@@ -122,12 +135,38 @@ impl Lobe {
         (self.energy * latitude * around, latitude.mean() * around.mean())
     }
 
+    /// Where light that has wandered about in the ply of a place leaves it towards `w`, in the section's frame: on the part of its outline
+    /// that faces there, by e^(-k d) / (d^2 + l^2) of the distance d from the place. That is Poisson's kernel, by which light that spreads
+    /// from a point reaches a circle, with a mean way l and with what is lost on the way.
+    pub(super) fn start(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Vec3A {
+        let shape = view.yarn.occluder().shape();
+        let PlyOptics { mean_way, fading, .. } = view.yarn.plies[spot.ply];
+        let facing = spot.inside.facing(w);
+        let at = spot.inside.in_ply(shape, spot.ply);
+        let [ahead, beside] = [at.dot(facing), facing.perp_dot(at)].map(f32x8::splat);
+        let [cos, sin] = OUTLINE.map(f32x8::new);
+        let (x, y) = (cos - ahead, sin - beside);
+        let square = x * x + y * y;
+        let shares = cos * (square.sqrt() * f32x8::splat(-fading)).exp() / (square + f32x8::splat(mean_way * mean_way));
+        let mut left = self.u_start * shares.reduce_add();
+        let mut drawn = OUTLINE[0].len() as f32;
+        for (part, share) in shares.to_array().into_iter().enumerate() {
+            if left < share {
+                drawn = part as f32 + left / share;
+                break;
+            }
+            left -= share;
+        }
+        let angle = PI * (drawn / OUTLINE[0].len() as f32 - 0.5);
+        spot.inside.outline(shape, spot.ply, Vec2::from_angle(angle).rotate(facing))
+    }
+
     /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
     fn again(&self, view: &View<'_>, node: &Node, stream: &mut Stream) -> Option<Again> {
         let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
         let (value, pdf) = self.value(view, node.spot.ply, w);
         let (open, met) = node.others(view, w, stream);
-        let (way, rest) = Taken::new(node, (node.spot.middle(view), w, value, pdf), open)?;
+        let (way, rest) = Taken::new(node, (self.start(view, &node.spot, w), w, value, pdf), open)?;
         let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
         if rest.max_channel() <= 0.0 {
             return Some(again);
@@ -138,7 +177,7 @@ impl Lobe {
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
         let open = first.open(view, w, |way, fibers| among.offer(view, way, fibers, stream));
-        let (way, rest) = Taken::new(node, (first.spot.middle(view), w, value, pdf), open)?;
+        let (way, rest) = Taken::new(node, (self.start(view, &first.spot, w), w, value, pdf), open)?;
         again.ways.push(way);
         again.meetings.push(first);
         if rest.max_channel() > 0.0 {
@@ -198,7 +237,7 @@ impl Lobe {
             None => {
                 let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
                 let (value, pdf) = self.value(view, node.spot.ply, w);
-                (w, value, pdf, node.spot.middle(view))
+                (w, value, pdf, self.start(view, &node.spot, w))
             }
             Some(again) => {
                 let mut chance = 1.0;
@@ -214,9 +253,9 @@ impl Lobe {
                     Some(last) => {
                         let w = last.draw_by(view, &self.frame, u, stream);
                         let (value, pdf) = last.value(view, &self.frame, w);
-                        (w, value, pdf * chance, last.spot.middle(view))
+                        (w, value, pdf * chance, self.start(view, &last.spot, w))
                     }
-                    None => (Vec3A::Z, Rgb::ZERO, 0.0, node.spot.middle(view)),
+                    None => (Vec3A::Z, Rgb::ZERO, 0.0, node.spot.inside.point),
                 })
             }
         };

@@ -11,11 +11,11 @@ use super::{
         lobe::LobeFrame,
         medium::TtWidth,
     },
-    Spot, View, across,
+    Spot, Turned, View,
 };
 use crate::{
     geometry::{
-        density::ChordFibers,
+        density::{AfterTurn, ChordFibers},
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -50,7 +50,7 @@ pub(super) struct Forward {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ChainEnd {
     pub(super) spot: Spot,
-    /// Where the light came from, in the section.
+    /// Where the light came from, across the fibre.
     pub(super) back: Vec3A,
     /// The camera's ray in the ply, or in the first one if it does not meet this.
     pub(super) crossing: PlyCrossing,
@@ -72,7 +72,7 @@ pub(super) struct Fiber {
     ended: Rgb,
     /// The width of its TT.
     width: TtWidth,
-    /// Where the light came from, in the section.
+    /// Where the light came from, across the fibre.
     back: Vec3A,
 }
 
@@ -123,8 +123,8 @@ struct Stretch {
     own: bool,
     /// Distance in the section to the point nearest to the ply's axis.
     foot: f32,
-    /// Expected fibres: beyond the fibre's dead zone, if it is the own ply.
-    fibers: f32,
+    /// Expected fibres.
+    expected: f32,
     /// The share of light that meets none of them.
     through: f32,
     chord: ChordFibers,
@@ -132,14 +132,14 @@ struct Stretch {
 
 /// A straight way on from a fibre.
 #[derive(Clone, Copy, Debug)]
-struct Way {
+struct Way<'a> {
     w: Vec3A,
     /// From the fibre's place to where the way begins.
     shift: Vec3A,
     /// How many more fibres it meets than one across the yarn.
     tilt: f32,
-    /// How many expected fibres of the own ply it meets none within.
-    free: f32,
+    /// What it meets in the own ply.
+    after: AfterTurn<'a>,
 }
 
 impl Forward {
@@ -184,7 +184,7 @@ impl Forward {
             }
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
-            let way = fiber.way(view, fiber.direction(stream));
+            let way = fiber.way(view, fiber.direction(stream), !forward.fibers.is_empty());
             let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
             let through = if forward.fibers.len() == LAST {
                 1.0
@@ -235,7 +235,8 @@ impl Forward {
         for (index, fiber) in self.fibers.iter().enumerate() {
             let lobe = fiber.lobe(w);
             if lobe.0 >= FORWARD_TAIL && fiber.passed != Rgb::ZERO {
-                let through = if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w), |_| {}) };
+                let through =
+                    if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w, index > 0), |_| {}) };
                 visit(&fiber.spot, self.part(view, fiber, lobe, through));
             }
         }
@@ -276,7 +277,7 @@ impl Fiber {
             passed: passed * optics.chain,
             ended: passed * (Rgb::ONE - optics.chain),
             width: optics.tt,
-            back: across(from),
+            back: spot.across(from).normalize_or_zero(),
         }
     }
 
@@ -305,18 +306,17 @@ impl Fiber {
 
     /// The way in the direction `w`.
     #[inline]
-    fn way(&self, view: &View<'_>, w: Vec3A) -> Way {
-        let (turn, shift) = self.spot.turned(view, self.back, w);
+    fn way<'a>(&self, view: &View<'a>, w: Vec3A, later: bool) -> Way<'a> {
+        let Turned { cos: turn, shift, .. } = self.spot.turned(view, self.back, w);
         let tilt = self.spot.tilt(view.section, w);
-        let free = view.yarn.plies[self.spot.ply].free_after(turn, self.spot.inside.along_short_axis(w));
-        let free = tilt / view.section.squeeze() * free;
-        Way { w, shift, tilt, free }
+        let after = view.yarn.plies[self.spot.ply].after.turned(later, turn, self.spot.inside.along_short_axis(w));
+        Way { w, shift, tilt, after }
     }
 
     /// The share of light on a way that meets no other fibre; `visit` is told of the plies there, in no order. The fibre's own chord keeps
     /// others away.
     #[inline]
-    fn follow_way(&self, view: &View<'_>, way: &Way, mut visit: impl FnMut(Stretch)) -> f32 {
+    fn follow_way(&self, view: &View<'_>, way: &Way<'_>, mut visit: impl FnMut(Stretch)) -> f32 {
         let (yarn, spot, thin) = (view.yarn, &self.spot, view.section.thinness());
         let (shape, wide) = (yarn.occluder().shape(), spot.inside.wide(way.w));
         let mut all = 1.0;
@@ -324,17 +324,17 @@ impl Fiber {
             let gaps = &yarn.plies[ahead.ply].gaps;
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
-            let fibers = (way.tilt * chord.ahead(-ahead.foot) - if own { way.free } else { 0.0 }).max(0.0);
-            let through = if own { (-gaps.rate * fibers).exp() } else { gaps.unscattered(fibers) };
+            let expected = way.tilt * chord.ahead(-ahead.foot);
+            let through = if own { (-gaps.rate * way.after.met(expected)).exp() } else { gaps.unscattered(expected) };
             all *= through;
-            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, fibers, through, chord });
+            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, expected, through, chord });
         });
         all
     }
 
     /// The fibre that light meets next on a way, where so much of it is `left`.
     #[inline]
-    fn next(&self, view: &View<'_>, way: &Way, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
+    fn next(&self, view: &View<'_>, way: &Way<'_>, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
         stretches.sort_unstable_by(|a, b| a.foot.total_cmp(&b.foot));
         let stretch = stretches.iter().find(|stretch| {
             let ends = left >= stretch.through;
@@ -344,8 +344,12 @@ impl Fiber {
             ends
         })?;
         let gaps = &view.yarn.plies[stretch.ply].gaps;
-        let passed = if stretch.own { -left.ln() / gaps.rate } else { gaps.fibers_passed(left) };
-        let behind = (stretch.fibers - passed).max(0.0) / way.tilt;
+        let passed = if stretch.own {
+            gaps.fibers_to_next(stretch.expected, (1.0 - left) / (1.0 - stretch.through))
+        } else {
+            gaps.fibers_passed(left)
+        };
+        let behind = (stretch.expected - passed).max(0.0) / way.tilt;
         let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
         let distance = (stretch.foot + at).max(0.0);
         let shape = view.yarn.occluder().shape();

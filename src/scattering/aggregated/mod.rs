@@ -152,20 +152,25 @@ impl Spot {
         (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 
-    /// How light that came from `back`, in the section, goes on from here towards `w`: the cosine of its turn in the section, and the way from
-    /// this place to where it starts. Light starts where it met the fibre, on the side where it came from, and is inside of it first if it
-    /// goes on forward.
+    /// How light that came from `back` goes on from here towards `w`. It starts where it met the fibre, on the side where it came from, and is
+    /// inside of it first if it goes on forward.
     #[inline]
-    fn turned(&self, view: &View<'_>, back: Vec3A, w: Vec3A) -> (f32, Vec3A) {
-        let out = across(w);
-        let turn = -back.dot(out);
-        (turn, view.section.thinness() * view.yarn.plies[self.ply].lead * (back + turn.max(0.0) * out))
+    fn turned(&self, view: &View<'_>, back: Vec3A, w: Vec3A) -> Turned {
+        let out = self.across(w);
+        let length = out.length().max(1e-6);
+        let out = out / length;
+        let cos = -back.dot(out);
+        Turned {
+            cos,
+            shift: view.section.thinness() * view.yarn.plies[self.ply].lead * (back + cos.max(0.0) * out),
+            beside: (1.0 - w.z * w.z).max(0.0).sqrt() / length,
+        }
     }
 
-    /// About where light that is scattered often leaves its ply, which may be anywhere on it: from the middle, in the section's frame.
+    /// The part of a vector across the fibre.
     #[inline]
-    fn middle(&self, view: &View<'_>) -> Vec3A {
-        self.inside.axis_of(view.yarn.occluder().shape(), self.ply)
+    fn across(&self, v: Vec3A) -> Vec3A {
+        v - v.dot(self.tangent) * self.tangent
     }
 
     /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
@@ -196,10 +201,15 @@ impl Spot {
     }
 }
 
-/// The part of a direction in the section, of unit length; zero along the yarn.
-#[inline]
-fn across(v: Vec3A) -> Vec3A {
-    Vec3A::new(v.x, v.y, 0.0).normalize_or_zero()
+/// How light goes on from a fibre, as seen along it: there others that run along it are circles.
+#[derive(Clone, Copy, Debug)]
+struct Turned {
+    /// The cosine of its turn.
+    cos: f32,
+    /// From the fibre's place to where the way on begins.
+    shift: Vec3A,
+    /// How much of the section it passes for each unit across the fibre.
+    beside: f32,
 }
 
 /// One place of scattering, for one camera direction: see the module's notes.
@@ -252,7 +262,7 @@ impl<'a> Vertex<'a> {
         if let Some(forward) = &self.forward {
             forward.toward(&self.view, w, |spot, part| {
                 let value = part.value * mis_weight(light_pdf, part.density());
-                start.offer(value.mean(), spot.inside.point);
+                start.offer(value.mean(), (*spot, false));
                 lobes.f += value;
             });
         }
@@ -263,20 +273,19 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            start.offer((lobes.r + lobes.tt + lobes.d).mean(), node.spot.inside.point);
-            self.backward.of(&self.view, node).evaluate(
-                &self.view,
-                node,
-                (w, light_pdf),
-                value.open,
-                at_node,
-                |spot, value| {
-                    start.offer(value.mean(), spot.middle(&self.view));
-                    lobes.b += value;
-                },
-            );
+            start.offer((lobes.r + lobes.tt + lobes.d).mean(), (node.spot, false));
+            let lobe = self.backward.of(&self.view, node);
+            lobe.evaluate(&self.view, node, (w, light_pdf), value.open, at_node, |spot, value| {
+                start.offer(value.mean(), (*spot, true));
+                lobes.b += value;
+            });
         }
-        Direct { lobes, start: start.drawn }
+        // B leaves from elsewhere than its place.
+        let start = start.drawn.map(|(spot, wandered)| match self.node.get(&self.view) {
+            Some(node) if wandered => self.backward.of(&self.view, node).start(&self.view, &spot, w),
+            _ => spot.inside.point,
+        });
+        Direct { lobes, start }
     }
 
     /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of

@@ -13,7 +13,7 @@ use super::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
     },
-    Spot, View,
+    Spot, Turned, View,
     forward::ChainEnd,
 };
 use crate::{
@@ -37,7 +37,7 @@ pub(super) struct Node {
     /// Sine and cosine of the camera's latitude against the fibre.
     sin: f32,
     cos: f32,
-    /// Where the light came from, in the section.
+    /// Where the light came from, across the fibre.
     back: Vec3A,
     /// Fibres that have passed it on before the node.
     before: f32,
@@ -247,7 +247,7 @@ impl Node {
     /// plies, and of all but the node's own.
     ///
     /// The way begins as that of F does, and no other fibre is met at once
-    /// ([`free_after`](crate::scattering::medium::PlyOptics::free_after)). Where it goes back the way that the light
+    /// ([`AfterFiber`](crate::geometry::density::AfterFiber)). Where it goes back the way that the light
     /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot".
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
@@ -261,20 +261,18 @@ impl Node {
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
         let thin = view.section.thinness();
-        let (turn, shift) = spot.turned(view, self.back, w);
-        let strip = ClearedStrip::new(2.0 * thin * shape.plies[spot.ply].fiber_radius, turn);
+        let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
+        let strip = ClearedStrip::new(2.0 * thin * beside * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
         let tilt = spot.tilt(view.section, w);
-        let short = spot.inside.along_short_axis(w);
-        let free = if turn < 0.0 { optics.free_back(turn, short) } else { optics.free_after(turn, short) };
-        let free = tilt / view.section.squeeze() * free;
+        let after = optics.after.turned(self.before > 0.0, turn, spot.inside.along_short_axis(w));
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             if way.ply == spot.ply {
-                let fibers = if turn < 0.0 { strip.fibers(&chord, way.foot) } else { chord.ahead(-way.foot) };
-                own += optics.rho * (tilt * fibers - free).max(0.0);
+                let expected = tilt * if turn < 0.0 { strip.fibers(&chord, way.foot) } else { chord.ahead(-way.foot) };
+                own += optics.rho * after.met(expected);
             } else {
                 let fibers = chord.ahead(-way.foot);
                 others += yarn.plies[way.ply].rho * fibers;
