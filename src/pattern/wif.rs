@@ -132,9 +132,15 @@ impl Sections {
         self.entry(section, key).map(|entry| number(entry, section)).transpose()
     }
 
-    /// The numbered lines of a section: number, line, value.
-    fn numbered(&self, name: &str) -> impl Iterator<Item = (u64, &Entry)> {
-        self.section(name).into_iter().flatten().filter_map(|(key, entry)| Some((key.parse().ok()?, entry)))
+    /// The lines of a section whose keys are numbers, those of threads, treadles or colours.
+    fn numbered(&self, name: &str) -> Result<Vec<(u64, &Entry)>, WifError> {
+        let lines = self.section(name).into_iter().flatten();
+        lines
+            .map(|(key, entry)| match key.parse() {
+                Ok(number) => Ok((number, entry)),
+                Err(_) => Err(wrong(entry.line, format!("[{name}] has a line for each number, found \"{key}\""))),
+            })
+            .collect()
     }
 }
 
@@ -142,6 +148,13 @@ fn number(entry: &Entry, section: &str) -> Result<f64, WifError> {
     // Decimal commas occur.
     let value = entry.value.replace(',', ".").parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
     value.ok_or_else(|| wrong(entry.line, format!("a number in [{section}] is expected, found \"{}\"", entry.value)))
+}
+
+/// Exactly `N` numbers between commas.
+fn numbers<const N: usize>(entry: &Entry, what: &str) -> Result<[f64; N], WifError> {
+    let parts: Result<Vec<f64>, _> = entry.value.split(',').map(|part| part.trim().parse()).collect();
+    let numbers = parts.ok().and_then(|parts| parts.try_into().ok());
+    numbers.ok_or_else(|| wrong(entry.line, format!("{what} is {N} numbers, found \"{}\"", entry.value)))
 }
 
 /// Numbers between commas, each once and in order; 0 stands for none.
@@ -202,7 +215,7 @@ pub fn parse(bytes: &[u8]) -> Result<Wif, WifError> {
 
 /// The number of threads: what the file says, or as many as its lists have.
 fn threads(file: &Sections, system: &str, list: &str) -> Result<u64, WifError> {
-    let listed = file.numbered(list).map(|(n, _)| n).max();
+    let listed = file.numbered(list)?.iter().map(|&(n, _)| n).max();
     let said = file.count(system, "THREADS")?;
     let count = said.or(listed).unwrap_or(0);
     if count == 0 {
@@ -226,7 +239,7 @@ fn crossings(
         return Err(wrong(0, "there is no section [THREADING]"));
     }
     let mut shafts_of_end: Vec<Vec<u64>> = vec![Vec::new(); ends];
-    for (end, entry) in file.numbered("THREADING") {
+    for (end, entry) in file.numbered("THREADING")? {
         if (1..=ends as u64).contains(&end) {
             shafts_of_end[end as usize - 1] = list(entry, "THREADING", shafts, "shaft")?;
         }
@@ -240,7 +253,7 @@ fn crossings(
     let mut moved_at_pick: Vec<Vec<u64>> = vec![Vec::new(); picks];
     let within = |pick: u64| (1..=picks as u64).contains(&pick).then(|| pick as usize - 1);
     if file.section("LIFTPLAN").is_some() {
-        for (pick, entry) in file.numbered("LIFTPLAN") {
+        for (pick, entry) in file.numbered("LIFTPLAN")? {
             if let Some(pick) = within(pick) {
                 moved_at_pick[pick] = list(entry, "LIFTPLAN", shafts, "shaft")?;
             }
@@ -260,12 +273,12 @@ fn crossings(
             return Err(missing("TIEUP", "a treadling, but"));
         }
         let mut shafts_of_treadle: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
-        for (treadle, entry) in file.numbered("TIEUP") {
+        for (treadle, entry) in file.numbered("TIEUP")? {
             let mut tied = list(entry, "TIEUP", shafts, "shaft")?;
             tied.retain(|shaft| threaded.contains(shaft));
             shafts_of_treadle.insert(treadle, tied);
         }
-        for (pick, entry) in file.numbered("TREADLING") {
+        for (pick, entry) in file.numbered("TREADLING")? {
             let Some(pick) = within(pick) else { continue };
             let pressed = list(entry, "TREADLING", treadles, "treadle")?;
             let moved = pressed.iter().filter_map(|treadle| shafts_of_treadle.get(treadle)).flatten();
@@ -296,21 +309,14 @@ fn palette(file: &Sections) -> Result<Option<BTreeMap<u64, [f64; 3]>>, WifError>
     }
     let (low, high) = match file.entry("COLOR PALETTE", "RANGE") {
         None => (0.0, 255.0),
-        Some(entry) => {
-            let parts: Vec<f64> = entry.value.split(',').filter_map(|p| p.trim().parse().ok()).collect();
-            match parts[..] {
-                [low, high] if high > low => (low, high),
-                _ => return Err(wrong(entry.line, format!("`Range` is two numbers, found \"{}\"", entry.value))),
-            }
-        }
+        Some(entry) => match numbers(entry, "`Range`")? {
+            [low, high] if high > low => (low, high),
+            _ => return Err(wrong(entry.line, format!("`Range` rises, found \"{}\"", entry.value))),
+        },
     };
     let mut palette = BTreeMap::new();
-    for (index, entry) in file.numbered("COLOR TABLE") {
-        let parts: Vec<f64> = entry.value.split(',').filter_map(|p| p.trim().parse().ok()).collect();
-        let &[r, g, b] = &parts[..] else {
-            return Err(wrong(entry.line, format!("a colour is three numbers, found \"{}\"", entry.value)));
-        };
-        palette.insert(index, [r, g, b].map(|c| ((c - low) / (high - low)).clamp(0.0, 1.0)));
+    for (index, entry) in file.numbered("COLOR TABLE")? {
+        palette.insert(index, numbers(entry, "a colour")?.map(|c| ((c - low) / (high - low)).clamp(0.0, 1.0)));
     }
     Ok(Some(palette))
 }
@@ -344,7 +350,7 @@ fn colors(
     };
     let default = default.map(|entry| color(entry, system)).transpose()?;
     let mut out: Vec<Option<[f64; 3]>> = vec![default; count];
-    for (thread, entry) in file.numbered(&section) {
+    for (thread, entry) in file.numbered(&section)? {
         if (1..=count as u64).contains(&thread) && !entry.value.is_empty() {
             out[thread as usize - 1] = Some(color(entry, &section)?);
         }
@@ -386,7 +392,7 @@ fn measures(
     let section = format!("{system} {what}");
     let default = file.number(system, what)?.filter(|v| *v > 0.0);
     let mut out: Vec<Option<f64>> = vec![default; count];
-    for (thread, entry) in file.numbered(&section) {
+    for (thread, entry) in file.numbered(&section)? {
         if (1..=count as u64).contains(&thread) && !entry.value.is_empty() {
             out[thread as usize - 1] = Some(number(entry, &section)?).filter(|v| *v > 0.0).or(default);
         }
@@ -465,6 +471,16 @@ mod tests {
         assert!(color.problem.contains("colour 3") && color.problem.contains("1 to 2"), "{color}");
         let color = parse(TWILL.replace("Color=1", "Color=0").as_bytes()).unwrap_err();
         assert!(color.problem.contains("colour 0"), "{color}");
+        // So is what is no number, with its line.
+        for (good, bad, problem) in [
+            ("2=2,3\n", "2=2,x,3\n", "line 24: [TIEUP] lists numbers of shaft, found \"x\""),
+            ("\n4=4\n[TIEUP]", "\nfour=4\n[TIEUP]", "line 21: [THREADING] has a line for each number, found \"FOUR\""),
+            ("255,0,51", "255,x,0,51", "line 37: a colour is 3 numbers, found \"255,x,0,51\""),
+            ("0,255\n", "0,x,255\n", "line 33: `Range` is 2 numbers, found \"0,x,255\""),
+        ] {
+            let error = parse(TWILL.replacen(good, bad, 1).as_bytes()).unwrap_err();
+            assert_eq!(error.without_hint(), problem);
+        }
         assert!(parse(b"hello").unwrap_err().to_string().contains("WIF"));
         assert!(parse(TWILL.replace("Threads=4", "Threads=99999999999").as_bytes()).is_err());
     }

@@ -36,7 +36,7 @@ pub struct WovenWif {
     pub draft: Draft,
     /// How the threads of the repeat differ.
     pub threads: [Threads; 2],
-    /// Mean distance of threads, millimetres.
+    /// Mean distance of threads, millimetres; `None` also where it says nothing of the cloth.
     pub spacing: [Option<f64>; 2],
     /// Mean radius of threads, millimetres.
     pub radius: [Option<f64>; 2],
@@ -80,14 +80,18 @@ impl Wif {
         let spacing = [0, 1].map(|side| mean(&threads[side].spacing));
         let thickness = [0, 1].map(|side| mean(&threads[side].thickness));
         let drawn = (0..2).any(|s| thickness[s].zip(spacing[s]).is_some_and(|(t, s)| t > DRAWN * s));
-        if drawn {
-            notes.push("threads are as thick as they are apart, which is how they are drawn: the yarn's own thickness is woven".into());
-        }
         let radius = thickness.map(|t| t.filter(|_| !drawn).map(|t| 0.5 * t));
+        // How far apart threads are says how open the cloth is only beside how thick they are.
+        let measured = |side: usize| radius[side].is_some() || !take.thickness;
+        let setting = [0, 1].map(|side| spacing[side].filter(|_| measured(side)));
+        if drawn || setting != spacing {
+            let why = if drawn { "as thick as they are apart, which is how they are drawn" } else { "of no thickness" };
+            notes.push(format!("threads are {why}: the yarn is woven as close as it goes"));
+        }
         let draft = Draft::repeat_of(&self.warp_over, &mut threads)?;
         let colors = sides.map(|side| if take.colors { side.colors.clone() } else { Vec::new() });
         let count = sides.map(|side| side.count as u32);
-        Ok(WovenWif { draft, threads, spacing, radius, colors, count, notes })
+        Ok(WovenWif { draft, threads, spacing: setting, radius, colors, count, notes })
     }
 }
 
@@ -95,7 +99,7 @@ impl Wif {
 mod tests {
     use super::*;
 
-    const HEAD: &str = "[WIF]\nVersion=1.1\n[WEAVING]\nShafts=2\n[WARP]\nThreads=4\nSpacing=1\nUnits=mm\n\
+    const HEAD: &str = "[WIF]\nVersion=1.1\n[WEAVING]\nShafts=2\n[WARP]\nThreads=4\nSpacing=1\nThickness=0.6\nUnits=mm\n\
         [WEFT]\nThreads=2\nSpacing=2\nThickness=0.5\nUnits=mm\n[THREADING]\n1=1\n2=2\n3=1\n4=2\n[LIFTPLAN]\n1=1\n2=2\n";
 
     fn woven(text: &str) -> WovenWif {
@@ -106,7 +110,7 @@ mod tests {
     fn measures_become_means_and_ratios() {
         let cloth = woven(HEAD);
         assert_eq!((cloth.draft.warps(), cloth.draft.wefts(), cloth.count), (2, 2, [4, 2]));
-        assert_eq!((cloth.spacing, cloth.radius), ([Some(1.0), Some(2.0)], [None, Some(0.25)]));
+        assert_eq!((cloth.spacing, cloth.radius), ([Some(1.0), Some(2.0)], [Some(0.3), Some(0.25)]));
         assert_eq!(cloth.threads, <[Threads; 2]>::default());
         let cloth = woven(&format!("{HEAD}[WARP SPACING]\n1=3\n[WARP THICKNESS]\n1=0.9\n2=0.1\n3=0.5\n4=0.5\n"));
         assert_eq!(cloth.spacing[0], Some(1.5));
@@ -115,11 +119,20 @@ mod tests {
         assert_eq!(cloth.draft.warps(), 4);
     }
 
+    /// Cloth of them is closed: neither their spacing nor their thickness is measured.
     #[test]
-    fn threads_as_thick_as_their_spacing_are_the_yarn_s_own() {
+    fn threads_that_are_only_drawn_are_woven_as_close_as_they_go() {
         let cloth = woven(&HEAD.replace("Thickness=0.5", "Thickness=2"));
-        assert_eq!(cloth.radius, [None; 2]);
-        assert!(cloth.notes[0].contains("as thick as they are apart"));
+        assert_eq!((cloth.radius, cloth.spacing), ([None; 2], [None; 2]));
+        assert!(cloth.notes[0].contains("as thick as they are apart"), "{:?}", cloth.notes);
+        let half = HEAD.replace("Thickness=0.6\n", "");
+        let cloth = woven(&half);
+        assert_eq!((cloth.radius, cloth.spacing), ([None, Some(0.25)], [None, Some(2.0)]));
+        assert!(cloth.notes[0].contains("of no thickness"), "{:?}", cloth.notes);
+        // Who leaves the thickness aside takes the spacing for the yarn's own.
+        let file = super::super::parse(half.as_bytes()).unwrap();
+        let cloth = file.woven(WifUse { thickness: false, ..WifUse::default() }).unwrap();
+        assert_eq!((cloth.spacing, cloth.notes.len()), ([Some(1.0), Some(2.0)], 0));
     }
 
     /// Files of another project, good and bad.
