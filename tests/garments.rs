@@ -233,3 +233,27 @@ fn cloth_that_has_no_room_is_an_error() {
     assert!(run.stderr.contains("no panel has room for a stitch of 4.000 x 3.000 mm"), "{}", run.stderr);
     assert!(!d.join("y.txt").exists());
 }
+
+/// `info` lays nothing, but reads the body: one that is not there is an error, one with a rim a warning, in words of its own.
+#[test]
+fn a_body_is_looked_at_before_yarns_are_laid() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "m.obj", mesh(&flat));
+    write(d, "s.toml", scene("path = \"m.obj\", body = \"body.obj\"", "", STILL));
+    let missing = yarnray(d, &["info", "s.toml"]);
+    assert!(missing.status == Some(2) && missing.stderr.contains("body.obj: no such file"), "{}", missing.stderr);
+    let corners = "v 0 0 -9\nv 9 0 -9\nv 0 9 -9\nv 0 0 -18\n";
+    let open = "f 1 2 3\nf 1 3 4\nf 1 4 2\n";
+    write(d, "body.obj", format!("o stand\n{corners}{open}"));
+    let said = yarnray(d, &["info", "s.toml"]).good().stdout;
+    assert_eq!(said.matches("the body is open: 3 edges").count(), 1, "{said}");
+    let said = yarnray(d, &["info", "body.obj"]).good().stdout;
+    assert!(said.contains("4 vertices, 3 triangles, open at 3 edges\n  groups    `stand`\n"), "{said}");
+    write(d, "body.obj", format!("o stand\n{corners}{open}f 2 4 3\n"));
+    let said = yarnray(d, &["info", "s.toml"]).good().stdout;
+    assert!(!said.contains("the body is open"), "{said}");
+    let info: serde_json::Value =
+        serde_json::from_str(&yarnray(d, &["info", "body.obj", "--json"]).good().stdout).unwrap();
+    assert_eq!((&info["vertices"], &info["open_edges"], &info["uv_bounds"]), (&4.into(), &0.into(), &().into()));
+}

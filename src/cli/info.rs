@@ -9,12 +9,18 @@ use serde_json::{Value, json};
 use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, positive, terminal::print};
 use crate::{
     cloth::{self, Estimate},
-    files::curve_file::{self, ReadOptions},
+    files::{
+        curve_file::{self, ReadOptions},
+        has_extension,
+        mesh_file::MeshFacts,
+        stage,
+    },
     geometry::{
         curve::{Basis, Curve, CurveSet},
         overlap::{Overlap, TOLERATED, overlap, overlap_of_plied},
         proposal::{self, Proposal},
     },
+    input::diagnostic::listed,
     plan::{Feature, Memory, Plan},
     render::film_file,
     scene::{CurveKind, Fabric, GarmentFacts, Scene},
@@ -23,13 +29,14 @@ use crate::{
 const EXAMPLES: &str = "Examples:
   yarnray info scenes/swatch.toml          counts, bounds, memory, what is used and what is left out
   yarnray info glove.bcc --radius 0.08      what a curve file holds, and how far its yarns overlap
+  yarnray info mannequin.obj               a mesh: whether it is closed, its groups, whether it has texture coordinates
   yarnray info part1.film                  how far a checkpoint or part of a render is, and of what
   yarnray info scenes/swatch.toml --json   the same for programs";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct InfoArgs {
-    /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .yarns, .smobj, .txt, .curves, .usd, .usda, .usdc, .usdz, .abc) or a film (a checkpoint, a part of a render).
+    /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .yarns, .smobj, .txt, .curves, .usd, .usda, .usdc, .usdz, .abc), a mesh (.obj or a stage) or a film (a checkpoint, a part of a render).
     file: PathBuf,
     /// Radius of the yarns of a curve file that has none, in its unit: tells how far they overlap.
     #[arg(long, value_name = "R", value_parser = positive)]
@@ -42,22 +49,60 @@ pub(super) struct InfoArgs {
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let is_scene = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let is_scene = has_extension(&args.file, "toml");
     let (report, text) = if film_file::is_film(&args.file) {
         film_report(&args.file)?
     } else if is_scene {
         let scene = args.options.load_or_survey(&args.file, true)?;
         scene_report(&scene)
     } else {
-        let set =
-            curve_file::read(&args.file, &ReadOptions::default()).map_err(|e| Failure::Input(format!("error: {e}")))?;
-        curves_report(&args.file, &set, args.radius)
+        file_report(&args.file, args.radius)?
     };
     if args.json {
         print(&(serde_json::to_string_pretty(&report).expect("numbers and text become JSON") + "\n"))
     } else {
         print(&text)
     }
+}
+
+/// What a file of curves holds, or of faces alone.
+fn file_report(path: &Path, radius: Option<f64>) -> Result<(Value, String), Failure> {
+    let read = curve_file::read(path, &ReadOptions::default());
+    let has_curves = read.as_ref().is_ok_and(|set| !set.curves.is_empty());
+    let may_be_mesh = stage::is_stage(path) || has_extension(path, "obj");
+    if !has_curves
+        && may_be_mesh
+        && let Ok(Some(facts)) = MeshFacts::read(path)
+    {
+        return Ok(mesh_report(path, &facts));
+    }
+    let set = read.map_err(|e| Failure::Input(format!("error: {e}")))?;
+    Ok(curves_report(path, &set, radius))
+}
+
+fn mesh_report(path: &Path, facts: &MeshFacts) -> (Value, String) {
+    let &MeshFacts { vertices, triangles, open_edges, bounds: (low, high), uvs, unit_mm, .. } = facts;
+    let report = json!({
+        "file": path.display().to_string(), "vertices": vertices, "triangles": triangles, "open_edges": open_edges,
+        "groups": facts.groups, "bounds": [list(low), list(high)],
+        "uv_bounds": uvs.map(|(low, high)| [low.to_array(), high.to_array()]), "unit_mm": unit_mm,
+    });
+    let closed = match open_edges {
+        0 => "closed".to_owned(),
+        open => format!("open at {open} edges"),
+    };
+    let uvs = uvs.map_or("none: a garment needs them".to_owned(), |(low, high)| format!("{low:.4} to {high:.4}"));
+    let text = format!(
+        "{}\n  mesh      {vertices} vertices, {triangles} triangles, {closed}\n  groups    {}\n  bounds    {low:.4} to {high:.4}\n  uvs       {uvs}\n  unit      {}\n",
+        path.display(),
+        listed(facts.groups.iter().map(|name| format!("`{name}`")), "and"),
+        unit_in_words(unit_mm),
+    );
+    (report, text)
+}
+
+fn unit_in_words(unit_mm: Option<f64>) -> String {
+    unit_mm.map_or("not stated".to_owned(), |unit| format!("{unit} mm"))
 }
 
 /// What a checkpoint or part of a render holds.
@@ -167,7 +212,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
         path.display(),
         set.curves.len(),
         if radii { "in the file" } else { "none: the scene's yarn gives them" },
-        set.unit_mm.map_or("not stated".to_owned(), |u| format!("{u} mm")),
+        unit_in_words(set.unit_mm),
     );
     if colored > 0 {
         let how = "`colors = true` in a scene's source dyes the yarns";

@@ -69,6 +69,11 @@ impl<R: BufRead> BufRead for Counting<'_, R> {
 /// # Errors
 /// What is wrong with the file, and in which line.
 pub(crate) fn read(path: &Path) -> Result<Mesh, MeshError> {
+    read_grouped(path).map(|(mesh, _)| mesh)
+}
+
+/// As [`read`], with the names of groups and objects that have faces.
+pub(crate) fn read_grouped(path: &Path) -> Result<(Mesh, Vec<String>), MeshError> {
     let fail = |line: usize, reason: String| MeshError { path: path.into(), line, reason };
     let file = File::open(path).map_err(|e| fail(0, in_words(&e)))?;
     let meta = file.metadata().map_err(|e| fail(0, in_words(&e)))?;
@@ -81,7 +86,7 @@ pub(crate) fn read(path: &Path) -> Result<Mesh, MeshError> {
     parse(BufReader::new(file)).map_err(|(line, reason)| fail(line, reason))
 }
 
-fn parse(reader: impl BufRead) -> Result<Mesh, (usize, String)> {
+fn parse(reader: impl BufRead) -> Result<(Mesh, Vec<String>), (usize, String)> {
     let lines = Cell::new(0);
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     let mut reader = Counting { inner: reader, lines: &lines };
@@ -95,7 +100,8 @@ fn parse(reader: impl BufRead) -> Result<Mesh, (usize, String)> {
             | LoadError::FaceColorOutOfBounds => (0, format!("{error}: a face names what the file does not have")),
             _ => (lines.get(), format!("{error}; is this an OBJ file?")),
         })?;
-    let meshes: Vec<tobj::Mesh> = models.into_iter().map(|m| m.mesh).filter(|m| !m.indices.is_empty()).collect();
+    let with_faces = models.into_iter().filter(|m| !m.mesh.indices.is_empty());
+    let (names, meshes): (Vec<String>, Vec<tobj::Mesh>) = with_faces.map(|m| (m.name, m.mesh)).unzip();
     if meshes.is_empty() {
         return Err((0, "there are no faces in it".to_owned()));
     }
@@ -123,7 +129,7 @@ fn parse(reader: impl BufRead) -> Result<Mesh, (usize, String)> {
     if mesh.uvs.iter().any(|uv| !uv.is_finite()) {
         return Err((0, "a texture coordinate is not finite".to_owned()));
     }
-    Ok(mesh)
+    Ok((mesh, names))
 }
 
 #[cfg(test)]
@@ -131,7 +137,7 @@ mod tests {
     use super::*;
 
     fn parsed(text: &str) -> Result<Mesh, (usize, String)> {
-        parse(text.as_bytes())
+        parse(text.as_bytes()).map(|(mesh, _)| mesh)
     }
 
     #[test]

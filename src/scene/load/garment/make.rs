@@ -19,6 +19,7 @@ use super::{
     GarmentPlan, Pattern, Rule,
 };
 use crate::{
+    files::mesh_file,
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
     geometry::{curve::Curve, mesh::Mesh},
 };
@@ -94,6 +95,7 @@ impl GarmentPlan {
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
         check_moves(&kept[1..shown], &kept[shown..], self.span, detail, context)?;
         if detail.survey {
+            self.bodies(&kept, unit, false, detail, (context, warnings))?;
             facts.repairs.clone_from(&notes);
             return Some((self.not_laid(&garment, &sizes, shown), facts));
         }
@@ -105,7 +107,7 @@ impl GarmentPlan {
         if with_rest {
             meshes.push(rest.clone());
         }
-        let bodies = self.bodies(&kept, unit, with_rest, detail, context)?;
+        let bodies = self.bodies(&kept, unit, with_rest, detail, (context, warnings))?;
         let all: Vec<&GarmentMesh> = meshes.iter().collect();
         let body: Vec<&Mesh> = bodies.iter().collect();
         let mut laid = match garment.lay(rest, &all, &body, &stranded, &mut notes) {
@@ -333,14 +335,14 @@ impl GarmentPlan {
         out
     }
 
-    /// The body in each pose that is kept.
+    /// The body in each pose that is kept; one that is open is told.
     fn bodies(
         &self,
         kept: &[usize],
         unit: f64,
         with_rest: bool,
         detail: &Detail,
-        context: &Context<'_>,
+        (context, warnings): (&Context<'_>, &mut Vec<String>),
     ) -> Option<Vec<Mesh>> {
         let Some((path, span)) = &self.body else { return Some(Vec::new()) };
         let own = Frames::find(path, detail);
@@ -367,6 +369,13 @@ impl GarmentPlan {
             }
             mesh
         };
+        let (_, open) = mesh_file::border(&read[&own.rest]);
+        if open > 0 {
+            let path = own.rest.path.display();
+            warnings.push(format!(
+                "{path}: the body is open: {open} edges have a face on one side only, where yarns may get into it"
+            ));
+        }
         let last = own.poses.len() - 1;
         let mut out: Vec<Mesh> = kept.iter().map(|&i| posed(&own.poses[i.min(last)])).collect();
         if with_rest {
