@@ -14,7 +14,7 @@ const ROOMS: [(&str, &[&str]); 20] = [
     ("image", &["ffi", "math"]),
     ("input", &[]),
     ("geometry", &["math"]),
-    ("pattern", &["geometry", "math"]),
+    ("pattern", &["geometry", "input", "math"]),
     ("files", &["geometry", "math", "pattern"]),
     ("garment", &["files", "geometry", "math", "pattern"]),
     ("trace", &["ffi", "geometry"]),

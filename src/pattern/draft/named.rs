@@ -1,6 +1,7 @@
 //! Weaves with a name.
 
 use super::{Draft, DraftError, LARGEST, Pile};
+use crate::input::diagnostic::nearest;
 
 /// How each weave with a name is written.
 pub const NAMES: &[&str] = &[
@@ -199,7 +200,14 @@ impl Draft {
         let unknown = || {
             let shown: String = text.chars().take(30).collect();
             let problem = format!("unknown weave \"{}\"", shown.escape_debug());
-            wrong(problem, format!("weaves are {}", NAMES.join(", ")))
+            // Numbers are the user's own.
+            let word = |name: &str| name.trim_end_matches(|c: char| !c.is_alphabetic()).to_lowercase();
+            let known: Vec<String> = NAMES.iter().map(|name| word(name)).collect();
+            let hint = match nearest(&word(text), known.iter().map(String::as_str)) {
+                Some(name) if name != word(text) => format!("did you mean \"{name}\"?"),
+                _ => format!("weaves are {}", NAMES.join(", ")),
+            };
+            wrong(problem, hint)
         };
         let words = Words::read(text).ok_or_else(unknown)?;
         let groups: Vec<&[usize]> = words.groups.iter().map(Vec::as_slice).collect();
@@ -342,7 +350,9 @@ mod tests {
             assert!(Draft::named(text).is_err(), "{text}");
         }
         let told = |text: &str| Draft::named(text).unwrap_err().to_string();
-        assert!(told("plane").starts_with("unknown weave \"plane\"; weaves are plain, basket 2, "));
+        assert_eq!(told("plane"), "unknown weave \"plane\"; did you mean \"plain\"?");
+        assert_eq!(told("twil 3/1"), "unknown weave \"twil 3/1\"; did you mean \"twill\"?");
+        assert!(told("jersey").starts_with("unknown weave \"jersey\"; weaves are plain, basket 2, "));
         assert_eq!(told("satin 6"), "there is no satin of 6 shafts; a satin has 5 shafts or more, but not 6");
         assert_eq!(told("sateen 8/2"), "there is no sateen of 8 shafts and step 2; steps of 8 shafts are 3, 5");
         assert_eq!(told("twill 2/2 step 4"), "a twill of 4 wefts has no step of 4; steps are 1 to 3");
