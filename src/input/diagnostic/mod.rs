@@ -143,12 +143,14 @@ pub(crate) struct Diagnostic {
     pub span: Option<Span>,
     /// What to do about it, shown beside the caret.
     pub hint: Option<String>,
+    /// A key that its table does not know, and the table: where else it is known is found out when all tables are read.
+    pub misplaced: Option<(String, String)>,
 }
 
 impl Diagnostic {
     /// An error without a place or a hint.
     pub(crate) fn error(message: impl Into<String>) -> Diagnostic {
-        Diagnostic { severity: Severity::Error, message: message.into(), span: None, hint: None }
+        Diagnostic { severity: Severity::Error, message: message.into(), span: None, hint: None, misplaced: None }
     }
 
     /// A warning without a place or a hint.
@@ -171,6 +173,8 @@ impl Diagnostic {
 #[derive(Default)]
 pub(crate) struct Diagnostics {
     list: RefCell<Vec<Diagnostic>>,
+    /// Names of tables with the keys that they know.
+    tables: RefCell<Vec<(String, Vec<String>)>>,
 }
 
 impl Diagnostics {
@@ -182,6 +186,23 @@ impl Diagnostics {
     /// Adds one.
     pub(crate) fn push(&self, diagnostic: Diagnostic) {
         self.list.borrow_mut().push(diagnostic);
+    }
+
+    /// Remembers which keys a table knows.
+    pub(crate) fn add_table(&self, name: &str, keys: Vec<String>) {
+        self.tables.borrow_mut().push((name.to_owned(), keys));
+    }
+
+    /// The other tables that know a key, if they are few.
+    fn homes(&self, key: &str, own: &str) -> Option<String> {
+        const MOST: usize = 3;
+        let tables = self.tables.borrow();
+        let know = tables.iter().filter(|(name, keys)| name != own && keys.iter().any(|known| known == key));
+        let mut names: Vec<&str> = know.map(|(name, _)| name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let names = names.into_iter().map(|name| if name.is_empty() { "the scene itself" } else { name }.to_owned());
+        (1..=MOST).contains(&names.len()).then(|| listed(names, "and"))
     }
 
     /// Whether there is nothing to tell.
@@ -209,6 +230,13 @@ impl Diagnostics {
             (place.is_none(), place)
         });
         list.dedup();
+        for diagnostic in &mut list {
+            if let Some((key, table)) = &diagnostic.misplaced
+                && let Some(homes) = self.homes(key, table)
+            {
+                diagnostic.hint = Some(format!("`{key}` is a key of {homes}"));
+            }
+        }
         list
     }
 

@@ -24,7 +24,9 @@ use title::Title;
 /// The plain methods answer `None` when the key is absent; the `required_` ones report that as an error;
 /// those with `_or` answer a default. A wrong value is reported by all of them and counts as absent.
 pub(crate) struct Reader<'a> {
-    table: &'a Table,
+    /// `None` for a table that is not there, whose keys have their defaults.
+    table: Option<&'a Table>,
+    header: Span,
     title: Title,
     diagnostics: &'a Diagnostics,
     asked: RefCell<Vec<String>>,
@@ -36,11 +38,11 @@ impl<'a> Reader<'a> {
     /// Reads the outermost table of a document.
     pub(crate) fn new(document: &'a Document, diagnostics: &'a Diagnostics) -> Reader<'a> {
         let title = Title { path: String::new(), text: String::new(), suffix: String::new() };
-        Reader::with_title(&document.root, title, diagnostics)
+        Reader::with_title(Some(&document.root), document.root.header(), title, diagnostics)
     }
 
-    fn with_title(table: &'a Table, title: Title, diagnostics: &'a Diagnostics) -> Reader<'a> {
-        Reader { table, title, diagnostics, asked: RefCell::new(Vec::new()), of_unknown_kind: Cell::new(false) }
+    fn with_title(table: Option<&'a Table>, header: Span, title: Title, diagnostics: &'a Diagnostics) -> Reader<'a> {
+        Reader { table, header, title, diagnostics, asked: RefCell::new(Vec::new()), of_unknown_kind: Cell::new(false) }
     }
 
     // Places and messages.
@@ -52,12 +54,12 @@ impl<'a> Reader<'a> {
 
     /// Where the table is announced.
     pub(crate) fn header(&self) -> Span {
-        self.table.header()
+        self.header
     }
 
     /// Where the value of a key was written. Does not count as asking for the key.
     pub(crate) fn span(&self, key: &str) -> Option<Span> {
-        self.table.get(key).map(|entry| entry.node.span)
+        self.table?.get(key).map(|entry| entry.node.span)
     }
 
     /// Whether the key is there, right or wrong. Counts as asking for it.
@@ -67,7 +69,7 @@ impl<'a> Reader<'a> {
 
     /// The keys that are there, in the order they were written. Does not count as asking for them.
     pub(crate) fn keys(&self) -> impl Iterator<Item = &'a str> {
-        self.table.entries().map(|entry| entry.key.as_str())
+        self.table.into_iter().flat_map(Table::entries).map(|entry| entry.key.as_str())
     }
 
     /// Reports an error at the value of a key, or at the table's header when the key is absent.
@@ -98,16 +100,19 @@ impl<'a> Reader<'a> {
         if self.of_unknown_kind.get() {
             return;
         }
-        let asked = self.asked.borrow();
-        for entry in self.table.entries().filter(|entry| !entry.is_read()) {
+        let asked = self.asked.take();
+        for entry in self.table.into_iter().flat_map(Table::entries).filter(|entry| !entry.is_read()) {
             let message = format!("unknown key `{}`{}", shortened(&entry.key), self.title.inside());
             let hint = match nearest(&entry.key, asked.iter().map(String::as_str)) {
                 Some(key) => format!("did you mean `{key}`?"),
                 None if asked.is_empty() => "there are no keys here".to_owned(),
                 None => format!("known keys: {}", listed(asked.iter().map(|key| format!("`{key}`")), "and")),
             };
-            self.diagnostics.push(Diagnostic::error(message).at(entry.key_span).hint(hint));
+            let diagnostic = Diagnostic::error(message).at(entry.key_span).hint(hint);
+            let misplaced = Some((shortened(&entry.key), self.title.kind().to_owned()));
+            self.diagnostics.push(Diagnostic { misplaced, ..diagnostic });
         }
+        self.diagnostics.add_table(self.title.kind(), asked);
     }
 
     // Asking.
@@ -122,7 +127,7 @@ impl<'a> Reader<'a> {
         if !asked.iter().any(|known| known == key) {
             asked.push(key.to_owned());
         }
-        let entry = self.table.get(key)?;
+        let entry = self.table?.get(key)?;
         entry.mark_read();
         Some(entry)
     }
@@ -401,6 +406,12 @@ impl<'a> Reader<'a> {
         self.inner(key, self.node(key)?, self.title.table(key), "a table")
     }
 
+    /// A table; where it is not there, one without keys.
+    pub(crate) fn table_or_empty(&self, key: &str) -> Reader<'a> {
+        let empty = || Reader::with_title(None, self.header, self.title.table(key), self.diagnostics);
+        self.table(key).unwrap_or_else(empty)
+    }
+
     /// A table that must be there.
     pub(crate) fn required_table(&self, key: &str) -> Option<Reader<'a>> {
         if self.required(key) { self.table(key) } else { None }
@@ -429,7 +440,7 @@ impl<'a> Reader<'a> {
 
     fn inner(&self, key: &str, node: &'a Node, title: Title, expected: &str) -> Option<Reader<'a>> {
         match &node.value {
-            Value::Table(table) => Some(Reader::with_title(table, title, self.diagnostics)),
+            Value::Table(table) => Some(Reader::with_title(Some(table), table.header(), title, self.diagnostics)),
             _ => {
                 self.wrong_type(&shortened(key), expected, node);
                 None

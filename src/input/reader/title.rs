@@ -33,6 +33,11 @@ impl Title {
         Title { suffix: format!(" of {text}"), text, path }
     }
 
+    /// The name without the numbers of tables: `[[light]]`.
+    pub(super) fn kind(&self) -> &str {
+        self.text.split(' ').next().unwrap_or_default()
+    }
+
     /// ` in [yarn.silk1]`, or nothing for the outermost table.
     pub(super) fn inside(&self) -> String {
         if self.text.is_empty() { String::new() } else { format!(" in {}", self.text) }

@@ -22,8 +22,7 @@ impl GivenSizes {
         context: &Context<'_>,
         form: &Option<Form>,
     ) -> Self {
-        let own = table.has("gauge");
-        let gauge = if own { Some(table) } else { fabric.filter(|f| f.has("gauge")) };
+        let gauge = garment::gauged(table, fabric);
         let mm = |key: &str| table.f64(key, Range::POSITIVE).map(|v| v * context.unit);
         let sizes = Sizes {
             stitch: gauge.and_then(|t| garment::stitch(t, None)).map(|s| s.to_array()),

@@ -236,7 +236,7 @@ fn threads(name: &str, text: &str, options: &LoadOptions) -> Option<usize> {
     let (mut sources, diagnostics) = (Sources::new(), Diagnostics::new());
     let mut document = Document::parse(name, text, &mut sources, &diagnostics)?;
     apply_options(&mut document, options, &mut sources, &diagnostics);
-    settings::threads(&Reader::new(&document, &diagnostics).table("render")?)
+    settings::threads(&Reader::new(&document, &diagnostics).table_or_empty("render"))
 }
 
 /// Loads a scene on the threads that there are.
@@ -353,7 +353,7 @@ fn build(
 
 /// Everything that a scene's text says, before the files it names are read. `None` where something is wrong.
 struct Plans {
-    render: Option<RenderSettings>,
+    render: RenderSettings,
     output: OutputSettings,
     detail: cloth::Detail,
     library: yarns::Library,
@@ -366,17 +366,13 @@ struct Plans {
 
 impl Plans {
     fn read(root: &Reader<'_>, options: &LoadOptions, context: &Context<'_>) -> Self {
-        let table = root.table("render");
-        let render = settings::render(table.as_ref());
-        let output = settings::output(root.table("output"));
+        let table = root.table_or_empty("render");
+        let render = settings::render(&table);
+        let output = settings::output(root.table_or_empty("output"));
         let intersections = [("tilted", true), ("perpendicular", false)];
-        let tilted = table
-            .as_ref()
-            .map_or(defaults::TILTED, |r| r.one_of_or("ply_intersection", defaults::TILTED, &intersections));
-        let mut detail = cloth::Detail::read(table.as_ref());
-        if let Some(table) = table {
-            table.finish();
-        }
+        let tilted = table.one_of_or("ply_intersection", defaults::TILTED, &intersections);
+        let mut detail = cloth::Detail::read(&table);
+        table.finish();
         let mut library = yarns::read(root, context, tilted);
         definitions::add_built_in(&mut library, root.node("fabric"), tilted);
         let tables = root.tables("fabric");
@@ -415,7 +411,7 @@ impl Plans {
         let ground = self.ground.and_then(|plan| plan.make(context, &mut made));
         Some(SceneBuilder {
             name: name.to_owned(),
-            render: self.render?,
+            render: self.render,
             output: self.output,
             camera: self.camera?,
             yarns: self.library.yarns.into_values().collect(),

@@ -13,10 +13,9 @@ pub(super) fn threads(table: &Reader<'_>) -> Option<usize> {
     table.u64("threads", 1..=4096).map(|t| t as usize)
 }
 
-/// The settings of `[render]`; `None` if one is wrong.
-pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
+/// The settings of `[render]`.
+pub(super) fn render(table: &Reader<'_>) -> RenderSettings {
     let otherwise = RenderSettings::default();
-    let Some(table) = table else { return Some(otherwise) };
     let width = table.u64_or("width", otherwise.width.into(), SIZE) as u32;
     let height = table.u64_or("height", otherwise.height.into(), SIZE) as u32;
     let crop = table.numbers("crop", Range::at_least(0.0));
@@ -48,7 +47,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         _ => PixelFilter::Gaussian(filter_width.unwrap_or(defaults::GAUSSIAN_WIDTH)),
     };
     let mode = table.one_of_or("mode", otherwise.mode, &Mode::NAMES);
-    Some(RenderSettings {
+    RenderSettings {
         mode,
         model: table.one_of_or("model", otherwise.model, &Model::NAMES),
         without: without(table),
@@ -68,7 +67,7 @@ pub(super) fn render(table: Option<&Reader<'_>>) -> Option<RenderSettings> {
         compact_bvh: table.one_of_or("bvh", otherwise.compact_bvh, &[("compact", true), ("fast", false)]),
         max_memory: table.f64("max_memory", Range::above(0.0)).map(|g| (g * 1e9) as u64),
         force: force(table),
-    })
+    }
 }
 
 /// `without = ["D"]`: lobes of single fibres to leave out.
@@ -99,8 +98,7 @@ fn force(table: &Reader<'_>) -> Vec<String> {
 }
 
 /// The settings of `[output]`.
-pub(super) fn output(table: Option<Reader<'_>>) -> OutputSettings {
-    let Some(table) = table else { return OutputSettings::default() };
+pub(super) fn output(table: Reader<'_>) -> OutputSettings {
     let otherwise = OutputSettings::default();
     let display = Display {
         tone_map: table.one_of_or("tone_map", otherwise.display.tone_map, &ToneMap::NAMES),

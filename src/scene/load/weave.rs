@@ -278,7 +278,7 @@ fn spacing(table: &Reader<'_>, context: &Context<'_>, key: &str, density: &str) 
 
 /// Distances of warps and of wefts by the `gauge`, ends and picks, of the weave or of its fabric.
 fn gauge(table: &Reader<'_>, fabric: &Reader<'_>, spacings: &[Option<f64>; 2]) -> Option<[f64; 2]> {
-    let place = [table, fabric].into_iter().find(|t| t.has("gauge"))?;
+    let place = garment::gauged(table, Some(fabric))?;
     let given = garment::stitch(place, None)?;
     if spacings.iter().any(Option::is_some) {
         let hint = "`gauge` has ends and picks: leave out `ends_per_cm`, `picks_per_cm` and spacings";

@@ -44,17 +44,13 @@ pub(super) struct Detail {
 }
 
 impl Detail {
-    pub(super) fn read(table: Option<&Reader<'_>>) -> Self {
+    pub(super) fn read(table: &Reader<'_>) -> Self {
         let bases = [("auto", None), ("catmull-rom", Some(Basis::CatmullRom)), ("b-spline", Some(Basis::BSpline))];
-        let basis = table.and_then(|t| t.one_of_or("curve_basis", None, &bases));
-        let tolerance = table.map_or(defaults::CURVE_TOLERANCE, |t| {
-            t.f64_or("curve_tolerance", defaults::CURVE_TOLERANCE, Range::between(0.0, 1.0))
-        });
-        let longest_segment = table.map_or(defaults::LONGEST_SEGMENT, |t| {
-            t.f64_or("longest_segment", defaults::LONGEST_SEGMENT, Range::above(0.0))
-        });
-        let frame = table.and_then(|t| t.u64("frame", 0..=u64::from(u32::MAX))).map_or(defaults::FRAME, |f| f as u32);
-        let can_move = table.is_none_or(|t| t.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name());
+        let basis = table.one_of_or("curve_basis", None, &bases);
+        let tolerance = table.f64_or("curve_tolerance", defaults::CURVE_TOLERANCE, Range::between(0.0, 1.0));
+        let longest_segment = table.f64_or("longest_segment", defaults::LONGEST_SEGMENT, Range::above(0.0));
+        let frame = table.u64_or("frame", defaults::FRAME.into(), 0..=u64::from(u32::MAX)) as u32;
+        let can_move = table.string_or("mode", Mode::Yarn.name()) == Mode::Yarn.name();
         Self {
             basis,
             tolerance,
