@@ -189,6 +189,12 @@ fn outputs_that_cannot_be_written_are_refused_before_rendering() {
         &to(&["-o", "x"]),
         "error: cannot write x: it has no extension; known are exr, png, hdr, tif, tiff, jpg, jpeg, bmp, tga, ppm and webp\n",
     );
+    // Before anything is read that may be large.
+    refused_with(d, &["render", "none.toml", "-o", "x.gif"], &["cannot write x.gif: unknown extension"]);
+    for command in [&["make", "fibers", "none.toml", "-o", "file/x.txt"][..], &["converge", "none.toml", "-o", "file"]]
+    {
+        refused_with(d, command, &["cannot write file/"]);
+    }
     // The second output counts as well, and the statistics.
     refused_with(d, &to(&["-o", "x.exr", "-o", "file/y.png"]), &["cannot write file/y.png: "]);
     refused_with(d, &to(&["-o", "x.exr", "--stats", "file/s.json"]), &["cannot write file/s.json: "]);

@@ -80,8 +80,10 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         }
         options.load(&args.scene).map_err(|error| error.to_string())
     };
+    let outputs = Files::default().reads("SCENE", [&args.scene]).writes("-o", &files);
+    outputs.refuse()?;
     let plain = args.options.load(&args.scene)?;
-    Files::default().reads("SCENE", [&args.scene]).writes("-o", &files).check(args.quiet)?;
+    outputs.check(args.quiet)?;
     let methods = if args.methods.is_empty() {
         let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };
         reference.into_iter().filter(|method| *method != yarn).chain([yarn]).collect()

@@ -44,6 +44,9 @@ pub(super) struct FibersArgs {
 
 pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     refuse_unknown(&args.out)?;
+    let files =
+        Files::default().reads("SCENE", [&args.scene]).reads("--curves", &args.options.curves).writes("-o", &args.out);
+    files.refuse()?;
     let mut scene = args.options.load(&args.scene)?;
     // Yarns are what the scene's own curve files hold: this command is for what is in them.
     if scene.render.mode == Mode::Yarn {
@@ -62,10 +65,6 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     if args.out.is_empty() {
         return Ok(());
     }
-    Files::default()
-        .reads("SCENE", [&args.scene])
-        .reads("--curves", &args.options.curves)
-        .writes("-o", &args.out)
-        .check(args.quiet)?;
+    files.check(args.quiet)?;
     write_all(&args.out, &level::curves(&scene)?, args.quiet)
 }

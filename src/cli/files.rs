@@ -38,12 +38,12 @@ impl Files {
         self.list.extend(paths.into_iter().map(|path| File { role, path: path.clone(), written }));
     }
 
-    /// Refuses two names of one file, unless both are only read, and files that cannot be written; makes missing folders,
-    /// and says so unless `quiet`.
+    /// Refuses two names of one file, unless both are only read, and files that cannot be written. Makes nothing: for
+    /// before large input is read, which may be wrong itself.
     ///
     /// # Errors
     /// [`Failure::Input`], which names both options.
-    pub(super) fn check(&self, quiet: bool) -> Result<(), Failure> {
+    pub(super) fn refuse(&self) -> Result<(), Failure> {
         for (i, file) in self.list.iter().enumerate() {
             let clash = |other: &&File| (file.written || other.written) && same_file(&file.path, &other.path);
             if let Some(other) = self.list[..i].iter().find(clash) {
@@ -56,9 +56,22 @@ impl Files {
                 )));
             }
         }
-        for file in self.list.iter().filter(|f| f.written) {
-            let folder = file.path.parent().filter(|f| !f.as_os_str().is_empty() && !f.exists());
-            output::check_target(&file.path)?;
+        self.written().try_for_each(output::check_place).map_err(Failure::from)
+    }
+
+    fn written(&self) -> impl Iterator<Item = &Path> {
+        self.list.iter().filter(|f| f.written).map(|f| f.path.as_path())
+    }
+
+    /// As [`Self::refuse`]; makes missing folders, and says so unless `quiet`.
+    ///
+    /// # Errors
+    /// [`Failure::Input`].
+    pub(super) fn check(&self, quiet: bool) -> Result<(), Failure> {
+        self.refuse()?;
+        for path in self.written() {
+            let folder = path.parent().filter(|f| !f.as_os_str().is_empty() && !f.exists());
+            output::check_target(path)?;
             if let Some(folder) = folder
                 && !quiet
             {

@@ -40,17 +40,16 @@ pub(super) struct GarmentArgs {
 
 pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
     refuse_unknown(&args.out)?;
-    Files::default()
-        .reads("scene", [&args.scene])
-        .reads("--curves", &args.options.curves)
-        .writes("-o", &args.out)
-        .check(args.quiet)?;
+    let files =
+        Files::default().reads("scene", [&args.scene]).reads("--curves", &args.options.curves).writes("-o", &args.out);
+    files.refuse()?;
     let mut scene = args.options.load(&args.scene)?;
     if scene.garments.is_empty() {
         let hint = "source = { type = \"garment\", path = \"pullover.obj\", cloth = { type = \"knit\" } }";
         let problem = format!("error: {}: no fabric is laid on a garment\n  help: {hint}", args.scene.display());
         return Err(Failure::Input(problem));
     }
+    files.check(args.quiet)?;
     scene.render.mode = level::mode(&args.level);
     let set = level::curves(&scene)?;
     write_all(&args.out, &set, args.quiet)?;

@@ -189,8 +189,8 @@ fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Refuses directories and read-only files, and creates the directory that the file goes into.
-pub fn check_target(path: &Path) -> Result<(), ImageError> {
+/// Refuses directories, read-only files and directories that cannot be; makes nothing.
+pub fn check_place(path: &Path) -> Result<(), ImageError> {
     if let Ok(metadata) = fs::metadata(path) {
         if metadata.is_dir() {
             return Err(ImageError::unwritable(path, "it is a directory"));
@@ -199,24 +199,33 @@ pub fn check_target(path: &Path) -> Result<(), ImageError> {
             return Err(ImageError::unwritable(path, "the file exists and is read-only"));
         }
     }
-    let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) else { return Ok(()) };
-    fs::create_dir_all(directory).map_err(|error| {
-        let reason = match error.kind() {
-            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => "a file is in its place".to_owned(),
-            _ => plain(&error),
-        };
-        ImageError::unwritable(
-            path,
-            format!("no directory `{}`, and it cannot be created: {reason}", directory.display()),
-        )
-    })
+    match directory_of(path).into_iter().flat_map(Path::ancestors).find_map(|place| fs::metadata(place).ok()) {
+        Some(place) if !place.is_dir() => Err(no_directory(path, "a file is in its place")),
+        _ => Ok(()),
+    }
+}
+
+/// As [`check_place`], and creates the directory that the file goes into.
+pub fn check_target(path: &Path) -> Result<(), ImageError> {
+    check_place(path)?;
+    let Some(directory) = directory_of(path) else { return Ok(()) };
+    fs::create_dir_all(directory).map_err(|error| no_directory(path, &plain(&error)))
+}
+
+fn directory_of(path: &Path) -> Option<&Path> {
+    path.parent().filter(|directory| !directory.as_os_str().is_empty())
+}
+
+fn no_directory(path: &Path, reason: &str) -> ImageError {
+    let directory = directory_of(path).unwrap_or(Path::new(".")).display();
+    ImageError::unwritable(path, format!("no directory `{directory}`, and it cannot be created: {reason}"))
 }
 
 /// An empty file in the directory of `path`, with its extension and the permissions of any new file, that is removed
 /// when dropped.
 fn temporary(path: &Path) -> Result<NamedTempFile, ImageError> {
     let suffix = path.extension().map(|extension| format!(".{}", extension.to_string_lossy())).unwrap_or_default();
-    let parent = path.parent().filter(|directory| !directory.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = directory_of(path).unwrap_or(Path::new("."));
     let elsewhere = std::env::temp_dir();
     let directory = if is_special(path) { elsewhere.as_path() } else { parent };
     let mut builder = tempfile::Builder::new();

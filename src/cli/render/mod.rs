@@ -45,8 +45,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
 fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let started = Instant::now();
-    let mut scene = args.options.load(&args.scene)?;
     let outputs = Outputs::new(args);
+    for path in &outputs.pictures {
+        Format::of(path)?;
+    }
+    files(args, &outputs).refuse()?;
+    let mut scene = args.options.load(&args.scene)?;
     check_and_apply(args, &outputs, &mut scene)?;
     let memory = Memory::new(&scene);
     memory.check()?;
@@ -103,6 +107,17 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     })
 }
 
+/// What is read and written, but for pictures without noise, which the scene may ask for.
+fn files(args: &RenderArgs, outputs: &Outputs) -> Files {
+    Files::default()
+        .reads("SCENE", [&args.scene])
+        .reads("--curves", &args.options.curves)
+        .writes("-o", &outputs.pictures)
+        .writes("-o", &outputs.films)
+        .writes("--stats", &args.stats)
+        .writes("--checkpoint", &args.checkpoint)
+}
+
 /// Refuses outputs that cannot be written, before any work, and lets options of the output win over the scene's.
 fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> Result<(), Failure> {
     let denoised: Vec<PathBuf> = outputs
@@ -111,15 +126,7 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
         .filter(|_| args.denoise || scene.denoise)
         .filter_map(|p| picture::denoised_path(p))
         .collect();
-    Files::default()
-        .reads("SCENE", [&args.scene])
-        .reads("--curves", &args.options.curves)
-        .writes("-o", &outputs.pictures)
-        .writes("-o", &outputs.films)
-        .writes("--denoise", &denoised)
-        .writes("--stats", &args.stats)
-        .writes("--checkpoint", &args.checkpoint)
-        .check(false)?;
+    files(args, outputs).writes("--denoise", &denoised).check(false)?;
     // A film may become any picture.
     let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
     for path in &outputs.pictures {
