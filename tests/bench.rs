@@ -147,6 +147,9 @@ fn mistakes_in_suites_are_shown_where_they_are() {
     let run = yarnray(d, &["bench", "none.toml"]);
     assert_eq!((run.status, run.stderr.as_str()), (Some(2), "none.toml: error: no such file\n"));
     write(d, "suite.toml", SUITE);
+    write(d, "long.toml", SUITE.split("[quick]").next().unwrap());
+    let run = yarnray(d, &["bench", "long.toml", "--quick"]);
+    assert!(run.status == Some(2) && run.stderr.contains("`--quick` needs a table [quick]"), "{}", run.stderr);
     let run = yarnray(d, &["bench", "suite.toml", "--row", "nothing"]);
     assert_eq!((run.status, run.stderr.as_str()), (Some(2), "error: no row of suite.toml contains nothing\n"));
 }

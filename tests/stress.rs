@@ -21,10 +21,25 @@ fn stress_runs_cases_and_reports_them() {
     assert!(markdown.contains("| **closed_forms**") && markdown.contains("| pass |"), "{markdown}");
 }
 
+/// What one file's disk refuses, another's takes, and the terminal.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_report_that_cannot_be_written_loses_no_other() {
+    let directory = directory();
+    let d = directory.path();
+    std::os::unix::fs::symlink("/dev/full", d.join("full.md")).unwrap();
+    let run = yarnray(d, &["stress", "--quick", "--case", "threads", "-o", "full.md", "-o", "r.json"]);
+    assert!(run.status == Some(2) && run.stderr.contains("cannot write full.md"), "{}", run.stderr);
+    assert!(run.stdout.contains("0 failed") && read_json(&d.join("r.json"))["passed"] == true, "{}", run.stdout);
+}
+
 #[test]
 fn stress_refuses_cases_that_it_does_not_have() {
     let directory = directory();
-    for (args, word) in [(["stress", "--case", "nonsense"], "no case"), (["stress", "-o", "x.txt"], ".md or .json")] {
+    for (args, word) in [
+        (["stress", "--case", "closed_form"], "did you mean \"closed_forms\"?"),
+        (["stress", "-o", "x.txt"], ".md or .json"),
+    ] {
         let run = yarnray(directory.path(), &args);
         assert_eq!(run.status, Some(2), "{}", run.stderr);
         assert!(run.stderr.contains(word), "{}", run.stderr);

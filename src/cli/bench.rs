@@ -4,7 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, files::Files, log, signals::interrupt_flag, terminal::print, thread_pool, write_text};
+use super::{
+    Failure,
+    files::{Attempts, Files},
+    log,
+    signals::interrupt_flag,
+    terminal::print,
+    thread_pool, write_text,
+};
 use crate::{
     experiment::{
         LOBES, converge,
@@ -105,10 +112,8 @@ fn run_fidelity(
     out: &Path,
     say: impl FnMut(&str),
 ) -> Result<(), Failure> {
-    let write = |table: &FidelityTable| {
-        write_text(&out.join("table.md"), &table.to_markdown())?;
-        write_text(&out.join("table.json"), &table.to_json())
-    };
+    let write =
+        |table: &FidelityTable| write_all(out, [("table.md", table.to_markdown()), ("table.json", table.to_json())]);
     let saved = |table: &FidelityTable| write(table).map_err(as_bench_error);
     let table = fidelity::run(suite, processes, out, say, saved)?;
     write(&table)?;
@@ -135,11 +140,19 @@ fn as_bench_error(failure: Failure) -> BenchError {
 
 /// Writes the table in all its forms, and the page.
 fn write(out: &Path, table: &Table, plots: &[Plot]) -> Result<(), Failure> {
-    write_text(&out.join("table.md"), &table.to_markdown())?;
-    write_text(&out.join("table.csv"), &table.to_csv())?;
-    write_text(&out.join("table.json"), &table.to_json())?;
     let pictures: Vec<Option<RowPictures>> = table.rows.iter().map(|row| pictures(out, row)).collect();
-    write_text(&out.join("report.html"), &page(table, &pictures, plots))
+    let page = page(table, &pictures, plots);
+    let texts = [table.to_markdown(), table.to_csv(), table.to_json(), page];
+    write_all(out, ["table.md", "table.csv", "table.json", "report.html"].into_iter().zip(texts))
+}
+
+/// Writes every file that can be written.
+fn write_all(out: &Path, files: impl IntoIterator<Item = (&'static str, String)>) -> Result<(), Failure> {
+    let mut attempts = Attempts::default();
+    for (name, text) in files {
+        attempts.note(write_text(&out.join(name), &text));
+    }
+    attempts.finish()
 }
 
 /// The pictures of a row; `None` if a file is gone.

@@ -4,19 +4,27 @@ use std::{path::PathBuf, time::Instant};
 
 use clap::Args;
 
-use super::{Failure, files::Files, terminal::print, write_text};
-use crate::experiment::stress::{self, Bound, Outcome, Scale, figure};
+use super::{
+    Failure,
+    files::{Attempts, Files},
+    terminal::print,
+    write_text,
+};
+use crate::{
+    experiment::stress::{self, Bound, Outcome, Scale, figure},
+    input::diagnostic::unknown_name,
+};
 
 const EXAMPLES: &str = "Examples:
   yarnray stress                              every case, in minutes
-  yarnray stress --quick                      every case, smaller, in seconds
+  yarnray stress --quick                      every case, smaller, in two minutes
   yarnray stress --case radii --case twist    some of them
   yarnray stress -o stress.md -o stress.json  the report in two formats";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct StressArgs {
-    /// Smaller cases: seconds in place of minutes.
+    /// Smaller cases: two minutes in place of many.
     #[arg(long)]
     quick: bool,
     /// Only this case (repeatable).
@@ -44,7 +52,8 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     }
     for name in &args.case {
         if !all.iter().any(|c| c.name == name) {
-            return Err(Failure::Input(format!("error: no case \"{name}\"; --list shows all")));
+            let (message, hint) = unknown_name("case", name, all.iter().map(|c| c.name));
+            return Err(Failure::Input(format!("error: {message}\n  hint: {hint}")));
         }
     }
     for path in &args.out {
@@ -70,10 +79,11 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     let elapsed = started.elapsed();
     let json = stress::to_json(&outcomes, scale, elapsed);
     let text = serde_json::to_string_pretty(&json).expect("numbers and text become JSON") + "\n";
+    let mut attempts = Attempts::default();
     for path in &args.out {
         let markdown = path.extension().is_some_and(|e| e == "md");
         let content = if markdown { stress::to_markdown(&outcomes, scale, elapsed) } else { text.clone() };
-        write_text(path, &content)?;
+        attempts.note(write_text(path, &content));
     }
     let failed = outcomes.iter().filter(|o| !o.passed()).count();
     let sum = format!("{} cases in {:.1} s, {failed} failed", outcomes.len(), elapsed.as_secs_f64());
@@ -82,6 +92,7 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     } else {
         print(&format!("{sum}\n"))?;
     }
+    attempts.finish()?;
     if failed > 0 { Err(Failure::Check(format!("error: {failed} cases of {} failed", outcomes.len()))) } else { Ok(()) }
 }
 

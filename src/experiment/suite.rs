@@ -188,6 +188,8 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
         if quick {
             shorter.shorten(&mut parts);
         }
+    } else if quick {
+        root.error("`--quick` needs a table [quick], which says what is measured", Some("[quick]\ntarget = 0.05"));
     }
     let Parts { quality, others, rows, converge } = parts;
     let (cases, missing) = lights.cases(rows);
