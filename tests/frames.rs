@@ -282,4 +282,11 @@ fn sequences_that_do_not_fit_together_say_why() {
         ],
     );
     refused(&["--frames", "7"], &["y.7.txt: no such file"]);
+    // Of several frames before the first is rendered.
+    write(d, "y.2.txt", straight(20.0, 1.0));
+    write(d, "y.4.txt", straight(20.0, 3.0));
+    let run = yarnray(d, &["render", "s.toml", "-q", "-o", "o.#.exr", "--frames", "1..6"]);
+    assert_eq!(run.status, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains("y.3.txt: no such file, and 2 others of frames 1 to 6\n"), "{}", run.stderr);
+    assert!(!d.join("o.1.exr").exists());
 }

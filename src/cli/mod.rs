@@ -22,7 +22,7 @@ mod signals;
 mod stress;
 mod terminal;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{ops::RangeInclusive, path::PathBuf, process::ExitCode};
 
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
@@ -237,6 +237,9 @@ pub fn run() -> ExitCode {
 /// Options that commands share which load a scene.
 #[derive(Args, Debug, Clone, Default)]
 struct SceneArgs {
+    /// All frames, before the first of them.
+    #[arg(skip)]
+    frames: Option<RangeInclusive<u32>>,
     /// How yarns are represented.
     #[arg(long, value_parser = names(&Mode::NAMES))]
     mode: Option<String>,
@@ -318,6 +321,7 @@ impl SceneArgs {
             assignments: self.set.clone(),
             curves: self.curves.clone(),
             frame: self.frame,
+            frames: self.frames.clone(),
             ..LoadOptions::default()
         };
         let mut set = |key: &str, value: Option<Value>, shown: String| {

@@ -62,14 +62,19 @@ impl Files {
 
 /// The numbers for which a numbered file exists, from the smallest to the largest.
 fn numbers(path: &Path) -> Vec<u32> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // A folder may have the number as well as the file, or in its place.
+    let has_place = |part: &&Path| part.file_name().is_some_and(|name| numbered(Path::new(name), 0).is_some());
+    let Some(place) = path.ancestors().filter(has_place).last() else { return Vec::new() };
+    let folder = place.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let numbers_in = |name: &str| -> Vec<u32> {
         let runs = name.split(|c: char| !c.is_ascii_digit());
         runs.filter_map(|digits| digits.parse().ok()).collect()
     };
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
-    let fits = |name: &str, number: u32| numbered(path, number).is_some_and(|p| p.file_name() == Some(name.as_ref()));
+    let of = |pattern: &Path, number: u32| numbered(pattern, number).unwrap_or_default();
+    let fits =
+        |name: &str, number: u32| of(place, number).file_name() == Some(name.as_ref()) && of(path, number).exists();
     let mut found: Vec<u32> =
         names.filter_map(|name| numbers_in(&name).into_iter().filter(|&n| fits(&name, n)).min()).collect();
     found.sort_unstable();
@@ -128,6 +133,13 @@ mod tests {
             std::fs::write(folder.path().join(name), "").expect("a file");
         }
         assert_eq!(numbers(&folder.path().join("x.####.bcc")), [9, 12]);
+        for name in ["0004/a.bcc", "0007/a.bcc", "0007/a.7.bcc", "0008/b.bcc"] {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            std::fs::write(path, "").expect("a file");
+        }
+        assert_eq!(numbers(&folder.path().join("####/a.bcc")), [4, 7]);
+        assert_eq!(numbers(&folder.path().join("####/a.{frame}.bcc")), [7]);
         assert!(numbers(&folder.path().join("z.####.bcc")).is_empty());
         assert!(numbers(&folder.path().join("none/z.####.bcc")).is_empty());
         let files = Files::about(&folder.path().join("x.####.bcc"), 9).expect("a place for a number");

@@ -80,6 +80,8 @@ impl RenderArgs {
         args.stats = self.stats.as_ref().map(named).transpose()?;
         args.checkpoint = self.checkpoint.as_ref().map(named).transpose()?;
         args.options.set.push(format!("render.frame={frame}"));
+        // What is missing for any of them is told before the first is rendered.
+        args.options.frames = self.frames.as_ref().map(|frames| frames.0.clone()).filter(|all| *all.start() == frame);
         Ok(args)
     }
 }

@@ -26,6 +26,7 @@ mod yarns;
 use std::{
     cell::RefCell,
     fmt,
+    ops::RangeInclusive,
     path::{Path, PathBuf},
 };
 
@@ -58,6 +59,8 @@ pub struct LoadOptions {
     pub curves: Option<PathBuf>,
     /// `--frame`: the camera frames what there is.
     pub frame: bool,
+    /// Frames that follow this one: files of theirs that are missing are told at once.
+    pub frames: Option<RangeInclusive<u32>>,
     /// Measure garments, but lay no yarns on them: they are in [`Scene::garments`] only.
     pub survey: bool,
 }
@@ -130,6 +133,21 @@ impl Context<'_> {
             // One of a sequence is found when its number is known.
             if !path.exists() && numbered(path, 0).is_none() {
                 self.error(*span, format!("{}: no such file", path.display()), None);
+            }
+        }
+    }
+
+    /// Tells which files of numbered ones are missing for some of these frames.
+    fn tell_missing_frames(&self, frames: &RangeInclusive<u32>) {
+        for (path, span) in self.named.borrow().iter().filter(|(path, _)| !path.exists()) {
+            let missing = frames.clone().filter_map(|frame| numbered(path, frame)).filter(|file| !file.exists());
+            let missing: Vec<PathBuf> = missing.collect();
+            if let [first, others @ ..] = missing.as_slice() {
+                let more = match others.len() {
+                    0 => String::new(),
+                    count => format!(", and {count} others of frames {} to {}", frames.start(), frames.end()),
+                };
+                self.error(*span, format!("{}: no such file{more}", first.display()), None);
             }
         }
     }
@@ -336,6 +354,12 @@ fn build(
     if diagnostics.has_errors() {
         context.tell_missing_files();
         return None;
+    }
+    if let Some(frames) = &options.frames {
+        context.tell_missing_frames(frames);
+        if diagnostics.has_errors() {
+            return None;
+        }
     }
     // The text is sound: now the files.
     let builder = plans.make(name, &context)?;
