@@ -3,7 +3,7 @@
 use std::{
     fs::{self, File},
     io::{self, Seek as _},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use tempfile::NamedTempFile;
@@ -90,13 +90,16 @@ pub fn write_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) 
 
 /// Writes a file that is written again and again and must outlive the machine's failures: the content is
 /// on the disk before it takes the name `path`, and a program that is killed meanwhile leaves one file, `path.new`, that the
-/// next one writes over.
+/// next one writes over. Links, and targets that are no ordinary files, are as for [`write_file`].
 ///
 /// # Errors
 /// [`ImageError::Write`]; then an older file of this name is as it was.
 pub fn write_durable(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), ImageError> {
     check_target(path)?;
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = behind_links(path);
+    if is_special(&target) {
+        return write_file(path, write);
+    }
     let mut beside = target.clone().into_os_string();
     beside.push(".new");
     let beside = Path::new(&beside);
@@ -168,8 +171,7 @@ pub fn write_colors(
 /// Lets `write` fill a temporary file with the extension of `path`, then gives it that name.
 fn replace(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<(), String>) -> Result<(), ImageError> {
     check_target(path)?;
-    // The name of a link stays a link: its target is what is replaced.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = behind_links(path);
     let mut temporary = temporary(&target).map_err(|error| ImageError::unwritable(path, error.reason()))?;
     write(&mut temporary).map_err(|reason| ImageError::unwritable(path, reason))?;
     if is_special(&target) {
@@ -182,6 +184,12 @@ fn replace(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<(), Str
     }
     temporary.persist(&target).map_err(|error| ImageError::unwritable(path, plain(&error.error)))?;
     Ok(())
+}
+
+/// What a path names in the end, there or not yet: the name of a link stays a link, and its target is what is replaced.
+fn behind_links(path: &Path) -> PathBuf {
+    let nowhere = || Some(directory_of(path).unwrap_or(Path::new(".")).join(fs::read_link(path).ok()?));
+    fs::canonicalize(path).ok().or_else(nowhere).unwrap_or_else(|| path.to_owned())
 }
 
 /// Whether something that is neither a file nor a directory has this name: a device, a pipe.

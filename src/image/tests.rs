@@ -590,3 +590,33 @@ mod with_openimageio {
         assert!(mapped() && oiio::is_loaded(), "TIFF does");
     }
 }
+
+/// Neither a picture nor a film takes the place of a pipe, or of a link, whether its target is there or not.
+#[test]
+#[cfg(unix)]
+fn pipes_and_links_stay_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+    std::os::unix::fs::symlink("target", at("link")).unwrap();
+    let content = |file: &mut fs::File| std::io::Write::write_all(file, b"all of it");
+    // Open both ways, so that nobody waits for the other end.
+    let mut pipe = fs::File::options().read(true).write(true).open(at("pipe")).unwrap();
+    for durable in [false, true] {
+        let write = |path: &Path| match durable {
+            true => output::write_durable(path, content),
+            false => output::write_file(path, content),
+        };
+        write(&at("pipe")).unwrap();
+        assert!(!at("pipe").is_file(), "a file took the place of the pipe");
+        let mut read = [0; 9];
+        std::io::Read::read_exact(&mut pipe, &mut read).unwrap();
+        assert_eq!(&read, b"all of it");
+        for _ in 0..2 {
+            write(&at("link")).unwrap();
+            assert!(at("link").is_symlink() && fs::read(at("target")).unwrap() == b"all of it");
+        }
+        fs::remove_file(at("target")).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+}
