@@ -29,6 +29,16 @@ fn what_is_lost_is_said_and_nothing_is_half_written() {
     let matrix = matrix.to_str().unwrap();
     let lost = yarnray(at, &["convert", matrix, "a.bcc", "--prim", "/bspline_pinned_vertex"]).good().stderr;
     assert!(lost.contains("radii are lost") && lost.contains("unit is lost"), "{lost}");
+    let guessed = yarnray(at, &["convert", "a.bcc", "g.usda"]).good().stderr;
+    assert!(
+        guessed.contains("taken for millimetres") && guessed.contains("curves without a radius have 0.5"),
+        "{guessed}"
+    );
+    let said = yarnray(at, &["convert", "a.bcc", "g.usda", "--unit", "cm", "--radius", "0.1"]).good().stderr;
+    assert!(!said.contains("millimetres") && !said.contains("radius"), "{said}");
+    for name in ["a.bcc", "g.usda"] {
+        fs::remove_file(at.join(name)).unwrap();
+    }
     for (arguments, expected) in [
         (vec!["convert", matrix, "b.bcc", "--prim", "/nothing"], "curves here: /linear_nonperiodic"),
         (vec!["convert", matrix, "b.bcc", "--prim", "nothing"], "begins with /"),

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     files::{
-        curve_file::{self, ReadOptions},
+        curve_file::{self, ReadOptions, SOME_RADIUS},
         stage::PrimPattern,
     },
     geometry::curve::{Basis, CurveSet},
@@ -87,6 +87,7 @@ struct Abilities {
     radii: bool,
     /// Whether radii change along a curve.
     varying: bool,
+    /// Whether it has a unit; such a format needs radii as well.
     unit: bool,
     colors: bool,
     ids: bool,
@@ -110,7 +111,7 @@ fn abilities(path: &Path) -> Abilities {
     }
 }
 
-/// What is lost on the way to a file, one line each.
+/// What is lost on the way to a file, and what it needs and was not given, one line each.
 fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
     let can = abilities(path);
     let mut lost = Vec::new();
@@ -133,6 +134,12 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
     if !can.unit && set.unit_mm.is_some_and(|unit| unit != 1.0) {
         let unit = set.unit_mm.unwrap_or(1.0);
         lost.push(format!("the unit is lost: lengths are of {unit} mm, which whoever reads them must know"));
+    }
+    if can.unit && set.unit_mm.is_none() {
+        lost.push("lengths are taken for millimetres: the input has no unit; --unit says it".to_owned());
+    }
+    if can.unit && set.curves.iter().any(|c| c.radii.is_none()) {
+        lost.push(format!("curves without a radius have {SOME_RADIUS}; --radius says it"));
     }
     if set.curves.iter().any(|c| !can.bases.contains(&c.basis)) {
         lost.push("how points are meant is lost: give it as `basis` where the file is read".to_owned());

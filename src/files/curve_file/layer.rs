@@ -2,13 +2,11 @@
 
 use std::{io, path::Path};
 
+use super::SOME_RADIUS;
 use crate::{
     files::stage::{self, CurvesOut, Interpolated},
     geometry::curve::{Basis, CurveSet, equal_radii},
 };
-
-/// The radius of curves that have none, in their own unit, where a format needs one.
-const SOME_RADIUS: f64 = 0.5;
 
 pub(super) fn can_write(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);

@@ -45,6 +45,9 @@ pub use yarns::write_yarns;
 /// The largest coordinate that is believed, in the file's own unit: beyond it no unit makes cloth of it.
 const FARTHEST: f64 = 1e12;
 
+/// The radius of curves that have none, in their own unit, where a format needs one.
+pub(crate) const SOME_RADIUS: f64 = 0.5;
+
 /// What the file itself cannot say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
