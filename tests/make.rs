@@ -61,11 +61,20 @@ fn sizes_are_kept_to_the_nearest_stitch_and_yarn() {
     let tube = ["knit", "--form", "tube", "--stitches", "24", "--circumference", "96", "--rows", "8", "--height", "24"];
     let said = made(&tube);
     assert!(said.contains("24 x 8, 96.000 around, 24.000 high; "), "{said}");
-    // A tube is of whole repeats too, however narrow.
-    let lace =
-        ["knit", "--form", "tube", "--chart", "k2tog yo", "--gauge", "22,34", "--circumference", "1", "--rows", "8"];
-    let said = made(&lace);
+    // A tube is of whole repeats too; where not one has room, that is told.
+    let lace = |around: &'static str| {
+        ["knit", "--form", "tube", "--chart", "k2tog yo", "--gauge", "22,34", "--circumference", around, "--rows", "8"]
+    };
+    let said = made(&lace("15"));
     assert!(said.contains("4 x 8, "), "{said}");
+    for (args, least) in [
+        (&lace("1")[..], "a circumference of 1.000 mm has no room for the smallest such knit\n  hint: it is 18.2 mm\n"),
+        (&["weave", "--width", "0.1"], "--width has no room for one yarn, or one repeat of a tile; at least "),
+        (&["weave", "--height", "1", "--tile"], "--height has no room"),
+    ] {
+        let run = yarnray(d, &[&["make"], args, &["-o", "none.bcc"]].concat());
+        assert!(run.status == Some(2) && run.stderr.contains(least), "{args:?}: {}", run.stderr);
+    }
     // A tile is of whole repeats.
     let said = made(&["knit", "--pattern", "moss", "--tile", "--gauge", "22,34", "--width", "60", "--height", "39"]);
     assert!(said.contains("period 63.636364 across, 35.294118 up; "), "{said}");

@@ -232,6 +232,10 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         Impossible::TooMuchCover { most } => {
             format!("error: these yarns cover at most {most:.3} of the plane in this weave")
         }
+        Impossible::TooSmall { warp, least } => {
+            let name = if warp { "width" } else { "height" };
+            format!("error: --{name} has no room for one yarn, or one repeat of a tile; at least {least:.3}")
+        }
         Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),
     })
 }

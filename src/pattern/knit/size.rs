@@ -145,6 +145,7 @@ impl Sizes {
             (knit.stitch_width, knit.row_height) = (Some(width / diameter), Some(height / diameter));
         }
         let [width, height] = [self.across().map(|w| w.0), self.height].map(|size| size.map(|mm| mm / diameter));
+        let across = self.across().map_or("width", |(_, key)| key);
         // A size and a count give the stitch.
         if let (Some(width), true) = (width, self.counted[0]) {
             knit.stitch_width = Some(width / f64::from(knit.stitches));
@@ -156,9 +157,16 @@ impl Sizes {
         let open = [width.filter(|_| !self.counted[0]), height.filter(|_| !self.counted[1])];
         if open != [None, None] {
             let stitch = knit.gauge();
-            let count = |size: f64, own: f64, of: u32, least: u32| {
+            let count = |key: &str, size: f64, own: f64, of: u32, least: u32| {
                 let (least, of) = (f64::from(least.div_ceil(of.max(1))), f64::from(of.max(1)));
-                ((size / own / of).round().clamp(least, (MOST / of).max(least)) * of) as u32
+                let repeats = (size / own / of).round();
+                if repeats < least {
+                    let [size, smallest] = [size, least * of * own].map(|length| length * diameter);
+                    let problem = format!("a {key} of {size:.3} mm has no room for the smallest such knit");
+                    let hint = format!("it is {smallest:.1} mm");
+                    return Err(Misfit { key: None, problem, hint });
+                }
+                Ok((repeats.min((MOST / of).max(least)) * of) as u32)
             };
             // Whole repeats, where rows do not fit otherwise or must close to a ring or a tile.
             let whole = knit.form != Form::Flat || !knit.chart.is_plain() || knit.edges == Edges::Tile;
@@ -166,10 +174,11 @@ impl Sizes {
             let high = if knit.edges == Edges::Tile { knit.chart.rows() } else { 1 };
             if let Some(width) = open[0] {
                 // A ring of fewer cannot be laid.
-                knit.stitches = count(width, stitch[0], wide, if knit.form == Form::Flat { 1 } else { 3 });
+                let least = if knit.form == Form::Flat { 1 } else { 3 };
+                knit.stitches = count(across, width, stitch[0], wide, least)?;
             }
             if let Some(height) = open[1] {
-                knit.rows = count(height, stitch[1], high, 1);
+                knit.rows = count("height", height, stitch[1], high, 1)?;
             }
         }
         Ok(knit)

@@ -67,7 +67,7 @@ pub struct Weave {
 pub enum Extent {
     /// So many yarns.
     Yarns(u32),
-    /// As many as fill this length best, at least one.
+    /// As many as fill this length best.
     Length(f64),
 }
 
@@ -85,6 +85,13 @@ pub enum Impossible {
     TooMuchCover {
         /// The most that is possible.
         most: f64,
+    },
+    /// A width or height in which not one yarn, or not one repeat of a tile, has room.
+    TooSmall {
+        /// Whether it is the width, which warps fill; else the height.
+        warp: bool,
+        /// The smallest length.
+        least: f64,
     },
     /// More control points than [`MAX_POINTS`].
     TooLarge,
@@ -251,19 +258,21 @@ impl Weave {
     }
 
     fn cloth(&self, cell: UnitCell) -> Result<Cloth<'_>, Impossible> {
-        let count = |extent: Extent, spacing: f64, repeat: usize| {
+        let count = |side: usize, extent: Extent, repeat: usize| {
+            let spacing = cell.spacing[side];
             let wanted = match extent {
                 Extent::Yarns(count) => f64::from(count),
                 // Threads of several spacings are so far apart in the mean.
                 Extent::Length(length) => length / spacing,
             };
             let of = if self.tile { repeat as f64 } else { 1.0 };
-            ((wanted / of).round().clamp(1.0, 1e9 / of) * of) as u32
+            let repeats = (wanted / of).round();
+            if repeats < 1.0 && matches!(extent, Extent::Length(_)) {
+                return Err(Impossible::TooSmall { warp: side == 0, least: of * spacing });
+            }
+            Ok((repeats.clamp(1.0, 1e9 / of) * of) as u32)
         };
-        let count = [
-            count(self.warps, cell.spacing[0], self.draft.warps()),
-            count(self.wefts, cell.spacing[1], self.draft.wefts()),
-        ];
+        let count = [count(0, self.warps, self.draft.warps())?, count(1, self.wefts, self.draft.wefts())?];
         // In f64, which does not overflow.
         let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.points);
         if points > MAX_POINTS as f64 {

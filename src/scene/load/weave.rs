@@ -91,6 +91,13 @@ impl WeavePlan {
                 format!("these yarns cover at most {most:.3} of the plane in this weave"),
                 "a lower `cover`, a higher `flatten`, or no cover at all for the closest",
             ),
+            Err(Impossible::TooSmall { warp, least }) => wrong(
+                format!(
+                    "the `{}` has no room for one yarn, or one repeat of a tile",
+                    if warp { "width" } else { "height" }
+                ),
+                &format!("at least {:.3}", least / context.unit),
+            ),
             Err(Impossible::TooLarge) => {
                 wrong("more than 2^27 control points".to_owned(), "fewer warps, wefts or points");
             }
