@@ -1,13 +1,14 @@
 //! Scenes that are built in code: the same as from text, and errors in place of panics.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 use yarnray::{
+    geometry::mesh::Mesh,
     light::{AreaLight, Environment, Light, Shape},
     math::Rgb,
     pattern::straight,
-    scattering::fiber::FiberMaterial,
+    scattering::{fiber::FiberMaterial, surface::SurfaceMaterial},
     scene::{
-        CurveKind, Fabric, SceneBuilder, Yarn,
+        CurveKind, Fabric, Material, Object, SceneBuilder, Yarn,
         builder::GroundSetup,
         load::{LoadOptions, parse},
     },
@@ -74,6 +75,26 @@ fn what_makes_no_scene_is_told() {
     assert!(error(&|s| s.fabrics[0].curves[1].1.truncate(2)).contains("as many radii, found 4 and 2"));
     assert!(error(&|s| s.fabrics[0].curves[0].0.points[2].x = f64::NAN).contains("finite points"));
     assert!(error(&|s| s.ground = Some(GroundSetup { height: None, material: 0 })).contains("no material 0"));
+    let light = |light: Light| error(&|s| s.lights.push(light.clone()));
+    let sphere = |radius| Shape::Sphere { centre: Vec3A::ZERO, radius };
+    let area = |shape, radiance| Light::Area(AreaLight { shape, radiance, two_sided: false, visible: true });
+    assert!(light(area(sphere(0.0), Rgb::ONE)).contains("light 3: expected sizes above 0"));
+    assert!(light(area(sphere(1.0), Rgb::splat(f32::NAN))).contains("light 3: expected finite light"));
+    let at = |x| Light::Point { position: Vec3A::new(x, 0.0, 0.0), intensity: Rgb::ONE };
+    assert!(light(at(f32::INFINITY)).contains("finite position"));
+    let towards = |towards| Light::Distant { towards, one_minus_cos: 0.0, irradiance: Rgb::ONE };
+    assert!(light(towards(Vec3A::splat(2.0))).contains("length 1"));
+    let mesh = |change: &dyn Fn(&mut Mesh)| {
+        let mut mesh = Mesh::cuboid(DVec3::ONE);
+        change(&mut mesh);
+        error(&|s| {
+            let material = s.add_material(Material { surface: SurfaceMaterial::diffuse(Rgb::ONE), texture: None });
+            s.objects.push(Object { origin: "box".to_owned(), mesh: mesh.clone(), material, next: Vec::new() });
+        })
+    };
+    assert!(mesh(&|m| m.points[3].y = f64::NAN).contains("mesh `box`: expected finite points"));
+    assert!(mesh(&|m| m.triangles[0][1] = 99).contains("triangles of them"));
+    assert!(mesh(&|m| m.uvs.truncate(2)).contains("texture coordinates"));
     assert!(error(&|s| s.size(0, 48)).contains("at least one pixel"));
     assert!(error(&|s| s.yarns[0].fibers.clear()).contains("yarn `wool`"));
 }

@@ -141,6 +141,42 @@ impl Light {
         }
     }
 
+    /// What is wrong with its numbers, whoever made it.
+    pub fn problem(&self) -> Option<&'static str> {
+        let (color, places, units) = match self {
+            Self::Environment(environment) => (environment.radiance, vec![], vec![]),
+            Self::Distant { towards, irradiance, .. } => (*irradiance, vec![], vec![*towards]),
+            Self::Point { position, intensity } => (*intensity, vec![*position], vec![]),
+            Self::Spot { position, axis, intensity, .. } => (*intensity, vec![*position], vec![*axis]),
+            Self::Area(AreaLight { shape, radiance, .. }) => match *shape {
+                Shape::Rectangle { corner, x, y, .. } => (*radiance, vec![corner], vec![x, y]),
+                Shape::Disk { centre, normal, .. } => (*radiance, vec![centre], vec![normal]),
+                Shape::Sphere { centre, .. } => (*radiance, vec![centre], vec![]),
+            },
+        };
+        let positive = |size: f32| size > 0.0 && size.is_finite();
+        let has_size = match self {
+            Self::Area(AreaLight { shape: Shape::Rectangle { size, .. }, .. }) => positive(size.x) && positive(size.y),
+            Self::Area(AreaLight { shape: Shape::Disk { radius, .. } | Shape::Sphere { radius, .. }, .. }) => {
+                positive(*radius)
+            }
+            Self::Distant { one_minus_cos, .. } => (0.0..=1.0).contains(one_minus_cos),
+            Self::Spot { cos_inner, cos_outer, .. } => {
+                -1.0 <= *cos_outer && cos_outer <= cos_inner && *cos_inner <= 1.0
+            }
+            Self::Environment(_) | Self::Point { .. } => true,
+        };
+        if !(color.is_finite() && color.min_channel() >= 0.0) {
+            Some("expected finite light, 0 or more")
+        } else if !places.iter().all(|place| place.is_finite()) {
+            Some("expected a finite position")
+        } else if !units.iter().all(|unit| unit.is_normalized()) {
+            Some("expected directions of length 1")
+        } else {
+            (!has_size).then_some("expected sizes above 0 and angles in their range")
+        }
+    }
+
     /// Whether shadow rays must look for it. An even environment is left to the
     /// sampled directions, which all end in it.
     pub fn needs_shadow_rays(&self) -> bool {

@@ -138,7 +138,7 @@ impl SceneBuilder {
     /// Makes the scene.
     ///
     /// # Errors
-    /// If an index points at nothing, curves lack points or radii, a number is not finite, the picture has no pixels, or a
+    /// If an index points at nothing, curves lack points or radii, a number is not finite, a light has no size, the picture has no pixels, or a
     /// feature cannot be forced.
     pub fn build(self) -> Result<Scene, SceneError> {
         self.check()?;
@@ -249,6 +249,20 @@ impl SceneBuilder {
                     ));
                 }
             }
+        }
+        for Object { origin, mesh, next, .. } in &self.objects {
+            let n = mesh.points.len();
+            let finite = mesh.points.iter().chain(next).chain(&mesh.normals).all(|p| p.is_finite());
+            let counted = [mesh.normals.len(), mesh.uvs.len(), next.len()].iter().all(|count| [0, n].contains(count));
+            if !finite || !counted || mesh.triangles.iter().flatten().any(|&i| i as usize >= n) {
+                return fail(format!(
+                    "mesh `{origin}`: expected finite points, for all of them or for none normals and texture \
+                     coordinates, and triangles of them"
+                ));
+            }
+        }
+        if let Some((i, problem)) = self.lights.iter().enumerate().find_map(|(i, light)| Some((i, light.problem()?))) {
+            return fail(format!("light {}: {problem}", i + 1));
         }
         let of_objects = self.objects.iter().map(|o| o.material);
         if let Some(none) = of_objects.chain(self.ground.map(|g| g.material)).find(|&m| m >= self.materials.len()) {
