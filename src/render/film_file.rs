@@ -472,4 +472,70 @@ mod tests {
         header.as_object_mut().unwrap().remove("story");
         assert!(parse_header(&header, 1).is_none());
     }
+
+    /// Whoever writes the checksums right may still lie in the rest: an error each time, and no memory on the file's word.
+    #[test]
+    fn crafted_films_are_errors() {
+        let mut scene = SceneBuilder::new("a test");
+        scene.size(40, 33);
+        let scene = scene.build().unwrap();
+        let about = About::new(&scene, "4.3.3", Vec::new(), None);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.film");
+        write(&path, &about, &Job::new(&scene, None).unwrap()).unwrap();
+        let sound = std::fs::read(&path).unwrap();
+        let problem = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            let [read, checked] = [read(&path).map(drop), check(&path).map(drop)].map(|r| r.map_err(|e| e.to_string()));
+            assert!(read.is_err() || checked.is_ok(), "what is read must be sound: {checked:?}");
+            read.err()
+        };
+        assert_eq!(problem(&sound), None);
+        for length in (0..sound.len()).step_by(97) {
+            assert!(problem(&sound[..length]).is_some(), "cut at {length}");
+        }
+        assert!(problem(&[&sound[..], &[0]].concat()).is_some_and(|p| p.contains("1 bytes follow")));
+        // Headers with another value, and tiles that say another length.
+        let length = u32::from_le_bytes(sound[12..16].try_into().unwrap()) as usize;
+        let tiles = &sound[16 + length + 4..];
+        let header: Value = serde_json::from_slice(&sound[16..16 + length]).unwrap();
+        let with = |key: &str, value: Value| {
+            let mut header = header.clone();
+            *header.pointer_mut(key).unwrap() = value;
+            let json = header.to_string().into_bytes();
+            let mut bytes = [&sound[..12], &(json.len() as u32).to_le_bytes(), &json].concat();
+            bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+            [&bytes, tiles].concat()
+        };
+        assert_eq!(problem(&with("/done", json!(0))), None);
+        for (key, value) in [
+            ("/crop", json!([0, 0, 41, 33])),
+            ("/crop", json!([0, 0, 40, 32])),
+            ("/crop", json!([7, 0, 7, 33])),
+            ("/crop", json!([0, 0, -1, 33])),
+            ("/frame/width", json!(u32::MAX)),
+            ("/samples", json!([9, 3])),
+            ("/samples", json!([0, 1u64 << 40])),
+            ("/collected", json!(["position"])),
+            ("/collected", json!(["everything"])),
+            ("/light_scale_bits", json!(0)),
+            ("/light_scale_bits", json!(f32::NAN.to_bits())),
+            ("/shard", json!([3, 2])),
+            ("/counters", json!([1, 2])),
+            ("/keys", json!("none")),
+            ("/metadata", json!([["a", "matrix", [1, 2, 3]]])),
+        ] {
+            assert!(problem(&with(key, value.clone())).is_some(), "{key} = {value}");
+        }
+        let mut large = with("/crop", json!([0, 0, 65_536, 65_536]));
+        assert!(problem(&large).is_some());
+        large = with("/frame/width", json!(65_536));
+        assert_eq!(problem(&large), None, "a crop of a wide frame");
+        let first = sound.len() - tiles.len();
+        for length in [0, 8, u32::MAX, u32::from_le_bytes(tiles[..4].try_into().unwrap()) - 1] {
+            let mut bytes = sound.clone();
+            bytes[first..first + 4].copy_from_slice(&length.to_le_bytes());
+            assert!(problem(&bytes).is_some_and(|p| p.contains("tile 0 at byte")), "{length}");
+        }
+    }
 }
