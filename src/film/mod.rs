@@ -187,16 +187,16 @@ impl Film {
         let color = |sum: &[NarrowSum; 3]| sum.map(|v| (v.value() / n) as f32);
         let alpha = sums.alpha[i].value();
         let of_cover = |sum: NarrowSum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
-        let depth = |sum: &Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
+        let far_of_cover = |sum: Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
         Pixel {
             color: mean.map(|c| c as f32 * tile.scale),
             alpha: (alpha / n) as f32,
             variance: variance.map(|v| (v * f64::from(tile.scale).powi(2)) as f32),
-            depth: sums.depth.get(i).map_or(0.0, depth),
+            depth: sums.depth.get(i).map_or(0.0, |d| far_of_cover(*d)),
             normal: sums.normal.get(i).map_or([0.0; 3], normal),
             albedo: sums.albedo.get(i).map_or([0.0; 3], color),
-            position: sums.position.get(i).map_or([0.0; 3], |p| p.map(of_cover)),
+            position: sums.position.get(i).map_or([0.0; 3], |p| p.map(far_of_cover)),
             motion: sums.motion.get(i).map_or([0.0; 2], |m| m.map(of_cover)),
             uv: sums.uv.get(i).map_or([0.0; 2], |uv| uv.map(of_cover)),
             parts: sums

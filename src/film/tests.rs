@@ -82,7 +82,7 @@ fn tiles_come_back_from_their_bytes() {
     let layers = Layers::ALL;
     assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 84);
     assert_eq!(Tile::bytes_per_pixel(Layers::DEFAULT), 144);
-    assert_eq!(Tile::bytes_per_pixel(layers), 516);
+    assert_eq!(Tile::bytes_per_pixel(layers), 528);
     let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
     let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
     for x in 0..3 {
@@ -91,7 +91,7 @@ fn tiles_come_back_from_their_bytes() {
     }
     let mut bytes = Vec::new();
     tile.save(&mut bytes);
-    assert_eq!(bytes.len(), 6 * 516 + 3 * 16);
+    assert_eq!(bytes.len(), 6 * 528 + 3 * 16);
     let mut again = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
     assert_eq!(again.load(&bytes), Some(()));
     assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));
@@ -116,6 +116,20 @@ fn a_film_is_as_small_as_it_says() {
         // In memory they are as tight as in the file.
         assert_eq!(size_of_val(&*sums.color) + size_of_val(&*sums.square), 5 * 72);
     }
+}
+
+/// A kilometre away, in as many samples as anybody takes.
+#[test]
+fn far_positions_do_not_reach_the_limit_of_their_sums() {
+    let mut film = Film::new([0, 0, 1, 1], Layers::ALL, 1.0).unwrap();
+    let position = Vec3A::new(1e6, -1e6, 3.5);
+    film.tiles_mut()[0].add(0, 0, &Sample { alpha: 1.0, position, ..Sample::default() });
+    for _ in 0..16 {
+        let twice = film.clone();
+        film.add(&twice);
+    }
+    let pixel = film.pixel(0, 0);
+    assert_eq!((pixel.samples, pixel.position), (65_536, position.to_array()));
 }
 
 #[test]

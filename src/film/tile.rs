@@ -56,7 +56,8 @@ pub(super) struct Sums {
     pub(super) depth: Vec<Sum>,
     pub(super) normal: Vec<[NarrowSum; 3]>,
     pub(super) albedo: Vec<[NarrowSum; 3]>,
-    pub(super) position: Vec<[NarrowSum; 3]>,
+    /// Wide sums: a scene may lie a kilometre away, and many samples of that are beyond the narrow ones.
+    pub(super) position: Vec<[Sum; 3]>,
     pub(super) motion: Vec<[NarrowSum; 2]>,
     pub(super) uv: Vec<[NarrowSum; 2]>,
     pub(super) parts: Vec<[[NarrowSum; 3]; LightParts::COUNT]>,
@@ -176,7 +177,7 @@ impl Tile {
             add_each(albedo, sample.albedo.to_array());
         }
         if let Some(position) = sums.position.get_mut(i) {
-            add_each(position, sample.position.to_array());
+            position.iter_mut().zip(sample.position.to_array()).for_each(|(sum, v)| sum.add(v));
         }
         if let Some(motion) = sums.motion.get_mut(i) {
             add_each(motion, sample.motion.to_array());
@@ -282,7 +283,7 @@ impl Tile {
             + sized(layers.depth, Sum::BYTES)
             + sized(layers.normal, narrow)
             + sized(layers.albedo, narrow)
-            + sized(layers.position, narrow)
+            + sized(layers.position, <[Sum; 3]>::BYTES)
             + sized(layers.motion, <[NarrowSum; 2]>::BYTES)
             + sized(layers.uv, <[NarrowSum; 2]>::BYTES)
             + sized(layers.lobes, LightParts::COUNT * narrow)

@@ -34,7 +34,7 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"YARNFILM";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Longest header that is read: identities hold a few lines for each light, yarn and fabric.
 const HEADER_LIMIT: u32 = 64 << 20;
 /// Bytes of a tile besides its sums and its length: next samples, shares, rays, checksum.
