@@ -12,6 +12,7 @@ use super::{
     write_text,
 };
 use crate::{
+    files::has_extension,
     image::{
         self, Image,
         metric::{Comparison, Pair, flip, map},
@@ -154,10 +155,6 @@ fn of_different_kinds(paths: [&PathBuf; 2]) -> Option<(String, String)> {
         _ => return None,
     };
     Some((paths[a].display().to_string(), paths[b].display().to_string()))
-}
-
-fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }
 
 /// Values of the error map and where its scale ends.

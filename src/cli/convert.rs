@@ -15,6 +15,7 @@ use super::{
 use crate::{
     files::{
         curve_file::{self, ReadOptions, SOME_RADIUS},
+        extension,
         stage::PrimPattern,
     },
     geometry::curve::{Basis, CurveSet},
@@ -98,7 +99,7 @@ struct Abilities {
 fn abilities(path: &Path) -> Abilities {
     let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
     let least = Abilities { radii: true, varying: true, unit: false, colors: false, ids: false, bases: &[] };
-    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let extension = extension(path);
     match extension.as_deref() {
         Some("bcc") => Abilities { radii: false, bases: all, ..least },
         Some("hair") => Abilities { bases: &[Basis::CatmullRom], ..least },

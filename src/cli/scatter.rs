@@ -21,6 +21,7 @@ use crate::{
             ply_alone,
         },
     },
+    files::{extension, has_extension},
     input::document::Value as Setting,
     scene::{
         Model, Yarn,
@@ -156,10 +157,7 @@ struct Found {
 
 impl ScatterArgs {
     fn file(&self) -> Option<PathBuf> {
-        self.source
-            .as_ref()
-            .filter(|s| std::path::Path::new(s).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")))
-            .map(PathBuf::from)
+        self.source.as_ref().map(PathBuf::from).filter(|path| has_extension(path, "toml"))
     }
 
     fn models(&self) -> Vec<Model> {
@@ -309,7 +307,7 @@ impl ScatterArgs {
 
 pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
     for path in &args.out {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        let extension = extension(path).unwrap_or_default();
         if !matches!(extension.as_str(), "json" | "csv" | "svg" | "png") {
             return Err(input(format!("{}: expected the extension .json, .csv, .svg or .png", path.display())));
         }
@@ -327,10 +325,6 @@ pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
     }
 }
 
-fn extension_is(path: &std::path::Path, what: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(what))
-}
-
 fn pretty(value: &Value) -> String {
     serde_json::to_string_pretty(value).expect("numbers and text become JSON") + "\n"
 }
@@ -342,11 +336,11 @@ fn run_one(args: &ScatterArgs) -> Result<(), Failure> {
     let shown: Vec<(&str, &Measurement)> = found.all.iter().map(|(n, m)| (n.as_str(), m)).collect();
     let (mut attempts, mut written) = (Attempts::default(), Vec::new());
     for path in &args.out {
-        let is_written = if extension_is(path, "png") {
+        let is_written = if has_extension(path, "png") {
             attempts.note(picture::write_map(path, &format!("{}, theta {}", found.title, args.theta), &shown))
-        } else if extension_is(path, "csv") {
+        } else if has_extension(path, "csv") {
             attempts.note(write_text(path, &picture::distribution_csv(&shown)))
-        } else if extension_is(path, "svg") {
+        } else if has_extension(path, "svg") {
             let title = format!("{}, theta {}: share per radian of azimuth", found.title, args.theta);
             attempts.note(write_text(path, &picture::polar_svg(&title, &shown)))
         } else {
@@ -487,9 +481,9 @@ fn run_sweep(args: &ScatterArgs, sweep: &Sweep) -> Result<(), Failure> {
     };
     let (mut attempts, mut written) = (Attempts::default(), Vec::new());
     for path in &args.out {
-        let text = if extension_is(path, "csv") {
+        let text = if has_extension(path, "csv") {
             csv.clone()
-        } else if extension_is(path, "svg") {
+        } else if has_extension(path, "svg") {
             picture::sweep_svg(&format!("{title}: energy over {}", sweep.key), &sweep.key, &names, &rows)
         } else {
             as_json()

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     experiment::stress::{self, Bound, Outcome, Scale, figure},
+    files::has_extension,
     input::diagnostic::unknown_name,
 };
 
@@ -57,7 +58,7 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
         }
     }
     for path in &args.out {
-        if !path.extension().is_some_and(|e| e == "md" || e == "json") {
+        if !has_extension(path, "md") && !has_extension(path, "json") {
             return Err(Failure::Input(format!("error: {}: expected the extension .md or .json", path.display())));
         }
     }
@@ -81,7 +82,7 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(&json).expect("numbers and text become JSON") + "\n";
     let mut attempts = Attempts::default();
     for path in &args.out {
-        let markdown = path.extension().is_some_and(|e| e == "md");
+        let markdown = has_extension(path, "md");
         let content = if markdown { stress::to_markdown(&outcomes, scale, elapsed) } else { text.clone() };
         attempts.note(write_text(path, &content));
     }

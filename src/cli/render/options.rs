@@ -8,7 +8,7 @@ use std::{
 use clap::Args;
 
 use super::super::{Failure, SceneArgs, log::LogArgs};
-use crate::{render::Shard, scene::animation::numbered};
+use crate::{files::has_extension, render::Shard, scene::animation::numbered};
 
 const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml                                  writes out/swatch.exr
@@ -133,7 +133,7 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
 
 /// Whether a path names a film file.
 pub(in crate::cli) fn is_film_path(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("film"))
+    has_extension(path, "film")
 }
 
 /// Films and pictures apart.

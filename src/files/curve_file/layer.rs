@@ -4,13 +4,15 @@ use std::{io, path::Path};
 
 use super::SOME_RADIUS;
 use crate::{
-    files::stage::{self, CurvesOut, Interpolated},
+    files::{
+        extension,
+        stage::{self, CurvesOut, Interpolated},
+    },
     geometry::curve::{Basis, CurveSet, equal_radii},
 };
 
 pub(super) fn can_write(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    matches!(extension.as_deref(), Some("usd" | "usda" | "usdc"))
+    matches!(extension(path).as_deref(), Some("usd" | "usda" | "usdc"))
 }
 
 /// The most prims for curves that are of one width each.

@@ -29,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     files::{
+        extension, has_extension,
         stage::{self, PrimPattern, Stage},
         unreadable::hindrance,
     },
@@ -207,7 +208,7 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     if stage::is_stage(path) {
         return staged::read(path, options);
     }
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("smobj")) {
+    if has_extension(path, "smobj") {
         let own = path.with_extension("sf");
         let library = options.faces.as_ref().unwrap_or(&own);
         let in_library = |error: CurveFileError| {
@@ -252,7 +253,7 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
     if bytes.starts_with(yarns::MAGIC) {
         return Some(Format::Yarns);
     }
-    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+    match extension(path)?.as_str() {
         "bcc" => Some(Format::Bcc),
         "hair" => Some(Format::Hair),
         "obj" => Some(Format::Obj),
@@ -300,12 +301,12 @@ pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Curv
 
 /// Whether a file is named as those that [`read`] reads.
 pub fn can_read(path: &Path) -> bool {
-    recognise(&[], path).is_some() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("smobj"))
+    recognise(&[], path).is_some() || has_extension(path, "smobj")
 }
 
 /// The format that a file's name asks for, if it can be written.
 fn written_as(path: &Path) -> Option<Format> {
-    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+    match extension(path)?.as_str() {
         "bcc" => Some(Format::Bcc),
         "hair" => Some(Format::Hair),
         "obj" => Some(Format::Obj),

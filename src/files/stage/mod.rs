@@ -26,7 +26,10 @@ pub use select::PrimPattern;
 #[cfg(feature = "usd")]
 pub use usd::write::{CurvesOut, Interpolated, write};
 
-use crate::{files::unreadable::hindrance, geometry::curve::CurveSet};
+use crate::{
+    files::{extension, unreadable::hindrance},
+    geometry::curve::CurveSet,
+};
 
 /// Why a stage could not be read. Displays as one line: file, object, problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -141,8 +144,7 @@ enum Take<'a> {
 
 /// Whether a file's name says that it is a stage.
 pub fn is_stage(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    matches!(extension.as_deref(), Some("usd" | "usda" | "usdc" | "usdz" | "abc"))
+    matches!(extension(path).as_deref(), Some("usd" | "usda" | "usdc" | "usdz" | "abc"))
 }
 
 impl Stage {

@@ -13,7 +13,10 @@ use openusd::{
 };
 
 use super::children;
-use crate::geometry::curve::{Basis, Curve, equal_radii};
+use crate::{
+    files::extension,
+    geometry::curve::{Basis, Curve, equal_radii},
+};
 
 /// Values of a primvar beside curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,8 +50,7 @@ pub struct CurvesOut<'a> {
 /// # Errors
 /// The extension is not `.usda`, `.usdc` or `.usd`, a curve has too few points for its basis, or writing failed.
 pub fn write(path: &Path, unit_mm: f64, groups: &[CurvesOut<'_>], out: &mut impl io::Write) -> io::Result<()> {
-    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let text = match extension.as_deref() {
+    let text = match extension(path).as_deref() {
         Some("usda") => true,
         Some("usdc" | "usd") => false,
         _ => return Err(invalid("a USD file that is written ends in .usda, .usdc or .usd")),

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     files::{
         curve_file::{self, CurveFileError, ReadOptions},
-        stage,
+        has_extension, stage,
     },
     geometry::curve::{Basis, Curve, CurveSet},
     math::sampler::Stream,
@@ -304,7 +304,7 @@ impl CurveFile {
             }
         };
         if set.curves.is_empty() {
-            let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+            let is_obj = has_extension(path, "obj");
             let hint =
                 is_obj.then(|| "curves of an OBJ file are its lines (`l`); its triangles go into a [[mesh]]".into());
             context.error(self.span, format!("{}: it holds no curve that can be drawn", path.display()), hint);

@@ -18,7 +18,10 @@ use super::{
     yarns::Library,
 };
 use crate::{
-    files::curve_file::ReadOptions, geometry::curve::Basis, input::diagnostic::Span, pattern::knit::Thickness,
+    files::{curve_file::ReadOptions, has_extension},
+    geometry::curve::Basis,
+    input::diagnostic::Span,
+    pattern::knit::Thickness,
 };
 
 /// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
@@ -194,7 +197,7 @@ fn file_source(
     context: &Context<'_>,
 ) -> Source {
     let mut options = ReadOptions::default();
-    if by_option && path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pyp")) {
+    if by_option && has_extension(&path, "pyp") {
         options.tile = SHOWN_CELLS;
     }
     let mut up = Up::Auto;
