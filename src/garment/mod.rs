@@ -43,6 +43,7 @@ pub(crate) use self::{
     panels::{LengthRatio, Panel},
 };
 use crate::{
+    files::stage::glob,
     geometry::mesh::Mesh,
     pattern::{StrandKind, tile::Tile},
 };
@@ -357,14 +358,13 @@ fn choose(panels: &[Panel], cloths: &[Cloth]) -> Result<Vec<usize>, GarmentError
     let chosen: Vec<usize> = panels
         .iter()
         .map(|panel| {
-            let takes =
-                |c: &Cloth| c.group.as_ref().is_some_and(|g| matches(g, &panel.group) || matches(g, &panel.material));
+            let takes = |c: &Cloth| c.group.as_ref().is_some_and(|g| glob(g, &panel.group) || glob(g, &panel.material));
             cloths.iter().rposition(takes).unwrap_or(0)
         })
         .collect();
     for (i, cloth) in cloths.iter().enumerate() {
         let Some(group) = &cloth.group else { continue };
-        if !panels.iter().any(|p| matches(group, &p.group) || matches(group, &p.material)) {
+        if !panels.iter().any(|p| glob(group, &p.group) || glob(group, &p.material)) {
             let mut names: Vec<&str> =
                 panels.iter().flat_map(|p| [p.group.as_str(), p.material.as_str()]).filter(|n| !n.is_empty()).collect();
             names.sort_unstable();
@@ -380,26 +380,6 @@ fn choose(panels: &[Panel], cloths: &[Cloth]) -> Result<Vec<usize>, GarmentError
         debug_assert!(i > 0, "the first cloth is for the rest");
     }
     Ok(chosen)
-}
-
-/// Whether a name fits a pattern with `*` (any signs) and `?` (one).
-fn matches(pattern: &str, name: &str) -> bool {
-    let (p, n): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
-    let (mut i, mut j, mut star) = (0, 0, None);
-    while j < n.len() {
-        if i < p.len() && (p[i] == '?' || p[i] == n[j]) && p[i] != '*' {
-            (i, j) = (i + 1, j + 1);
-        } else if i < p.len() && p[i] == '*' {
-            star = Some((i, j));
-            i += 1;
-        } else if let Some((at, from)) = star {
-            (i, j) = (at + 1, from + 1);
-            star = Some((at, from + 1));
-        } else {
-            return false;
-        }
-    }
-    p[i..].iter().all(|c| *c == '*')
 }
 
 #[cfg(test)]

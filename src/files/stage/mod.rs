@@ -23,6 +23,7 @@ use glam::DMat4;
 
 pub use polygons::{FaceGroup, PolygonMesh};
 pub use select::PrimPattern;
+pub(crate) use select::glob;
 #[cfg(feature = "usd")]
 pub use usd::write::{CurvesOut, Interpolated, write};
 

@@ -58,32 +58,34 @@ impl PrimPattern {
 /// Whether a path is one that the pattern means; what lies below it is chosen on the way down.
 fn path_matches(pattern: &[String], path: &str) -> bool {
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
-    parts.len() == pattern.len() && pattern.iter().zip(parts).all(|(p, part)| glob(p.as_bytes(), part.as_bytes()))
+    parts.len() == pattern.len() && pattern.iter().zip(parts).all(|(p, part)| glob(p, part))
 }
 
-/// Whether `text` is what `pattern` says, byte by byte. Linear in time but for one star that may move on.
-fn glob(pattern: &[u8], text: &[u8]) -> bool {
-    let (mut p, mut t) = (0, 0);
+/// Whether a name is what a pattern says, with `*` for any letters and `?` for one.
+pub(crate) fn glob(pattern: &str, name: &str) -> bool {
+    let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
+    let (mut p, mut n) = (0, 0);
+    // The star before here, and from where on the name is what follows it.
     let mut star: Option<(usize, usize)> = None;
-    while t < text.len() {
+    while n < name.len() {
         match pattern.get(p) {
-            Some(b'*') => {
-                star = Some((p, t));
+            Some('*') => {
+                star = Some((p, n));
                 p += 1;
             }
-            Some(&c) if c == b'?' || c == text[t] => {
+            Some(&c) if c == '?' || c == name[n] => {
                 p += 1;
-                t += 1;
+                n += 1;
             }
             _ => {
                 let Some((at, from)) = star else { return false };
                 star = Some((at, from + 1));
                 p = at + 1;
-                t = from + 1;
+                n = from + 1;
             }
         }
     }
-    pattern[p..].iter().all(|&c| c == b'*')
+    pattern[p..].iter().all(|&c| c == '*')
 }
 
 #[cfg(test)]
@@ -108,11 +110,15 @@ mod tests {
             ("a*b*c", "aXbYbZc", true),
             ("a*b", "ab", true),
             ("a*b", "abc", false),
+            ("rib_*", "ribs", false),
+            ("front", "front2", false),
+            ("*a*b", "xaxbxb", true),
             ("??", "ab", true),
             ("?", "", false),
             ("**x", "yyx", true),
+            ("?rmel_*", "Ärmel_links", true),
         ] {
-            assert_eq!(glob(pattern.as_bytes(), text.as_bytes()), want, "{pattern} {text}");
+            assert_eq!(glob(pattern, text), want, "{pattern} {text}");
         }
     }
 
