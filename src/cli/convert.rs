@@ -18,7 +18,10 @@ use crate::{
         extension,
         stage::PrimPattern,
     },
-    geometry::curve::{Basis, CurveSet},
+    geometry::{
+        curve::{Basis, CurveSet},
+        proposal::UNITS,
+    },
 };
 
 const EXAMPLES: &str = "Examples:
@@ -37,10 +40,10 @@ pub(super) struct ConvertArgs {
     /// Where to write; the extension names the format.
     output: PathBuf,
     /// The input's unit, where its format has none; files that have a unit say it themselves.
-    #[arg(long, value_parser = ["um", "mm", "cm", "m", "in"])]
+    #[arg(long, value_parser = UNITS.map(|(name, _)| name))]
     unit: Option<String>,
     /// The unit to write in; that of the input if not given.
-    #[arg(long, value_parser = ["um", "mm", "cm", "m", "in"])]
+    #[arg(long, value_parser = UNITS.map(|(name, _)| name))]
     to_unit: Option<String>,
     /// Which objects of a stage, such as '/Garment/*' or 'material:/Looks/Wool'.
     #[arg(long, value_name = "PATTERN", value_parser = PrimPattern::parse)]
@@ -74,13 +77,7 @@ fn counts(text: &str) -> Result<[u32; 2], String> {
 
 /// Millimetres of a unit by its name, which clap has checked.
 fn millimetres(unit: &str) -> f64 {
-    match unit {
-        "um" => 1e-3,
-        "cm" => 10.0,
-        "m" => 1000.0,
-        "in" => 25.4,
-        _ => 1.0,
-    }
+    UNITS.iter().find(|(name, _)| *name == unit).map_or(1.0, |(_, mm)| *mm)
 }
 
 /// What a format can say.

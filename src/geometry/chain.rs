@@ -10,6 +10,7 @@ use super::{
     segment_uvs::{self, SegmentUvs},
     spline::{SplinePoint, Weights, evaluate},
 };
+use crate::math::special::GAUSS_LEGENDRE_4;
 
 /// A curve as a chain of segments that can be evaluated.
 pub(crate) struct Chain {
@@ -110,7 +111,7 @@ impl Chain {
 
     /// Arc length from the chain's start to each of its knots.
     pub(crate) fn lengths(&self) -> Vec<f64> {
-        let nodes = GAUSS.map(|(u, weight)| (Weights::new(self.basis, u), weight));
+        let nodes = GAUSS_LEGENDRE_4.map(|(u, weight)| (Weights::new(self.basis, u), weight));
         let length_of = |segment: usize| {
             let p = self.points_of(segment);
             let mut length = 0.0;
@@ -130,14 +131,6 @@ impl Chain {
         lengths
     }
 }
-
-/// Nodes and weights on 0..1 of Gauss's quadrature with four points, exact to the seventh power.
-pub(crate) const GAUSS: [(f64, f64); 4] = [
-    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-    (0.330_009_478_207_571_87, 0.326_072_577_431_273_1),
-    (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
-    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
-];
 
 /// Segments for which a task of their own is worth while.
 const PARALLEL: usize = 4096;

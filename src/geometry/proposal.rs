@@ -15,8 +15,8 @@ const MOST_STEPS: u32 = 60;
 const STRIDE: u32 = 4;
 /// Radius of a common yarn, millimetres: worsted knitting yarn has about 1, fine weaving yarn 0.2.
 const COMMON_RADIUS: f64 = 0.5;
-/// Units of length and their millimetres.
-const UNITS: [(&str, f64); 5] = [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("in", 25.4), ("m", 1000.0)];
+/// Units of length and their millimetres, the likeliest first.
+pub(crate) const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)];
 
 /// A guess, in the file's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]

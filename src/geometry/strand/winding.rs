@@ -6,9 +6,12 @@ use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::{StrandOptions, frames::PointFrame};
-use crate::geometry::{
-    chain::{Chain, GAUSS},
-    spline::{SplinePoint, Weights},
+use crate::{
+    geometry::{
+        chain::Chain,
+        spline::{SplinePoint, Weights},
+    },
+    math::special::GAUSS_LEGENDRE_4,
 };
 
 /// How far the inner side of a bend may run backwards, in yarn radii, before plies are seen to break: about the radius of one
@@ -125,7 +128,7 @@ impl Winding {
 /// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
 /// knots from there to there, and the tightest bend.
 fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) {
-    let [a, b, c, d] = GAUSS;
+    let [a, b, c, d] = GAUSS_LEGENDRE_4;
     let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (u, Weights::new(chain.basis, u), weight));
     let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
     // Where the segment before ends: straight segments do not go on as they began.

@@ -42,6 +42,7 @@ use super::{
     view::CameraSetup,
 };
 use crate::files::{curve_file, unreadable::in_words};
+use crate::geometry::proposal::UNITS;
 use crate::input::{
     diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},
@@ -76,9 +77,6 @@ impl fmt::Display for LoadError {
 }
 
 impl std::error::Error for LoadError {}
-
-/// Units of length and their millimetres.
-const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4), ("um", 1e-3)];
 
 /// From z up to y up: a quarter turn about x.
 const Y_UP: DMat3 = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
