@@ -154,9 +154,7 @@ FACE int32_t yarnray_oiio_write(const char *path, int32_t width, int32_t height,
             say(message, message_size, reason(OIIO::geterror(), "no writer knows this format"));
             return YARNRAY_OIIO_FAILED;
         }
-        const auto format = sample == YARNRAY_OIIO_U8     ? OIIO::TypeDesc::UINT8
-                            : sample == YARNRAY_OIIO_HALF ? OIIO::TypeDesc::HALF
-                                                          : OIIO::TypeDesc::FLOAT;
+        const auto format = sample == YARNRAY_OIIO_U8 ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
         OIIO::ImageSpec spec(width, height, channels, format);
         spec.attribute("oiio:ColorSpace", sample == YARNRAY_OIIO_U8 ? "sRGB" : "Linear");
         spec.attribute("CompressionQuality", 95); // the JPEG default of 75 shows its blocks in fine yarn

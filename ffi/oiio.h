@@ -18,8 +18,7 @@ extern "C" {
 #define YARNRAY_OIIO_TOO_LARGE 2
 
 #define YARNRAY_OIIO_U8 0
-#define YARNRAY_OIIO_HALF 1
-#define YARNRAY_OIIO_FLOAT 2
+#define YARNRAY_OIIO_FLOAT 1
 
 typedef struct YarnrayOiioImage {
     int32_t width, height, channels;

@@ -571,10 +571,10 @@ impl Knit {
         }
         let cell = |kind: &Vec<bool>| {
             let row: Vec<&str> = kind.iter().map(|purl| if *purl { "p" } else { "k" }).collect();
-            let chart = Chart::parse(&[row.join(" ")]).ok()?;
-            Some(Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size))
+            let chart = Chart::parse(&[row.join(" ")]).expect("knits and purls are a chart");
+            Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size)
         };
-        Kinds { cells: known.par_iter().filter_map(cell).collect(), of_row }
+        Kinds { cells: known.par_iter().map(cell).collect(), of_row }
     }
 }
 

@@ -158,7 +158,7 @@ impl PolygonMesh {
 
     /// Adds another one. Where one of them has no texture coordinates its own are zero; normals are kept where both have
     /// them.
-    pub(super) fn append(&mut self, other: Self) {
+    pub(super) fn append(&mut self, mut other: Self) {
         let (first_point, first_face) = (self.points.len() as u32, self.counts.len() as u32);
         if !self.uv_corners.is_empty() || !other.uv_corners.is_empty() {
             let zero = |mesh: &mut Self| {
@@ -167,13 +167,11 @@ impl PolygonMesh {
                     mesh.uv_corners = vec![0; mesh.corners.len()];
                 }
             };
-            let mut other_uvs = Self { corners: other.corners.clone(), ..Self::default() };
-            (other_uvs.uvs, other_uvs.uv_corners) = (other.uvs.clone(), other.uv_corners.clone());
             zero(self);
-            zero(&mut other_uvs);
+            zero(&mut other);
             let first = self.uvs.len() as u32;
-            self.uvs.extend(other_uvs.uvs);
-            self.uv_corners.extend(other_uvs.uv_corners.into_iter().map(|i| i + first));
+            self.uvs.extend(other.uvs);
+            self.uv_corners.extend(other.uv_corners.into_iter().map(|i| i + first));
         }
         if self.corners.is_empty() || (!self.normals.is_empty() && !other.normals.is_empty()) {
             self.normals.extend(&other.normals);
