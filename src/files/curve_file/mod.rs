@@ -27,13 +27,15 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use crate::{
     files::{
         extension, has_extension,
         stage::{self, PrimPattern, Stage},
         unreadable::hindrance,
     },
-    geometry::curve::{Basis, Curve, CurveSet},
+    geometry::curve::{Basis, CurveSet},
     pattern::tile::Tile,
 };
 
@@ -52,7 +54,8 @@ pub(crate) const SOME_RADIUS: f64 = 0.5;
 /// What the file itself cannot say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
-    /// How the points of a text, cyHair or OBJ file are meant; Catmull-Rom if absent. The other formats know their own.
+    /// How the points of a text, cyHair, OBJ or `.yarns` file are meant; Catmull-Rom if absent. The other formats know their
+    /// own.
     pub basis: Option<Basis>,
     /// How many cells of a periodic pattern (PYP) to lay out along x and y; each at least 1.
     pub tile: [u32; 2],
@@ -165,9 +168,9 @@ impl std::error::Error for CurveFileError {}
 
 /// Reads the curves of a file.
 ///
-/// Stages are known by their extension (`.usd`, `.usda`, `.usdc`, `.usdz`, `.abc`). Else the content decides first (a BCC
-/// file is known by its first three letters, cyHair by four), then the extension: `.bcc`, `.hair`, `.pyp`, `.obj`, `.txt`
-/// or `.curves`. Repairs are listed in [`CurveSet::notes`].
+/// Stages are known by their extension (`.usd`, `.usda`, `.usdc`, `.usdz`, `.abc`), and stitch meshes (`.smobj`). Else the
+/// content decides first (BCC, cyHair and `.yarns` files begin with letters of their own), then the extension: `.bcc`,
+/// `.hair`, `.pyp`, `.obj`, `.yarns`, `.txt` or `.curves`. Repairs are listed in [`CurveSet::notes`].
 ///
 /// # Errors
 /// The file cannot be read, is of no known format, or breaks the rules of its format.
@@ -180,7 +183,12 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileErr
 /// # Errors
 /// As [`read`]; a file of another format.
 pub fn read_tile(path: &Path) -> Result<Tile, CurveFileError> {
-    read_bytes(path).and_then(|bytes| pyp::tile(&bytes)).map_err(|error| error.in_file(path))
+    let read = || {
+        let tile = pyp::tile(&read_bytes(path)?)?;
+        check_reach(tile.strands.iter().map(|strand| strand.points.as_slice()))?;
+        Ok(tile)
+    };
+    read().map_err(|error: CurveFileError| error.in_file(path))
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, CurveFileError> {
@@ -231,11 +239,16 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
 
 /// The curves, unless they reach so far that no picture of them could be made.
 fn within_reach(set: CurveSet) -> Result<CurveSet, CurveFileError> {
-    let far = |(number, curve): (usize, &Curve)| {
-        let point = curve.points.iter().position(|point| point.abs().max_element() > FARTHEST)?;
-        Some((number, point, curve.points[point]))
+    check_reach(set.curves.iter().map(|curve| curve.points.as_slice()))?;
+    Ok(set)
+}
+
+fn check_reach<'a>(curves: impl Iterator<Item = &'a [DVec3]>) -> Result<(), CurveFileError> {
+    let far = |(number, points): (usize, &[DVec3])| {
+        let point = points.iter().position(|point| point.abs().max_element() > FARTHEST)?;
+        Some((number, point, points[point]))
     };
-    let Some((curve, point, at)) = set.curves.iter().enumerate().find_map(far) else { return Ok(set) };
+    let Some((curve, point, at)) = curves.enumerate().find_map(far) else { return Ok(()) };
     let problem = format!(
         "point {point} of curve {curve} is at [{:e}, {:e}, {:e}]; coordinates may be at most {FARTHEST:e}",
         at.x, at.y, at.z

@@ -52,10 +52,17 @@ fn errors_name_the_file() {
 
 #[test]
 fn points_beyond_all_reach_are_an_error() {
-    let (_folder, path) = scratch("far.txt", b"0 0 0\n1 0 0\n\n0 0 0\n0 -1e300 0\n");
+    let (folder, path) = scratch("far.txt", b"0 0 0\n1 0 0\n\n0 0 0\n0 -1e300 0\n");
     let error = read(&path, &ReadOptions::default()).expect_err("too far").to_string();
     let problem = "point 1 of curve 1 is at [0e0, -1e300, 0e0]; coordinates may be at most 1e12; is the file damaged?";
     assert_eq!(error, format!("{}: {problem}", path.display()));
+    // A tile too.
+    let path = folder.path().join("far.pyp");
+    let text = "*pattern\n10 20 0.5 1\n*Q\n1 1 1e13 0\n*E\n0 0 1 0\n";
+    fs::write(&path, text).unwrap();
+    assert!(read_tile(&path).unwrap_err().to_string().contains("coordinates may be at most 1e12"));
+    fs::write(&path, text.replace("1e13", "1")).unwrap();
+    assert!(read_tile(&path).is_ok());
 }
 
 #[test]
