@@ -402,9 +402,9 @@ fn summary(timed: &[(Figures, f64)], method: Method, truth: &Converged, target: 
     (run, time)
 }
 
-/// A converged picture from the cache, or rendered and put there; and its file, from the directory of the table.
-/// The picture that a job converges to, in two halves, and its file: as many samples as the job says, or fewer once the relMSE
-/// of a half is estimated to be below `limit`.
+/// The picture that a job converges to, in two halves, from the cache or rendered and put there; and its file, from the
+/// directory of the table. It has as many samples as the job says, or fewer once the relMSE of a half is estimated to be below
+/// `limit`.
 pub(super) fn converge(
     suite: &Suite,
     job: &Job<'_>,

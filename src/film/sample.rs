@@ -10,7 +10,7 @@ use crate::math::Rgb;
 pub struct Sample {
     /// Radiance.
     pub radiance: Rgb,
-    /// 1 if the camera's ray met cloth or ground that scattered it, else 0.
+    /// 1 if the camera's ray met cloth, a mesh or ground that scattered it, or a light that is seen, else 0.
     pub alpha: f32,
     /// Depth along the view where it first scattered, millimetres; zero without.
     pub depth: f32,

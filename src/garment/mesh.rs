@@ -178,8 +178,9 @@ impl GarmentMesh {
                     if corners.len() > 4 {
                         polygons.add(&part.group, number);
                     }
-                    for (a, b) in mesh.cut(&corners) {
-                        let of = |k: usize| [corners[0], corners[a], corners[b]][k];
+                    // Always about the first corner: all frames of an animation must be cut alike.
+                    for k in 1..corners.len() - 1 {
+                        let of = |corner: usize| [corners[0], corners[k], corners[k + 1]][corner];
                         mesh.faces.push(Face {
                             points: [0, 1, 2].map(|k| of(k).0),
                             uvs: [0, 1, 2].map(|k| of(k).1),
@@ -196,12 +197,6 @@ impl GarmentMesh {
         }
         polygons.note("faces of more than four corners were cut into triangles", &mut mesh.notes);
         Ok(mesh)
-    }
-
-    /// The triangles of a polygon as pairs of corners beside the first. A quad is cut along its shorter diagonal only if
-    /// that begins at its first corner: all frames of an animation must be cut alike.
-    fn cut(&self, corners: &[(u32, u32)]) -> impl Iterator<Item = (usize, usize)> + use<> {
-        (1..corners.len() - 1).map(|i| (i, i + 1))
     }
 
     fn part(&mut self, part: &Part) -> u32 {
