@@ -427,3 +427,23 @@ fn forced_features_are_part_of_what_a_checkpoint_is_of() {
     assert_eq!(run.status, Some(2), "{}", run.stdout);
     assert!(run.stderr.contains("is damaged"), "{}", run.stderr);
 }
+
+/// The second of two runs on one checkpoint would write over what the first has.
+#[test]
+fn a_checkpoint_is_one_run_s_at_a_time() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "s.toml", SWATCH);
+    let other = std::fs::File::create(d.join("c.film.lock")).unwrap();
+    other.lock().unwrap();
+    let refused = render(d, "--spp 1 --checkpoint c.film -o a.exr");
+    assert!(
+        refused.status == Some(2) && refused.stderr.contains("another run renders to c.film\n"),
+        "{}",
+        refused.stderr
+    );
+    assert!(!d.join("c.film").exists() && d.join("c.film.lock").exists());
+    drop(other);
+    render(d, "--spp 1 --checkpoint c.film -o a.exr").good();
+    assert!(d.join("c.film").exists() && !d.join("c.film.lock").exists());
+}

@@ -1,6 +1,7 @@
 //! Films that are saved on the way and gone on from.
 
 use std::{
+    fs::{File, TryLockError},
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -38,6 +39,38 @@ pub(super) fn check_shard(args: &RenderArgs, scene: &Scene, outputs: &Outputs) -
         ));
     }
     Ok(())
+}
+
+/// Keeps other runs off a checkpoint while this one renders to it.
+pub(super) struct Lock {
+    path: PathBuf,
+    _file: File,
+}
+
+impl Lock {
+    /// Takes the checkpoint, if one is written and no other run has it. The system gives it back when a run ends, however it
+    /// does. Where there are no locks on files nothing is kept off.
+    pub(super) fn take(args: &RenderArgs) -> Result<Option<Self>, Failure> {
+        let Some(checkpoint) = args.checkpoint.as_deref() else { return Ok(None) };
+        let mut path = checkpoint.to_owned().into_os_string();
+        path.push(".lock");
+        let path = PathBuf::from(path);
+        let Ok(file) = File::create(&path) else { return Ok(None) };
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(Failure::Input(format!(
+                "error: another run renders to {}\n  hint: wait for it, or give this one a checkpoint of its own",
+                checkpoint.display()
+            ))),
+            _ => Ok(Some(Self { path, _file: file })),
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // What cannot be removed is locked by nobody.
+        let _ = std::fs::remove_file(&self.path);
+    }
 }
 
 /// The checkpoint to go on from, if there is one and it is asked for.

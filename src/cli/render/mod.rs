@@ -31,7 +31,7 @@ use crate::{
     report::{self, Phases, RunRecord},
     scene::{Layers, Scene},
 };
-use checkpoint::{Saver, check_shard, old_checkpoint, resumed};
+use checkpoint::{Lock, Saver, check_shard, old_checkpoint, resumed};
 use options::Outputs;
 pub(super) use options::{RenderArgs, is_film_path};
 use progress::{bar, show, summary, warn};
@@ -55,6 +55,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let memory = Memory::new(&scene);
     memory.check()?;
     let (pool, threads) = thread_pool(scene.render.threads)?;
+    let _lock = Lock::take(args)?;
     let old = old_checkpoint(args)?;
     let load = started.elapsed();
     log::phase("load", load);
