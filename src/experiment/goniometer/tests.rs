@@ -195,8 +195,8 @@ fn the_recommended_model_keeps_its_distance_from_the_oracle() {
     // Of one ply, fibres that only transmit make most of the third error.
     // With 16,000 paths and one seed for all cases, noise alone moves these means by 0.001 (relative ones by 0.005).
     for (name, cases, paths, bounds) in [
-        ("one ply", dense(&|n| n == 1), 128_000, [0.006, 0.0072, 0.032, 0.05]),
-        ("several plies", dense(&|n| n > 1), 512_000, [0.0045, 0.0025, 0.028, 0.008]),
+        ("one ply", dense(&|n| n == 1), 128_000, [0.0098, 0.0066, 0.05, 0.046]),
+        ("several plies", dense(&|n| n > 1), 512_000, [0.0061, 0.0022, 0.035, 0.0075]),
     ] {
         let ours = errors(Model::Aggregated, &cases, paths);
         let printed = errors(Model::Printed, &cases, 16_000);
