@@ -56,10 +56,14 @@ impl AfterFiber {
     /// Expected fibres from one knot to the next.
     pub(crate) const STEP: f32 = 0.4;
 
-    /// Of fibres of which none is within so many expected ones of light that goes on, and of light that goes back but in the strip.
+    /// Of fibres of which none is within so many expected ones of light that goes on, and of light that goes back by less the more it is turned:
+    /// by the square of what the cosine is above -1, and a tenth at the least.
     pub(crate) fn free(fibers: f32) -> Self {
-        let knots = |free: f32| std::array::from_fn(|knot| [free.min(Self::STEP * knot as f32); 4]);
-        Self { first: knots(fibers), later: knots(fibers), back: knots(0.0) }
+        let knots = |shares: [f32; 4]| {
+            std::array::from_fn(|knot| shares.map(|share| (share * fibers).min(Self::STEP * knot as f32)))
+        };
+        let back = TURN_COSINES[1].map(|cos| (1.0 + cos).powi(2).max(0.1));
+        Self { first: knots([1.0; 4]), later: knots([1.0; 4]), back: knots([back[0], back[0], back[1], back[1]]) }
     }
 
     /// That of light by whether it met others before the fibre, by the cosine of its turn across it and by how much its way is along the
