@@ -42,8 +42,10 @@ pub struct AfterFiber {
     pub first: [[f32; 4]; AfterFiber::KNOTS],
     /// Of light that goes on after another one.
     pub later: [[f32; 4]; AfterFiber::KNOTS],
-    /// Of light that goes back, where those in the [`ClearedStrip`] are not expected.
+    /// Of light that goes back after the first, where those in the [`ClearedStrip`] are not expected.
     pub back: [[f32; 4]; AfterFiber::KNOTS],
+    /// Of light that goes back after another one, where all are expected. Below 0 where the one before is in its way.
+    pub back_later: [[f32; 4]; AfterFiber::KNOTS],
 }
 
 /// By how much the light of [`AfterFiber`] is turned, radians: 0 and 30 degrees, as which all up to a right angle counts; 95 and 150.
@@ -63,7 +65,8 @@ impl AfterFiber {
             std::array::from_fn(|knot| shares.map(|share| (share * fibers).min(Self::STEP * knot as f32)))
         };
         let back = TURN_COSINES[1].map(|cos| (1.0 + cos).powi(2).max(0.1));
-        Self { first: knots([1.0; 4]), later: knots([1.0; 4]), back: knots([back[0], back[0], back[1], back[1]]) }
+        let back = knots([back[0], back[0], back[1], back[1]]);
+        Self { first: knots([1.0; 4]), later: knots([1.0; 4]), back, back_later: back }
     }
 
     /// That of light by whether it met others before the fibre, by the cosine of its turn across it and by how much its way is along the
@@ -71,7 +74,8 @@ impl AfterFiber {
     #[inline]
     pub(crate) fn turned(&self, later: bool, turn: f32, short: f32) -> AfterTurn<'_> {
         let (rows, [little, much]) = match later {
-            _ if turn < 0.0 => (&self.back, TURN_COSINES[1]),
+            false if turn < 0.0 => (&self.back, TURN_COSINES[1]),
+            true if turn < 0.0 => (&self.back_later, TURN_COSINES[1]),
             false => (&self.first, TURN_COSINES[0]),
             true => (&self.later, TURN_COSINES[0]),
         };
@@ -353,6 +357,7 @@ mod tests {
 
     #[test]
     fn after_a_fiber_no_more_are_met_than_are_expected_and_the_more_the_more_are() {
+        assert_eq!(TURN_COSINES, TURNS.map(|turns| turns.map(|turn| turn.cos() as f32)));
         let free = AfterFiber::free(0.5);
         assert!((free.turned(true, 1.0, 0.3).met(2.0) - 1.5).abs() < 1e-6);
         let rows = std::array::from_fn(|knot| [0.4, 0.3, 0.2, 0.1].map(|step: f32| step * knot as f32));

@@ -131,27 +131,30 @@ struct Hit {
 }
 
 /// Light that is out, about each number of expected fibres, and what would be of fibres at random.
-#[derive(Clone, Copy, Default)]
 struct Out {
+    /// Extinction per expected fibre.
+    rate: f64,
+    least: bool,
     counted: [f64; AfterFiber::KNOTS + 1],
     at_random: [f64; AfterFiber::KNOTS + 1],
 }
 
 impl Out {
-    fn rate(ply: &PlyShape) -> f64 {
-        (1.0 - ply.mean_dead_zone()).recip()
+    fn of(ply: &PlyShape, least: bool) -> Self {
+        let none = [0.0; AfterFiber::KNOTS + 1];
+        Self { rate: (1.0 - ply.mean_dead_zone()).recip(), counted: none, at_random: none, least }
     }
 
-    fn add(&mut self, weight: f64, expected: f64, is_out: bool, ply: &PlyShape) {
+    fn add(&mut self, weight: f64, expected: f64, is_out: bool) {
         let at = (expected / f64::from(AfterFiber::STEP)).min((AfterFiber::KNOTS - 1) as f64);
         for (knot, share) in [(at as usize, 1.0 - at.fract()), (at as usize + 1, at.fract())] {
             self.counted[knot] += weight * share * f64::from(u8::from(is_out));
-            self.at_random[knot] += weight * share * (-Self::rate(ply) * expected).exp();
+            self.at_random[knot] += weight * share * (-self.rate * expected).exp();
         }
     }
 
     /// How many of the expected fibres are missing at each knot; where too little is out to tell, as many as at the one before.
-    fn missing(&self, ply: &PlyShape) -> Knots {
+    fn missing(&self) -> Knots {
         const LEAST: f64 = 12.0;
         let mut missing = [0.0f32; AfterFiber::KNOTS];
         for knot in 1..AfterFiber::KNOTS {
@@ -159,9 +162,9 @@ impl Out {
             missing[knot] = if self.counted[knot] < LEAST {
                 before
             } else {
-                let missing = (self.counted[knot] / self.at_random[knot]).ln() / Self::rate(ply);
+                let missing = (self.counted[knot] / self.at_random[knot]).ln() / self.rate;
                 // The more are to be expected, the more are met.
-                missing.clamp(0.0, f64::from(before + AfterFiber::STEP)) as f32
+                missing.min(f64::from(before + AfterFiber::STEP)).max(if self.least { 0.0 } else { -2.0 }) as f32
             };
         }
         missing
@@ -216,11 +219,11 @@ impl Lines {
         let rows = |[[a, b], [c, d]]: [[[Knots; 2]; 2]; 2], which: usize| {
             std::array::from_fn(|knot| [a, b, c, d].map(|numbers| numbers[which][knot]))
         };
-        AfterFiber { first: rows(onward, 0), later: rows(onward, 1), back: rows(back, 0) }
+        AfterFiber { first: rows(onward, 0), later: rows(onward, 1), back: rows(back, 0), back_later: rows(back, 1) }
     }
 
     /// The same of light that is turned by an angle, on ways in all directions or near one of an angle: after the first fibre on
-    /// a line, and after another one.
+    /// a line and, of light that goes on, after another one.
     fn after_on_ways(&self, sections: &[Vec<DVec2>], ply: &PlyShape, turn: f64, axis: Option<f64>) -> [Knots; 2] {
         /// How near, radians.
         const NEAR: f64 = 0.25;
@@ -228,7 +231,7 @@ impl Lines {
         let mut stream = Stream::new(0xaf7e);
         let mut next = || f64::from(stream.next());
         let turns = [turn, -turn];
-        let mut counts = [Out::default(); 2];
+        let mut counts = [Out::of(ply, true), Out::of(ply, turn < FRAC_PI_2)];
         let mut hits = Vec::new();
         for ray in 0..RAYS {
             let discs = &sections[ray % sections.len()];
@@ -252,36 +255,40 @@ impl Lines {
                 continue;
             };
             hits.swap(0, first);
-            let other = 1 + ((next() * (hits.len() - 1) as f64) as usize).min(hits.len().saturating_sub(2));
-            // The other stands for all but the first.
-            let weights = [1.0, hits.len() as f64 - 1.0];
-            for ((hit, weight), count) in
-                [hits.first(), hits.get(other)].into_iter().flatten().zip(weights).zip(&mut counts)
-            {
+            // Any other one stands for all but the first.
+            let others = hits.len() - 1;
+            let other = 1 + (next() * others as f64) as usize;
+            let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f64))];
+            for (later, (hit, count)) in looked_at.into_iter().zip(&mut counts).enumerate() {
+                let Some((hit, weight)) = hit else { continue };
                 let at = |lies: f64| lies * along + offset * across;
                 let tilt = self.slopes.half_width(discs[hit.fiber], across);
                 for &turn in turns {
                     let w = DVec2::from_angle(turn).rotate(along);
                     // As the model has it: abreast of the fibre's centre, and from where the light came.
                     let from = at(hit.lies) + FRAC_PI_4 * self.radius * (along.dot(w).max(0.0) * w - along);
-                    if let Some(ahead) = self.ahead(ply, from, w, turn) {
-                        let is_free = |(fiber, disc): (usize, &DVec2)| {
-                            let way = *disc - at(hit.enter);
-                            fiber == hit.fiber
-                                || way.dot(w) < 0.0
-                                || way.dot(w.perp()).abs() >= self.radius * self.slopes.half_width(*disc, w.perp())
-                        };
-                        count.add(weight, tilt * ahead, discs.iter().enumerate().all(is_free), ply);
+                    if let Some(ahead) = self.ahead(ply, from, w, later == 0 && turn.abs() > FRAC_PI_2, turn) {
+                        count.add(weight, tilt * ahead, self.is_free(discs, hit.fiber, at(hit.enter), w));
                     }
                 }
             }
         }
-        counts.map(|count| count.missing(ply))
+        counts.map(|count| count.missing())
+    }
+
+    /// Whether a way from a place on a fibre meets no other.
+    fn is_free(&self, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> bool {
+        discs.iter().enumerate().all(|(other, disc)| {
+            let way = *disc - from;
+            other == fiber
+                || way.dot(w) < 0.0
+                || way.dot(w.perp()).abs() >= self.radius * self.slopes.half_width(*disc, w.perp())
+        })
     }
 
     /// The fibres, as circles, that light is expected to meet from a place in a direction, into which it was turned by an angle. `None` if
     /// the place is outside and there are none.
-    fn ahead(&self, ply: &PlyShape, from: DVec2, w: DVec2, turn: f64) -> Option<f64> {
+    fn ahead(&self, ply: &PlyShape, from: DVec2, w: DVec2, cleared: bool, turn: f64) -> Option<f64> {
         let root = self.stretch.sqrt();
         let (beside, reach) = (from.dot(w.perp()), self.reach(w.perp()));
         if beside.abs() >= reach * (1.0 + self.radius) {
@@ -293,7 +300,7 @@ impl Lines {
         let [offset, length, thin, wide] =
             [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
         let chord = ply.chord(offset, length, thin, wide);
-        let ahead = if turn.abs() > FRAC_PI_2 {
+        let ahead = if cleared {
             ClearedStrip::new(2.0 * thin * self.radius as f32, turn.cos() as f32).fibers(&chord, foot)
         } else {
             chord.ahead(-foot)

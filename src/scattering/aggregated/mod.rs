@@ -38,7 +38,7 @@ use crate::{
         sampler::{OneOf, Stream},
     },
 };
-use backward::Backward;
+use backward::{Backward, Lobe};
 use forward::Forward;
 use single::LateNode;
 
@@ -262,7 +262,7 @@ impl<'a> Vertex<'a> {
         if let Some(forward) = &self.forward {
             forward.toward(&self.view, w, |spot, part| {
                 let value = part.value * mis_weight(light_pdf, part.density());
-                start.offer(value.mean(), (*spot, false));
+                start.offer(value.mean(), (*spot, None));
                 lobes.f += value;
             });
         }
@@ -273,19 +273,17 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            start.offer((lobes.r + lobes.tt + lobes.d).mean(), (node.spot, false));
+            start.offer((lobes.r + lobes.tt + lobes.d).mean(), (node.spot, None));
             let lobe = self.backward.of(&self.view, node);
             lobe.evaluate(&self.view, node, (w, light_pdf), value.open, at_node, |spot, value| {
-                start.offer(value.mean(), (*spot, true));
+                start.offer(value.mean(), (*spot, Some(lobe)));
                 lobes.b += value;
             });
         }
         // B leaves from elsewhere than its place.
-        let start = start.drawn.map(|(spot, wandered)| match self.node.get(&self.view) {
-            Some(node) if wandered => self.backward.of(&self.view, node).start(&self.view, &spot, w),
-            _ => spot.inside.point,
-        });
-        Direct { lobes, start }
+        let leaves_from =
+            |(spot, lobe): (Spot, Option<&Lobe>)| lobe.map_or(spot.inside.point, |b| b.start(&self.view, &spot, w));
+        Direct { lobes, start: start.drawn.map(leaves_from) }
     }
 
     /// The density, 1/steradian, with which paths go on as F towards `w`, whichever of its parts they belong to: a check of
