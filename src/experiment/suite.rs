@@ -49,6 +49,8 @@ pub(crate) struct Suite {
     pub max_spp: u32,
     /// Size of all pictures; `None` leaves it to the scenes.
     pub size: Option<[u32; 2]>,
+    /// How many packings of fibres a picture is the mean of, by seeds of the first fabric; with 1 the scene's own.
+    pub packings: u32,
     /// Scenes under lights, in order.
     pub cases: Vec<Case>,
     /// Rows that need files which are not there.
@@ -208,6 +210,7 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
         min_seconds: quality.min_seconds,
         max_spp: quality.max_spp,
         size: quality.size,
+        packings: quality.packings,
         cases,
         missing,
         converge,
@@ -355,11 +358,21 @@ struct Quality {
     min_seconds: f64,
     max_spp: u32,
     size: Option<[u32; 2]>,
+    packings: u32,
 }
 
 impl Quality {
     fn read(table: &Reader<'_>) -> Self {
-        Self { target: 0.01, repeats: 3, converged: 4.0, min_seconds: 0.0, max_spp: 1 << 16, size: None }.over(table)
+        let usual = Self {
+            target: 0.01,
+            repeats: 3,
+            converged: 4.0,
+            min_seconds: 0.0,
+            max_spp: 1 << 16,
+            size: None,
+            packings: 1,
+        };
+        usual.over(table)
     }
 
     /// These, where the table does not say otherwise.
@@ -375,6 +388,7 @@ impl Quality {
             min_seconds: table.f64_or("min_seconds", self.min_seconds, Range::between(0.0, 3600.0)),
             max_spp: table.u64_or("max_spp", self.max_spp.into(), 2..=u64::from(u32::MAX)) as u32,
             size: size.map(|size| size.map(|v| v as u32)).or(self.size),
+            packings: table.u64_or("packings", self.packings.into(), 1..=1000) as u32,
         }
     }
 }

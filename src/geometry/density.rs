@@ -30,22 +30,31 @@ pub struct PlyPacking {
     pub after: Option<AfterFiber>,
 }
 
-/// How many fibres fewer than at random places light meets on its way out after one that it met, by how many it is expected to meet:
-/// others are kept away by the first, and then follow all the closer. Such a row is of so many times [`AfterFiber::STEP`] expected
-/// fibres, and the last one of more.
-///
-/// Of a row's four numbers two are of light that is turned in the section by one angle, on ways along the long axis of a pressed section
-/// and along the short one, and two of light that is turned by another: by [`TURNS`].
+/// How many fibres fewer than at random places light meets on its way out after one that it met: others are kept away by the first, and
+/// then follow all the closer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AfterFiber {
     /// Of light that goes on after the first fibre on its way into the ply.
-    pub first: [[f32; 4]; AfterFiber::KNOTS],
+    pub first: MissingFibers,
     /// Of light that goes on after another one.
-    pub later: [[f32; 4]; AfterFiber::KNOTS],
+    pub later: MissingFibers,
     /// Of light that goes back after the first, where those in the [`ClearedStrip`] are not expected.
-    pub back: [[f32; 4]; AfterFiber::KNOTS],
+    pub back: MissingFibers,
     /// Of light that goes back after another one, where all are expected. Below 0 where the one before is in its way.
-    pub back_later: [[f32; 4]; AfterFiber::KNOTS],
+    pub back_later: MissingFibers,
+}
+
+/// The fibres that are missing by how many are expected: a row is of so many times [`AfterFiber::STEP`] expected fibres, and the last one of
+/// more.
+///
+/// Of a row's four numbers two are of light that is turned in the section by one angle, on ways along the long axis of a pressed section
+/// and along the short one, and two of light that is turned by another: by [`TURNS`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MissingFibers {
+    /// On ways through the inside of the ply.
+    pub inside: [[f32; 4]; AfterFiber::KNOTS],
+    /// On ways by its rim ([`PlyShape::by_rim`]).
+    pub rim: [[f32; 4]; AfterFiber::KNOTS],
 }
 
 /// By how much the light of [`AfterFiber`] is turned, radians: 0 and 30 degrees, as which all up to a right angle counts; 95 and 150.
@@ -62,7 +71,8 @@ impl AfterFiber {
     /// by the square of what the cosine is above -1, and a tenth at the least.
     pub(crate) fn free(fibers: f32) -> Self {
         let knots = |shares: [f32; 4]| {
-            std::array::from_fn(|knot| shares.map(|share| (share * fibers).min(Self::STEP * knot as f32)))
+            let rows = std::array::from_fn(|knot| shares.map(|share| (share * fibers).min(Self::STEP * knot as f32)));
+            MissingFibers { inside: rows, rim: rows }
         };
         let back = TURN_COSINES[1].map(|cos| (1.0 + cos).powi(2).max(0.1));
         let back = knots([back[0], back[0], back[1], back[1]]);
@@ -73,7 +83,7 @@ impl AfterFiber {
     /// section's short axis, from 0 to 1.
     #[inline]
     pub(crate) fn turned(&self, later: bool, turn: f32, short: f32) -> AfterTurn<'_> {
-        let (rows, [little, much]) = match later {
+        let (missing, [little, much]) = match later {
             false if turn < 0.0 => (&self.back, TURN_COSINES[1]),
             true if turn < 0.0 => (&self.back_later, TURN_COSINES[1]),
             false => (&self.first, TURN_COSINES[0]),
@@ -81,25 +91,28 @@ impl AfterFiber {
         };
         let less = ((turn - much) / (little - much)).clamp(0.0, 1.0);
         let [long, more] = [1.0 - short, 1.0 - less];
-        AfterTurn { rows, shares: f32x4::new([less * long, less * short, more * long, more * short]) }
+        AfterTurn { missing, shares: f32x4::new([less * long, less * short, more * long, more * short]) }
     }
 }
 
 /// [`AfterFiber`] on one way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AfterTurn<'a> {
-    rows: &'a [[f32; 4]; AfterFiber::KNOTS],
+    missing: &'a MissingFibers,
     /// How much of each number of a row holds.
     shares: f32x4,
 }
 
 impl AfterTurn<'_> {
-    /// How many fibres light meets where so many are expected.
+    /// How many fibres light meets where so many are expected, on a way that is so much by the rim.
     #[inline]
-    pub(crate) fn met(&self, expected: f32) -> f32 {
+    pub(crate) fn met(&self, expected: f32, by_rim: f32) -> f32 {
         let at = (expected * AfterFiber::STEP.recip()).min((AfterFiber::KNOTS - 1) as f32);
         let below = (at as usize).min(AfterFiber::KNOTS - 2);
-        let [from, to] = [below, below + 1].map(|knot| f32x4::new(self.rows[knot]));
+        let [from, to] = [below, below + 1].map(|knot| {
+            let [inside, rim] = [&self.missing.inside, &self.missing.rim].map(|rows| f32x4::new(rows[knot]));
+            inside + (rim - inside) * f32x4::splat(by_rim)
+        });
         let missing = from + (to - from) * f32x4::splat(at - below as f32);
         (expected - (missing * self.shares).reduce_add()).max(0.0)
     }
@@ -210,11 +223,16 @@ impl PlyShape {
     pub fn dead_zone(&self, chord: &ChordFibers, offset: f32, length: f32) -> f32 {
         let line = 2.0 * (self.radius * self.radius - offset * offset).max(0.0).sqrt();
         let inside = FRAC_PI_2 * self.fiber_radius * chord.total() * length;
-        // From two fibres below the rim on order is that of the inside.
-        let depth = (self.radius - offset.abs()) / self.fiber_radius;
-        let by_rim = (2.0 - 0.5 * depth).clamp(0.0, 1.0);
-        let regularity = self.regularity + by_rim * (self.rim - self.regularity);
+        let regularity = self.regularity + self.by_rim(offset) * (self.rim - self.regularity);
         (regularity * inside / line.max(1e-12)).min(0.85)
+    }
+
+    /// How much the order of fibres on a line at a distance from the ply's axis is that by the rim, from 0 to 1: from two fibres below it
+    /// on it is that of the inside.
+    #[inline]
+    pub fn by_rim(&self, offset: f32) -> f32 {
+        let depth = (self.radius - offset.abs()) / self.fiber_radius;
+        (2.0 - 0.5 * depth).clamp(0.0, 1.0)
     }
 }
 
@@ -359,22 +377,30 @@ mod tests {
     fn after_a_fiber_no_more_are_met_than_are_expected_and_the_more_the_more_are() {
         assert_eq!(TURN_COSINES, TURNS.map(|turns| turns.map(|turn| turn.cos() as f32)));
         let free = AfterFiber::free(0.5);
-        assert!((free.turned(true, 1.0, 0.3).met(2.0) - 1.5).abs() < 1e-6);
+        assert!((free.turned(true, 1.0, 0.3).met(2.0, 0.6) - 1.5).abs() < 1e-6);
         let rows = std::array::from_fn(|knot| [0.4, 0.3, 0.2, 0.1].map(|step: f32| step * knot as f32));
-        let after = AfterFiber { first: rows, later: rows, back: [[0.0; 4]; AfterFiber::KNOTS] };
+        let missing = MissingFibers { inside: rows, rim: rows.map(|row: [f32; 4]| row.map(|missing| 0.5 * missing)) };
+        let after = AfterFiber { first: missing, later: missing, back: MissingFibers::default(), back_later: missing };
         for (turn, short) in [(1.0, 0.0), (0.9, 0.5), (0.3, 1.0), (0.0, 0.2)] {
             let turned = after.turned(false, turn, short);
             let mut before = 0.0;
             for i in 1..=200 {
                 let expected = 0.02 * i as f32;
-                let met = turned.met(expected);
+                let met = turned.met(expected, 0.0);
                 assert!(met >= before - 1e-6 && met <= expected, "{turn} {short}: {met} of {expected}");
                 before = met;
             }
         }
-        assert!(after.turned(false, 1.0, 0.0).met(1.0).abs() < 1e-6, "straight on none is met");
-        assert!((after.turned(false, 0.5, 1.0).met(1.0) - 0.75).abs() < 1e-6, "turned and across, a quarter fewer");
-        assert_eq!(after.turned(true, -0.5, 1.0).met(1.0), 1.0);
+        assert!(after.turned(false, 1.0, 0.0).met(1.0, 0.0).abs() < 1e-6, "straight on none is met");
+        assert!(
+            (after.turned(false, 0.5, 1.0).met(1.0, 0.0) - 0.75).abs() < 1e-6,
+            "turned and across, a quarter fewer"
+        );
+        assert!(
+            (after.turned(false, 1.0, 0.0).met(1.0, 0.5) - 0.25).abs() < 1e-6,
+            "half by the rim, where half are missing"
+        );
+        assert_eq!(after.turned(false, -0.5, 1.0).met(1.0, 1.0), 1.0);
     }
 
     #[test]

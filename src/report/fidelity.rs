@@ -33,9 +33,10 @@ pub(crate) struct Row {
     pub within: f64,
     /// Samples per pixel of the reference.
     pub spp: f64,
-    /// The reference's mean on the cloth, and its error: half of the difference between two pictures with half of the samples.
+    /// The reference's mean on the cloth.
     pub mean: [f64; 3],
-    /// As above.
+    /// Its error: of several packings its standard error over them, of one half of the difference between two pictures with half of the
+    /// samples.
     pub mean_error: [f64; 3],
     /// What the reference's own noise is in the error of blocks.
     pub block_noise: Option<f64>,
@@ -54,6 +55,8 @@ pub(crate) struct Table {
     pub commit: String,
     /// Mode of the reference.
     pub reference: String,
+    /// How many packings of the fibres pictures are means of.
+    pub packings: u32,
     /// What was measured.
     pub rows: Vec<Row>,
     /// What was not.
@@ -80,10 +83,14 @@ impl Table {
             "`yarnray bench {}`, program {}. Reference: mode {}, every fibre a curve.\n\n\
              *ratio*: mean over the cloth's pixels over that of the reference, red, green, blue. *blocks*: mean of |error| / (reference + 0.05 mean) after \
              averaging 8 x 8 pixels; behind it what the reference's own noise makes of it. *relMSE*: of the same blocks, without noise. *FLIP*: mean HDR-FLIP, with \
-             noise. *error of the mean*: of the reference, from two halves of its samples. A mean is *within* its goal if every channel with more than {:.0} % of the light is.\n",
+             noise. *error of the mean*: of the reference, {}. A mean is *within* its goal if every channel with more than {:.0} % of the light is.\n",
             self.suite,
             self.commit,
             self.reference,
+            match self.packings {
+                1 => "from two halves of its samples".to_owned(),
+                n => format!("a standard error over {n} packings of the fibres, of which every picture is the mean"),
+            },
             100.0 * SHARE_THAT_COUNTS
         );
         let _ = writeln!(
@@ -178,6 +185,7 @@ mod tests {
             suite: "s.toml".to_owned(),
             commit: "c".to_owned(),
             reference: "fiber".to_owned(),
+            packings: 4,
             rows: vec![
                 row("a", false, [1.04, 0.96, 1.5], [1.0, 1.0, 0.01]),
                 row("b", true, [1.04, 0.96, 1.5], [1.0, 1.0, 0.5]),
@@ -188,6 +196,7 @@ mod tests {
         assert!(text.contains("| seen in development | yarn | 1 | 1 | 0 | 0.100 |"), "{text}");
         assert!(text.contains("| held out | yarn | 1 | 0 | 1 | 0.100 |"), "{text}");
         assert!(text.contains("| b | yarn | 1.040 0.960 1.500 | 0.100, 0.020 | 0.0100 | 0.200 | 1.0 % |"), "{text}");
+        assert!(text.contains("over 4 packings of the fibres"), "{text}");
         assert!(text.contains("Missing: m: gone"));
         assert_eq!(serde_json::from_str::<Table>(&table.to_json()).unwrap(), table);
     }

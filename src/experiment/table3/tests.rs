@@ -94,6 +94,7 @@ fn suite(cases: &[&str]) -> Suite {
         min_seconds: 2.0,
         max_spp: 100_000,
         size: None,
+        packings: 1,
         cases: cases.iter().map(case).collect(),
         missing: vec![("glove".to_owned(), "no file".to_owned())],
         converge: None,

@@ -11,7 +11,7 @@ use super::{
 
 use crate::{
     geometry::{
-        density::{AfterFiber, ChordFibers, ClearedStrip, PlyPacking, TURNS},
+        density::{AfterFiber, ChordFibers, ClearedStrip, MissingFibers, PlyPacking, TURNS},
         occluder::PlyGaps,
         yarn::{PlyParameters, PlyShape, YarnShape},
     },
@@ -134,15 +134,16 @@ struct Hit {
 struct Out {
     /// Extinction per expected fibre.
     rate: f64,
-    least: bool,
+    /// Whether more than expected may be met.
+    blocked: bool,
     counted: [f64; AfterFiber::KNOTS + 1],
     at_random: [f64; AfterFiber::KNOTS + 1],
 }
 
 impl Out {
-    fn of(ply: &PlyShape, least: bool) -> Self {
+    fn of(ply: &PlyShape, blocked: bool) -> Self {
         let none = [0.0; AfterFiber::KNOTS + 1];
-        Self { rate: (1.0 - ply.mean_dead_zone()).recip(), counted: none, at_random: none, least }
+        Self { rate: (1.0 - ply.mean_dead_zone()).recip(), counted: none, at_random: none, blocked }
     }
 
     fn add(&mut self, weight: f64, expected: f64, is_out: bool) {
@@ -156,6 +157,9 @@ impl Out {
     /// How many of the expected fibres are missing at each knot; where too little is out to tell, as many as at the one before.
     fn missing(&self) -> Knots {
         const LEAST: f64 = 12.0;
+        /// By how many more than expected may be met, at most.
+        const MOST_MORE: f64 = 2.0;
+        let least = if self.blocked { -MOST_MORE } else { 0.0 };
         let mut missing = [0.0f32; AfterFiber::KNOTS];
         for knot in 1..AfterFiber::KNOTS {
             let before = missing[knot - 1];
@@ -164,7 +168,7 @@ impl Out {
             } else {
                 let missing = (self.counted[knot] / self.at_random[knot]).ln() / self.rate;
                 // The more are to be expected, the more are met.
-                missing.min(f64::from(before + AfterFiber::STEP)).max(if self.least { 0.0 } else { -2.0 }) as f32
+                missing.clamp(least, f64::from(before + AfterFiber::STEP)) as f32
             };
         }
         missing
@@ -216,22 +220,25 @@ impl Lines {
             if self.stretch == 1.0 { [near(None); 2] } else { [near(Some(0.0)), near(Some(FRAC_PI_2))] }
         };
         let [onward, back] = TURNS.map(|turns| turns.map(on_ways));
-        let rows = |[[a, b], [c, d]]: [[[Knots; 2]; 2]; 2], which: usize| {
-            std::array::from_fn(|knot| [a, b, c, d].map(|numbers| numbers[which][knot]))
+        let missing = |[[a, b], [c, d]]: [[[[Knots; 2]; 2]; 2]; 2], which: usize| {
+            let rows = |rim: usize| std::array::from_fn(|knot| [a, b, c, d].map(|numbers| numbers[which][rim][knot]));
+            MissingFibers { inside: rows(0), rim: rows(1) }
         };
-        AfterFiber { first: rows(onward, 0), later: rows(onward, 1), back: rows(back, 0), back_later: rows(back, 1) }
+        let [first, later] = [0, 1].map(|which| missing(onward, which));
+        let [back, back_later] = [0, 1].map(|which| missing(back, which));
+        AfterFiber { first, later, back, back_later }
     }
 
     /// The same of light that is turned by an angle, on ways in all directions or near one of an angle: after the first fibre on
-    /// a line and, of light that goes on, after another one.
-    fn after_on_ways(&self, sections: &[Vec<DVec2>], ply: &PlyShape, turn: f64, axis: Option<f64>) -> [Knots; 2] {
+    /// a line and after another one, of each on ways through the inside and by the rim.
+    fn after_on_ways(&self, sections: &[Vec<DVec2>], ply: &PlyShape, turn: f64, axis: Option<f64>) -> [[Knots; 2]; 2] {
         /// How near, radians.
         const NEAR: f64 = 0.25;
         const RAYS: usize = 20_000;
         let mut stream = Stream::new(0xaf7e);
         let mut next = || f64::from(stream.next());
         let turns = [turn, -turn];
-        let mut counts = [Out::of(ply, true), Out::of(ply, turn < FRAC_PI_2)];
+        let mut counts = [0, 1].map(|later| [0, 1].map(|_| Out::of(ply, later == 1 && turn > FRAC_PI_2)));
         let mut hits = Vec::new();
         for ray in 0..RAYS {
             let discs = &sections[ray % sections.len()];
@@ -259,7 +266,7 @@ impl Lines {
             let others = hits.len() - 1;
             let other = 1 + (next() * others as f64) as usize;
             let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f64))];
-            for (later, (hit, count)) in looked_at.into_iter().zip(&mut counts).enumerate() {
+            for (later, (hit, counts)) in looked_at.into_iter().zip(&mut counts).enumerate() {
                 let Some((hit, weight)) = hit else { continue };
                 let at = |lies: f64| lies * along + offset * across;
                 let tilt = self.slopes.half_width(discs[hit.fiber], across);
@@ -267,13 +274,18 @@ impl Lines {
                     let w = DVec2::from_angle(turn).rotate(along);
                     // As the model has it: abreast of the fibre's centre, and from where the light came.
                     let from = at(hit.lies) + FRAC_PI_4 * self.radius * (along.dot(w).max(0.0) * w - along);
-                    if let Some(ahead) = self.ahead(ply, from, w, later == 0 && turn.abs() > FRAC_PI_2, turn) {
-                        count.add(weight, tilt * ahead, self.is_free(discs, hit.fiber, at(hit.enter), w));
+                    let swept = later == 0 && turn.abs() > FRAC_PI_2;
+                    if let Some((ahead, offset)) = self.ahead(ply, from, w, swept.then_some(turn)) {
+                        let is_out = self.is_free(discs, hit.fiber, at(hit.enter), w);
+                        let by_rim = f64::from(ply.by_rim(offset));
+                        for (count, share) in counts.iter_mut().zip([1.0 - by_rim, by_rim]) {
+                            count.add(share * weight, tilt * ahead, is_out);
+                        }
                     }
                 }
             }
         }
-        counts.map(|count| count.missing())
+        counts.map(|counts| counts.map(|count| count.missing()))
     }
 
     /// Whether a way from a place on a fibre meets no other.
@@ -286,9 +298,9 @@ impl Lines {
         })
     }
 
-    /// The fibres, as circles, that light is expected to meet from a place in a direction, into which it was turned by an angle. `None` if
-    /// the place is outside and there are none.
-    fn ahead(&self, ply: &PlyShape, from: DVec2, w: DVec2, cleared: bool, turn: f64) -> Option<f64> {
+    /// The fibres, as circles, that light is expected to meet from a place in a direction, less those in the strip that it has swept if it was
+    /// `turned` back by an angle; and the distance of its way from the ply's axis. `None` if the place is outside and there are none.
+    fn ahead(&self, ply: &PlyShape, from: DVec2, w: DVec2, turned: Option<f64>) -> Option<(f64, f32)> {
         let root = self.stretch.sqrt();
         let (beside, reach) = (from.dot(w.perp()), self.reach(w.perp()));
         if beside.abs() >= reach * (1.0 + self.radius) {
@@ -300,12 +312,11 @@ impl Lines {
         let [offset, length, thin, wide] =
             [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
         let chord = ply.chord(offset, length, thin, wide);
-        let ahead = if cleared {
-            ClearedStrip::new(2.0 * thin * self.radius as f32, turn.cos() as f32).fibers(&chord, foot)
-        } else {
-            chord.ahead(-foot)
+        let ahead = match turned {
+            Some(turn) => ClearedStrip::new(2.0 * thin * self.radius as f32, turn.cos() as f32).fibers(&chord, foot),
+            None => chord.ahead(-foot),
         };
-        Some(root * f64::from(ahead))
+        Some((root * f64::from(ahead), offset))
     }
 
     fn across(angle: usize) -> DVec2 {

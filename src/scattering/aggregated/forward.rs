@@ -325,7 +325,11 @@ impl Fiber {
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
             let expected = way.tilt * chord.ahead(-ahead.foot);
-            let through = if own { (-gaps.rate * way.after.met(expected)).exp() } else { gaps.unscattered(expected) };
+            let through = if own {
+                (-gaps.rate * way.after.met(expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
+            } else {
+                gaps.unscattered(expected)
+            };
             all *= through;
             visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, expected, through, chord });
         });

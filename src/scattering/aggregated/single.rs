@@ -271,8 +271,13 @@ impl Node {
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             if way.ply == spot.ply {
-                let expected = tilt * if turn < 0.0 && self.before == 0.0 { strip.fibers(&chord, way.foot) } else { chord.ahead(-way.foot) };
-                own += optics.rho * after.met(expected);
+                let expected = tilt
+                    * if turn < 0.0 && self.before == 0.0 {
+                        strip.fibers(&chord, way.foot)
+                    } else {
+                        chord.ahead(-way.foot)
+                    };
+                own += optics.rho * after.met(expected, shape.plies[way.ply].by_rim(way.offset));
             } else {
                 let fibers = chord.ahead(-way.foot);
                 others += yarn.plies[way.ply].rho * fibers;
