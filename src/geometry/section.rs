@@ -279,23 +279,23 @@ impl<'a> Section<'a> {
         from: &Inside,
         shift: Vec3A,
         w: Vec3A,
-        mut visit: impl FnMut(PlyAhead),
+        mut visit: impl FnMut(PlyAhead<'_>),
     ) {
         let (cos, direction) = self.direction_out(w);
-        let mut pass = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
-            visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos });
+        let mut pass = |way: &[Station], ply: usize, Passage { offset, foot, speed, .. }: Passage| {
+            visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos, way, cos });
         };
         if self.ends == [f32::NEG_INFINITY, f32::INFINITY]
             && let Some(way) = from.way_out(self, shift, direction)
         {
-            return way::passages::<false>(&way, shape, pass);
+            return way::passages::<false>(&way, shape, |ply, passage| pass(&way, ply, passage));
         }
         let line = Line { start: from.point + shift, direction, reach: LIGHT };
         let mut near = self.neighbourhood(self.turn(shape), from.travel, LIGHT);
         let first = self.step(&mut near, line.start, direction, 0.0, LIGHT);
         let mut way = Way::new();
         self.march(&line, first, &mut near, |a, b| keep(&mut way, a, b));
-        way::passages::<false>(&way, shape, &mut pass);
+        way::passages::<false>(&way, shape, |ply, passage| pass(&way, ply, passage));
     }
 
     /// The length in the section of a unit of a way out in the direction `w`, of which a steep way has little, and where the way leads.

@@ -117,6 +117,11 @@ impl Arc {
         self.slope + u * (2.0 * self.square + 3.0 * u * self.cube)
     }
 
+    #[inline]
+    fn bend_at(&self, u: f32) -> Vec2 {
+        2.0 * self.square + 6.0 * u * self.cube
+    }
+
     /// The station at `u` of the arc from `a` to `b`.
     #[inline]
     fn station(&self, a: &Station, b: &Station, u: f32) -> Station {
@@ -295,7 +300,10 @@ pub(super) fn passes(a: &Station, b: &Station, plies: &[FourPlies]) -> Option<f3
 /// Share of the core's radius below which the length of a chord does not tell how fast it is passed.
 const SHORT_CHORD: f32 = 0.01;
 
-/// How far a straight line is followed to its nearest point, in yarn radii.
+/// How little of a straight way's the curve of a bent one's distance from a ply's axis counts, and of a bent one's a straight way's.
+const LEAST_CURVE: f32 = 0.2;
+
+/// How far a line is followed to its nearest point, in yarn radii.
 const FARTHEST_FOOT: f32 = 16.0;
 
 /// A passage that has begun.
@@ -327,14 +335,16 @@ impl Open {
         let distance = at.length_squared();
         let passage = &mut self.passage;
         if distance < self.nearest {
+            // The square of the distance from the ply's axis is a parabola there: its curve is the ply's, as the way sees it.
             let square = slope.length_squared().max(1e-24);
-            let size = square.sqrt();
+            let (outward, curve) = (at.dot(slope), square + at.dot(arc.bend_at(u)));
+            let curve = curve.clamp(LEAST_CURVE * square, square / LEAST_CURVE);
             self.nearest = distance;
             self.depth = a.depth + length * u;
-            passage.offset = slope.perp_dot(at) / size;
-            let ahead = length * (u - at.dot(slope) / square);
+            passage.offset = (distance - outward * outward / curve).max(0.0).sqrt().copysign(slope.perp_dot(at));
+            let ahead = length * (u - outward / curve);
             passage.foot = a.depth + ahead.clamp(-FARTHEST_FOOT, FARTHEST_FOOT);
-            passage.speed = size / length;
+            passage.speed = curve.sqrt() / length;
             if ENDS && !self.core {
                 passage.enter = way.station(a, b, u);
                 passage.exit = passage.enter;

@@ -195,7 +195,7 @@ fn the_recommended_model_keeps_its_distance_from_the_oracle() {
     // Of one ply, fibres that only transmit make most of the third error.
     // With 16,000 paths and one seed for all cases, noise alone moves these means by 0.001 (relative ones by 0.005).
     for (name, cases, paths, bounds) in [
-        ("one ply", dense(&|n| n == 1), 128_000, [0.0098, 0.0066, 0.05, 0.046]),
+        ("one ply", dense(&|n| n == 1), 128_000, [0.0064, 0.0102, 0.03, 0.063]),
         ("several plies", dense(&|n| n > 1), 512_000, [0.0061, 0.0022, 0.035, 0.0075]),
     ] {
         let ours = errors(Model::Aggregated, &cases, paths);

@@ -154,8 +154,17 @@ impl Out {
         }
     }
 
-    /// How many of the expected fibres are missing at each knot; where too little is out to tell, as many as at the one before.
-    fn missing(&self) -> Knots {
+    /// Both together.
+    fn with(&self, other: &Self) -> Self {
+        let sum = |of: fn(&Self) -> &[f64; AfterFiber::KNOTS + 1]| {
+            std::array::from_fn(|knot| of(self)[knot] + of(other)[knot])
+        };
+        Self { counted: sum(|out| &out.counted), at_random: sum(|out| &out.at_random), ..*self }
+    }
+
+    /// How many of the expected fibres are missing at each knot: of `all` light where too little of this is out to tell, and as many as at the
+    /// one before where that is too little as well.
+    fn missing(&self, all: &Self) -> Knots {
         const LEAST: f64 = 12.0;
         /// By how many more than expected may be met, at most.
         const MOST_MORE: f64 = 2.0;
@@ -163,13 +172,13 @@ impl Out {
         let mut missing = [0.0f32; AfterFiber::KNOTS];
         for knot in 1..AfterFiber::KNOTS {
             let before = missing[knot - 1];
-            missing[knot] = if self.counted[knot] < LEAST {
-                before
-            } else {
-                let missing = (self.counted[knot] / self.at_random[knot]).ln() / self.rate;
+            if let Some(out) = [self, all].into_iter().find(|out| out.counted[knot] >= LEAST) {
+                let of_random = (out.counted[knot] / out.at_random[knot]).ln() / self.rate;
                 // The more are to be expected, the more are met.
-                missing.clamp(least, f64::from(before + AfterFiber::STEP)) as f32
-            };
+                missing[knot] = of_random.clamp(least, f64::from(before + AfterFiber::STEP)) as f32;
+            } else {
+                missing[knot] = before;
+            }
         }
         missing
     }
@@ -285,7 +294,10 @@ impl Lines {
                 }
             }
         }
-        counts.map(|counts| counts.map(|count| count.missing()))
+        counts.map(|[inside, rim]| {
+            let all = inside.with(&rim);
+            [inside, rim].map(|out| out.missing(&all))
+        })
     }
 
     /// Whether a way from a place on a fibre meets no other.
@@ -709,17 +721,19 @@ mod tests {
             let after = packing.after.unwrap();
             let other = lines.after(&sections, &ply);
             let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
-            let rows = |of: &AfterFiber| [of.first, of.later, of.back];
+            let rows = |of: &AfterFiber| {
+                [of.first, of.later, of.back, of.back_later].map(|missing| [missing.inside, missing.rim]).concat()
+            };
             for (rows, others) in rows(&after).iter().zip(&rows(&other)) {
                 for (knot, (row, other)) in rows.iter().zip(others).enumerate() {
                     let out = |missing: f32| (rate * (missing - AfterFiber::STEP * knot as f32)).exp();
                     let off = row.iter().zip(other).map(|(a, b)| (out(*a) - out(*b)).abs()).fold(0.0, f32::max);
-                    // The few fibres by the rim of a few packings.
-                    assert!(off < 0.1, "{count} at {density}, knot {knot}: {row:?}, not {other:?}");
+                    // The few ways by the rim of a few packings.
+                    assert!(off < 0.13, "{count} at {density}, knot {knot}: {row:?}, not {other:?}");
                 }
             }
             // Along the axes of a pressed section it is not the same.
-            let round = after.first.iter().skip(1).all(|row| row[0] == row[1]);
+            let round = after.first.inside.iter().skip(1).all(|row| row[0] == row[1]);
             assert_eq!(stretch == 1.0, round, "{after:?}");
         }
     }

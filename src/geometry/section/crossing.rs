@@ -4,13 +4,14 @@ use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3A};
 use wide::f32x4;
 
-use super::Section;
+use super::{Inside, Section, unrotate};
 use crate::{
     geometry::{
         density::ChordFibers,
         occluder::PlyGaps,
         way::{self, Station, Way},
         yarn::{MAX_PLIES, YarnShape, fiber_tangent},
+        yarn_frame::Pressed,
     },
     math::special::GAUSS_LEGENDRE_4,
 };
@@ -86,7 +87,7 @@ pub type Crossings = ArrayVec<PlyCrossing, MAX_PLIES>;
 
 /// A ply on a way out of a yarn.
 #[derive(Clone, Copy, Debug)]
-pub struct PlyAhead {
+pub struct PlyAhead<'w> {
     /// Index of the ply in the yarn's shape.
     pub ply: usize,
     /// Signed distance of the way from the ply's axis, in the circle of the ply's radius.
@@ -95,6 +96,35 @@ pub struct PlyAhead {
     pub foot: f32,
     /// Length in the circle of one unit of that distance.
     pub length: f32,
+    /// The whole way.
+    pub(super) way: &'w [Station],
+    /// Length in the section of one unit of it.
+    pub(super) cos: f32,
+}
+
+impl PlyAhead<'_> {
+    /// How many more fibres the way in the direction `w` meets there than one across untwisted plies, from one inside the yarn: |w x t| at the
+    /// middle of what is ahead of the ply's `chord`, over the way's length in the section, times [`Section::squeeze`].
+    #[inline]
+    pub fn tilt(&self, shape: &YarnShape, section: &Section<'_>, from: &Inside, w: Vec3A, chord: &ChordFibers) -> f32 {
+        let middle = 0.5 * ((self.foot - chord.half).max(0.0) + self.foot + chord.half);
+        let station = way::station_at(self.way, middle / self.cos);
+        // The direction as it is seen from the unwound yarn's axes there.
+        let turned = from.turn * (station.travel - from.travel);
+        let turned = Vec2::new(1.0 - 0.5 * turned * turned, turned);
+        let across = unrotate(from.across(w), turned);
+        let along = station.advance * station.straightness;
+        let of = &shape.plies[self.ply];
+        let at = station.at;
+        let mut t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at).truncate();
+        if let Some(pressed) = from.pressed {
+            let pressed = Pressed { axis: unrotate(pressed.axis, turned), ..pressed };
+            t = pressed.real(t) + section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
+        }
+        let (w, t) = (across.extend(along), (t / station.straightness).extend(1.0));
+        let square = w.cross(t).length_squared() / w.length_squared().max(1e-12);
+        section.squeeze() * (square.max(1e-9)).sqrt() / self.cos
+    }
 }
 
 impl Section<'_> {

@@ -123,6 +123,8 @@ struct Stretch {
     own: bool,
     /// Distance in the section to the point nearest to the ply's axis.
     foot: f32,
+    /// How many more fibres are met there than by a way across the yarn.
+    tilt: f32,
     /// Expected fibres.
     expected: f32,
     /// The share of light that meets none of them.
@@ -136,8 +138,6 @@ struct Way<'a> {
     w: Vec3A,
     /// From the fibre's place to where the way begins.
     shift: Vec3A,
-    /// How many more fibres it meets than one across the yarn.
-    tilt: f32,
     /// What it meets in the own ply.
     after: AfterTurn<'a>,
 }
@@ -308,9 +308,8 @@ impl Fiber {
     #[inline]
     fn way<'a>(&self, view: &View<'a>, w: Vec3A, later: bool) -> Way<'a> {
         let Turned { cos: turn, shift, .. } = self.spot.turned(view, self.back, w);
-        let tilt = self.spot.tilt(view.section, w);
         let after = view.yarn.plies[self.spot.ply].after.turned(later, turn, self.spot.inside.along_short_axis(w));
-        Way { w, shift, tilt, after }
+        Way { w, shift, after }
     }
 
     /// The share of light on a way that meets no other fibre; `visit` is told of the plies there, in no order. The fibre's own chord keeps
@@ -324,14 +323,15 @@ impl Fiber {
             let gaps = &yarn.plies[ahead.ply].gaps;
             let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
             let own = ahead.ply == spot.ply;
-            let expected = way.tilt * chord.ahead(-ahead.foot);
+            let tilt = ahead.tilt(shape, view.section, &spot.inside, way.w, &chord);
+            let expected = tilt * chord.ahead(-ahead.foot);
             let through = if own {
                 (-gaps.rate * way.after.met(expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
             } else {
                 gaps.unscattered(expected)
             };
             all *= through;
-            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, expected, through, chord });
+            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, tilt, expected, through, chord });
         });
         all
     }
@@ -353,7 +353,7 @@ impl Fiber {
         } else {
             gaps.fibers_passed(left)
         };
-        let behind = (stretch.expected - passed).max(0.0) / way.tilt;
+        let behind = (stretch.expected - passed).max(0.0) / stretch.tilt;
         let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
         let distance = (stretch.foot + at).max(0.0);
         let shape = view.yarn.occluder().shape();

@@ -109,8 +109,6 @@ struct Spot {
     inside: Inside,
     /// Unit tangent of the fibre there.
     tangent: Vec3A,
-    /// 1 / z of `tangent`.
-    stretch: f32,
 }
 
 impl<'a> View<'a> {
@@ -140,8 +138,7 @@ impl Spot {
     #[inline]
     fn new(view: &View<'_>, ply: usize, inside: Inside) -> Self {
         let tangent = inside.fiber_tangent(view.yarn.occluder().shape(), view.section, ply);
-        let stretch = tangent.length();
-        Self { ply, inside, tangent: tangent / stretch, stretch }
+        Self { ply, inside, tangent: tangent.normalize() }
     }
 
     /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count.
@@ -176,28 +173,21 @@ impl Spot {
     /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
     /// fibres on its way.
     #[inline]
-    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead, f32)) -> Rgb {
+    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> Rgb {
         let shape = view.yarn.occluder().shape();
         let (thin, wide) = (view.section.thinness(), self.inside.wide(w));
         let mut depth = Rgb::ZERO;
         view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
             if way.ply != self.ply {
-                let fibers = shape.plies[way.ply].chord(way.offset, way.length, thin, wide).ahead(-way.foot);
+                let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
+                let fibers = way.tilt(shape, view.section, &self.inside, w, &chord) * chord.ahead(-way.foot);
                 if fibers > 0.0 {
                     depth += view.yarn.plies[way.ply].rho * fibers;
                     other(&way, fibers);
                 }
             }
         });
-        depth * self.tilt(view.section, w)
-    }
-
-    /// How many more fibres a way in the direction `w` meets than one across the yarn: its length for each unit in the
-    /// section, times the fibres' width as seen along it, and how much closer they are where the yarn is pressed flat.
-    #[inline]
-    fn tilt(&self, section: &Section<'_>, w: Vec3A) -> f32 {
-        let along = w.dot(self.tangent);
-        section.squeeze() * ((1.0 - along * along).max(1e-9) / (1.0 - w.z * w.z).max(1e-12)).sqrt() * self.stretch
+        depth
     }
 }
 

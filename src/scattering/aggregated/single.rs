@@ -256,7 +256,7 @@ impl Node {
 
     /// The same; `other` is told of the fibres in each other ply.
     #[inline]
-    fn depth_by_plies(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead, f32)) -> (Rgb, Rgb) {
+    fn depth_by_plies(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> (Rgb, Rgb) {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
@@ -264,12 +264,12 @@ impl Node {
         let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
         let strip = ClearedStrip::new(2.0 * thin * beside * shape.plies[spot.ply].fiber_radius, turn);
         let wide = spot.inside.wide(w);
-        let tilt = spot.tilt(view.section, w);
         let after = optics.after.turned(self.before > 0.0, turn, spot.inside.along_short_axis(w));
         let mut own = Rgb::ZERO;
         let mut others = Rgb::ZERO;
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
+            let tilt = way.tilt(shape, view.section, &spot.inside, w, &chord);
             if way.ply == spot.ply {
                 let expected = tilt
                     * if turn < 0.0 && self.before == 0.0 {
@@ -279,12 +279,11 @@ impl Node {
                     };
                 own += optics.rho * after.met(expected, shape.plies[way.ply].by_rim(way.offset));
             } else {
-                let fibers = chord.ahead(-way.foot);
+                let fibers = tilt * chord.ahead(-way.foot);
                 others += yarn.plies[way.ply].rho * fibers;
                 other(&way, fibers);
             }
         });
-        others *= tilt;
         (own + others, others)
     }
 }
@@ -306,7 +305,7 @@ pub(super) struct Among {
 
 impl Among {
     #[inline]
-    pub(super) fn offer(&mut self, view: &View<'_>, way: &PlyAhead, fibers: f32, stream: &mut Stream) {
+    pub(super) fn offer(&mut self, view: &View<'_>, way: &PlyAhead<'_>, fibers: f32, stream: &mut Stream) {
         self.fibers += fibers;
         if fibers > 0.0 && stream.next() * self.fibers < fibers {
             let radius = view.yarn.occluder().shape().plies[way.ply].radius;

@@ -103,7 +103,10 @@ fn plain_lobes(view: &View<'_>, (spot, before): &(Spot, f32), w: Vec3A) -> (Rgb,
             depth += view.yarn.plies[way.ply].rho * (sigma * length);
         }
     });
-    let depth = depth * spot.tilt(view.section, w);
+    // Of the node's own fibre, for all of the way.
+    let own = spot.inside.fiber_tangent(shape, view.section, spot.ply);
+    let across = own.length_squared() - w.dot(own).powi(2);
+    let depth = depth * (view.section.squeeze() * (across / (1.0 - w.z * w.z)).max(0.0).sqrt());
     let sines = [view.camera, w].map(|v| v.dot(spot.tangent).clamp(-1.0, 1.0));
     let cosines = sines.map(|sin| (1.0 - sin * sin).sqrt());
     let at = Latitudes::new(sines[0], cosines[0], sines[1], cosines[1]);
