@@ -26,11 +26,11 @@ fn feet_and_head(cell: &Cell, row: usize, k: usize) -> [DVec3; 2] {
 
 /// Share of a cell that no yarn of diameter 1 covers, seen from the front.
 fn see_through(cell: &Cell) -> f64 {
-    const ACROSS: usize = 160;
-    let [width, height] = cell.period.to_array();
-    let up = (ACROSS as f64 * height / width).round() as usize;
-    let size = DVec2::new(width / ACROSS as f64, height / up as f64);
-    let mut covered = vec![false; ACROSS * up];
+    // In diameters.
+    const PIXEL: f64 = 0.1;
+    let [across, up] = (cell.period / PIXEL).round().to_array().map(|n| n as usize);
+    let size = cell.period / DVec2::new(across as f64, up as f64);
+    let mut covered = vec![false; across * up];
     for row in 0..cell.high as usize {
         let points: Vec<DVec3> = (0..cell.visits[row].len()).flat_map(|k| cell.visit(row, k)).map(|(p, _)| p).collect();
         for w in points.windows(2) {
@@ -42,8 +42,8 @@ fn see_through(cell: &Cell) -> f64 {
                     for x in -(reach.x as i64)..=reach.x as i64 {
                         let pixel = middle + DVec2::new(x as f64, y as f64);
                         if ((pixel + 0.5) * size).distance(p) < 0.5 {
-                            let x = (pixel.x as i64).rem_euclid(ACROSS as i64) as usize;
-                            covered[(pixel.y as i64).rem_euclid(up as i64) as usize * ACROSS + x] = true;
+                            let x = (pixel.x as i64).rem_euclid(across as i64) as usize;
+                            covered[(pixel.y as i64).rem_euclid(up as i64) as usize * across + x] = true;
                         }
                     }
                 }
