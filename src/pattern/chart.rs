@@ -204,8 +204,8 @@ pub const PATTERNS: [(&str, &[&str]); 20] = [
     ("braid", &["p2 c4f k2 p2", "p2 k6 p2", "p2 k2 c4b p2", "p2 k6 p2"]),
     ("honeycomb", &["3: k8", "c4b c4f", "3: k8", "c4f c4b"]),
     ("basket-cable", &["3: k12", "k2 c4f c4f k2", "3: k12", "c4b c4b c4b"]),
-    ("eyelet", &["3: k6", "k2 k2tog yo k2", "2: k6"]),
-    ("lace", &["k6", "yo ssk k k2tog yo k", "k6", "k yo cdd yo k2"]),
+    ("eyelet", &["3: k6", "k2 yo k2tog k2", "2: k6"]),
+    ("lace", &["k7", "k yo k2tog k ssk yo k", "k7", "k2 yo cdd yo k2"]),
     ("feather-and-fan", &["k", "k2tog k2tog k2tog yo k yo k yo k yo k yo k yo k k2tog k2tog k2tog", "k", "p"]),
 ];
 

@@ -580,7 +580,7 @@ impl Knit {
 
 /// How the yarns of a piece relax, which begin so thin.
 fn finding_room(steps: usize, thin: f64) -> Run {
-    Run { steps, growing: steps / 3, thin, free: [false; 2], load: DVec2::ZERO, firm: 2.0, calm: 0.02 }
+    Run { steps, growing: steps / 3, thin, free: [false; 2], load: DVec2::ZERO, press: 0.0, firm: 2.0, calm: 0.02 }
 }
 
 /// Lays a piece as it curls; then its yarns find room.

@@ -51,6 +51,8 @@ pub(super) struct Run {
     pub(super) free: [bool; 2],
     /// Pull on the cloth across and along, force by length.
     pub(super) load: DVec2,
+    /// How firmly cloth is pressed flat: force by length of yarn, for each unit of distance from the middle of its depth.
+    pub(super) press: f64,
     /// How firm contact is, against what a relaxation begins with.
     pub(super) firm: f64,
     /// Stops when no force is larger.
@@ -235,6 +237,9 @@ impl Rods {
             }
             self.gone(&before, strained, &mut work.gone);
             let virial = self.forces(&has, apart, CONTACT * run.firm, &mut work);
+            if run.press > 0.0 {
+                self.press(run.press, &mut work.forces);
+            }
             let free = |k: usize| f64::from(u8::from(run.free[k]));
             let cell_force = match self.period {
                 Some(period) => {
@@ -284,6 +289,14 @@ impl Rods {
             }
         }
         (run.steps, largest)
+    }
+
+    /// Presses points towards the middle of the depth.
+    fn press(&self, firm: f64, forces: &mut [DVec3]) {
+        let middle = self.points.iter().map(|p| p.z).sum::<f64>() / self.points.len() as f64;
+        for ((force, p), rest) in forces.iter_mut().zip(&self.points).zip(&self.rest) {
+            force.z -= firm * rest * (p.z - middle);
+        }
     }
 
     /// Moves all points by one step; gives how many are farther than `step.far` (squared) from where they were before.

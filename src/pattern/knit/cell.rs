@@ -20,6 +20,11 @@ const BLOCKING: DVec2 = DVec2::new(0.03, 0.015);
 /// The same for each share of the stitches that are tucked. These rods slide where wool holds: tucks would draw the yarn of
 /// the loops beside them into the width, and rows down, unless loops are pulled up.
 const DRAWN_UP: DVec2 = DVec2::new(-0.06, 0.34);
+/// The same for each share of the stitches that are yarn-overs: openwork is stretched to show its holes.
+const OPENED: DVec2 = DVec2::new(0.8, 1.2);
+/// How firmly it is pressed flat meanwhile, force by length of yarn and distance: loops that are worked together would
+/// pile up in front of the cloth, where a wet one lets them slide beside each other.
+const PRESSED: f64 = 0.15;
 /// Points of a stitch while a cell finds its form; as many as are asked for after that.
 const COARSE: u32 = 12;
 /// A loop that is laid longer than so many of them has more points.
@@ -36,6 +41,8 @@ pub(super) struct Cell {
     /// How wide and high it is.
     pub(super) period: DVec2,
     pub(super) rods: Rods,
+    /// Whether its wales lean, so that rows wave.
+    pub(super) waves: bool,
     /// Pull on it across and along while it relaxes.
     pull: DVec2,
     /// The first point of each visit of each course, and behind them the end of the course.
@@ -82,13 +89,17 @@ impl Cell {
         let scale = yarn / 13.9;
         let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale * loops.room()));
         let period = start * DVec2::new(wide.into(), high.into());
-        let tucks = rows.iter().flatten().filter(|s| s.act == Act::Tuck).count();
-        let pull = BLOCKING + DRAWN_UP * (tucks as f64 / f64::from((wide * high).max(1)));
+        let share = |act: Act| {
+            let count = rows.iter().flatten().filter(|s| s.act == act).count();
+            count as f64 / f64::from((wide * high).max(1))
+        };
+        let pull = BLOCKING + DRAWN_UP * share(Act::Tuck) + OPENED * share(Act::Over);
         let mut cell = Self {
             wide,
             high,
             period,
             rods: Rods { period: Some(period), ..Rods::default() },
+            waves: loops.has_waves(),
             pull: pull.max(DVec2::ZERO),
             visits: Vec::new(),
             grid: Vec::new(),
@@ -122,7 +133,8 @@ impl Cell {
         let free = size.map(|s| s.is_none());
         // The many strands of a bobble begin close to each other.
         let (growing, thin) = if loops.has_bobbles() { (STEPS[0] / 3, 0.3) } else { (STEPS[0] / 5, 0.5) };
-        let run = Run { steps: STEPS[0], growing, thin, free, load: self.pull, firm: 1.0, calm: 0.01 };
+        let press = if self.waves { PRESSED } else { 0.0 };
+        let run = Run { steps: STEPS[0], growing, thin, free, load: self.pull, press, firm: 1.0, calm: 0.01 };
         self.rods.relax(&run);
         self.refine(points);
         let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };

@@ -37,7 +37,7 @@ pub(super) enum Way {
 
 /// How rings and the flat cell relax.
 const RUN: Run =
-    Run { steps: STEPS, growing: 0, thin: 1.0, free: [true; 2], load: DVec2::ZERO, firm: 1.0, calm: 0.002 };
+    Run { steps: STEPS, growing: 0, thin: 1.0, free: [true; 2], load: DVec2::ZERO, press: 0.0, firm: 1.0, calm: 0.002 };
 
 /// Energy of a stitch of a cell that nothing bends.
 fn flat_energy(cell: &Cell) -> f64 {

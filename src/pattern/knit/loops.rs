@@ -34,6 +34,8 @@ pub(in super::super) struct Loop {
     pub(in super::super) layer: f64,
     /// Share of a stitch's yarn.
     pub(in super::super) yarn: f64,
+    /// Width of its stitch, in mean widths: where decreases draw stitches together they are narrow.
+    pub(in super::super) wide: f64,
     /// Where its feet are across the cloth: half way between its own middle and those of its parents.
     pub(in super::super) foot: f64,
     /// Whether it closes a bobble, which is drawn through what it is.
@@ -56,6 +58,7 @@ impl Loop {
             twist: 0.0,
             layer: 0.0,
             yarn: 1.0,
+            wide: 1.0,
             foot: at,
             bobble: false,
             side: 0.0,
@@ -90,6 +93,13 @@ pub(in super::super) enum Visit {
         /// Where.
         at: f64,
     },
+}
+
+impl Visit {
+    /// The loop that is made, if one is.
+    fn made(self) -> Option<u32> {
+        if let Self::Loop(i) = self { Some(i) } else { None }
+    }
 }
 
 /// A yarn's way along a row, from left to right.
@@ -140,6 +150,8 @@ pub(in super::super) struct Loops {
     room: f64,
     /// Where rows are short, how far up each stitch of each row begins, and behind them the tops of all; else nothing.
     levels: Vec<Vec<f64>>,
+    /// Where rows wave, how far each stitch of each row is above its row's height, from the left; else nothing.
+    waves: Vec<Vec<(f64, f64)>>,
     /// Whether any stitch is a bobble.
     bobbles: bool,
     /// How far each layer of a cloth of two is from the middle between them, in yarn diameters; 0 where there is one.
@@ -217,8 +229,25 @@ impl Loops {
         }
     }
 
-    /// The same at a place of a row of a flat piece: short rows make some columns higher than others.
+    /// How far a row is above its height at a place of it: rows wave where wales lean.
+    fn rise(&self, row: i32, at: f64) -> f64 {
+        let Some(wave) = self.waves.get(row.rem_euclid(self.rows) as usize).filter(|w| !w.is_empty()) else {
+            return 0.0;
+        };
+        let round = self.wide as f64;
+        // Between the last stitch of the round before and the first of the next one.
+        let first = wave[0].0;
+        let at = first + (at - first).rem_euclid(round);
+        let k = wave.partition_point(|knot| knot.0 <= at).max(1);
+        let (a, b) = (wave[k - 1], wave.get(k).copied().unwrap_or((first + round, wave[0].1)));
+        if b.0 > a.0 { a.1 + (b.1 - a.1) * (at - a.0) / (b.0 - a.0) } else { a.1 }
+    }
+
+    /// The height at a place of a row: rows wave, and short ones make some columns of a flat piece higher than others.
     pub(in super::super) fn up_at(&self, row: i32, at: f64) -> f64 {
+        if !self.waves.is_empty() {
+            return self.up(row) + self.rise(row, at);
+        }
         let Some(levels) = usize::try_from(row).ok().and_then(|r| self.levels.get(r)) else { return self.up(row) };
         let last = levels.len() - 1;
         let x = (at + 0.5 * last as f64).clamp(0.0, last as f64);
@@ -261,6 +290,11 @@ impl Loops {
             Visit::Loop(i) => -0.25 * self.loops[*i as usize].side,
             Visit::Pass { .. } | Visit::Float { .. } | Visit::Through { .. } => 0.0,
         }
+    }
+
+    /// Whether decreases and yarn-overs move its wales, so that rows wave.
+    pub(in super::super) fn has_waves(&self) -> bool {
+        !self.waves.is_empty()
     }
 
     pub(in super::super) fn has_bobbles(&self) -> bool {

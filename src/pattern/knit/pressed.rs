@@ -322,9 +322,10 @@ mod tests {
     const YARN: Thickness = Thickness { radius: 0.65, half_width: 0.91, flatten: FLATTEN };
 
     fn knit(pattern: &str, edges: Edges) -> Knit {
+        let chart = Chart::named(pattern).unwrap();
         Knit {
-            chart: Chart::named(pattern).unwrap(),
-            stitches: 24,
+            stitches: 24_u32.next_multiple_of(chart.even_width(100).unwrap()),
+            chart,
             rows: 14,
             form: Form::Flat,
             stitch_width: None,

@@ -251,6 +251,8 @@ impl Loops {
             false if drawn => rims::PINCHED,
             false => 1.0 + 0.8 * (count - 1.0),
         };
+        // Its head is as wide as what is drawn through it.
+        let spread = if own.children.is_empty() { spread } else { spread * mean(&|c: &Loop| c.wide) };
         let crossing = match over {
             true if own.is_lifted() => 0.46,
             true => 0.35,
@@ -271,7 +273,7 @@ impl Loops {
             let wide = match own.is_lifted() {
                 true => NARROW,
                 // What closes a bobble goes through heads that lie close.
-                false => mix(if own.bobble { CLOSING } else { 1.0 }, spread),
+                false => mix(if own.bobble { CLOSING } else { own.wide }, spread),
             };
             let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * wide * turned;
             // Layers that are bound off together are beside each other before what closes them comes through.
@@ -280,7 +282,7 @@ impl Loops {
             let at = foot.at
                 + (head_at - foot.at) * moved
                 + step * across
-                + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step));
+                + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step * own.wide));
             let low = foot_up(at);
             let up = low + (head_up(at) - low) * head + (1.0 - inside) * (end.up - foot_up(end.at));
             let mut out = if over {

@@ -1,4 +1,5 @@
 mod double;
+mod openwork;
 mod rims;
 mod short_rows;
 mod topology;

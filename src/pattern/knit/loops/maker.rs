@@ -1,6 +1,7 @@
 //! Makes the loops of a chart's stitches: where they are, what they are drawn through, and the edges.
 
 mod across;
+mod net;
 
 use super::{
     super::rims::CastOn,
@@ -35,6 +36,8 @@ pub(super) struct Maker<'a> {
     border: Border,
     /// Middles of the stitches of each row, and those of the cast-on edge before them.
     middles: Vec<Vec<f64>>,
+    /// How far each stitch is above the beginning of its row, in rows, where rows wave; else nothing.
+    rises: Vec<Vec<f64>>,
     loops: Vec<Loop>,
     /// The loop made at each stitch.
     made: Vec<Vec<u32>>,
@@ -51,6 +54,7 @@ impl<'a> Maker<'a> {
             cast_on,
             border,
             middles: Vec::new(),
+            rises: Vec::new(),
             loops: Vec::new(),
             made: Vec::new(),
             cast: Vec::new(),
@@ -138,7 +142,7 @@ impl<'a> Maker<'a> {
             let mut visits = Vec::with_capacity(row.len());
             for (j, s) in row.iter().enumerate() {
                 let at = self.middles[r][j];
-                let base = Loop { layer: s.layer.into(), ..Loop::laid(r as i32, at) };
+                let base = Loop { layer: s.layer.into(), wide: self.width(r, j), ..Loop::laid(r as i32, at) };
                 let new = match s.act {
                     Act::Draw | Act::Lift { .. } => Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base }),
                     Act::Bobble => Some(Loop { sign: 1.0, bobble: true, yarn: BOBBLE, ..base }),
@@ -216,7 +220,10 @@ impl<'a> Maker<'a> {
         const FAR: f64 = 0.8;
         let stitches = if self.border.turns { self.rows[0].len() as f64 } else { 1.0 };
         mean /= through.len().max(1) as f64;
-        if self.loops[own as usize].layer == 0.0 && mean.abs() * stitches < FAR {
+        if !self.rises.is_empty() {
+            mean = mean.clamp(-FAR, FAR);
+        }
+        if self.loops[own as usize].layer == 0.0 && (mean.abs() * stitches < FAR || !self.rises.is_empty()) {
             self.loops[own as usize].foot = at + 0.5 * mean;
         }
     }
@@ -358,7 +365,14 @@ impl<'a> Maker<'a> {
     }
 
     pub(super) fn finish(mut self) -> Loops {
+        self.lean_with_neighbours();
         let Heights { heights, room, levels } = self.heights();
+        let wave = |(at, rises): (&Vec<f64>, &Vec<f64>)| -> Vec<(f64, f64)> {
+            let mut wave: Vec<(f64, f64)> = at.iter().copied().zip(rises.iter().map(|rise| rise / room)).collect();
+            wave.sort_by(|a, b| a.0.total_cmp(&b.0));
+            wave
+        };
+        let waves = self.middles.iter().zip(&self.rises).map(wave).collect();
         let mut courses = Vec::new();
         courses.extend(self.below.take());
         courses.append(&mut self.courses);
@@ -372,6 +386,7 @@ impl<'a> Maker<'a> {
             heights,
             room,
             levels,
+            waves,
             bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
             apart: 0.0,
             ribbed: false,

@@ -86,7 +86,8 @@ impl<'a> Laying<'a> {
         match self.surface {
             // Layers that are bound off together lean to each other.
             Surface::Plane { .. } => (self.even && (side == 0.0 || self.plain(own))).then_some(cell),
-            Surface::Round { .. } | Surface::Bent(_) => self.plain(own).then_some(cell),
+            // Where wales lean nothing is as it would be in even rows: all of a repeat is taken as it is.
+            Surface::Round { .. } | Surface::Bent(_) => (cell.0.waves || self.plain(own)).then_some(cell),
         }
     }
 
@@ -123,6 +124,10 @@ impl<'a> Laying<'a> {
         let row = f64::from(course.row);
         let out = p.z + self.loops.layer_of(&course.visits[k].1);
         match (self.surface, course.visits[k].1) {
+            (Surface::Round { .. }, _) if cell.waves => {
+                let at = p.x / width / self.loops.wide as f64;
+                Place { at, up: row + p.y / height - r as f64, out }
+            }
             (Surface::Round { .. } | Surface::Bent(_), Visit::Loop(i)) => {
                 let own = &self.loops.loops[i as usize];
                 let lean = own.foot - own.at + (self.head(own) - own.foot) * head;

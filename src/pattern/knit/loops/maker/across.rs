@@ -1,6 +1,8 @@
 //! Where stitches are across the cloth.
 
-use super::{super::super::super::chart::Stitch, Maker};
+use glam::DVec2;
+
+use super::{super::super::super::chart::Stitch, Maker, net::Net};
 
 /// Rounds of looking for it.
 const ROUNDS: usize = 100;
@@ -21,12 +23,58 @@ impl Maker<'_> {
     /// Where stitches are: evenly, and in shaped cloth so that wales run on where stitches come and go.
     pub(in super::super) fn positions(&mut self) {
         self.middles = self.rows.iter().map(|r| self.even(r.len())).collect();
+        if self.border.stacked
+            && let Some(mut net) = Net::new(self.rows)
+        {
+            net.relax();
+            let places = net.places();
+            self.middles = places.iter().map(|row| row.iter().map(|p| p.x).collect()).collect();
+            let rise = |(r, row): (usize, &Vec<DVec2>)| row.iter().map(|p| p.y - r as f64).collect();
+            self.rises = places.iter().enumerate().map(rise).collect();
+            return;
+        }
         if self.border.round.is_none() {
             self.lie_over_each_other();
         }
         let is_shaped = self.rows.windows(2).any(|w| w[0].len() != w[1].len());
         if is_shaped && !self.border.stacked {
             self.share_shaping();
+        }
+    }
+
+    /// Width of a stitch, in mean widths, where its row is not even.
+    pub(super) fn width(&self, r: usize, j: usize) -> f64 {
+        // Loops of other widths do not hold each other.
+        const RANGE: [f64; 2] = [0.6, 1.4];
+        let Some(round) = self.border.round.filter(|_| !self.rises.is_empty()) else { return 1.0 };
+        let (row, n) = (&self.middles[r], self.middles[r].len());
+        let left = if j > 0 { row[j - 1] } else { row[n - 1] - round };
+        let right = if j + 1 < n { row[j + 1] } else { row[0] + round };
+        (0.5 * (right - left)).clamp(RANGE[0], RANGE[1])
+    }
+
+    /// What is drawn through nothing leans as the stitches beside it, so that feet keep their distances.
+    pub(super) fn lean_with_neighbours(&mut self) {
+        if self.rises.is_empty() {
+            return;
+        }
+        for course in &self.courses {
+            let loops: Vec<u32> = course.visits.iter().filter_map(|(_, v)| v.made()).collect();
+            let n = loops.len();
+            let lean = |k: usize| {
+                let own = &self.loops[loops[k % n] as usize];
+                (!own.parents.is_empty()).then_some(own.foot - own.at)
+            };
+            let leans: Vec<f64> = (0..n)
+                .map(|k| {
+                    let sides = [(1..n).find_map(|by| lean(k + n - by)), (1..n).find_map(|by| lean(k + by))];
+                    lean(k).unwrap_or_else(|| 0.5 * sides.iter().flatten().sum::<f64>())
+                })
+                .collect();
+            for (i, lean) in loops.into_iter().zip(leans) {
+                let own = &mut self.loops[i as usize];
+                own.foot = own.at + lean;
+            }
         }
     }
 
