@@ -113,7 +113,7 @@ impl Prepared<'_> {
             }
             Of::Yarns { yarn, shape, strands } => {
                 estimate.tight_bends = strands.tight_bends().len();
-                let plies = Plies::new(strands, &yarn.plies, shape, self.fabric.seed);
+                let plies = plies(self.fabric, yarn, shape, strands);
                 match mode {
                     Mode::Yarn => {
                         let (points, segments) = (strands.points().len(), strands.segments().len());
@@ -156,7 +156,7 @@ impl Prepared<'_> {
             Of::Yarns { yarn, shape, strands } => (yarn, shape, strands),
             Of::Fibers { curves, material } => return vec![Piece::of_lone_fibers(index, &curves, material)],
         };
-        let plies = Plies::new(&strands, &yarn.plies, &shape, fabric.seed);
+        let plies = plies(fabric, yarn, &shape, &strands);
         let (variants, shows_fibers) = (&fabric.variants[..], fabric.shows_fibers);
         let wound = Wound { index, yarn, variants, shape: &shape, strands: &strands, plies, shows_fibers };
         let slots = 0..yarn.plies.len();
@@ -250,6 +250,14 @@ impl Wound<'_> {
     fn piece(&self, fibers: FiberGeometry) -> Piece {
         let scatterers = Scatterers::Fibers(material::of_fibers(self.yarn, self.variants, fibers.ply));
         Piece { curves: CurveGeometry::Fibers(fibers), scatterers }
+    }
+}
+
+fn plies<'a>(fabric: &Fabric, yarn: &'a Yarn, shape: &'a YarnShape, strands: &'a Strands) -> Plies<'a> {
+    let plies = Plies::new(strands, &yarn.plies, shape, fabric.seed);
+    match fabric.tufts {
+        [0, _] => plies,
+        [tufts, opened] => plies.with_opened(yarn.radius, opened as f64 / tufts as f64),
     }
 }
 

@@ -55,11 +55,25 @@ const LOOP_POINTS: f64 = 14.0;
 impl Plies<'_> {
     /// Control points and segments of all fly-aways to be expected.
     pub fn flyaway_counts(&self, of: &Flyaways) -> (u64, u64) {
-        let lengths = (0..self.strands.yarns()).map(|y| self.strands.length_of(y) / self.strands.mean_radius_of(y));
+        let length = |y| self.strands.length_of(y) / self.strands.mean_radius_of(y) * self.hairiness(y);
+        let lengths = (0..self.strands.yarns()).map(length);
         let plies = self.plies.len() as f64 * lengths.sum::<f64>();
         let (hairs, loops) = (of.hair_density * plies, of.loop_density * plies);
         let knots = hairs * HAIR_POINTS as f64 + loops * loop_points(of) as f64;
         ((knots + 2.0 * (hairs + loops)) as u64, (knots - hairs - loops) as u64)
+    }
+
+    /// How many of the fly-aways of a yarn as thick a curve has: the strands that a yarn has opened into share its own, and no
+    /// more, on each length of it.
+    fn hairiness(&self, yarn: usize) -> f64 {
+        /// Thinner than this share of the whole yarn is a strand.
+        const STRAND: f64 = 0.6;
+        match self.opened {
+            Some((radius, strands)) if self.strands.mean_radius_of(yarn) < STRAND * radius => {
+                self.strands.mean_radius_of(yarn) / (radius * strands)
+            }
+            _ => 1.0,
+        }
     }
 
     /// The fly-aways of one ply in all yarns, the first of each yarn, and for each of them the yarn's segment from which
@@ -90,7 +104,8 @@ impl Plies<'_> {
             // Cut at three deviations: a hair a hundred radii long is an accident of numbers.
             mean + deviation * f64::from(normal(stream.next())).clamp(-3.0, 3.0)
         };
-        let count = |stream: &mut Stream, density: f64| (density * length + f64::from(stream.next())).floor() as usize;
+        let counted = length * self.hairiness(yarn);
+        let count = |stream: &mut Stream, density: f64| (density * counted + f64::from(stream.next())).floor() as usize;
         let mut curves = Vec::new();
         let mut add = |path: &dyn Fn(f64) -> (f64, DVec2), points: usize| {
             let knots: Vec<_> = (0..points)

@@ -156,6 +156,8 @@ pub struct Plies<'a> {
     longest_step: f64,
     /// Steps along each yarn, found when first asked for: yarns that stay whole need none.
     steps: OnceLock<Vec<usize>>,
+    /// Of yarns of which some have opened: the radius of a whole one, and into how many strands.
+    opened: Option<(f64, f64)>,
     seed: u32,
 }
 
@@ -177,7 +179,13 @@ impl<'a> Plies<'a> {
                 helices.min(LARGEST_TURN_IN_ELLIPSE / pressed.max(elliptical).max(1e-9))
             })
             .fold(f64::MAX, f64::min);
-        Self { strands, plies, shape, longest_step, steps: OnceLock::new(), seed }
+        Self { strands, plies, shape, longest_step, steps: OnceLock::new(), opened: None, seed }
+    }
+
+    /// Of yarns of this radius, some of which have opened into so many strands each, a curve for each strand.
+    #[must_use]
+    pub fn with_opened(self, radius: f64, strands: f64) -> Self {
+        Self { opened: Some((radius, strands)), ..self }
     }
 
     /// Steps along each yarn: at least one for each of its segments.

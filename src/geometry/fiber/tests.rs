@@ -270,6 +270,10 @@ fn flyaways_are_as_many_and_reach_as_far_as_asked() {
     assert!((1.0..2.2).contains(&far), "{far}");
     let none = Flyaways { hair_density: 0.0, loop_density: 0.0, ..of };
     assert!(made.flyaways(0, &none).0.count() <= 1);
+    // As one of 16 strands of a yarn four times as thick, which share its hairs.
+    let strand = made.with_opened(4.0 * 0.5, 16.0);
+    let (expected, found) = (3.0 * length / (4.0 * 16.0), strand.flyaways(2, &of).0.count() as f64);
+    assert!((found - expected).abs() <= 2.0, "{found} of {expected}");
 }
 
 #[test]

@@ -124,9 +124,9 @@ pub const LONGEST: f64 = 1000.0;
 pub const FRINGE: f64 = 24.0;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
 pub const FLATTEN: f64 = 1.5;
-/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut, five as loops.
+/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut, eight as loops.
 pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
-    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 5.0 } else { 4.0 };
+    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
     2.0 * diameters * radius
 }
 

@@ -4,14 +4,20 @@
 //! Pile yarns are twisted little and bloom where they are free: loops grow thicker, and a tuft opens into the strands that it was
 //! twisted of, which spread until they meet those of its neighbours.
 
+mod arch;
+mod tuft;
+
 use std::{
-    collections::{BTreeSet, HashMap},
+    collections::BTreeSet,
     f64::consts::{PI, TAU},
 };
 
-use glam::{DVec2, DVec3, IVec2};
-use rayon::prelude::*;
+use glam::{DVec2, DVec3};
 
+use self::{
+    arch::Arch,
+    tuft::{Cut, Tuft, Vault},
+};
 use super::{
     super::{
         draft::{Draft, Pile},
@@ -20,29 +26,31 @@ use super::{
     Cloth, PatternStrand, StrandKind,
     edges::{Point, from_points, points},
 };
-use crate::math::{sampler::hash2, special::smooth_step};
+use crate::math::sampler::hash2;
 
 /// How far from the middle of a crossing that holds it a pile yarn stands up, in spacings.
-const RISE: f64 = 0.7;
+const RISE: f64 = 0.75;
+const LEAST_RISE: f64 = 0.5;
 /// Distance of points of loops and legs, in radii of the yarn.
 const STEP: f64 = 1.1;
 
 /// Rounds in which pile finds room.
 const ROUNDS: usize = 80;
-/// Strands across a tuft's yarn: of five there are 19.
-const ACROSS: u32 = 5;
-/// How much thicker strands are at their tips, at most, and loops where they are free.
-const BLOOM_CUT: f64 = 2.2;
-const BLOOM_LOOP: f64 = 1.7;
-/// How far the tip of a strand is from its place by chance, and from the cut, in radii of the yarn.
-const UNEVEN: f64 = 0.35;
-const CUT: f64 = 0.2;
-/// How far tufts at the border of a wale lean out, of half its period, and how much lower they are at its sides.
-const LEAN_OUT: f64 = 0.05;
+/// How much lower tufts are at the sides of a wale, of their height.
 const ROUNDED: f64 = 0.55;
-/// How far tufts lean by chance, and loops, of their height.
-const LEAN: f64 = 0.12;
-const LEAN_LOOP: f64 = 0.3;
+/// How far tufts lean by chance, and loops at most, of their height.
+const LEAN: f64 = 0.06;
+const LEAN_LOOP: f64 = 0.7;
+/// By how much the top of a loop is turned, at least and at most, in half turns.
+const TURN: [f64; 2] = [0.3, 1.2];
+
+#[cfg(test)]
+mod tests;
+
+/// Mean diameter of warp and weft.
+fn diameter(cloth: &Cloth<'_>) -> f64 {
+    cloth.weave.warp_radius + cloth.weave.weft_radius
+}
 
 /// A yarn, some of whose points stand free of the ground.
 pub(super) struct Standing {
@@ -51,85 +59,6 @@ pub(super) struct Standing {
     free: Vec<bool>,
     /// Whether it is a tuft, which opens.
     tuft: Option<Tuft>,
-}
-
-/// How a tuft opens.
-struct Tuft {
-    /// Unit vector across the plane in which it is bent.
-    across: DVec3,
-    /// Points of its first leg and of its last.
-    legs: [usize; 2],
-    /// Radius of the yarn where it carries none of its own.
-    radius: f64,
-    /// Half its width at the tips, across the yarn and along it.
-    spread: [f64; 2],
-    seed: u32,
-}
-
-impl Tuft {
-    /// Its strands: side by side where it is held, apart at the tips.
-    fn open(&self, strand: &PatternStrand, flat: bool) -> Vec<PatternStrand> {
-        let mut way = points(strand);
-        if strand.curve.radii.is_none() {
-            way.iter_mut().for_each(|p| p.1 = self.radius);
-        }
-        let last = way.len() - 1;
-        let thin = 1.0 / f64::from(ACROSS);
-        let strands = bundle();
-        let random = |what: u32| f64::from(hash2(self.seed, what) >> 8) / f64::from(1u32 << 23) - 1.0;
-        let turned = DVec2::from_angle(PI * random(0));
-        // Where it is on a leg, which of them, and from 0 to 1 at the tip.
-        let [first, second] = self.legs;
-        let on_leg = |i: usize| {
-            if i < first {
-                (0, 1.0 - i as f64 / first as f64)
-            } else {
-                (1, (i + second).saturating_sub(last) as f64 / second.max(1) as f64)
-            }
-        };
-        let one = |(k, at): (usize, DVec2)| {
-            let at = turned.rotate(at);
-            let chance = |leg: usize, what: u32| random(1 + 8 * k as u32 + 4 * leg as u32 + what);
-            let place = |i: usize| -> Point {
-                let (p, radius, axis, coordinates) = way[i];
-                let tangent = (way[(i + 1).min(last)].0 - way[i.saturating_sub(1)].0).normalize_or(DVec3::Z);
-                let major = (self.across - self.across.dot(tangent) * tangent).normalize_or(self.across);
-                let minor = tangent.cross(major);
-                let (leg, s) = on_leg(i);
-                let [wide, long] = self.spread.map(|spread| (spread / radius - 1.0).max(0.0));
-                let bloom = ((1.0 + wide) * (1.0 + long)).sqrt().min(BLOOM_CUT) - 1.0;
-                let thick = 1.0 + bloom * s.sqrt();
-                // Not before there is room, and beyond what they need at the tips only.
-                let apart = |spread: f64| 1.0 + spread.min(bloom) * s.sqrt() + (spread - spread.min(bloom)) * s;
-                let at = at * DVec2::new(apart(wide), apart(long));
-                let by_chance = DVec2::new(chance(leg, 0), chance(leg, 1)) * (UNEVEN * s);
-                let off = (at + by_chance) * radius;
-                let cut = tangent * (CUT * radius * chance(leg, 2) * s);
-                (
-                    p + off.x * major + off.y * minor + cut,
-                    thin * radius * thick,
-                    minor.as_vec3() * axis.length(),
-                    coordinates,
-                )
-            };
-            let places: Vec<Point> = (0..=last).map(place).collect();
-            let mut made = from_points(strand.kind, strand.index, &places, flat);
-            made.curve.radii = Some(places.iter().map(|p| p.1).collect());
-            made.share = strand.share / strands.len() as f64;
-            made
-        };
-        strands.iter().copied().enumerate().map(one).collect()
-    }
-}
-
-/// Where the strands of a yarn of radius 1 are in its section: in rings of six, as close as they lie.
-fn bundle() -> Vec<DVec2> {
-    let rings = ACROSS as i32 / 2;
-    let step = 2.0 / f64::from(ACROSS);
-    let place =
-        |(a, b): (i32, i32)| DVec2::new(f64::from(a) + 0.5 * f64::from(b), 0.75f64.sqrt() * f64::from(b)) * step;
-    let all = (-rings..=rings).flat_map(|a| (-rings..=rings).map(move |b| (a, b)));
-    all.filter(|(a, b)| (a + b).abs() <= rings).map(place).collect()
 }
 
 impl Standing {
@@ -143,10 +72,19 @@ impl Standing {
         Self { strand, free: points.iter().map(|p| p.1).collect(), tuft: None }
     }
 
+    /// Whether its loops can be thicker than the rest of it: a round yarn carries no radii.
+    fn opens(&self) -> bool {
+        self.tuft.is_none() && !self.free.is_empty() && self.strand.curve.radii.is_some()
+    }
+
+    fn is_free(&self, point: usize) -> bool {
+        self.free.get(point).copied().unwrap_or(false)
+    }
+
     /// The points by which the yarn finds room: all free ones and those beside them, few of the others.
     fn places(&self, step: f64) -> Vec<usize> {
         let points = &self.strand.curve.points;
-        let free = |i: usize| self.free.get(i).copied().unwrap_or(false);
+        let free = |i: usize| self.is_free(i);
         let mut places: Vec<usize> = Vec::new();
         for i in 0..points.len() {
             let beside = free(i) || (i > 0 && free(i - 1)) || free(i + 1);
@@ -158,9 +96,10 @@ impl Standing {
         places
     }
 
-    fn rope(&self, places: &[usize], diameter: f64) -> Rope {
+    /// A rope through some of its points, those that are `free` to move; the unit is a diameter.
+    fn rope(&self, places: &[usize], free: impl Fn(usize) -> bool, diameter: f64) -> Rope {
         let points = &self.strand.curve.points;
-        let pinned: Vec<bool> = places.iter().map(|&i| !self.free.get(i).copied().unwrap_or(false)).collect();
+        let pinned: Vec<bool> = places.iter().map(|&i| !free(i)).collect();
         let segments = places.windows(2).zip(pinned.windows(2));
         let lengths =
             segments.filter(|(_, pinned)| *pinned != [true; 2]).map(|(i, _)| points[i[0]].distance(points[i[1]]));
@@ -175,7 +114,8 @@ impl Standing {
 pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStrand> {
     if yarns.iter().any(|yarn| !yarn.free.is_empty()) {
         let places: Vec<Vec<usize>> = yarns.iter().map(|yarn| yarn.places(0.5 * STEP * diameter)).collect();
-        let ropes = yarns.iter().zip(&places).map(|(yarn, places)| yarn.rope(places, diameter)).collect();
+        let ropes =
+            yarns.iter().zip(&places).map(|(yarn, places)| yarn.rope(places, |i| yarn.is_free(i), diameter)).collect();
         let mut relaxation = Relaxation { ropes, period: None, shear: 0.0 };
         relaxation.run(ROUNDS, |_| {});
         for ((yarn, places), rope) in yarns.iter_mut().zip(&places).zip(relaxation.ropes) {
@@ -184,74 +124,16 @@ pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStra
             }
         }
     }
-    let mut strands = Vec::new();
-    let mut legs = Vec::new();
-    let mut room: f64 = 0.0;
-    for yarn in yarns {
-        let Some(tuft) = yarn.tuft else {
-            strands.push(yarn.strand);
-            continue;
-        };
-        let opened = tuft.open(&yarn.strand, yarn.strand.curve.flattening.is_some());
-        legs.extend((strands.len()..strands.len() + opened.len()).map(|strand| (strand, tuft.legs)));
-        room = room.max(4.0 * tuft.spread[0] * tuft.spread[1] / opened.len() as f64);
-        strands.extend(opened);
-    }
-    share_room(&mut strands, &legs, room);
-    strands
-}
-
-/// Lets strands, which open around the leg that they are of, find their places among those of all others: each has `room` of
-/// the plane, and pushes those away that are nearer than in the closest packing of such rooms. `legs` are strands with the
-/// points of their first leg and of their last; they bend from the ground up.
-fn share_room(strands: &mut [PatternStrand], legs: &[(usize, [usize; 2])], room: f64) {
-    /// In which tips come to rest.
-    const ROUNDS: usize = 80;
-    /// How far a tip goes from where it stood, at most, in distances of neighbours.
-    const FURTHEST: f64 = 2.5;
-    /// They press on each other, or cracks would stay where tufts stood apart.
-    const PRESSED: f64 = 1.15;
-    if legs.is_empty() {
-        return;
-    }
-    let distance = PRESSED * (2.0 / 3f64.sqrt() * room).sqrt();
-    // The last point of each leg, and the points below it.
-    let ends: Vec<(usize, usize, usize)> = legs
-        .iter()
-        .flat_map(|&(strand, [first, last])| {
-            [(strand, 0, first), (strand, strands[strand].curve.points.len() - 1, last)]
-        })
-        .filter(|(.., points)| *points > 0)
-        .collect();
-    let stood: Vec<DVec2> = ends.iter().map(|&(strand, tip, _)| strands[strand].curve.points[tip].truncate()).collect();
-    let mut tips = stood.clone();
-    for _ in 0..ROUNDS {
-        let cell = |p: DVec2| (p / distance).floor().as_ivec2();
-        let mut cells: HashMap<IVec2, Vec<usize>> = HashMap::new();
-        tips.iter().enumerate().for_each(|(i, p)| cells.entry(cell(*p)).or_default().push(i));
-        let pushed = |(i, p): (usize, &DVec2)| {
-            let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| IVec2::new(x, y)));
-            let near = around.filter_map(|by| cells.get(&(cell(*p) + by))).flatten().filter(|&&k| k != i);
-            let push: DVec2 = near
-                .map(|&k| {
-                    let off = *p - tips[k];
-                    let apart = off.length();
-                    if apart < distance { 0.5 * (distance - apart) * off.normalize_or(DVec2::X) } else { DVec2::ZERO }
-                })
-                .sum();
-            // Half of it: each is pushed by several.
-            stood[i] + (*p + 0.5 * push - stood[i]).clamp_length_max(FURTHEST * distance)
-        };
-        tips = tips.par_iter().enumerate().map(pushed).collect();
-    }
-    for ((&(strand, tip, points), from), to) in ends.iter().zip(&stood).zip(&tips) {
-        let way = &mut strands[strand].curve.points;
-        for k in 0..points {
-            let i = if tip == 0 { k } else { tip - k };
-            let s = 1.0 - k as f64 / points as f64;
-            way[i] += ((*to - *from) * s * s).extend(0.0);
-        }
-    }
+    arch::spread(&mut yarns, diameter);
+    arch::bloom(&mut yarns, diameter);
+    let tufts: Vec<(&PatternStrand, &Tuft)> =
+        yarns.iter().filter_map(|yarn| Some((&yarn.strand, yarn.tuft.as_ref()?))).collect();
+    let mut opened = tuft::open(&tufts).into_iter();
+    let strands = |yarn: Standing| match yarn.tuft {
+        Some(_) => opened.next().unwrap_or_default(),
+        None => vec![yarn.strand],
+    };
+    yarns.into_iter().flat_map(strands).collect()
 }
 
 /// Raises the floats of a pile yarn. It is held where it lies on the other side of the cloth.
@@ -280,13 +162,17 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
     let border = |c: i64| side == 0 && !(flat_border..i64::from(cloth.count[1]) - flat_border).contains(&(c + first));
     let at = |c: i64| nodes / 2 + c * nodes;
     let holds: Vec<(i64, bool)> = (0..crossings).filter(|&c| held(c)).map(|c| (at(c), border(c))).collect();
-    let rise = (RISE * nodes as f64).round() as i64;
+    let nearest_hold = holds.windows(2).map(|pair| pair[1].0 - pair[0].0).min().unwrap_or(i64::MAX);
+    let own_room = 0.5 * diameter(cloth) / cloth.cell.spacing[1 - side];
+    // The feet of a tuft and of the next on its yarn stand beside each other.
+    let beside = |rise: f64| rise.min(0.5 * nearest_hold as f64 / nodes as f64 - own_room).max(LEAST_RISE);
+    let rise = ((if pile.cut { beside(RISE) } else { RISE }) * nodes as f64).floor() as i64;
     let up = if back { -1.0 } else { 1.0 };
     let seed = strand.index ^ ((side as u32) << 30);
-    let wale = wale(draft, pile, side);
+    let wale = wale(draft, pile, side, rise as f64 / nodes as f64);
     let per_repeat = (0..size).filter(|&c| held(c - first)).count().max(1) as f64;
     let even = if wale.is_some() { 0.0 } else { (RISE - 0.25 * size as f64 / per_repeat).clamp(0.0, RISE) };
-    let made = Raised { cloth, side, up, seed, wale, even };
+    let made = Raised { cloth, side, up, seed, wale, rise: rise as f64 / nodes as f64, even };
     // Nothing where a part would begin beyond the end: the yarn may end on top of its last crossing.
     let part = |from: i64, to: i64| -> Vec<(Point, bool)> {
         let (from, to) = (from.max(0), to.min(way.len() as i64 - 1));
@@ -300,8 +186,7 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
             let (a, b) = (base[0].0, base[base.len() - 1].0);
             let free = |points: Vec<Point>| points.into_iter().map(|p| (p, true));
             let place = |at: i64| (at - nodes / 2) as f64 / nodes as f64 + first as f64;
-            let legs = [(a, -1.0, at - rise), (b, 1.0, at + rise)]
-                .map(|(foot, out, foot_at)| made.leg(foot, out, at as u32, place(foot_at)));
+            let legs = [(a, -1.0), (b, 1.0)].map(|(foot, out)| made.leg(foot, out, at as u32, place(at)));
             let counts = [legs[0].len(), legs[1].len()];
             let [before, after] = legs;
             let mut all: Vec<(Point, bool)> = free(before).collect();
@@ -309,8 +194,15 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
             all.extend(&base);
             all.extend(free(after));
             let seed = hash2(made.seed, at as u32);
-            let tuft =
-                Tuft { across: made.direction(0.0, 1.0, 0.0), legs: counts, radius: made.radius(), spread, seed };
+            let tuft = Tuft {
+                across: made.direction(0.0, 1.0, 0.0),
+                legs: counts,
+                stride: (nodes as usize / 4).max(1),
+                radius: made.radius(),
+                spread,
+                cut: made.cut(0.5 * (a.0.z + b.0.z), place(at)),
+                seed,
+            };
             Standing { tuft: Some(tuft), ..Standing::of(&strand, &all, flat) }
         };
         return holds.iter().filter(|(_, border)| !border).map(|&(at, _)| tuft(at)).collect();
@@ -338,16 +230,38 @@ struct Raised<'a> {
     up: f64,
     seed: u32,
     wale: Option<Wale>,
+    /// How far legs stand from where their tuft is held, in crossings.
+    rise: f64,
     /// How far legs lean towards each other, in crossings.
     even: f64,
 }
 
 /// Where tufts stand in rows across the yarns that they are cut of; in crossings.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Wale {
     middle: f64,
     /// Distance to the next.
     period: f64,
+    /// Where legs stand at the ground, from the middle, in order: at their tips they are as far from each other.
+    feet: Vec<f64>,
+}
+
+impl Wale {
+    /// Share of a wale's period that is no groove.
+    const FULL: f64 = 0.85;
+
+    /// Of a place, how far it is from the middle of its wale.
+    fn beside(&self, place: f64) -> f64 {
+        let away = (place - self.middle) / self.period;
+        (away - away.round()) * self.period
+    }
+
+    /// Where the tips of a leg are that stands at a place, from the middle of its wale.
+    fn tips(&self, foot: f64) -> f64 {
+        let count = self.feet.len().max(1) as f64;
+        let order = self.feet.iter().filter(|f| **f < foot - 1e-6).count() as f64;
+        Self::FULL * self.period * ((order + 0.5).min(count - 0.5) / count - 0.5)
+    }
 }
 
 /// Places, in crossings, where the pile yarns of a repeat are held.
@@ -361,29 +275,33 @@ fn held_places<'a>(draft: &'a Draft, pile: &'a Pile, side: usize) -> impl Iterat
     })
 }
 
-/// The wales of a pile, unless it is held everywhere alike.
-fn wale(draft: &Draft, pile: &Pile, side: usize) -> Option<Wale> {
+/// The wales of a pile, unless it is held everywhere alike; its legs rise so far from where they are held.
+fn wale(draft: &Draft, pile: &Pile, side: usize, rise: f64) -> Option<Wale> {
     const ALIKE: f64 = 0.2;
     let period = if side == 0 { draft.wefts() } else { draft.warps() } as f64;
     let (sum, count) = held_places(draft, pile, side).fold((DVec2::ZERO, 0.0), |(sum, count), place| {
         (sum + DVec2::from_angle(TAU * place as f64 / period), count + 1.0)
     });
-    (sum.length() > ALIKE * count).then(|| Wale { middle: sum.to_angle() / TAU * period, period })
+    (sum.length() > ALIKE * count).then(|| {
+        let mut wale = Wale { middle: sum.to_angle() / TAU * period, period, feet: Vec::new() };
+        let places: BTreeSet<usize> = held_places(draft, pile, side).collect();
+        let holds = places.into_iter().map(|place| wale.beside(place as f64));
+        wale.feet = holds.flat_map(|hold| [hold - rise, hold + rise]).collect();
+        wale
+    })
 }
 
 /// Half the room of a leg, across the yarns of the pile and along them.
 fn spread(cloth: &Cloth<'_>, pile: &Pile, side: usize) -> [f64; 2] {
-    /// Share of a wale's period that is no groove.
-    const FULL: f64 = 0.85;
     let draft = &cloth.weave.draft;
     let [p, q] = cloth.cell.spacing;
     let size = [p * draft.warps() as f64, q * draft.wefts() as f64];
     let legs = 2.0 * held_places(draft, pile, side).count().max(1) as f64;
-    if wale(draft, pile, side).is_some() {
+    if wale(draft, pile, side, RISE).is_some() {
         // Tufts behind each other share what their wale has of the repeat's other side.
         let places: BTreeSet<usize> = held_places(draft, pile, side).collect();
         let across = 2.0 * size[side] * places.len() as f64 / legs;
-        return [0.5 * across, 0.5 * FULL * size[0] * size[1] / (legs * across)];
+        return [0.5 * across, 0.5 * Wale::FULL * size[0] * size[1] / (legs * across)];
     }
     let standing = (0..[draft.warps(), draft.wefts()][side]).filter(|&yarn| pile.stands(side, yarn).is_some()).count();
     let across = size[side] / standing.max(1) as f64;
@@ -405,58 +323,62 @@ impl Raised<'_> {
         if self.side == 0 { DVec3::new(across, along, up * self.up) } else { DVec3::new(along, across, up * self.up) }
     }
 
-    fn at(&self, p: DVec3, bloom: f64, near: Point) -> Point {
-        (p, self.radius() * bloom, self.direction(1.0, 0.0, 0.0).as_vec3(), near.3)
+    fn at(&self, p: DVec3, near: Point) -> Point {
+        (p, self.radius(), self.direction(1.0, 0.0, 0.0).as_vec3(), near.3)
     }
 
-    /// A leg that stands up from `from`, which is at `place` along the yarn, in crossings, and leans from the middle of its wale.
-    fn leg(&self, from: Point, out: f64, place_of: u32, place: f64) -> Vec<Point> {
+    /// The face of the pile over feet at a height, of a tuft that is held at `place` along the yarn, in crossings.
+    fn cut(&self, foot: f64, place: f64) -> Cut {
+        let vault = self.wale.as_ref().map(|wale| {
+            let own = place - wale.beside(place);
+            let half = 0.5 * wale.period * self.cloth.cell.spacing[1 - self.side];
+            let middle = self.cloth.position(1 - self.side, own + 0.5);
+            Vault { axis: 1 - self.side, middle, half, lower: ROUNDED }
+        });
+        Cut { foot, top: foot + self.up * self.cloth.weave.pile_height, vault }
+    }
+
+    /// A leg that stands up from `from`, before or after the place `hold` along the yarn, in crossings.
+    fn leg(&self, from: Point, out: f64, place_of: u32, hold: f64) -> Vec<Point> {
         let (r, height) = (self.radius(), self.cloth.weave.pile_height);
         let what = if out > 0.0 { 0 } else { 8 };
         let [lean, aside] = [what, what + 1].map(|what| LEAN * height * self.random(place_of, what));
-        let beside = self.wale.map_or(0.0, |wale| {
-            let away = (place - wale.middle) / wale.period;
-            2.0 * (away - away.round())
-        });
-        let period = self.wale.map_or(0.0, |wale| 0.5 * wale.period * self.cloth.cell.spacing[1 - self.side]);
-        // Both legs of a tuft and of the next stand alike far apart at their tips.
-        let inwards = self.even * self.cloth.cell.spacing[1 - self.side];
-        let height = height * (1.0 - ROUNDED * beside * beside) * (1.0 + 0.04 * self.random(place_of, what + 2));
+        let spacing = self.cloth.cell.spacing[1 - self.side];
+        // Tips share the width of their wale; else both legs of a tuft and of the next stand alike far apart at their tips.
+        let (to, lower) = match &self.wale {
+            Some(wale) => {
+                let foot = wale.beside(hold) + out * self.rise;
+                let tips = wale.tips(foot);
+                (tips - foot, ROUNDED * (2.0 * tips / wale.period).powi(2))
+            }
+            None => (-out * self.even, 0.0),
+        };
+        let height = height * (1.0 - lower);
         let steps = (height / (STEP * r)).ceil().max(2.0) as usize;
         let leg = |k: usize| {
             let s = k as f64 / steps as f64;
-            let along = LEAN_OUT * beside * period * s.powf(1.5) + (lean - out * inwards) * s * s;
-            let p = from.0 + self.direction(along, aside * s * s, height * s);
-            self.at(p, 1.0, from)
+            self.at(from.0 + self.direction(to * spacing * s + lean * s * s, aside * s * s, height * s), from)
         };
         (1..=steps).map(leg).collect()
     }
 
-    /// A loop from `from` to `to`, without both: a drop, which yarn that wants to untwist turns out of the warp's plane, all
-    /// to one side.
+    /// A loop from `from` to `to`, without both. Yarn that wants to untwist turns all of them to one side, each by another
+    /// angle.
     fn arch(&self, from: Point, to: Point, place: u32) -> Vec<Point> {
-        let (r, height) = (self.radius(), self.cloth.weave.pile_height);
-        let height = height * (1.0 + 0.05 * self.random(place, 2));
-        let [lean, aside] = [0, 1].map(|what| LEAN_LOOP * height * self.random(place, what));
-        let twist = PI * (0.25 + 0.12 * self.random(place, 3));
-        let wide = 2.4 * r;
-        let steps = (2.4 * height / (STEP * r)).ceil().max(6.0) as usize;
-        let arch = |k: usize| {
-            let s = k as f64 / steps as f64;
-            // Rounder at the top than a sine.
-            let up = (PI * s).sin().powf(0.8);
-            // Wider at the top than at the foot, and turned more: what lies between both feet is turned with it.
-            let across = -wide * (TAU * s).sin();
-            let (sin, cos) = (twist * up * up).sin_cos();
-            let fallen = up * up;
-            let (middle, half) = (0.5 * (from.0 + to.0), 0.5 * (to.0 - from.0).length());
-            let along = -half * (1.0 - 2.0 * s) + across;
-            let base = DVec3::Z * (from.0.lerp(to.0, s) - middle).z;
-            let p =
-                middle + base + self.direction(lean * fallen + along * cos, aside * fallen + along * sin, height * up);
-            let bloom = 1.0 + (BLOOM_LOOP - 1.0) * smooth_step((5.0 * s.min(1.0 - s)).min(1.0));
-            self.at(p, bloom, if s < 0.5 { from } else { to })
+        let height = self.cloth.weave.pile_height;
+        let random = |what: u32| self.random(place, what);
+        let lean = DVec2::from_angle(PI * random(0)) * (LEAN_LOOP * height * (0.5 + 0.5 * random(1)).sqrt());
+        let arch = Arch {
+            feet: [from.0, to.0],
+            up: self.direction(0.0, 0.0, 1.0),
+            radius: self.radius(),
+            height: height * (1.0 + 0.05 * random(2)),
+            lean: lean.extend(0.0),
+            turn: PI * (TURN[0] + (TURN[1] - TURN[0]) * (0.5 + 0.5 * random(3))),
         };
-        (1..steps).map(arch).collect()
+        let points = arch.points(STEP * self.radius());
+        let count = points.len();
+        let near = |k: usize| if 2 * k < count { from } else { to };
+        points.into_iter().enumerate().map(|(k, p)| self.at(p, near(k))).collect()
     }
 }
