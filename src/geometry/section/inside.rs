@@ -139,7 +139,7 @@ impl Inside {
     }
 
     /// The two stations of a way out from `shift` beside this point in a direction `w` of the section's frame: `None` unless it
-    /// turns and bends little.
+    /// turns and bends little, and stays near enough for the bend to be that of this place.
     #[inline]
     pub(super) fn way_out(&self, section: &Section<'_>, shift: Vec3A, w: Vec3A) -> Option<[Station; 2]> {
         let real = self.pressed.map_or(self.at, |pressed| pressed.real(self.at));
@@ -151,7 +151,8 @@ impl Inside {
         let to = from.ahead(depth)?;
         let turning = self.turn.abs() + if self.pressed.is_some() { section.pressed_turn.abs() } else { 0.0 };
         let turned = turning * to.travel;
-        if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT {
+        let is_near = section.walker.is_none() || to.travel.abs() <= LIGHT.near;
+        if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT || !is_near {
             return None;
         }
         let start = Unbent { at: from.at, slope: from.slope, travel: 0.0, advance, straightness, lean: 0.0, cos: 1.0 };

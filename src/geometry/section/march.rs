@@ -35,8 +35,8 @@ pub(super) struct Reach {
 pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
 /// A ray that gathers light.
 pub(super) const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
-/// Light that leaves from inside: how far it still has to go is felt in all.
-pub(super) const LIGHT: Reach = Reach { near: 1.2, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
+/// Light that leaves from inside: how far it still has to go is felt in all, and a weave's bend turns round within a radius or two.
+pub(super) const LIGHT: Reach = Reach { near: 0.5, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
 /// The shortest step towards the surface, in yarn radii.
 const LEAST_STEP: f32 = 0.1;
 /// The shortest that a step is made by turns and bends, in yarn radii.
