@@ -67,16 +67,11 @@ impl AfterFiber {
     /// Expected fibres from one knot to the next.
     pub(crate) const STEP: f32 = 0.4;
 
-    /// Of fibres of which none is within so many expected ones of light that goes on, and of light that goes back by less the more it is turned:
-    /// by the square of what the cosine is above -1, and a tenth at the least.
+    /// Of fibres of which none is within so many expected ones of light that goes on; light that goes back finds its strip clear alone.
     pub(crate) fn free(fibers: f32) -> Self {
-        let knots = |shares: [f32; 4]| {
-            let rows = std::array::from_fn(|knot| shares.map(|share| (share * fibers).min(Self::STEP * knot as f32)));
-            MissingFibers { inside: rows, rim: rows }
-        };
-        let back = TURN_COSINES[1].map(|cos| (1.0 + cos).powi(2).max(0.1));
-        let back = knots([back[0], back[0], back[1], back[1]]);
-        Self { first: knots([1.0; 4]), later: knots([1.0; 4]), back, back_later: back }
+        let rows = std::array::from_fn(|knot| [fibers.min(Self::STEP * knot as f32); 4]);
+        let onward = MissingFibers { inside: rows, rim: rows };
+        Self { first: onward, later: onward, back: MissingFibers::default(), back_later: MissingFibers::default() }
     }
 
     /// That of light by whether it met others before the fibre, by the cosine of its turn across it and by how much its way is along the

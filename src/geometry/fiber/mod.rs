@@ -455,9 +455,6 @@ impl Placement {
     /// How the fibres that are placed in a ply lie, from some that are, as far as it is not known: the crowding to 0.01 or so, and the
     /// regularity to some hundredths. `stretch` is the long over the short axis of the yarn's section, 1 if it is round.
     pub fn packing_of(self, ply: &PlyParameters, twist: Twist, known: KnownPacking, stretch: f64) -> PlyPacking {
-        if let KnownPacking { crowding: Some(crowding), regularity: Some(regularity) } = known {
-            return PlyPacking { crowding, depth: 0.0, regularity, rim: regularity, after: None };
-        }
         let core = ply.radius - ply.fiber_radius;
         let fiber = ply.fiber_radius / core;
         let measured = match self {
@@ -475,7 +472,7 @@ impl Placement {
             depth: if known.crowding.is_some() { 0.0 } else { measured.depth },
             regularity: known.regularity.unwrap_or(measured.regularity),
             rim: known.regularity.unwrap_or(measured.rim),
-            after: if known.regularity.is_some() { None } else { measured.after },
+            after: measured.after,
         }
     }
 }
