@@ -26,7 +26,7 @@ use super::{
     Cloth, PatternStrand, StrandKind,
     edges::{Point, from_points, points},
 };
-use crate::math::sampler::hash2;
+use crate::math::sampler::{hash2, unit};
 
 /// How far from the middle of a crossing that holds it a pile yarn stands up, in spacings.
 const RISE: f64 = 0.75;
@@ -110,19 +110,31 @@ impl Standing {
     }
 }
 
+/// Relaxes ropes of a diameter through places of yarns, and puts what is not pinned there.
+fn find_room(yarns: &mut [Standing], places: &[(usize, Vec<usize>)], ropes: Vec<Rope>, diameter: f64, rounds: usize) {
+    let mut relaxation = Relaxation { ropes, period: None, shear: 0.0 };
+    relaxation.run(rounds, |_| {});
+    for ((yarn, places), rope) in places.iter().zip(relaxation.ropes) {
+        let points = &mut yarns[*yarn].strand.curve.points;
+        for ((&i, point), _) in places.iter().zip(rope.points).zip(rope.pinned).filter(|(_, pinned)| !pinned) {
+            points[i] = point * diameter;
+        }
+    }
+}
+
+/// A number from -1 to 1 by chance.
+fn random(seed: u32, what: u32) -> f64 {
+    2.0 * f64::from(unit(hash2(seed, what))) - 1.0
+}
+
 /// Lets what stands free find room; the ground stays.
 pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStrand> {
     if yarns.iter().any(|yarn| !yarn.free.is_empty()) {
-        let places: Vec<Vec<usize>> = yarns.iter().map(|yarn| yarn.places(0.5 * STEP * diameter)).collect();
-        let ropes =
-            yarns.iter().zip(&places).map(|(yarn, places)| yarn.rope(places, |i| yarn.is_free(i), diameter)).collect();
-        let mut relaxation = Relaxation { ropes, period: None, shear: 0.0 };
-        relaxation.run(ROUNDS, |_| {});
-        for ((yarn, places), rope) in yarns.iter_mut().zip(&places).zip(relaxation.ropes) {
-            for (&i, point) in places.iter().zip(rope.points).filter(|(i, _)| yarn.free.get(**i) == Some(&true)) {
-                yarn.strand.curve.points[i] = point * diameter;
-            }
-        }
+        let step = 0.5 * STEP * diameter;
+        let places: Vec<(usize, Vec<usize>)> = yarns.iter().map(|yarn| yarn.places(step)).enumerate().collect();
+        let rope = |yarn: &Standing, places: &[usize]| yarn.rope(places, |i| yarn.is_free(i), diameter);
+        let ropes = places.iter().map(|(yarn, places)| rope(&yarns[*yarn], places)).collect();
+        find_room(&mut yarns, &places, ropes, diameter, ROUNDS);
     }
     arch::spread(&mut yarns, diameter);
     arch::bloom(&mut yarns, diameter);
@@ -151,12 +163,7 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
     // Crossing c is at point `nodes / 2 + (c - first) * nodes`.
     let first = if side == 0 { -hem } else { 0 };
     let crossings = (way.len() as i64 - 1) / nodes;
-    let held = |c: i64| {
-        let other = (c + first).rem_euclid(size) as usize;
-        let warp_over = if side == 0 { draft.warp_over(other, own) } else { draft.warp_over(own, other) };
-        let on_top = warp_over == (side == 0);
-        on_top == back
-    };
+    let held = |c: i64| is_held(draft, side, own, (c + first).rem_euclid(size) as usize, back);
     // A hem, and what it is folded onto, is woven flat, as borders of towels are.
     let flat_border = if hem > 0 { hem + 1 } else { 0 };
     let border = |c: i64| side == 0 && !(flat_border..i64::from(cloth.count[1]) - flat_border).contains(&(c + first));
@@ -180,7 +187,7 @@ pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: 
     };
     let flat = cloth.weave.sized();
     if pile.cut {
-        let spread = spread(cloth, pile, side);
+        let spread = spread(cloth, pile, side, made.wale.is_some());
         let tuft = |at: i64| {
             let base = part(at - rise, at + rise);
             let (a, b) = (base[0].0, base[base.len() - 1].0);
@@ -264,15 +271,18 @@ impl Wale {
     }
 }
 
+/// Whether a yarn of a side is held at its crossing with another: there it lies on the side of the cloth that its pile leaves.
+fn is_held(draft: &Draft, side: usize, own: usize, other: usize, back: bool) -> bool {
+    let on_top = if side == 0 { draft.warp_over(other, own) } else { !draft.warp_over(own, other) };
+    on_top == back
+}
+
 /// Places, in crossings, where the pile yarns of a repeat are held.
 fn held_places<'a>(draft: &'a Draft, pile: &'a Pile, side: usize) -> impl Iterator<Item = usize> + 'a {
     let [own, other] = if side == 0 { [draft.warps(), draft.wefts()] } else { [draft.wefts(), draft.warps()] };
-    (0..own).filter_map(move |yarn| Some((yarn, pile.stands(side, yarn)?))).flat_map(move |(yarn, back)| {
-        (0..other).filter(move |&c| {
-            let on_top = if side == 0 { draft.warp_over(c, yarn) } else { !draft.warp_over(yarn, c) };
-            on_top == back
-        })
-    })
+    (0..own)
+        .filter_map(move |yarn| Some((yarn, pile.stands(side, yarn)?)))
+        .flat_map(move |(yarn, back)| (0..other).filter(move |&c| is_held(draft, side, yarn, c, back)))
 }
 
 /// The wales of a pile, unless it is held everywhere alike; its legs rise so far from where they are held.
@@ -291,13 +301,13 @@ fn wale(draft: &Draft, pile: &Pile, side: usize, rise: f64) -> Option<Wale> {
     })
 }
 
-/// Half the room of a leg, across the yarns of the pile and along them.
-fn spread(cloth: &Cloth<'_>, pile: &Pile, side: usize) -> [f64; 2] {
+/// Half the room of a leg, across the yarns of the pile and along them, in wales or everywhere alike.
+fn spread(cloth: &Cloth<'_>, pile: &Pile, side: usize, in_wales: bool) -> [f64; 2] {
     let draft = &cloth.weave.draft;
     let [p, q] = cloth.cell.spacing;
     let size = [p * draft.warps() as f64, q * draft.wefts() as f64];
     let legs = 2.0 * held_places(draft, pile, side).count().max(1) as f64;
-    if wale(draft, pile, side, RISE).is_some() {
+    if in_wales {
         // Tufts behind each other share what their wale has of the repeat's other side.
         let places: BTreeSet<usize> = held_places(draft, pile, side).collect();
         let across = 2.0 * size[side] * places.len() as f64 / legs;
@@ -315,7 +325,7 @@ impl Raised<'_> {
 
     /// From -1 to 1.
     fn random(&self, place: u32, what: u32) -> f64 {
-        f64::from(hash2(hash2(self.seed, place), what) >> 8) / f64::from(1u32 << 23) - 1.0
+        random(hash2(self.seed, place), what)
     }
 
     /// Along the yarn, across it, up.

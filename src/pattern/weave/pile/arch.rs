@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{super::super::relax::Relaxation, Standing};
+use super::{Standing, find_room};
 use crate::{
     geometry::contact::{PointGrid, nearest},
     math::special::smooth_step,
@@ -132,13 +132,7 @@ pub(super) fn spread(yarns: &mut [Standing], diameter: f64) {
     let far: Vec<Vec<f64>> = yarns.iter().map(|yarn| from_ground(&yarn.strand.curve.points, &yarn.free)).collect();
     let free = |yarn: usize, i: usize| far[yarn][i] > HELD * diameter;
     let ropes = loops.iter().map(|(yarn, places)| yarns[*yarn].rope(places, |i| free(*yarn, i), thick)).collect();
-    let mut relaxation = Relaxation { ropes, period: None, shear: 0.0 };
-    relaxation.run(ROUNDS, |_| {});
-    for ((yarn, places), rope) in loops.iter().zip(relaxation.ropes) {
-        for (&i, point) in places.iter().zip(rope.points).filter(|(i, _)| free(*yarn, **i)) {
-            yarns[*yarn].strand.curve.points[i] = point * thick;
-        }
-    }
+    find_room(yarns, &loops, ropes, thick, ROUNDS);
 }
 
 /// Lets loops open where they have room: each point of `yarns` that is free is as thick as what is near it leaves, half of

@@ -5,14 +5,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::super::{
-    PatternStrand,
-    edges::{Point, from_points, points},
+use super::{
+    super::{
+        PatternStrand,
+        edges::{Point, from_points, points},
+    },
+    random,
 };
-use crate::{
-    geometry::contact::{PointGrid, Walk},
-    math::sampler::hash2,
-};
+use crate::geometry::contact::{PointGrid, Walk};
 
 /// Strands across a tuft's yarn: of seven there are 37.
 const ACROSS: u32 = 7;
@@ -162,7 +162,7 @@ impl Tuft {
             })
             .collect();
         let bundle = bundle();
-        let random = |what: u32| f64::from(hash2(self.seed, what) >> 8) / f64::from(1u32 << 23) - 1.0;
+        let random = |what: u32| random(self.seed, what);
         let turned = DVec2::from_angle(PI * random(0));
         let thin = LOOSE / f64::from(ACROSS);
         let height = (self.cut.top - self.cut.foot).abs().max(1e-12);
