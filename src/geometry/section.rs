@@ -219,6 +219,13 @@ impl<'a> Section<'a> {
         1.0 / self.squeeze()
     }
 
+    /// Of a slope across the yarn along it, at a point of the round section, that in the section as it is pressed there. What presses
+    /// turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
+    #[inline]
+    fn pressed_slope(&self, pressed: &Pressed, at: Vec2, slope: Vec2) -> Vec2 {
+        pressed.real(slope) + self.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()))
+    }
+
     /// The tangent of a fibre of a ply at a `point` of this frame, `travel` farther along the yarn: its part along the yarn
     /// is 1.
     #[inline]

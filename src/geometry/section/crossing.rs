@@ -119,11 +119,11 @@ impl PlyAhead<'_> {
         let mut t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at).truncate();
         if let Some(pressed) = from.pressed {
             let pressed = Pressed { axis: unrotate(pressed.axis, turned), ..pressed };
-            t = pressed.real(t) + section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
+            t = section.pressed_slope(&pressed, at, t);
         }
         let (w, t) = (across.extend(along), (t / station.straightness).extend(1.0));
         let square = w.cross(t).length_squared() / w.length_squared().max(1e-12);
-        section.squeeze() * (square.max(1e-9)).sqrt() / self.cos
+        section.squeeze() * square.max(1e-9).sqrt() / self.cos
     }
 }
 

@@ -130,9 +130,7 @@ impl Inside {
         let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
         let mut across = t.truncate();
         if let Some(pressed) = &self.pressed {
-            // What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
-            let turned = section.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()));
-            across = pressed.real(across) + turned;
+            across = section.pressed_slope(pressed, at, across);
         }
         let across = across / self.straightness;
         self.out(across.extend(1.0).into())

@@ -262,7 +262,8 @@ impl Node {
         let optics = &yarn.plies[spot.ply];
         let thin = view.section.thinness();
         let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
-        let strip = ClearedStrip::new(2.0 * thin * beside * shape.plies[spot.ply].fiber_radius, turn);
+        let is_swept = turn < 0.0 && self.before == 0.0;
+        let strip = is_swept.then(|| ClearedStrip::new(2.0 * thin * beside * shape.plies[spot.ply].fiber_radius, turn));
         let wide = spot.inside.wide(w);
         let after = optics.after.turned(self.before > 0.0, turn, spot.inside.along_short_axis(w));
         let mut own = Rgb::ZERO;
@@ -271,13 +272,8 @@ impl Node {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             let tilt = way.tilt(shape, view.section, &spot.inside, w, &chord);
             if way.ply == spot.ply {
-                let expected = tilt
-                    * if turn < 0.0 && self.before == 0.0 {
-                        strip.fibers(&chord, way.foot)
-                    } else {
-                        chord.ahead(-way.foot)
-                    };
-                own += optics.rho * after.met(expected, shape.plies[way.ply].by_rim(way.offset));
+                let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
+                own += optics.rho * after.met(tilt * ahead, shape.plies[way.ply].by_rim(way.offset));
             } else {
                 let fibers = tilt * chord.ahead(-way.foot);
                 others += yarn.plies[way.ply].rho * fibers;
