@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     image::metric::{Halves, Pair},
+    math::stats::Estimate,
     report::{
         fidelity::{Row, Table, Way},
         machine,
@@ -134,12 +135,11 @@ fn error_of_mean(references: &[Converged], found: &[Converged], all: &Halves) ->
         return std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs());
     }
     let pairs: Vec<_> = references.iter().zip(found).map(|(reference, found)| (mean(reference), mean(found))).collect();
-    let n = pairs.len() as f64;
+    let of_all = cloth_mean(&all.mean(), all);
     std::array::from_fn(|k| {
         let beside: Vec<f64> = pairs.iter().map(|(reference, found)| reference[k] / found[k].max(1e-30)).collect();
-        let ratio = beside.iter().sum::<f64>() / n;
-        let variance = beside.iter().map(|r| (r / ratio.max(1e-30) - 1.0).powi(2)).sum::<f64>() / (n - 1.0);
-        (variance / n).sqrt() * pairs.iter().map(|(reference, _)| reference[k]).sum::<f64>() / n
+        let share = Estimate::of(&beside).filter(|e| e.mean > 0.0).map_or(0.0, |e| e.relative_deviation());
+        share / (pairs.len() as f64).sqrt() * of_all[k]
     })
 }
 
