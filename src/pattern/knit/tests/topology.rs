@@ -4,7 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    super::{loops::Visit, piece::follow::threaded, shape::bobble},
+    super::{
+        loops::{Border, Loops, Visit},
+        piece::follow::threaded,
+        shape::bobble,
+    },
     *,
 };
 use crate::pattern::rods::passing::passed;
