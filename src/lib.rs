@@ -28,7 +28,7 @@
 //! # The rooms, from ground to top
 //! A room uses only rooms above it in this list (`tests/layering.rs` holds the exact table).
 //! * [`ffi`]: Embree, OpenImageIO, Open Image Denoise and the heap behind a safe face; the only `unsafe` code.
-//! * [`math`]: numbers, not yarns. [`image`]: pictures at rest. [`input`]: TOML with positions, and its diagnostics.
+//! * [`math`]: numbers, not yarns. [`input`]: TOML with positions, and what is said of files. [`image`]: pictures at rest.
 //! * [`geometry`]: shapes, no light: curves, frames along yarns, plies in the cross-section, fibres in plies.
 //! * [`pattern`]: cloth made without files: charts are knitted, drafts are woven, yarns relax until they touch.
 //! * [`files`]: curves and meshes in files: curve formats, OBJ, USD and Alembic.

@@ -22,6 +22,7 @@ use crate::{
         overlap::overlap_of_plied,
     },
     image::output,
+    input::system::in_words,
     pattern::{
         PatternStrand, StrandKind,
         draft::{Draft, DraftError},
@@ -243,7 +244,7 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
 /// A draft of a weaving program; what it leaves open is said.
 fn wif_draft(path: &str) -> Result<WovenWif, Failure> {
     let wrong = |problem: String| Failure::Input(format!("error: {path}: {problem}"));
-    let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|e| wrong(in_words(&e)))?;
     let file = wif::parse(&bytes).map_err(|e| wrong(e.to_string()))?;
     let woven = file.woven(WifUse::default()).map_err(|e| wrong(e.to_string()))?;
     woven.notes.iter().for_each(|note| log::say(&format!("{path}: {note}")));

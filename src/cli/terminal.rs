@@ -6,6 +6,7 @@
 use std::io::{self, Write as _};
 
 use super::Failure;
+use crate::input::system::in_words;
 
 /// Prints what was asked for.
 ///
@@ -15,8 +16,7 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => Failure::Closed,
-        io::ErrorKind::StorageFull => Failure::Input("error: cannot write standard output: the disk is full".into()),
-        _ => Failure::Input(format!("error: cannot write standard output: {error}")),
+        _ => Failure::Input(format!("error: cannot write standard output: {}", in_words(&error))),
     })
 }
 

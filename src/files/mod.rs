@@ -6,7 +6,6 @@ pub mod curve_file;
 pub(crate) mod mesh_file;
 pub(crate) mod obj;
 pub mod stage;
-pub(crate) mod unreadable;
 
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use std::{
 use glam::{DVec2, DVec3};
 use tobj::LoadError;
 
-use crate::{files::unreadable::in_words, geometry::mesh::Mesh};
+use crate::{geometry::mesh::Mesh, input::system::in_words};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 31;

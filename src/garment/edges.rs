@@ -165,15 +165,19 @@ impl Edging {
     }
 }
 
-/// The yarns along some edges in all frames: for each frame the same yarns.
-pub(super) fn finish(poses: &[Pose], edgings: &[&Edging]) -> Vec<Vec<LaidYarn>> {
-    let link = chain(LINK);
+/// A link of the chains along edges, as it relaxes.
+pub(super) fn relaxed_link() -> Vec<DVec3> {
+    chain(LINK)
+}
+
+/// The yarns along some edges in all frames, chains of this link: for each frame the same yarns.
+pub(super) fn finish(poses: &[Pose], edgings: &[&Edging], link: &[DVec3]) -> Vec<Vec<LaidYarn>> {
     poses
         .iter()
         .map(|pose| {
             let one = |edging: &&Edging| {
                 let rail = Rail { pose, way: &edging.way, lengths: &edging.lengths };
-                let (points, radius) = points(&rail, &edging.finish, edging.count, &link);
+                let (points, radius) = points(&rail, &edging.finish, edging.count, link);
                 LaidYarn {
                     points,
                     closed: edging.way.closed,

@@ -12,7 +12,7 @@ use std::{
 
 use glam::{DVec2, DVec3};
 
-use crate::files::{stage::PolygonMesh, unreadable::in_words};
+use crate::{files::stage::PolygonMesh, input::system::in_words};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 30;

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 
 use self::{
     body::Body,
-    edges::{Edging, finish},
+    edges::{Edging, finish, relaxed_link},
     floats::Lanes,
     lattice::Lattice,
     lay::{Laying, lay},
@@ -333,9 +333,10 @@ impl Garment {
                 frame[cloth].extend(yarns);
             }
         }
+        let link = relaxed_link();
         for cloth in 0..self.options.cloths.len() {
             let own: Vec<&Edging> = self.edgings.iter().filter(|e| e.cloth == cloth).collect();
-            for (frame, mut yarns) in laid.iter_mut().zip(finish(&poses, &own)) {
+            for (frame, mut yarns) in laid.iter_mut().zip(finish(&poses, &own, &link)) {
                 if self.options.coordinates {
                     for yarn in &mut yarns {
                         yarn.coordinates = vec![[0.5, 0.5]; yarn.points.len()];

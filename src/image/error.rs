@@ -2,6 +2,8 @@
 
 use std::{fmt, io, path::Path, path::PathBuf};
 
+use crate::input::system::in_words;
+
 /// What went wrong with a picture or an output file. Displayed as one line that names the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ImageError {
@@ -41,8 +43,8 @@ pub enum ImageError {
 
 impl ImageError {
     /// The file cannot be opened or read.
-    pub(super) fn unreadable(path: &Path, error: &io::Error) -> Self {
-        Self::Read { path: path.into(), reason: plain(error) }
+    pub(crate) fn unreadable(path: &Path, error: &io::Error) -> Self {
+        Self::Read { path: path.into(), reason: in_words(error) }
     }
 
     /// The output cannot be written.
@@ -80,15 +82,3 @@ impl fmt::Display for ImageError {
 }
 
 impl std::error::Error for ImageError {}
-
-/// The operating system's words, without Rust's "(os error 2)".
-pub(super) fn plain(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "no such file or directory".to_owned(),
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        io::ErrorKind::StorageFull => "the disk is full".to_owned(),
-        io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".to_owned(),
-        io::ErrorKind::NotADirectory => "part of the path is not a directory".to_owned(),
-        _ => error.to_string(),
-    }
-}

@@ -10,11 +10,11 @@ use tempfile::NamedTempFile;
 
 use super::{
     ImageError,
-    error::plain,
     exr::{self, ChannelSpec, ExrLayout, Line, Sample},
     oiio,
     png::{self, Display},
 };
+use crate::input::system::in_words;
 
 /// The extensions that can be written, as an error lists them.
 const KNOWN: &str = "exr, png, hdr, tif, tiff, jpg, jpeg, bmp, tga, ppm and webp";
@@ -85,7 +85,7 @@ pub fn check_file(path: &Path) -> Result<(), ImageError> {
 /// # Errors
 /// [`ImageError::Write`]; then nothing is left behind, and an older file of this name is as it was.
 pub fn write_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), ImageError> {
-    replace(path, |temporary| write(temporary.as_file_mut()).map_err(|error| plain(&error)))
+    replace(path, |temporary| write(temporary.as_file_mut()).map_err(|error| in_words(&error)))
 }
 
 /// Writes a file that is written again and again and must outlive the machine's failures: the content is
@@ -110,7 +110,7 @@ pub fn write_durable(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()
     written.and_then(|()| fs::rename(beside, &target)).map_err(|error| {
         // What cannot be removed is written over the next time.
         let _ = fs::remove_file(beside);
-        ImageError::unwritable(path, plain(&error))
+        ImageError::unwritable(path, in_words(&error))
     })
 }
 
@@ -180,9 +180,9 @@ fn replace(path: &Path, write: impl FnOnce(&mut NamedTempFile) -> Result<(), Str
             temporary.rewind()?;
             io::copy(&mut temporary, &mut device)
         });
-        return copied.map(drop).map_err(|error| ImageError::unwritable(path, plain(&error)));
+        return copied.map(drop).map_err(|error| ImageError::unwritable(path, in_words(&error)));
     }
-    temporary.persist(&target).map_err(|error| ImageError::unwritable(path, plain(&error.error)))?;
+    temporary.persist(&target).map_err(|error| ImageError::unwritable(path, in_words(&error.error)))?;
     Ok(())
 }
 
@@ -217,7 +217,7 @@ pub fn check_place(path: &Path) -> Result<(), ImageError> {
 pub fn check_target(path: &Path) -> Result<(), ImageError> {
     check_place(path)?;
     let Some(directory) = directory_of(path) else { return Ok(()) };
-    fs::create_dir_all(directory).map_err(|error| no_directory(path, &plain(&error)))
+    fs::create_dir_all(directory).map_err(|error| no_directory(path, &in_words(&error)))
 }
 
 fn directory_of(path: &Path) -> Option<&Path> {
@@ -242,7 +242,7 @@ fn temporary(path: &Path) -> Result<NamedTempFile, ImageError> {
     // The umask still applies; without this, only the owner could read the picture.
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(directory).map_err(|error| {
-        let reason = format!("no file can be made in `{}`: {}", directory.display(), plain(&error));
+        let reason = format!("no file can be made in `{}`: {}", directory.display(), in_words(&error));
         ImageError::unwritable(path, reason)
     })
 }

@@ -8,7 +8,8 @@ use std::{
 
 pub use crate::math::srgb::{linear_to_srgb, srgb_to_linear};
 
-use super::{Channel, Image, ImageError, check_size, error::plain, output, palette::Indexed};
+use super::{Channel, Image, ImageError, check_size, output, palette::Indexed};
+use crate::input::system::in_words;
 
 /// The curve from linear light to the light that a screen shows, before the sRGB encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -156,7 +157,7 @@ pub(super) fn read(path: &Path) -> Result<Image, ImageError> {
             png::DecodingError::IoError(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 "the PNG ends too early".to_owned()
             }
-            png::DecodingError::IoError(error) => plain(&error),
+            png::DecodingError::IoError(error) => in_words(&error),
             error => format!("damaged PNG: {error}"),
         },
     };

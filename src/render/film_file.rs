@@ -229,8 +229,8 @@ pub(crate) fn is_film(path: &Path) -> bool {
 }
 
 fn open(path: &Path) -> Result<(Header, BufReader<File>), ImageError> {
-    let file = File::open(path).map_err(|e| unreadable(path, &in_words(&e)))?;
-    let size = file.metadata().map_err(|e| unreadable(path, &in_words(&e)))?.len();
+    let file = File::open(path).map_err(|e| ImageError::unreadable(path, &e))?;
+    let size = file.metadata().map_err(|e| ImageError::unreadable(path, &e))?.len();
     let mut file = BufReader::with_capacity(1 << 20, file);
     let mut start = [0; 16];
     file.read_exact(&mut start).map_err(|e| unreadable_or_short(path, &e, 0))?;
@@ -274,15 +274,7 @@ fn unreadable(path: &Path, reason: &str) -> ImageError {
 fn unreadable_or_short(path: &Path, error: &io::Error, at: u64) -> ImageError {
     match error.kind() {
         io::ErrorKind::UnexpectedEof => unreadable(path, &format!("it is cut short, at byte {at}")),
-        _ => unreadable(path, &error.to_string()),
-    }
-}
-
-fn in_words(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "no such file".to_owned(),
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        _ => error.to_string(),
+        _ => ImageError::unreadable(path, error),
     }
 }
 

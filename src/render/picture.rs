@@ -124,29 +124,9 @@ fn write_exr(
     denoised: Option<&Denoised>,
     attributes: &[(String, Attribute)],
 ) -> Result<(), ImageError> {
-    let layers = frame.layers;
-    let mut channels: Vec<ChannelSpec> = ["R", "G", "B", "A"].map(|n| ChannelSpec::new(n, Sample::F32)).into();
-    let mut layer = |wanted: bool, name: &str, parts: &[&str], sample: Sample| {
-        if wanted {
-            channels.extend(parts.iter().map(|part| ChannelSpec::new(format!("{name}.{part}"), sample)));
-        }
-    };
-    layer(layers.depth, "depth", &["Z"], Sample::F32);
-    layer(layers.normal, "N", &["X", "Y", "Z"], Sample::F32);
-    layer(layers.albedo, "albedo", &["R", "G", "B"], Sample::F32);
-    layer(layers.variance, "variance", &["R", "G", "B"], Sample::F32);
-    layer(layers.samples, "samples", &["count"], Sample::U32);
-    layer(layers.position, "P", &["X", "Y", "Z"], Sample::F32);
-    // As Nuke calls them.
-    layer(layers.motion, "forward", &["u", "v"], Sample::F32);
-    layer(layers.uv, "uv", &["U", "V"], Sample::F32);
-    let precision = if frame.storage.half_lobes { Sample::F16 } else { Sample::F32 };
-    for name in PART_NAMES {
-        layer(layers.lobes, name, &["R", "G", "B"], precision);
-    }
-    layer(denoised.is_some(), "denoised", &["R", "G", "B"], Sample::F32);
-    let mattes: Vec<MatteLayer> = if layers.cryptomatte { MatteLayer::all(frame, film) } else { Vec::new() };
-    channels.extend(mattes.iter().flat_map(|m| cryptomatte::channels(m.name)));
+    let mattes: Vec<MatteLayer> = if frame.layers.cryptomatte { MatteLayer::all(frame, film) } else { Vec::new() };
+    let mut layers = exr_layers(frame, film, denoised, &mattes);
+    let channels = layers.iter().flat_map(|layer| layer.channels.clone()).collect();
     let mut layout = ExrLayout::new(film.width as usize, film.height as usize, channels);
     layout.origin = film.origin.map(|o| o as i32);
     layout.display_size = [frame.width as usize, frame.height as usize];
@@ -155,53 +135,100 @@ fn write_exr(
         layout.attributes.push(("yarnray.denoised".to_owned(), Attribute::Text(denoised.by.clone())));
     }
     layout.attributes.extend(mattes.iter().flat_map(MatteLayer::attributes));
-    let mut covering = Vec::new();
     layout.compression = frame.storage.compression;
+    let mut values = Vec::new();
     exr::write(path, &layout, |y, lines| {
         for x in 0..film.width {
-            let p = film.pixel(x, y as u32);
-            let mut values = Vec::with_capacity(lines.len());
-            values.extend(p.color);
-            values.push(p.alpha);
-            if layers.depth {
-                values.push(p.depth);
-            }
-            if layers.normal {
-                values.extend(p.normal);
-            }
-            if layers.albedo {
-                values.extend(p.albedo);
-            }
-            if layers.variance {
-                values.extend(p.variance);
-            }
-            if layers.samples {
-                values.push(0.0);
-            }
-            if layers.position {
-                values.extend(in_world(&p, frame.middle));
-            }
-            if layers.motion {
-                values.extend(p.motion);
-            }
-            if layers.uv {
-                values.extend(p.uv);
-            }
-            if layers.lobes {
-                values.extend(p.parts.as_flattened());
-            }
-            values.extend(denoised.into_iter().flat_map(|d| d.pixel(x, y as u32)));
-            for matte in &mattes {
-                values.extend(matte.ranks(film.covering(x, y as u32), p.samples, &mut covering));
-            }
-            for (line, value) in lines.iter_mut().zip(values) {
+            let at = At { x, y: y as u32, pixel: film.pixel(x, y as u32) };
+            values.clear();
+            layers.iter_mut().for_each(|layer| (layer.values)(&at, &mut values));
+            for (line, value) in lines.iter_mut().zip(&values) {
                 match line {
-                    Line::Float(line) => line[x as usize] = value,
-                    Line::Whole(line) => line[x as usize] = p.samples,
+                    Line::Float(line) => line[x as usize] = *value,
+                    // The only whole number, which a float may round.
+                    Line::Whole(line) => line[x as usize] = at.pixel.samples,
                 }
             }
         }
     })
+}
+
+/// A pixel, and where it is in the film.
+struct At {
+    x: u32,
+    y: u32,
+    pixel: Pixel,
+}
+
+/// A layer of an EXR: its channels, and what they hold.
+struct ExrLayer<'a> {
+    channels: Vec<ChannelSpec>,
+    values: AddValues<'a>,
+}
+
+/// Appends the values that the channels of a layer have at a pixel.
+type AddValues<'a> = Box<dyn FnMut(&At, &mut Vec<f32>) + 'a>;
+
+impl<'a> ExrLayer<'a> {
+    /// Channels `NAME.PART`, or just `PART` if the name is empty.
+    fn new<const COUNT: usize>(
+        name: &str,
+        parts: [&str; COUNT],
+        sample: Sample,
+        values: impl Fn(&At) -> [f32; COUNT] + 'a,
+    ) -> Self {
+        let dot = if name.is_empty() { "" } else { "." };
+        let channels = parts.map(|part| ChannelSpec::new(format!("{name}{dot}{part}"), sample)).into();
+        Self { channels, values: Box::new(move |at, out| out.extend(values(at))) }
+    }
+
+    fn of_matte(matte: &'a MatteLayer, film: &'a Film) -> Self {
+        let mut buffer = Vec::new();
+        let values = move |at: &At, out: &mut Vec<f32>| {
+            out.extend(matte.ranks(film.covering(at.x, at.y), at.pixel.samples, &mut buffer));
+        };
+        Self { channels: cryptomatte::channels(matte.name).collect(), values: Box::new(values) }
+    }
+}
+
+/// The picture, the layers that the frame wants, and the denoised picture if there is one.
+fn exr_layers<'a>(
+    frame: &'a Frame,
+    film: &'a Film,
+    denoised: Option<&'a Denoised>,
+    mattes: &'a [MatteLayer],
+) -> Vec<ExrLayer<'a>> {
+    use Sample::{F16, F32, U32};
+    const RGB: [&str; 3] = ["R", "G", "B"];
+    const XYZ: [&str; 3] = ["X", "Y", "Z"];
+    let picture = |at: &At| {
+        let [r, g, b] = at.pixel.color;
+        [r, g, b, at.pixel.alpha]
+    };
+    let mut layers = vec![ExrLayer::new("", ["R", "G", "B", "A"], F32, picture)];
+    let mut add = |wanted: bool, layer: ExrLayer<'a>| {
+        if wanted {
+            layers.push(layer);
+        }
+    };
+    let wanted = frame.layers;
+    add(wanted.depth, ExrLayer::new("depth", ["Z"], F32, |at| [at.pixel.depth]));
+    add(wanted.normal, ExrLayer::new("N", XYZ, F32, |at| at.pixel.normal));
+    add(wanted.albedo, ExrLayer::new("albedo", RGB, F32, |at| at.pixel.albedo));
+    add(wanted.variance, ExrLayer::new("variance", RGB, F32, |at| at.pixel.variance));
+    add(wanted.samples, ExrLayer::new("samples", ["count"], U32, |at| [at.pixel.samples as f32]));
+    add(wanted.position, ExrLayer::new("P", XYZ, F32, |at| in_world(&at.pixel, frame.middle)));
+    // As Nuke calls them.
+    add(wanted.motion, ExrLayer::new("forward", ["u", "v"], F32, |at| at.pixel.motion));
+    add(wanted.uv, ExrLayer::new("uv", ["U", "V"], F32, |at| at.pixel.uv));
+    let precision = if frame.storage.half_lobes { F16 } else { F32 };
+    for (part, name) in PART_NAMES.into_iter().enumerate() {
+        add(wanted.lobes, ExrLayer::new(name, RGB, precision, move |at| at.pixel.parts[part]));
+    }
+    let denoised = denoised.map(|d| ExrLayer::new("denoised", RGB, F32, |at| d.pixel(at.x, at.y)));
+    layers.extend(denoised);
+    layers.extend(mattes.iter().map(|matte| ExrLayer::of_matte(matte, film)));
+    layers
 }
 
 /// The place of a pixel in the world; the origin where nothing is.

@@ -149,107 +149,198 @@ impl PlyOptics {
         stretch: f64,
         solutions: &Solutions,
     ) -> Self {
-        let n = f64::from(ply.fibers);
-        let (fiber, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
-        let density = ply.density();
-        let sigma = 2.0 * fiber * n / (PI * core * core);
-        let f = material.chain_share();
-        let per_channel = |value: &dyn Fn(usize) -> f64| Rgb::from([value(0), value(1), value(2)]);
-
-        let r = |c: usize| material.r[c];
-        let d = |c: usize| material.d[c];
-        let tt_out = |c: usize| material.tt[c] * (1.0 - f);
-        let chain = |c: usize| material.tt[c] * f;
-        let ended = |c: usize| 1.0 - chain(c);
-        let dead_zone = ply.mean_dead_zone();
-        let rho = |c: usize| extinction_rate(ended(c), dead_zone);
-        // Light that leaves the chain, over what the chain loses; 0 where nothing is lost.
-        let single = |part: f64, c: usize| if ended(c) > 0.0 { (part / ended(c)).min(1.0) } else { 0.0 };
-        let albedo = |c: usize| single(r(c) + d(c) + tt_out(c), c);
-        // Light that is scattered on starts at fibres, on no line that was drawn: its extinction is the mean medium's.
-        let extinction = |c: usize| sigma * extinction_rate(ended(c), density);
-        let radius_optical = |c: usize| extinction(c) * core;
-        let own_escape = |c: usize| calibrated::ESCAPE_OF_FIBER * extinction(c) * fiber;
-        let escape = |c: usize| escape::past_itself(escape_probability_of_disc(radius_optical(c)), own_escape(c));
-        let neighbours = ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0);
-        let taken_back = |c: usize| neighbours * (escape(c) * radius_optical(c) * PI / 2.0).min(1.0);
-        let escape_yarn = |c: usize| escape(c) * (1.0 - taken_back(c));
-        let closure = |escape: f64, c: usize| {
-            let gain = albedo(c) * escape;
-            // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
-            let absorbed = single((1.0 - r(c) - d(c) - material.tt[c]).max(0.0), c);
-            if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
-        };
-        // Chains are bent: a chain that keeps the share a of TT at each fibre gets as far as a straight one that keeps a g, with g the
-        // mean cosine by which TT of a chain turns. Where it turns and goes on nothing is lost.
-        let straight = if f > 1e-9 { ((-0.5 * material.beta_n.powi(2)).exp() / f).min(1.0) } else { 1.0 };
-        let media = [0, 1, 2].map(|c| {
-            let loss = 1.0 - straight * chain(c);
-            let (rate, bent_rate) = (extinction_rate(ended(c), density), extinction_rate(loss, density));
-            let absorbed = if bent_rate > 0.0 { (1.0 - albedo(c)) * rate / bent_rate } else { 1.0 - albedo(c) };
-            Medium {
-                radius: sigma * bent_rate * core,
-                // The mean way to the next fibre is one, between the ends of chains 1 / loss.
-                apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
-                albedo: (1.0 - absorbed).clamp(0.0, 1.0),
-                first: albedo(c),
-                sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back(c),
-                taken_back: taken_back(c),
-            }
-        });
-        // Of what a fibre sends out of a chain: the share that it reflects, and of a ply's events: those that another follows.
-        let reflected = |c: usize| {
-            let out = r(c) + d(c) + tt_out(c);
-            if out > 0.0 { r(c) / out } else { 0.0 }
-        };
-        let again = |c: usize| albedo(c) * (1.0 - escape_yarn(c));
-        let mirrored = |c: usize| {
-            let share = reflected(c);
-            share * share * (1.0 - again(c)) / (1.0 - again(c) * share).max(1e-12)
-        };
-        let gaps = PlyGaps::new(dead_zone as f32);
-        // So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
-        let hit = |c: usize| if ended(c) > 1e-9 { rho(c) / ended(c) } else { 1.0 };
-        let events = |c: usize| chain(c) * hit(c);
-        let untouched = |c: usize| (f64::from(gaps.rate) - rho(c)).max(0.0);
-        // Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
-        // often, and there are three flights and more.
-        let mirrored_variance = |c: usize| {
-            let again = again(c) * reflected(c);
-            let more = again / (1.0 - again).max(1e-12);
-            let flight = events(c) / rho(c).max(LEAST_RATE) * (1.0 - escape(c));
-            (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
-        };
-        let mirrored_kappa = kappa_of_variance(per_channel(&mirrored_variance));
-        let (beta_tt_squared, beta_n) = ((material.beta_tt * material.beta_tt) as f32, material.beta_n as f32);
-        // The length of diffusion, by which light fades, is the mean way over the root of 3 (1 - albedo).
-        let fading = per_channel(&|c| radius_optical(c) * (3.0 * (1.0 - albedo(c))).max(0.0).sqrt());
-        let radius_optical = per_channel(&radius_optical);
+        let fibers = Fibers::new(ply, plies);
+        let channels = [0, 1, 2].map(|c| Channel::new(material, &fibers, c));
+        let rgb = |of: &dyn Fn(&Channel) -> f64| Rgb::from(channels.each_ref().map(of));
+        let mirrored_kappa = kappa_of_variance(rgb(&|c| c.mirrored_variance(material)));
+        let beta_tt_squared = (material.beta_tt * material.beta_tt) as f32;
         Self {
-            gaps,
-            chain_share: f as f32,
-            rho: per_channel(&|c| rho(c).max(LEAST_RATE)),
-            chain: per_channel(&chain),
-            single_r: per_channel(&|c| single(r(c), c)),
-            single_d: per_channel(&|c| single(d(c), c)),
-            single_tt: per_channel(&|c| single(tt_out(c), c)),
-            albedo: per_channel(&albedo),
-            leaves_yarn: per_channel(&|c| closure(escape_yarn(c), c)),
-            leaving: Arc::new(Leaving::new(&media, stretch, solutions)),
-            mirrored: per_channel(&mirrored),
+            gaps: fibers.gaps,
+            chain_share: material.chain_share() as f32,
+            rho: rgb(&|c| c.rho().max(LEAST_RATE)),
+            chain: rgb(&|c| c.chain),
+            single_r: rgb(&|c| c.single(c.r)),
+            single_d: rgb(&|c| c.single(c.d)),
+            single_tt: rgb(&|c| c.single(c.tt_out)),
+            albedo: rgb(&|c| c.albedo()),
+            leaves_yarn: rgb(&|c| c.closure(c.escape_yarn())),
+            leaving: Arc::new(Leaving::new(&channels.each_ref().map(|c| c.medium(material)), stretch, solutions)),
+            mirrored: rgb(&|c| c.mirrored()),
             mirrored_kappa,
             mirrored_factor: normalisation(mirrored_kappa),
             sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
-            events: per_channel(&events),
-            untouched: per_channel(&untouched),
+            events: rgb(&|c| c.events()),
+            untouched: rgb(&|c| c.untouched()),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
             beta_tt_squared,
-            tt: TtWidth::new(beta_tt_squared, beta_n),
-            after: ply.after.unwrap_or(AfterFiber::free(gaps.dead_zone)),
-            lead: (FRAC_PI_4 * fiber) as f32,
-            mean_way: radius_optical.mean().recip().min(10.0),
-            fading: fading.mean(),
+            tt: TtWidth::new(beta_tt_squared, material.beta_n as f32),
+            after: ply.after.unwrap_or(AfterFiber::free(fibers.gaps.dead_zone)),
+            lead: (FRAC_PI_4 * fibers.radius) as f32,
+            mean_way: rgb(&|c| c.radius_optical()).mean().recip().min(10.0),
+            fading: rgb(&|c| c.fading()).mean(),
         }
+    }
+}
+
+/// A ply's fibres as shapes, which all channels share.
+struct Fibers {
+    /// Of a fibre and of the core, yarn radii.
+    radius: f64,
+    core: f64,
+    /// Area fraction of the fibres in the ply.
+    density: f64,
+    /// What fibres a line meets per length, where the ply is even.
+    sigma: f64,
+    dead_zone: f64,
+    gaps: PlyGaps,
+    /// Share of the surroundings that the other plies of the yarn take.
+    neighbours: f64,
+}
+
+impl Fibers {
+    fn new(ply: &PlyShape, plies: usize) -> Self {
+        let (radius, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
+        let dead_zone = ply.mean_dead_zone();
+        Self {
+            radius,
+            core,
+            density: ply.density(),
+            sigma: 2.0 * radius * f64::from(ply.fibers) / (PI * core * core),
+            dead_zone,
+            gaps: PlyGaps::new(dead_zone as f32),
+            neighbours: ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0),
+        }
+    }
+}
+
+/// What one channel of light meets in a ply.
+struct Channel<'a> {
+    fibers: &'a Fibers,
+    /// Energies of a fibre's lobes.
+    r: f64,
+    d: f64,
+    tt: f64,
+    /// The parts of TT that go on forward in a chain and that leave it.
+    chain: f64,
+    tt_out: f64,
+}
+
+impl<'a> Channel<'a> {
+    fn new(material: &FiberMaterial, fibers: &'a Fibers, c: usize) -> Self {
+        let (tt, f) = (material.tt[c], material.chain_share());
+        Self { fibers, r: material.r[c], d: material.d[c], tt, chain: tt * f, tt_out: tt * (1.0 - f) }
+    }
+
+    /// What ends a chain at a fibre.
+    fn ended(&self) -> f64 {
+        1.0 - self.chain
+    }
+
+    fn rho(&self) -> f64 {
+        extinction_rate(self.ended(), self.fibers.dead_zone)
+    }
+
+    /// A part of the light that leaves the chain, over what the chain loses; 0 where nothing is lost.
+    fn single(&self, part: f64) -> f64 {
+        if self.ended() > 0.0 { (part / self.ended()).min(1.0) } else { 0.0 }
+    }
+
+    fn albedo(&self) -> f64 {
+        self.single(self.r + self.d + self.tt_out)
+    }
+
+    /// Light that is scattered on starts at fibres, on no line that was drawn: its extinction is the mean medium's.
+    fn extinction(&self) -> f64 {
+        self.fibers.sigma * extinction_rate(self.ended(), self.fibers.density)
+    }
+
+    fn radius_optical(&self) -> f64 {
+        self.extinction() * self.fibers.core
+    }
+
+    /// The share that leaves the ply.
+    fn escape(&self) -> f64 {
+        let own = calibrated::ESCAPE_OF_FIBER * self.extinction() * self.fibers.radius;
+        escape::past_itself(escape_probability_of_disc(self.radius_optical()), own)
+    }
+
+    /// The share of it that the other plies take, and of theirs that returns to them: see [`Medium`].
+    fn taken_back(&self) -> f64 {
+        self.fibers.neighbours * (self.escape() * self.radius_optical() * PI / 2.0).min(1.0)
+    }
+
+    fn escape_yarn(&self) -> f64 {
+        self.escape() * (1.0 - self.taken_back())
+    }
+
+    /// The share that leaves at last where each event lets so much escape.
+    fn closure(&self, escape: f64) -> f64 {
+        let gain = self.albedo() * escape;
+        // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
+        let absorbed = self.single((1.0 - self.r - self.d - self.tt).max(0.0));
+        if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
+    }
+
+    fn medium(&self, material: &FiberMaterial) -> Medium {
+        let Fibers { core, density, sigma, .. } = *self.fibers;
+        // Chains are bent: a chain that keeps the share a of TT at each fibre gets as far as a straight one that keeps a g, with g the
+        // mean cosine by which TT of a chain turns. Where it turns and goes on nothing is lost.
+        let f = material.chain_share();
+        let straight = if f > 1e-9 { ((-0.5 * material.beta_n.powi(2)).exp() / f).min(1.0) } else { 1.0 };
+        let loss = 1.0 - straight * self.chain;
+        let (rate, bent_rate) = (extinction_rate(self.ended(), density), extinction_rate(loss, density));
+        let albedo = self.albedo();
+        let absorbed = if bent_rate > 0.0 { (1.0 - albedo) * rate / bent_rate } else { 1.0 - albedo };
+        let taken_back = self.taken_back();
+        Medium {
+            radius: sigma * bent_rate * core,
+            // The mean way to the next fibre is one, between the ends of chains 1 / loss.
+            apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
+            albedo: (1.0 - absorbed).clamp(0.0, 1.0),
+            first: albedo,
+            sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back,
+            taken_back,
+        }
+    }
+
+    /// Of what a fibre sends out of a chain: the share that it reflects.
+    fn reflected(&self) -> f64 {
+        let out = self.r + self.d + self.tt_out;
+        if out > 0.0 { self.r / out } else { 0.0 }
+    }
+
+    /// Of a ply's events: those that another follows.
+    fn again(&self) -> f64 {
+        self.albedo() * (1.0 - self.escape_yarn())
+    }
+
+    fn mirrored(&self) -> f64 {
+        let (share, again) = (self.reflected(), self.again());
+        share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
+    }
+
+    /// So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
+    fn events(&self) -> f64 {
+        let hit = if self.ended() > 1e-9 { self.rho() / self.ended() } else { 1.0 };
+        self.chain * hit
+    }
+
+    fn untouched(&self) -> f64 {
+        (f64::from(self.fibers.gaps.rate) - self.rho()).max(0.0)
+    }
+
+    /// Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
+    /// often, and there are three flights and more.
+    fn mirrored_variance(&self, material: &FiberMaterial) -> f64 {
+        let again = self.again() * self.reflected();
+        let more = again / (1.0 - again).max(1e-12);
+        let flight = self.events() / self.rho().max(LEAST_RATE) * (1.0 - self.escape());
+        (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
+    }
+
+    /// The length of diffusion, by which light fades, is the mean way over the root of 3 (1 - albedo).
+    fn fading(&self) -> f64 {
+        self.radius_optical() * (3.0 * (1.0 - self.albedo())).max(0.0).sqrt()
     }
 }
 

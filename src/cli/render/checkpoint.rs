@@ -1,7 +1,7 @@
 //! Films that are saved on the way and gone on from.
 
 use std::{
-    fs::{File, TryLockError},
+    fs::{File, Metadata, TryLockError},
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -55,20 +55,48 @@ impl Lock {
         let mut path = checkpoint.to_owned().into_os_string();
         path.push(".lock");
         let path = PathBuf::from(path);
-        let Ok(file) = File::create(&path) else { return Ok(None) };
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Err(Failure::Input(format!(
+        Self::at(path).map_err(|Taken| {
+            Failure::Input(format!(
                 "error: another run renders to {}\n  hint: wait for it, or give this one a checkpoint of its own",
                 checkpoint.display()
-            ))),
-            _ => Ok(Some(Self { path, _file: file })),
+            ))
+        })
+    }
+
+    fn at(path: PathBuf) -> Result<Option<Self>, Taken> {
+        loop {
+            let Ok(file) = File::create(&path) else { return Ok(None) };
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => return Err(Taken),
+                // Another run has ended since the file was opened, and removed it: this lock keeps nobody off.
+                Ok(()) if !leads_to(&path, &file) => {}
+                _ => return Ok(Some(Self { path, _file: file })),
+            }
         }
     }
 }
 
+/// Another run has the lock.
+#[derive(Debug)]
+struct Taken;
+
+/// Whether a path still is that of an open file.
+#[cfg(unix)]
+fn leads_to(path: &Path, file: &File) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let id = |of: Metadata| (of.dev(), of.ino());
+    std::fs::metadata(path).map(id).ok() == file.metadata().map(id).ok()
+}
+
+/// Elsewhere the standard library does not tell.
+#[cfg(not(unix))]
+fn leads_to(_: &Path, _: &File) -> bool {
+    true
+}
+
 impl Drop for Lock {
     fn drop(&mut self) {
-        // What cannot be removed is locked by nobody.
+        // While it is still locked; what cannot be removed is locked by nobody afterwards.
         let _ = std::fs::remove_file(&self.path);
     }
 }
@@ -145,5 +173,31 @@ impl Saver<'_> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_lock_is_one_run_s_also_while_another_gives_it_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.film.lock");
+        let held = AtomicBool::new(false);
+        let run = || {
+            for _ in 0..3000 {
+                if let Ok(lock) = Lock::at(path.clone()) {
+                    assert!(!held.swap(true, Ordering::SeqCst), "two have it");
+                    std::thread::yield_now();
+                    held.store(false, Ordering::SeqCst);
+                    drop(lock);
+                }
+            }
+        };
+        std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(run))));
+        assert!(!path.exists());
     }
 }

@@ -33,9 +33,9 @@ use crate::{
     files::{
         extension, has_extension,
         stage::{self, PrimPattern, Stage},
-        unreadable::hindrance,
     },
     geometry::curve::{Basis, CurveSet},
+    input::system::hindrance,
     pattern::tile::Tile,
 };
 

@@ -27,10 +27,7 @@ pub(crate) use select::glob;
 #[cfg(feature = "usd")]
 pub use usd::write::{CurvesOut, Interpolated, write};
 
-use crate::{
-    files::{extension, unreadable::hindrance},
-    geometry::curve::CurveSet,
-};
+use crate::{files::extension, geometry::curve::CurveSet, input::system::hindrance};
 
 /// Why a stage could not be read. Displays as one line: file, object, problem.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -143,7 +143,11 @@ impl<'a> Reader<'a> {
 
     fn wrong_type(&self, key: &str, expected: &str, node: &Node) {
         let message = format!("`{key}`: expected {expected}, found {}", node.value.kind());
-        self.diagnostics.push(Diagnostic::error(message).at(node.span));
+        let diagnostic = Diagnostic::error(message).at(node.span);
+        self.diagnostics.push(match half_written(&node.value) {
+            Some(number) => diagnostic.hint(format!("in TOML a point stands between digits: write {number}")),
+            None => diagnostic,
+        });
     }
 
     // Numbers.
@@ -447,4 +451,11 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// Text that is a number but for a point without a digit on one side, as TOML would have it: 0.1 for `.1`.
+fn half_written(value: &Value) -> Option<String> {
+    let Value::String(text) = value else { return None };
+    let number: f64 = text.parse().ok()?;
+    (text.trim_start_matches(['+', '-']).starts_with('.') || text.ends_with('.')).then(|| number_text(number))
 }

@@ -266,6 +266,15 @@ fn options() {
          --set render.seed= -1: error: `seed` must be at least 0, found -1\n                   ^^\n"
     );
     assert_eq!(
+        check_with(scene, &["yarn.silk1.radius=.3", "light.0.radiance=-5.", "render.spp=1."]),
+        "--set yarn.silk1.radius=.3: error: `radius`: expected a number, found a string\n                        \
+         ^^ in TOML a point stands between digits: write 0.3\n\
+         --set light.0.radiance=-5.: error: `radiance`: expected a number or an array of 3 numbers, found a string\n                       \
+         ^^^ in TOML a point stands between digits: write -5\n\
+         --set render.spp=1.: error: `spp`: expected an integer, found a string\n                 \
+         ^^ in TOML a point stands between digits: write 1\n"
+    );
+    assert_eq!(
         check_with(scene, &["light.2.radiance=1", "light.x.radiance=1", "render.spp.x=1", "lamp.0.radiance=1"]),
         "--set light.2.radiance=1: error: `light` has 2 entries, with indices from 0 to 1\n            ^\n\
          --set light.x.radiance=1: error: `light` is an array: expected an index, found `x`\n            ^\n\

@@ -6,9 +6,8 @@
 //! its children at its head; where several loops lie over each other, each has a depth of its own.
 
 pub(super) mod bobble;
+mod form;
 mod rims;
-
-use std::f64::consts::TAU;
 
 use glam::DVec3;
 
@@ -43,13 +42,8 @@ pub(in super::super) struct Piece {
 const DEPTH: f64 = 0.763;
 pub(super) const REACH: f64 = 0.775 / 2.28;
 pub(super) const LEAN: f64 = 0.982 / 4.13;
-/// Distance of loops that lie over each other, and of cables that pass each other.
+/// Distance of loops that lie over each other.
 const LAYER: f64 = 0.85;
-const CABLE: f64 = 2.6;
-/// Width of a strand that is lifted between two stitches.
-const NARROW: f64 = 0.9;
-/// How wide a stitch is out of which a bobble grows.
-const HOLDS_BOBBLE: f64 = 1.35;
 /// How much of the way between two layers they come together where they are bound off.
 const CLOSED_BY: f64 = 0.5;
 /// How wide the foot is of what closes a bobble.
@@ -92,11 +86,6 @@ impl Loops {
             _ => 1.0,
         };
         own.side * self.apart * share
-    }
-
-    fn child_sign(&self, own: &Loop) -> f64 {
-        let sign = own.children.first().map_or(own.sign, |&c| self.loops[c as usize].sign);
-        if sign == 0.0 { 1.0 } else { sign }
     }
 
     /// How deep the feet of a loop dive: behind all that it is drawn through.
@@ -219,165 +208,6 @@ impl Loops {
             Visit::Loop(i) => !self.loops[*i as usize].is_lifted(),
             Visit::Pass { .. } | Visit::Float { .. } | Visit::Through { .. } => true,
         }
-    }
-
-    fn loop_piece(&self, own: &Loop, column: u32, foot: Foot, ends: [Foot; 2], step: f64) -> Piece {
-        let over = own.sign == 0.0;
-        let child = self.child_sign(own);
-        let children = || own.children.iter().map(|&c| &self.loops[c as usize]);
-        let count = own.children.len().max(1) as f64;
-        let border = self.border;
-        let mean = |of: &dyn Fn(&Loop) -> f64| children().map(of).sum::<f64>() / count;
-        let head_at =
-            if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
-        let bound = own.held == Some(own.row);
-        let held = own.held.unwrap_or(own.row + 1);
-        let drawn = self.is_drawn(own);
-        let bound_off = self.border.finished && held == self.rows;
-        let head_up = |at: f64| match drawn {
-            true => self.ring(at) + rims::BEYOND,
-            false => self.up_at(held, at) + self.reach() + if bound { 0.5 } else { 0.0 },
-        };
-        // Where rows are short a row may climb along a stitch.
-        let level = self.up_at(own.row, foot.at);
-        let foot_up = |at: f64| foot.up + (self.up_at(own.row, at) - level);
-        let swap = self.swap(own, head_up(head_at) - foot_up(head_at), head_at - foot.at);
-        let head_depth = swap.map_or(DEPTH + LAYER * f64::from(own.rank), |s| s.depth);
-        let foot_depth = self.foot_depth(own);
-        let spread = match over && own.side != 0.0 {
-            // Cast on for both layers, it is as wide as others where its layer is alone.
-            true => 2.0,
-            false if children().any(|c| c.bobble) => HOLDS_BOBBLE,
-            false if drawn => rims::PINCHED,
-            false => 1.0 + 0.8 * (count - 1.0),
-        };
-        // Its head is as wide as what is drawn through it.
-        let spread = if own.children.is_empty() { spread } else { spread * mean(&|c: &Loop| c.wide) };
-        let crossing = match over {
-            true if own.is_lifted() => 0.46,
-            true => 0.35,
-            false => 0.5,
-        };
-        // A tuck stays on its side of the stitch that it is worked with.
-        let reach = if over && own.rank > 0 { TAU / 14.0 } else { TAU / 6.0 };
-        let piece = |k: usize| {
-            let t = TAU * k as f64 / STEPS as f64;
-            let head = 0.5 - 0.5 * t.cos();
-            let (cos2, sin2) = ((2.0 * t).cos(), (2.0 * t).sin());
-            let upper = smooth_step((head - 0.3) / 0.4);
-            let mix = |low: f64, high: f64| low + (high - low) * upper;
-            // At its ends a foot goes over into the neighbour's.
-            let inside = smooth_step(t.min(TAU - t) / reach);
-            let (side, end) = if k <= STEPS / 2 { (-1.0, ends[0]) } else { (1.0, ends[1]) };
-            let turned = if own.twist == 0.0 { 1.0 } else { 1.0 - 2.0 * smooth_step((head - crossing) / 0.24 + 0.5) };
-            let wide = match own.is_lifted() {
-                true => NARROW,
-                // What closes a bobble goes through heads that lie close.
-                false => mix(if own.bobble { CLOSING } else { own.wide }, spread),
-            };
-            let across = (t / TAU - 0.5 + if over { 0.5 } else { 1.0 } * LEAN * sin2) * wide * turned;
-            // Layers that are bound off together are beside each other before what closes them comes through.
-            let lean = if own.side != 0.0 && bound_off { smooth_step((head - 0.2) / 0.4) } else { upper };
-            let moved = swap.map_or(lean, |s| s.moved(head));
-            let at = foot.at
-                + (head_at - foot.at) * moved
-                + step * across
-                + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step * own.wide));
-            let low = foot_up(at);
-            let up = low + (head_up(at) - low) * head + (1.0 - inside) * (end.up - foot_up(end.at));
-            let mut out = if over {
-                laid_over(own, child, [foot.out, head_depth], head)
-            } else {
-                let deep = |depth: f64| if cos2 > 0.0 { depth } else { DEPTH };
-                mix(-own.sign * deep(foot_depth), -child * deep(head_depth)) * cos2
-            };
-            out += swap.map_or(0.0, |s| s.raised(head)) + self.layer(own, head);
-            if drawn {
-                out += (Self::around(t / TAU) - out) * upper;
-            }
-            if own.bobble {
-                // The last one of those that it is drawn through lies in the cloth.
-                out += PILED * (1.0 - smooth_step((head - 0.42) / 0.16));
-            }
-            if own.twist != 0.0 {
-                let bump = 1.0 - smooth_step((head - crossing).abs() / 0.25);
-                out += side * own.twist * 0.55 * bump;
-            }
-            out += (1.0 - inside) * (end.out - foot.out);
-            let place = Place { at, up, out };
-            (place, [column as f32 + (t / TAU) as f32, own.row as f32 + 0.02 + 0.96 * head as f32])
-        };
-        let (places, grid) = (0..=STEPS).map(piece).unzip();
-        Piece { places, grid, yarn: own.yarn }
-    }
-}
-
-/// How far out a loop is that was laid over the needle, at a share of its height.
-fn laid_over(own: &Loop, child: f64, [foot, head_depth]: [f64; 2], head: f64) -> f64 {
-    let legs = if own.rank > 0 { 0.12 } else { 0.06 };
-    // A lifted strand stays on its side of the heads of the row below.
-    let [from, over] = match own.is_lifted() {
-        true if own.layer == child => [0.5, 0.25],
-        true => [0.3, 0.2],
-        false => [0.0, 0.5],
-    };
-    let (low, high) = (smooth_step((head - from) / over), smooth_step(2.0 * head - 1.0));
-    foot * (1.0 - low) - child * (legs * low + (head_depth - legs) * high)
-}
-
-/// A loop on its way to where it is worked passes others, between the heads of its own row and the feet of that above.
-#[derive(Clone, Copy)]
-struct Swap {
-    /// From which share of its height on; it ends as far from the other end.
-    from: f64,
-    /// How far in front of the others it passes.
-    front: f64,
-    /// How far it lies over the last of those that are worked together with it, up to its head.
-    over: f64,
-    /// How deep its head dives without that.
-    depth: f64,
-}
-
-impl Swap {
-    /// The share of its height in which it comes forward, and goes back again.
-    fn ramp(self) -> f64 {
-        0.25 * (1.0 - 2.0 * self.from)
-    }
-
-    /// How much of the way across is behind it at a share of its height.
-    fn moved(self, head: f64) -> f64 {
-        smooth_step((head - self.from - self.ramp()) / (2.0 * self.ramp()))
-    }
-
-    /// How far it is in front there.
-    fn raised(self, head: f64) -> f64 {
-        let by = |off: f64| smooth_step((off - self.from) / self.ramp());
-        self.front * by(head.min(1.0 - head)) + self.over * by(head)
-    }
-}
-
-impl Loops {
-    /// How a loop so many rows high, worked so far across from its feet, passes those that it changes places with, or that are
-    /// worked together with it.
-    fn swap(&self, own: &Loop, high: f64, across: f64) -> Option<Swap> {
-        const FAR: f64 = 0.6;
-        let child = &self.loops[*own.children.first()? as usize];
-        let stitches = |d: f64| d.abs() * if self.border.turns { self.wide as f64 } else { 1.0 };
-        let together = || child.parents.iter().map(|p| &self.loops[*p as usize]);
-        let beside = together().any(|l| stitches(self.border.short(l.at - own.at)) > 0.25);
-        let bound = together().any(|l| l.row == child.row);
-        let last = (child.parents.len() - 1) as f64;
-        let (mut front, mut over, mut depth) = (0.0, 0.0, DEPTH + LAYER * f64::from(own.rank));
-        if child.layer != 0.0 {
-            front = CABLE * child.layer.max(0.0);
-        } else if beside && !bound {
-            over = child.sign * LAYER * (last - f64::from(own.rank));
-            depth = DEPTH + LAYER * last;
-        } else if stitches(across) < FAR {
-            return None;
-        }
-        // Heads reach so far up from the row below, and feet down from that above.
-        Some(Swap { from: (2.0 * self.reach() / high).min(0.4), front, over, depth })
     }
 }
 

@@ -7,7 +7,8 @@ mod topology;
 use std::collections::BTreeSet;
 
 use super::{
-    super::{bend::folded, chart::PATTERNS},
+    super::{StrandKind, bend::folded, chart::PATTERNS},
+    loops::{Border, Loops},
     *,
 };
 use crate::geometry::overlap::{Overlap, overlap};

@@ -151,93 +151,53 @@ pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStra
 /// Raises the floats of a pile yarn. It is held where it lies on the other side of the cloth.
 pub(super) fn raise(cloth: &Cloth<'_>, strand: PatternStrand, number: i64, hem: i64) -> Vec<Standing> {
     let draft = &cloth.weave.draft;
-    let Some(pile) = draft.pile() else { return vec![Standing::ground(strand)] };
     let side = usize::from(strand.kind == StrandKind::Weft);
-    let [own, size] = [side, 1 - side].map(|side| [draft.warps(), draft.wefts()][side] as i64);
-    let own = number.rem_euclid(own) as usize;
-    let Some(back) = pile.stands(side, own) else {
+    let own = number.rem_euclid([draft.warps(), draft.wefts()][side] as i64) as usize;
+    let Some((pile, back)) = draft.pile().and_then(|pile| Some((pile, pile.stands(side, own)?))) else {
         return vec![Standing::ground(strand)];
     };
-    let nodes = cloth.cell.nodes as i64;
-    let way = points(&strand);
-    // Crossing c is at point `nodes / 2 + (c - first) * nodes`.
-    let first = if side == 0 { -hem } else { 0 };
-    let crossings = (way.len() as i64 - 1) / nodes;
-    let held = |c: i64| is_held(draft, side, own, (c + first).rem_euclid(size) as usize, back);
-    // A hem, and what it is folded onto, is woven flat, as borders of towels are.
-    let flat_border = if hem > 0 { hem + 1 } else { 0 };
-    let border = |c: i64| side == 0 && !(flat_border..i64::from(cloth.count[1]) - flat_border).contains(&(c + first));
-    let at = |c: i64| nodes / 2 + c * nodes;
-    let holds: Vec<(i64, bool)> = (0..crossings).filter(|&c| held(c)).map(|c| (at(c), border(c))).collect();
-    let nearest_hold = holds.windows(2).map(|pair| pair[1].0 - pair[0].0).min().unwrap_or(i64::MAX);
-    let own_room = 0.5 * diameter(cloth) / cloth.cell.spacing[1 - side];
-    // The feet of a tuft and of the next on its yarn stand beside each other.
-    let beside = |rise: f64| rise.min(0.5 * nearest_hold as f64 / nodes as f64 - own_room).max(LEAST_RISE);
-    let rise = ((if pile.cut { beside(RISE) } else { RISE }) * nodes as f64).floor() as i64;
-    let up = if back { -1.0 } else { 1.0 };
-    let seed = strand.index ^ ((side as u32) << 30);
-    let wale = wale(draft, pile, side, rise as f64 / nodes as f64);
-    let per_repeat = (0..size).filter(|&c| held(c - first)).count().max(1) as f64;
-    let even = if wale.is_some() { 0.0 } else { (RISE - 0.25 * size as f64 / per_repeat).clamp(0.0, RISE) };
-    let made = Raised { cloth, side, up, seed, wale, rise: rise as f64 / nodes as f64, even };
-    // Nothing where a part would begin beyond the end: the yarn may end on top of its last crossing.
-    let part = |from: i64, to: i64| -> Vec<(Point, bool)> {
-        let (from, to) = (from.max(0), to.min(way.len() as i64 - 1));
-        if from > to { Vec::new() } else { way[from as usize..=to as usize].iter().map(|&p| (p, false)).collect() }
-    };
-    let flat = cloth.weave.sized();
+    let raised = Raised::new(cloth, pile, &strand, PileYarn { side, own, back }, hem);
     if pile.cut {
-        let spread = spread(cloth, pile, side, made.wale.is_some());
-        let tuft = |at: i64| {
-            let base = part(at - rise, at + rise);
-            let (a, b) = (base[0].0, base[base.len() - 1].0);
-            let free = |points: Vec<Point>| points.into_iter().map(|p| (p, true));
-            let place = |at: i64| (at - nodes / 2) as f64 / nodes as f64 + first as f64;
-            let legs = [(a, -1.0), (b, 1.0)].map(|(foot, out)| made.leg(foot, out, at as u32, place(at)));
-            let counts = [legs[0].len(), legs[1].len()];
-            let [before, after] = legs;
-            let mut all: Vec<(Point, bool)> = free(before).collect();
-            all.reverse();
-            all.extend(&base);
-            all.extend(free(after));
-            let seed = hash2(made.seed, at as u32);
-            let tuft = Tuft {
-                across: made.direction(0.0, 1.0, 0.0),
-                legs: counts,
-                stride: (nodes as usize / 4).max(1),
-                radius: made.radius(),
-                spread,
-                cut: made.cut(0.5 * (a.0.z + b.0.z), place(at)),
-                seed,
-            };
-            Standing { tuft: Some(tuft), ..Standing::of(&strand, &all, flat) }
-        };
-        return holds.iter().filter(|(_, border)| !border).map(|&(at, _)| tuft(at)).collect();
+        return raised.tufts(spread(cloth, pile, side, raised.wale.is_some()));
     }
-    let Some((&(start, _), &(end, _))) = holds.first().zip(holds.last()) else { return vec![Standing::ground(strand)] };
-    let mut all = part(0, start + rise);
-    for pair in holds.windows(2) {
-        let [(from, flat_from), (to, flat_to)] = [pair[0], pair[1]];
-        if to - from > nodes && !flat_from && !flat_to {
-            let (a, b) = (all[all.len() - 1].0, way[(to - rise) as usize]);
-            all.extend(made.arch(a, b, from as u32).into_iter().map(|p| (p, true)));
-            all.extend(part(to - rise, to + rise));
-        } else {
-            all.extend(part(from + rise + 1, to + rise));
-        }
+    match raised.looped() {
+        Some(looped) => vec![looped],
+        None => vec![Standing::ground(strand)],
     }
-    all.extend(part(end + rise + 1, way.len() as i64 - 1));
-    vec![Standing::of(&strand, &all, flat)]
 }
 
+/// Which yarn of a repeat it is, warp (0) or weft (1), and whether it stands up on the back.
+#[derive(Clone, Copy)]
+struct PileYarn {
+    side: usize,
+    own: usize,
+    back: bool,
+}
+
+/// A place where the ground holds a pile yarn.
+struct Hold {
+    /// The point of the yarn.
+    at: i64,
+    /// Whether it is in a border that is woven flat.
+    flat: bool,
+}
+
+/// A pile yarn that is raised.
 struct Raised<'a> {
     cloth: &'a Cloth<'a>,
+    /// As it lies in the ground.
+    strand: &'a PatternStrand,
+    way: Vec<Point>,
+    /// Its crossing c is at point `nodes / 2 + (c - first) * nodes`.
+    first: i64,
+    holds: Vec<Hold>,
     side: usize,
     /// 1 on the face, -1 on the back.
     up: f64,
     seed: u32,
     wale: Option<Wale>,
-    /// How far legs stand from where their tuft is held, in crossings.
+    /// How far legs stand from where their tuft is held, in points and in crossings.
+    reach: i64,
     rise: f64,
     /// How far legs lean towards each other, in crossings.
     even: f64,
@@ -318,7 +278,95 @@ fn spread(cloth: &Cloth<'_>, pile: &Pile, side: usize, in_wales: bool) -> [f64; 
     [0.5 * across, 0.5 * size[0] * size[1] / (legs * across)]
 }
 
-impl Raised<'_> {
+/// How far from a hold legs stand that keep out of each other's way, in points.
+fn reach(cloth: &Cloth<'_>, pile: &Pile, side: usize, holds: &[Hold]) -> i64 {
+    let nodes = cloth.cell.nodes as f64;
+    if !pile.cut {
+        return (RISE * nodes).floor() as i64;
+    }
+    let nearest = holds.windows(2).map(|pair| pair[1].at - pair[0].at).min().unwrap_or(i64::MAX);
+    let own_room = 0.5 * diameter(cloth) / cloth.cell.spacing[1 - side];
+    // The feet of a tuft and of the next on its yarn stand beside each other.
+    let beside = RISE.min(0.5 * nearest as f64 / nodes - own_room).max(LEAST_RISE);
+    (beside * nodes).floor() as i64
+}
+
+impl<'a> Raised<'a> {
+    fn new(cloth: &'a Cloth<'a>, pile: &Pile, strand: &'a PatternStrand, yarn: PileYarn, hem: i64) -> Self {
+        let (draft, nodes) = (&cloth.weave.draft, cloth.cell.nodes as i64);
+        let PileYarn { side, own, back } = yarn;
+        let size = [draft.wefts(), draft.warps()][side] as i64;
+        let held = |crossing: i64| is_held(draft, side, own, crossing.rem_euclid(size) as usize, back);
+        let way = points(strand);
+        let first = if side == 0 { -hem } else { 0 };
+        // A hem, and what it is folded onto, is woven flat, as borders of towels are.
+        let border = if hem > 0 { hem + 1 } else { 0 };
+        let flat = |crossing: i64| side == 0 && !(border..i64::from(cloth.count[1]) - border).contains(&crossing);
+        let holds: Vec<Hold> = (0..(way.len() as i64 - 1) / nodes)
+            .filter(|c| held(c + first))
+            .map(|c| Hold { at: nodes / 2 + c * nodes, flat: flat(c + first) })
+            .collect();
+        let reach = reach(cloth, pile, side, &holds);
+        let rise = reach as f64 / nodes as f64;
+        let wale = wale(draft, pile, side, rise);
+        let per_repeat = (0..size).filter(|&c| held(c)).count().max(1) as f64;
+        let even = if wale.is_some() { 0.0 } else { (RISE - 0.25 * size as f64 / per_repeat).clamp(0.0, RISE) };
+        let (up, seed) = (if back { -1.0 } else { 1.0 }, strand.index ^ ((side as u32) << 30));
+        Self { cloth, strand, way, first, holds, side, up, seed, wale, reach, rise, even }
+    }
+
+    /// Its points in the ground between two, these among them; nothing where that would begin beyond the end: the yarn may end on
+    /// top of its last crossing.
+    fn part(&self, from: i64, to: i64) -> Vec<(Point, bool)> {
+        let (from, to) = (from.max(0), to.min(self.way.len() as i64 - 1));
+        if from > to { Vec::new() } else { self.way[from as usize..=to as usize].iter().map(|&p| (p, false)).collect() }
+    }
+
+    /// What is left of it where its floats are cut: a tuft at each hold, whose legs have half of this room.
+    fn tufts(&self, spread: [f64; 2]) -> Vec<Standing> {
+        self.holds.iter().filter(|hold| !hold.flat).map(|hold| self.tuft(hold.at, spread)).collect()
+    }
+
+    fn tuft(&self, at: i64, spread: [f64; 2]) -> Standing {
+        let nodes = self.cloth.cell.nodes as i64;
+        let base = self.part(at - self.reach, at + self.reach);
+        let (a, b) = (base[0].0, base[base.len() - 1].0);
+        let place = (at - nodes / 2) as f64 / nodes as f64 + self.first as f64;
+        let [before, after] = [(a, -1.0), (b, 1.0)].map(|(foot, out)| self.leg(foot, out, at as u32, place));
+        let tuft = Tuft {
+            across: self.direction(0.0, 1.0, 0.0),
+            legs: [before.len(), after.len()],
+            stride: (nodes as usize / 4).max(1),
+            radius: self.radius(),
+            spread,
+            cut: self.cut(0.5 * (a.0.z + b.0.z), place),
+            seed: hash2(self.seed, at as u32),
+        };
+        let free = |p: Point| (p, true);
+        let all: Vec<(Point, bool)> =
+            before.into_iter().rev().map(free).chain(base).chain(after.into_iter().map(free)).collect();
+        Standing { tuft: Some(tuft), ..Standing::of(self.strand, &all, self.cloth.weave.sized()) }
+    }
+
+    /// All of it, its floats loops; `None` where nothing holds it.
+    fn looped(&self) -> Option<Standing> {
+        let (first, last) = (self.holds.first()?.at, self.holds.last()?.at);
+        let reach = self.reach;
+        let mut all = self.part(0, first + reach);
+        for pair in self.holds.windows(2) {
+            let (from, to) = (pair[0].at, pair[1].at);
+            if to - from > self.cloth.cell.nodes as i64 && !pair[0].flat && !pair[1].flat {
+                let (a, b) = (all[all.len() - 1].0, self.way[(to - reach) as usize]);
+                all.extend(self.arch(a, b, from as u32).into_iter().map(|p| (p, true)));
+                all.extend(self.part(to - reach, to + reach));
+            } else {
+                all.extend(self.part(from + reach + 1, to + reach));
+            }
+        }
+        all.extend(self.part(last + reach + 1, self.way.len() as i64 - 1));
+        Some(Standing::of(self.strand, &all, self.cloth.weave.sized()))
+    }
+
     fn radius(&self) -> f64 {
         [self.cloth.weave.warp_radius, self.cloth.weave.weft_radius][self.side]
     }

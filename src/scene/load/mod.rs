@@ -41,12 +41,13 @@ use super::{
     defaults,
     view::CameraSetup,
 };
-use crate::files::{curve_file, unreadable::in_words};
+use crate::files::curve_file;
 use crate::geometry::proposal::UNITS;
 use crate::input::{
     diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},
     reader::{Range, Reader},
+    system::in_words,
 };
 
 /// What the command line adds to a scene file.

@@ -2,11 +2,11 @@
 
 use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates, garment};
 use crate::{
-    files::unreadable::in_words,
     geometry::curve::Curve,
     input::{
         diagnostic::Span,
         document::{Node, Value},
+        system::in_words,
     },
     pattern::{
         PatternStrand, StrandKind,

@@ -5,13 +5,11 @@
 //! to the other lies between them.
 
 use super::{
-    super::{
-        super::chart::Stitch,
-        colors::{Colors, Hold},
-    },
+    super::colors::{Colors, Hold},
     Border, Course, Loops, Visit,
     maker::Maker,
 };
+use crate::pattern::chart::Stitch;
 
 /// Yarn of a loop of the cast-on edge, which goes to the front and to the back by turns, in shares of a stitch's.
 const ZIGZAG: f64 = 0.62;

@@ -4,13 +4,13 @@ mod across;
 mod net;
 
 use super::{
-    super::rims::CastOn,
     super::{
-        super::chart::{Act, Stitch, Top},
+        rims::CastOn,
         shape::bobble::{BELLY, BOBBLE},
     },
     Border, Course, Loop, Loops, Visit,
 };
+use crate::pattern::chart::{Act, Stitch, Top};
 
 /// Yarn of what is no whole loop, in shares of a stitch's.
 const OVER: f64 = 0.8;

@@ -4,14 +4,15 @@
 
 use glam::DVec3;
 
-use super::super::{
-    super::{
+use super::super::shape::Place;
+use crate::{
+    geometry::spline::catmull_rom,
+    math::special::hermite,
+    pattern::{
         chart::{Act, Stitch},
         rods::Fire,
     },
-    shape::Place,
 };
-use crate::{geometry::spline::catmull_rom, math::special::hermite};
 
 /// Stiffness of the net against shear and against bending, over that against stretching: it is blocked, and bulges only where
 /// it must.

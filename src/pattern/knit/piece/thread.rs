@@ -4,14 +4,14 @@ use std::collections::HashSet;
 
 use glam::{DVec3, IVec3};
 
-use super::super::{
-    super::{
+use super::super::shape::spaced;
+use crate::{
+    geometry::spline::through_points,
+    pattern::{
         bend::folded,
         rods::{Rods, Run, Strand},
     },
-    shape::spaced,
 };
-use crate::geometry::spline::through_points;
 
 /// The longest segment, in diameters.
 const LONGEST: f64 = 1.0;

@@ -1,10 +1,11 @@
 //! Double knitting: what is drawn through what in both layers, and in which layer each colour is.
 
 use super::{
-    super::{super::rods::passing::passed, piece::follow::threaded},
+    super::piece::follow::threaded,
     topology::{Stitches, stitches_of},
     *,
 };
+use crate::pattern::rods::passing::passed;
 
 /// A diamond, and rows that change layers as a whole.
 const PICTURE: [&str; 9] = [

@@ -1,9 +1,7 @@
 //! Tops that are drawn together and the cable cast-on: what goes through what, and that nothing is left open.
 
-use super::{
-    super::{super::rods::passing::passed, piece::follow::threaded},
-    *,
-};
+use super::{super::piece::follow::threaded, *};
+use crate::pattern::rods::passing::passed;
 
 /// The points of one yarn with their wale and course.
 fn yarn(piece: &Knit) -> Vec<(DVec3, [f32; 2])> {

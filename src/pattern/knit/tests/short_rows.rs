@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::{
-    super::{super::rods::passing::passed, loops::Visit, piece::follow::threaded},
+    super::{
+        loops::{Border, Loops, Visit},
+        piece::follow::threaded,
+    },
     topology::{linked, yarn_of_stitches},
     *,
 };
+use crate::pattern::{chart::Act, rods::passing::passed};
 
 /// Longer on the right, by as much for each stitch.
 const WEDGE: [&str; 12] = ["k", "k", "k", "-4 k12", "-4 k12", "-8 k8", "-8 k8", "-12 k4", "-12 k4", "k", "k", "k"];

@@ -4,9 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    super::{super::rods::passing::passed, loops::Visit, piece::follow::threaded, shape::bobble},
+    super::{
+        loops::{Border, Loops, Visit},
+        piece::follow::threaded,
+        shape::bobble,
+    },
     *,
 };
+use crate::pattern::rods::passing::passed;
 
 /// How a way is linked with a ring: how often it passes the ring towards the front less towards the back. The ring is closed far
 /// below, the way far above, and crossings are counted as seen from the front (Gauss' linking number as a sum of signs where

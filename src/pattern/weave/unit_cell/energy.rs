@@ -3,11 +3,12 @@
 use glam::DVec3;
 
 use super::{
-    super::{super::draft::Draft, minimize::minimize},
+    super::minimize::minimize,
     CellOptions, Node,
     contact::{Gradient, Spheroid},
     full,
 };
+use crate::pattern::draft::Draft;
 
 /// Resistance of a section to being flattened, energy per crossing and squared logarithm of its width.
 const SECTION: f64 = 20.0;

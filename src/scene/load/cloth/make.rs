@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        super::{CurveKind, Fabric, FabricMotion, GarmentFacts, Taken, defaults, transform_curves},
         Context, Y_UP,
         color::{ColorPlan, FabricCoordinates},
         dyes::Dyes,
@@ -26,6 +25,7 @@ use crate::{
     geometry::curve::{Basis, Curve, CurveSet},
     math::sampler::Stream,
     pattern::straight,
+    scene::{CurveKind, Fabric, FabricMotion, GarmentFacts, Taken, defaults, transform_curves},
 };
 
 /// Columns that a yarn counts where nothing is known of its cloth.

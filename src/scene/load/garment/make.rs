@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        super::{FabricMotion, GarmentFacts, Taken, Yarn},
         Context,
         cloth::Detail,
         color::{ColorPlan, FabricCoordinates},
@@ -22,6 +21,7 @@ use crate::{
     files::mesh_file,
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
     geometry::{curve::Curve, mesh::Mesh},
+    scene::{FabricMotion, GarmentFacts, Taken, Yarn},
 };
 
 /// For each rule its colours where each is a yarn of its own, and the yarns in the library that they are.

@@ -2,7 +2,8 @@
 
 use glam::DVec2;
 
-use super::{super::super::super::chart::Stitch, Maker, net::Net};
+use super::{Maker, net::Net};
+use crate::pattern::chart::Stitch;
 
 /// Rounds of looking for it.
 const ROUNDS: usize = 100;

@@ -6,12 +6,10 @@
 
 use glam::DVec2;
 
-use super::super::super::{
-    super::{
-        chart::{Act, Stitch},
-        rods::Fire,
-    },
-    ROW_HEIGHT, STITCH_WIDTH,
+use crate::pattern::{
+    chart::{Act, Stitch},
+    knit::{ROW_HEIGHT, STITCH_WIDTH},
+    rods::Fire,
 };
 
 /// Stiffness against shear and against bending of courses and of wales, over that against stretching: knitted cloth shears

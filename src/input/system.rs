@@ -1,4 +1,4 @@
-//! Why a file cannot be read, in the words that all formats share.
+//! Why the operating system refuses a file, in the words that all messages share.
 
 use std::io;
 
@@ -6,7 +6,10 @@ use std::io;
 pub(crate) fn hindrance(error: &io::Error) -> Option<&'static str> {
     match error.kind() {
         io::ErrorKind::NotFound => Some("no such file"),
-        io::ErrorKind::PermissionDenied => Some("no permission to read it"),
+        io::ErrorKind::PermissionDenied => Some("permission denied"),
+        io::ErrorKind::NotADirectory => Some("part of the path is not a directory"),
+        io::ErrorKind::StorageFull => Some("the disk is full"),
+        io::ErrorKind::ReadOnlyFilesystem => Some("the file system is read-only"),
         _ => None,
     }
 }

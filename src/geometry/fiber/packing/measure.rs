@@ -1,0 +1,87 @@
+//! How packings lie, by lines through some of them.
+
+use std::f64::consts::PI;
+
+use glam::{DMat2, DVec2};
+
+use super::{leaning_discs, lines::Lines};
+use crate::{
+    geometry::{
+        density::PlyPacking,
+        fiber::{
+            slopes::{Slopes, Twist},
+            yielding::{Ellipse, Yielding},
+        },
+    },
+    math::sampler::Stream,
+};
+
+/// The most discs of a packing that is measured, about how many discs are looked at, and in how many packings.
+const MOST_MEASURED: u32 = 100;
+const MEASURED: u32 = 1500;
+const LEAST_PACKINGS: u32 = 15;
+const MOST_PACKINGS: u32 = 100;
+/// At how many turns a packing is squeezed.
+const SQUEEZED: u32 = 4;
+
+/// How the packings that [`hard_discs`](super::hard_discs) makes of fibres with a twist lie, from some of them; `radius` is
+/// in core radii. Where `stretch`, the long over the short axis of their ply's section, is above 1, discs have given way to
+/// each other as [`Yielding`] has it.
+///
+/// The crowding and its depth are those with which lines by the rim meet as many discs as they do, by least squares of what
+/// would pass if these lay at random. The regularity is that with which the gaps of
+/// [`PlyGaps`](crate::geometry::occluder::PlyGaps) pass as much as pieces of lines away from the rim do; that by the rim with
+/// which they pass as much as lines in all directions through the packings, by least squares of the roots over the ply's
+/// width. What is free after a fibre is that with which as much light leaves that met one as on lines from the place where it
+/// did.
+///
+/// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
+/// falls with a disc's radius.
+pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacking {
+    let packed = count.min(MOST_MEASURED);
+    let fewer = (f64::from(packed) / f64::from(count.max(1))).sqrt();
+    // The same area fraction of the ply, whose radius is 1 + radius.
+    let share = radius / (1.0 + radius) / fewer;
+    if packed == 0 || share >= 1.0 {
+        return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0, after: None };
+    }
+    let radius = share / (1.0 - share);
+    let slopes = twist.scaled(twist.room(packed, share)).in_core(share);
+    let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
+        .map(|seed| leaning_discs(packed, radius, &slopes, &mut Stream::new(seed)))
+        .collect();
+    let pressed = Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0)));
+    let sections: Vec<Vec<DVec2>> = match &pressed {
+        None => packings,
+        Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, &slopes, ellipse)).collect(),
+    };
+    let lines = match &pressed {
+        None => Lines { radius, stretch: 1.0, slopes },
+        Some(ellipse) => Lines { radius, stretch, slopes: ellipse.slopes_in(&slopes) },
+    };
+    let mut ply = lines.ply(packed);
+    lines.fit_wall(&sections, &mut ply);
+    let core = pressed.as_ref().map_or(DVec2::ONE, |ellipse| ellipse.core(share) / (1.0 - share));
+    let regularity = lines.inside(&sections, core);
+    ply.regularity = regularity as f32;
+    let rim = lines.rim(&sections, &mut ply);
+    let after = Some(lines.after(&sections, &ply));
+    PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim, after }
+}
+
+/// A packing in an ellipse, at some turns; in core radii, as the packing. `share` is a disc's radius over the ply's.
+pub(super) fn squeezed<'a>(
+    discs: &'a [DVec2],
+    share: f64,
+    slopes: &Slopes,
+    ellipse: &'a Ellipse,
+) -> impl Iterator<Item = Vec<DVec2>> + 'a {
+    let yielding = Yielding::new(discs, share, slopes, ellipse);
+    let slopes = ellipse.slopes_in(slopes).per_ply_radius(share);
+    (0..SQUEEZED).map(move |turn| {
+        let mut out = Vec::with_capacity(discs.len());
+        yielding.squeeze(DVec2::from_angle(PI * f64::from(turn) / f64::from(SQUEEZED)), ellipse, &slopes, &mut out);
+        out.iter_mut().for_each(|at| *at /= 1.0 - share);
+        out
+    })
+}

@@ -1,0 +1,71 @@
+//! What a piece without a repeat begins with: cells for those of its rows that are like their neighbours.
+
+use rayon::prelude::*;
+
+use super::{Knit, cell::Cell};
+use crate::pattern::chart::{Chart, Stitch};
+
+/// Cells of rows that are alike, and which row takes which.
+#[derive(Default)]
+pub(super) struct Kinds {
+    cells: Vec<Cell>,
+    of_row: Vec<Option<usize>>,
+}
+
+impl Kinds {
+    /// The cell of a row, and the row in it; none where it is not like its neighbours.
+    pub(super) fn of(&self, row: usize) -> Option<(&Cell, usize)> {
+        let kind = self.of_row.get(row).copied().flatten()?;
+        Some((&self.cells[kind], 0))
+    }
+
+    /// That of the cell that most rows take, unless it is given.
+    pub(super) fn gauge(&self, given: [Option<f64>; 2]) -> [f64; 2] {
+        let count = |k: usize| self.of_row.iter().filter(|o| **o == Some(k)).count();
+        let most = (0..self.cells.len()).max_by_key(|&k| (count(k), std::cmp::Reverse(k)));
+        let own = most.map_or([4.0, 2.8], |k| self.cells[k].gauge());
+        [0, 1].map(|c| given[c].unwrap_or(own[c]))
+    }
+}
+
+impl Knit {
+    /// Cells for rows of knit and purl columns that are above and below their like: what a shaped piece begins with.
+    pub(super) fn rows_of_a_kind(&self, rows: &[Vec<Stitch>], size: [Option<f64>; 2], points: u32) -> Kinds {
+        const MOST_KINDS: usize = 6;
+        let kinds: Vec<Option<Vec<bool>>> = rows.iter().map(|r| column_signs(r)).collect();
+        let mut known: Vec<Vec<bool>> = Vec::new();
+        let of_row: Vec<Option<usize>> = (0..rows.len())
+            .map(|r| {
+                let kind = kinds[r].as_ref()?;
+                let alike =
+                    |other: Option<usize>| other.and_then(|o| kinds.get(o)).is_none_or(|k| k.as_ref() == Some(kind));
+                if !alike(r.checked_sub(1)) || !alike(Some(r + 1)) {
+                    return None;
+                }
+                known.iter().position(|k| k == kind).or_else(|| {
+                    (known.len() < MOST_KINDS).then(|| {
+                        known.push(kind.clone());
+                        known.len() - 1
+                    })
+                })
+            })
+            .collect();
+        if known.is_empty() {
+            known.push(vec![false]);
+        }
+        let cell = |kind: &Vec<bool>| {
+            let row: Vec<&str> = kind.iter().map(|purl| if *purl { "p" } else { "k" }).collect();
+            let chart = Chart::parse(&[row.join(" ")]).expect("knits and purls are a chart");
+            Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size)
+        };
+        Kinds { cells: known.par_iter().map(cell).collect(), of_row }
+    }
+}
+
+/// Knit or purl along a row, once around its repeat, if that is short.
+fn column_signs(row: &[Stitch]) -> Option<Vec<bool>> {
+    const LONGEST: usize = 12;
+    let repeats = |n: &usize| (0..row.len()).all(|j| row[j].purl == row[j % n].purl);
+    let n = (1..=LONGEST.min(row.len())).find(repeats)?;
+    Some(row[..n].iter().map(|s| s.purl).collect())
+}
