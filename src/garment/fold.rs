@@ -11,6 +11,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::edges::SeamKind;
 
+/// Exponent of the superellipse that the right side follows round a bend; 2 is a circle.
+const FULL: f64 = 4.0;
+
 /// How a cloth is turned in at each kind of seam.
 pub(super) type Folds = [Option<Fold>; SeamKind::COUNT];
 
@@ -30,6 +33,10 @@ pub(super) struct Fold {
     least: f64,
     /// How far the cloth's wrong side and its right side are from its middle, mm.
     sides: [f64; 2],
+    /// Between which heights the middles of its yarns lie, mm.
+    heights: [f64; 2],
+    /// Up to which angle its right side is full: whole quarters of a turn, radians.
+    full: f64,
     /// Whether what is turned in is laid to one side.
     laid_over: bool,
 }
@@ -47,7 +54,8 @@ impl Fold {
     pub(super) fn new(kind: SeamKind, [low, high]: [f64; 2], diameter: f64, pressed: bool) -> Option<Self> {
         let (wall, flare) = match kind {
             SeamKind::None => return None,
-            SeamKind::Mattress if pressed => (0.0, FRAC_PI_2),
+            // Without any wall a slot stands open between loops that touch at one height only.
+            SeamKind::Mattress if pressed => (0.8 * diameter, FRAC_PI_2),
             // Where the edges part the sewing yarn has room between them. Before, somewhere on the wall, loops of both sides
             // touch.
             SeamKind::Mattress => (1.8 * diameter, 50_f64.to_radians()),
@@ -57,7 +65,9 @@ impl Fold {
         let radius = 0.9 * diameter - low;
         let sides = [0.5 * diameter - low, 0.5 * diameter + high];
         let half = high + 0.51 * diameter;
-        Some(Self { radius, half, wall, flare, neutral: radius + 0.5 * low, least: 0.3 * diameter, sides, laid_over })
+        let (neutral, least, heights) = (radius + 0.5 * low, 0.3 * diameter, [low, high]);
+        let full = FRAC_PI_2 * (1.0 + (flare / FRAC_PI_2).floor());
+        Some(Self { radius, half, wall, flare, full, neutral, least, sides, heights, laid_over })
     }
 
     /// The distance from the seam at which the bend begins, mm.
@@ -126,10 +136,21 @@ impl Fold {
         self.off(s, -self.sides[0] - clear)
     }
 
+    /// By how much a layer bulges out of a round bend at an angle of it: the nearer to the right side, the more. Loops there
+    /// are drawn over the bend and fill it, so that both sides meet in a narrow line; round they would leave a groove
+    /// as wide as a column.
+    fn fullness(&self, angle: f64, z: f64) -> f64 {
+        let [low, high] = self.heights;
+        let front = ((z - low) / (high - low).max(1e-9)).clamp(0.0, 1.0);
+        let n = 2.0 + (FULL - 2.0) * front;
+        let (sin, cos) = angle.min(self.full).sin_cos();
+        (sin.abs().powf(n) + cos.abs().powf(n)).powf(-1.0 / n)
+    }
+
     fn off(&self, s: f64, z: f64) -> [f64; 2] {
         let Turned { angle, down, straight } = self.turned(s);
         let (sin, cos) = angle.sin_cos();
-        let out = self.radius + z;
+        let out = (self.radius + z) * self.fullness(angle, z);
         [self.begin() - out * sin - straight * cos, out * cos - self.radius - down - straight * sin]
     }
 }
@@ -149,8 +170,8 @@ mod tests {
             for i in 1..900 {
                 let here = fold.bend(6.0 - 0.01 * f64::from(i), 0.0, 1.0);
                 let step = (here[0] - before[0]).hypot(here[1] - before[1]);
-                // Outside of the neutral line cloth is drawn out.
-                assert!((0.0099..0.0135).contains(&step), "{i}: {step}");
+                // Outside of the neutral line cloth is drawn out, most where it bulges.
+                assert!((0.0099..0.0150).contains(&step), "{i}: {step}");
                 before = here;
             }
             // Right sides face each other and do not meet, and what is turned in lies under the cloth.
@@ -159,6 +180,23 @@ mod tests {
             assert!(fold.bend(-2.0, 0.0, 1.0)[1] < -2.0);
         }
         assert_eq!(Fold::new(SeamKind::None, [-0.8, 0.7], 1.0, false), None);
+    }
+
+    /// Seen from outside both right sides meet as two columns do: no groove that is wider or deeper than a yarn.
+    #[test]
+    fn right_sides_meet_below_a_narrow_groove() {
+        for (kind, pressed) in [SeamKind::Mattress, SeamKind::Overlock].into_iter().zip([true, false]) {
+            let fold = Fold::new(kind, [-0.8, 0.7], 1.0, pressed).unwrap();
+            let upper = 0.7 + 0.5;
+            let skin: Vec<_> = (-100..1000).map(|i| fold.bend(0.005 * f64::from(i), upper, 1.0)).collect();
+            let gap = |depth: f64| {
+                let here = skin.iter().filter(|[_, out]| (out - (upper - depth)).abs() < 0.02);
+                2.0 * here.map(|[aside, _]| *aside).fold(f64::MAX, f64::min)
+            };
+            assert!(gap(0.5) < 1.0 && gap(1.0) < 0.5, "{kind:?}: {} {}", gap(0.5), gap(1.0));
+            // And closed for more than a yarn below.
+            assert!((0..12).all(|i| gap(1.8 + 0.1 * f64::from(i)) < 0.2), "{kind:?}: {}", gap(1.8));
+        }
     }
 
     #[test]

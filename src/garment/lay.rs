@@ -97,6 +97,8 @@ enum On {
 const LONGEST: usize = 6000;
 /// So much of a turn's way do cut threads go beyond their last stitch.
 pub(super) const CUT_END: f64 = 0.65;
+/// The end of a knit's yarn goes back so far behind where it came from, in diameters.
+const TAIL_DEEP: f32 = 1.1;
 /// A row's end and the next row's are joined if they are no further apart, in stitches.
 const FURTHEST: usize = 3;
 
@@ -407,34 +409,30 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// The end of a yarn: over the border to the wrong side, and back behind the stitches.
+    /// The end of a yarn: over the border to the wrong side, and back behind the stitches; cut at the edge of a weave and of
+    /// what is turned in, where nobody looks and bends leave no room.
     fn tail(&mut self, run: &Run, strand: Option<Strand<'_>>, first: bool) {
         let corner = if first { run.start() } else { run.end() };
         let outward = if (corner == run.last) == (run.last > run.first) { 1.0_f32 } else { -1.0 };
         let from = self.corner(run.line, corner, strand, UNSTRAINED);
         let bulge = self.bulge();
-        let d = self.shapes.diameter as f32;
-        // Not round the bend of what is turned in.
         let at = if self.axis == 0 { [corner, run.line] } else { [run.line, corner] };
-        let furthest = if self.sheet.is_turned_in(at[0], at[1]) { 1 } else { 3 };
-        let inward = (run.last - run.first).min(furthest) as f32;
-        // Out, up or down, behind, and in; threads of a weave are cut at the edge.
-        // Between the lanes of this row and of the next.
-        let up = if strand.is_some() { 0.5 } else { 0.3 };
-        let darned = [
-            (0.62 * bulge, 0.05, 0.0),
-            (0.7 * bulge, up - 0.05, -0.9 * d),
-            (-0.3, up, -1.6 * d),
-            (-0.6 * inward, up, -1.6 * d),
-            (-inward, up, -1.5 * d),
-        ];
+        let inward = (run.last - run.first).min(3) as f32;
+        // From wherever the yarn is, for a float's end lies behind the cloth already: half a round, and back between the feet
+        // of this row and of the next, where no lane is.
+        let (up, deep) = (0.5, TAIL_DEEP * self.shapes.diameter as f32);
+        let half_round = [(0.4, 0.02), (0.85, 0.2), (1.0, 0.5), (0.85, 0.8), (0.4, 0.98)];
+        let back = [(-0.1, 1.0), (-0.6 * inward, 1.0), (-inward, 0.95)];
+        let darned = half_round.map(|(out, share)| (out * bulge, share)).into_iter().chain(back);
+        let darned: Vec<_> = darned.map(|(along, share)| (along, share * up, -share * deep)).collect();
         let cut = [(0.3 * bulge, 0.0, 0.0), (CUT_END as f32 * bulge, 0.0, 0.0), (bulge, 0.0, 0.0)];
-        let way: &[(f32, f32, f32)] = if self.shapes.is_woven() { &cut } else { &darned };
+        let is_cut = self.shapes.is_woven() || self.sheet.is_turned_in(at[0], at[1]);
+        let way: &[(f32, f32, f32)] = if is_cut { &cut } else { &darned };
         let place = |(along, up, out): (f32, f32, f32)| {
             let mut p = from;
             p[self.axis] += outward * along;
             p[1 - self.axis] += up;
-            p.z = if out == 0.0 { p.z } else { out };
+            p.z += out;
             p
         };
         let places: Vec<Vec3> = way.iter().copied().map(place).collect();

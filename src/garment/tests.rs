@@ -196,6 +196,30 @@ fn a_tube_sewn_to_itself_is_knitted_in_the_round() {
     assert!(overlapping(&yarns) < 0.12);
 }
 
+/// A chain round a closed edge has no start: link follows on link all the way, also from the last to the first.
+#[test]
+fn chains_close_round_without_a_start() {
+    let (_, yarns) = laid(&tube(), options(stockinette()));
+    // What finishes edges is of no stitch.
+    let chains: Vec<&LaidYarn> = yarns.iter().filter(|y| y.coordinates.iter().all(|c| *c == [0.5, 0.5])).collect();
+    assert_eq!(chains.len(), 2);
+    let per_link = crate::pattern::tile::chain(3.2).len();
+    for yarn in chains {
+        let n = yarn.points.len();
+        assert!(yarn.closed && n % per_link == 0, "{n} {per_link}");
+        let link = |i: usize| {
+            let [a, b] = [yarn.points[i], yarn.points[(i + per_link) % n]];
+            let turned = DVec2::new(a.x, a.z).angle_to(DVec2::new(b.x, b.z)) * (n / per_link) as f64;
+            (turned.abs() - std::f64::consts::TAU, a.y - b.y, a.x.hypot(a.z) - b.x.hypot(b.z))
+        };
+        let most = (0..n)
+            .map(link)
+            .fold([0.0, 0.0, 0.0], |m: [f64; 3], (a, b, c)| [m[0].max(a.abs()), m[1].max(b.abs()), m[2].max(c.abs())]);
+        eprintln!("{n} points: {most:.4?}");
+        assert!(most.iter().all(|m| *m < 0.01), "{most:?}");
+    }
+}
+
 #[test]
 fn a_woven_tube_is_sewn() {
     let sewn = Options { seam: SeamKind::Overlock, ..options(woven()) };
