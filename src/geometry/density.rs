@@ -5,14 +5,11 @@
 //! even; for q < 0 their density falls as 1 - 3 q (1 - 2 r^2 / R_c^2) with the distance r from the ply's axis, where R_c is the
 //! radius within which the centres lie. Either has the second moment 2 <r^2> / R_c^2 - 1 = q, if the circle is that of R_c.
 
-use std::{
-    f32::consts::{FRAC_1_PI, FRAC_PI_2},
-    f64::consts::{FRAC_PI_6, PI},
-};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
 use wide::f32x4;
 
-use super::yarn::PlyShape;
+use super::{after_fiber::AfterFiber, yarn::PlyShape};
 
 /// How the fibres of a ply lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,123 +25,6 @@ pub struct PlyPacking {
     pub rim: f64,
     /// What light meets after a fibre. `None` if no other is within the mean dead zone, and those beyond lie at random.
     pub after: Option<AfterFiber>,
-}
-
-/// How many fibres fewer than at random places light meets on its way out after one that it met: others are kept away by the first, and
-/// then follow all the closer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AfterFiber {
-    /// Of light that goes on after the first fibre on its way into the ply.
-    pub first: MissingFibers,
-    /// Of light that goes on after another one.
-    pub later: MissingFibers,
-    /// Of light that goes back after the first, where those in the [`ClearedStrip`] are not expected.
-    pub back: MissingFibers,
-    /// Of light that goes back after another one, where all are expected. Below 0 where the one before is in its way.
-    pub back_later: MissingFibers,
-}
-
-/// The fibres that are missing by how many are expected: a row is of so many times [`AfterFiber::STEP`] expected fibres, and the last one of
-/// more.
-///
-/// Of a row's four numbers two are of light that is turned in the section by one angle, on ways along the long axis of a pressed section
-/// and along the short one, and two of light that is turned by another: by [`TURNS`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MissingFibers {
-    /// On ways through the inside of the ply.
-    pub inside: [[f32; 4]; AfterFiber::KNOTS],
-    /// On ways by its rim ([`PlyShape::by_rim`]).
-    pub rim: [[f32; 4]; AfterFiber::KNOTS],
-}
-
-/// By how much the light of [`AfterFiber`] is turned, radians: 0 and 30 degrees, as which all up to a right angle counts; 95 and 150.
-pub(crate) const TURNS: [[f64; 2]; 2] = [[0.0, FRAC_PI_6], [PI * 95.0 / 180.0, PI - FRAC_PI_6]];
-/// Their cosines.
-const TURN_COSINES: [[f32; 2]; 2] = [[1.0, 0.866_025_4], [-0.087_155_744, -0.866_025_4]];
-
-impl AfterFiber {
-    pub(crate) const KNOTS: usize = 8;
-    /// Expected fibres from one knot to the next.
-    pub(crate) const STEP: f32 = 0.4;
-
-    /// Of fibres of which none is within so many expected ones of light that goes on; light that goes back finds its strip clear alone.
-    pub(crate) fn free(fibers: f32) -> Self {
-        let rows = std::array::from_fn(|knot| [fibers.min(Self::STEP * knot as f32); 4]);
-        let onward = MissingFibers { inside: rows, rim: rows };
-        Self { first: onward, later: onward, back: MissingFibers::default(), back_later: MissingFibers::default() }
-    }
-
-    /// That of light by whether it met others before the fibre, by the cosine of its turn across it and by how much its way is along the
-    /// section's short axis, from 0 to 1.
-    #[inline]
-    pub(crate) fn turned(&self, later: bool, turn: f32, short: f32) -> AfterTurn<'_> {
-        let (missing, [little, much]) = match later {
-            false if turn < 0.0 => (&self.back, TURN_COSINES[1]),
-            true if turn < 0.0 => (&self.back_later, TURN_COSINES[1]),
-            false => (&self.first, TURN_COSINES[0]),
-            true => (&self.later, TURN_COSINES[0]),
-        };
-        let less = ((turn - much) / (little - much)).clamp(0.0, 1.0);
-        let [long, more] = [1.0 - short, 1.0 - less];
-        AfterTurn { missing, shares: f32x4::new([less * long, less * short, more * long, more * short]) }
-    }
-}
-
-/// [`AfterFiber`] on one way.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AfterTurn<'a> {
-    missing: &'a MissingFibers,
-    /// How much of each number of a row holds.
-    shares: f32x4,
-}
-
-impl AfterTurn<'_> {
-    /// How many fibres light meets where so many are expected, on a way that is so much by the rim.
-    #[inline]
-    pub(crate) fn met(&self, expected: f32, by_rim: f32) -> f32 {
-        let at = (expected * AfterFiber::STEP.recip()).min((AfterFiber::KNOTS - 1) as f32);
-        let below = (at as usize).min(AfterFiber::KNOTS - 2);
-        let [from, to] = [below, below + 1].map(|knot| {
-            let [inside, rim] = [&self.missing.inside, &self.missing.rim].map(|rows| f32x4::new(rows[knot]));
-            inside + (rim - inside) * f32x4::splat(by_rim)
-        });
-        let missing = from + (to - from) * f32x4::splat(at - below as f32);
-        (expected - (missing * self.shares).reduce_add()).max(0.0)
-    }
-}
-
-/// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ClearedStrip {
-    /// The length after which the way has left the strip.
-    cleared: f32,
-}
-
-impl ClearedStrip {
-    /// For light that is turned by an angle of a cosine.
-    #[inline]
-    pub(crate) fn new(width: f32, turn: f32) -> Self {
-        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
-        Self { cleared: if turn < 0.0 { width / aside } else { width } }
-    }
-
-    /// The length between two distances along the way, less what lies in the strip.
-    #[inline]
-    pub(crate) fn length(&self, from: f32, to: f32) -> f32 {
-        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
-        outside(to) - outside(from)
-    }
-
-    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
-    #[inline]
-    pub(crate) fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
-        let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);
-        if to <= 0.0 {
-            return 0.0;
-        }
-        let ring = (to / chord.zone).clamp(0.0, 1.0);
-        chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
-    }
 }
 
 /// What of [`PlyPacking`] is known, and not to be measured.
@@ -366,36 +246,6 @@ mod tests {
             let at = |share: f32| ply.chord(ply.radius - share * wide * ply.fiber_radius, 1.0, 1.0, wide).total();
             assert!(at(0.0) < 1e-3 && at(0.5) > 0.3 * at(1.0) && at(1.0) > 0.5, "{} {} {}", at(0.0), at(0.5), at(1.0));
         }
-    }
-
-    #[test]
-    fn after_a_fiber_no_more_are_met_than_are_expected_and_the_more_the_more_are() {
-        assert_eq!(TURN_COSINES, TURNS.map(|turns| turns.map(|turn| turn.cos() as f32)));
-        let free = AfterFiber::free(0.5);
-        assert!((free.turned(true, 1.0, 0.3).met(2.0, 0.6) - 1.5).abs() < 1e-6);
-        let rows = std::array::from_fn(|knot| [0.4, 0.3, 0.2, 0.1].map(|step: f32| step * knot as f32));
-        let missing = MissingFibers { inside: rows, rim: rows.map(|row: [f32; 4]| row.map(|missing| 0.5 * missing)) };
-        let after = AfterFiber { first: missing, later: missing, back: MissingFibers::default(), back_later: missing };
-        for (turn, short) in [(1.0, 0.0), (0.9, 0.5), (0.3, 1.0), (0.0, 0.2)] {
-            let turned = after.turned(false, turn, short);
-            let mut before = 0.0;
-            for i in 1..=200 {
-                let expected = 0.02 * i as f32;
-                let met = turned.met(expected, 0.0);
-                assert!(met >= before - 1e-6 && met <= expected, "{turn} {short}: {met} of {expected}");
-                before = met;
-            }
-        }
-        assert!(after.turned(false, 1.0, 0.0).met(1.0, 0.0).abs() < 1e-6, "straight on none is met");
-        assert!(
-            (after.turned(false, 0.5, 1.0).met(1.0, 0.0) - 0.75).abs() < 1e-6,
-            "turned and across, a quarter fewer"
-        );
-        assert!(
-            (after.turned(false, 1.0, 0.0).met(1.0, 0.5) - 0.25).abs() < 1e-6,
-            "half by the rim, where half are missing"
-        );
-        assert_eq!(after.turned(false, -0.5, 1.0).met(1.0, 1.0), 1.0);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Shapes, no light: yarn curves, frames along them, plies in the cross-section, fibres in plies.
 
+pub(crate) mod after_fiber;
 pub(crate) mod chain;
 pub(crate) mod contact;
 pub mod curve;

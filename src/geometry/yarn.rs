@@ -6,10 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3A};
 
-use super::{
-    density::{AfterFiber, PlyPacking},
-    way::FourPlies,
-};
+use super::{after_fiber::AfterFiber, density::PlyPacking, way::FourPlies};
 
 /// The most plies a yarn can have.
 pub const MAX_PLIES: usize = 64;

@@ -11,7 +11,7 @@ use super::{
     kernel::{kappa_of_variance, normalisation},
 };
 use crate::{
-    geometry::{density::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
+    geometry::{after_fiber::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 

@@ -15,7 +15,8 @@ use super::{
 };
 use crate::{
     geometry::{
-        density::{AfterTurn, ChordFibers},
+        after_fiber::AfterTurn,
+        density::ChordFibers,
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     geometry::{
-        density::ClearedStrip,
+        after_fiber::ClearedStrip,
         section::{PlyAhead, PlyCrossing},
     },
     math::{Rgb, sampler::Stream},
@@ -247,7 +247,7 @@ impl Node {
     /// plies, and of all but the node's own.
     ///
     /// The way begins as that of F does, and no other fibre is met at once
-    /// ([`AfterFiber`](crate::geometry::density::AfterFiber)). Where it goes back the way that the light
+    /// ([`AfterFiber`](crate::geometry::after_fiber::AfterFiber)). Where it goes back the way that the light
     /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot".
     #[inline]
     pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
@@ -273,7 +273,11 @@ impl Node {
             let tilt = way.tilt(shape, view.section, &spot.inside, w, &chord);
             if way.ply == spot.ply {
                 let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
-                own += optics.rho * after.met(tilt * ahead, shape.plies[way.ply].by_rim(way.offset));
+                let by_rim = shape.plies[way.ply].by_rim(way.offset);
+                let [met, counted] = [after.met(tilt * ahead, by_rim), after.counted(tilt * ahead, by_rim)];
+                // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
+                let lost = optics.rho * optics.gaps.rate.recip();
+                own += optics.rho * (Rgb::splat(counted) + lost * (met - counted));
             } else {
                 let fibers = tilt * chord.ahead(-way.foot);
                 others += yarn.plies[way.ply].rho * fibers;

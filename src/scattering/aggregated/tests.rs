@@ -10,7 +10,7 @@ use glam::Vec2;
 use super::*;
 use crate::{
     geometry::{
-        density::ClearedStrip,
+        after_fiber::ClearedStrip,
         yarn::{PlyParameters, touching_plies},
         yarn_frame::Pressed,
     },

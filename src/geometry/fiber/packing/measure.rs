@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
 
-use super::{leaning_discs, lines::Lines};
+use super::{after::after, leaning_discs, lines::Lines};
 use crate::{
     geometry::{
         density::PlyPacking,
@@ -65,7 +65,7 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacki
     let regularity = lines.inside(&sections, core);
     ply.regularity = regularity as f32;
     let rim = lines.rim(&sections, &mut ply);
-    let after = Some(lines.after(&sections, &ply));
+    let after = Some(after(&lines, &sections, &ply));
     PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim, after }
 }
 

@@ -1,9 +1,7 @@
 //! Packings, and what is measured of them against other packings.
 
-use glam::DMat2;
-
-use super::{lines::Lines, measure::squeezed, *};
-use crate::geometry::{density::AfterFiber, fiber::yielding::Ellipse, occluder::PlyGaps};
+use super::{lines::Lines, *};
+use crate::geometry::occluder::PlyGaps;
 
 #[test]
 fn discs_do_not_overlap_and_fill_the_core_evenly() {
@@ -109,42 +107,6 @@ fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
         // By one number, the second moment, .05 to .25 off.
         assert!(off < 0.08 * passed, "{count} at {density}: {off} of {passed}");
         assert!((found / want - 1.0).abs() < 0.16, "{count} at {density}: {found} {want}");
-    }
-}
-
-#[test]
-fn as_much_light_leaves_after_a_fiber_as_in_other_packings() {
-    for (count, density, stretch) in [(60u32, 0.3f64, 1.0), (60, 0.45, 1.0), (60, 0.6, 1.0), (100, 0.4, 1.5)] {
-        let share = (density / f64::from(count)).sqrt();
-        let radius = share / (1.0 - share);
-        let packing = measured(count, radius, Twist::NONE, stretch);
-        let lines = Lines { radius, stretch, slopes: Slopes::NONE };
-        let mut ply = lines.ply(count);
-        (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
-        ply.regularity = packing.regularity as f32;
-        let packings: Vec<_> =
-            (500..620).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed))).collect();
-        let sections = match Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0))) {
-            None => packings,
-            Some(ellipse) => packings.iter().flat_map(|p| squeezed(p, share, &Slopes::NONE, &ellipse)).collect(),
-        };
-        let after = packing.after.unwrap();
-        let other = lines.after(&sections, &ply);
-        let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
-        let rows = |of: &AfterFiber| {
-            [of.first, of.later, of.back, of.back_later].map(|missing| [missing.inside, missing.rim]).concat()
-        };
-        for (rows, others) in rows(&after).iter().zip(&rows(&other)) {
-            for (knot, (row, other)) in rows.iter().zip(others).enumerate() {
-                let out = |missing: f32| (rate * (missing - AfterFiber::STEP * knot as f32)).exp();
-                let off = row.iter().zip(other).map(|(a, b)| (out(*a) - out(*b)).abs()).fold(0.0, f32::max);
-                // The few ways by the rim of a few packings.
-                assert!(off < 0.13, "{count} at {density}, knot {knot}: {row:?}, not {other:?}");
-            }
-        }
-        // Along the axes of a pressed section it is not the same.
-        let round = after.first.inside.iter().skip(1).all(|row| row[0] == row[1]);
-        assert_eq!(stretch == 1.0, round, "{after:?}");
     }
 }
 
