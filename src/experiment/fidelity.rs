@@ -64,11 +64,11 @@ fn measure(
     say: &mut impl FnMut(&str),
 ) -> Result<Row, BenchError> {
     let mut pictures = |method, set: &[String]| -> Result<Vec<Converged>, BenchError> {
-        let seeds = (1..=suite.packings).map(|seed| (suite.packings > 1).then(|| format!("fabric.0.seed={seed}")));
+        let seeds = (1..=case.packings).map(|seed| (case.packings > 1).then(|| format!("fabric.0.seed={seed}")));
         let mut of_packing = |seed: Option<String>| {
             // What a way sets itself stands over the seed.
             let set: Vec<String> = seed.into_iter().chain(set.iter().cloned()).collect();
-            let spp = suite.max_spp.div_ceil(suite.packings);
+            let spp = suite.max_spp.div_ceil(case.packings);
             let job = Job { case, method, set: &set, spp, noise: None, seed: 0, lobes: false };
             Ok(converge(suite, &job, None, renderer, directory, say)?.0)
         };
@@ -96,6 +96,7 @@ fn measure(
         name: case.name.clone(),
         held_out: case.held_out,
         within: case.within,
+        packings: case.packings,
         spp: references.iter().map(|picture| picture.spp).sum(),
         mean: cloth_mean(&reference.mean(), &reference),
         mean_error: mean_error.unwrap_or_default(),

@@ -49,7 +49,7 @@ pub(crate) struct Suite {
     pub max_spp: u32,
     /// Size of all pictures; `None` leaves it to the scenes.
     pub size: Option<[u32; 2]>,
-    /// How many packings of fibres a picture is the mean of, by seeds of the first fabric; with 1 the scene's own.
+    /// How many packings of fibres a picture is the mean of where a row does not say; see [`Case::packings`].
     pub packings: u32,
     /// Scenes under lights, in order.
     pub cases: Vec<Case>,
@@ -87,6 +87,8 @@ pub(crate) struct Case {
     pub held_out: bool,
     /// How far the light's means may be off, as a share.
     pub within: f64,
+    /// How many packings of fibres its pictures are means of, by seeds of the first fabric; with 1 the scene's own.
+    pub packings: u32,
 }
 
 /// Which cases are measured against time.
@@ -170,6 +172,7 @@ struct Row {
     lights: Vec<String>,
     paper: Option<Paper>,
     held_out: bool,
+    packings: Option<u32>,
     missing: Option<String>,
 }
 
@@ -194,7 +197,7 @@ fn read(name: &str, path: &Path, root: Reader<'_>, quick: bool) -> Option<Suite>
         root.error("`--quick` needs a table [quick], which says what is measured", Some("[quick]\ntarget = 0.05"));
     }
     let Parts { quality, others, rows, converge } = parts;
-    let (cases, missing) = lights.cases(rows);
+    let (cases, missing) = lights.cases(rows, quality.packings);
     let converge = converge.map(|plan| plan.of_cases(&cases, &missing, &root, quick));
     root.finish();
     Some(Suite {
@@ -270,8 +273,8 @@ impl Lightings {
         names
     }
 
-    /// Each row under each of its lightings; then the rows that are missing, with the reason.
-    fn cases(&self, rows: Vec<Row>) -> (Vec<Case>, Vec<(String, String)>) {
+    /// Each row under each of its lightings, of so many packings unless it says otherwise; then the rows that are missing, with the reason.
+    fn cases(&self, rows: Vec<Row>, packings: u32) -> (Vec<Case>, Vec<(String, String)>) {
         let (mut cases, mut missing) = (Vec::new(), Vec::new());
         for row in rows {
             if let Some(reason) = row.missing {
@@ -286,6 +289,7 @@ impl Lightings {
                 paper: row.paper,
                 held_out: row.held_out,
                 within,
+                packings: row.packings.unwrap_or(packings),
             };
             if self.0.is_empty() {
                 cases.push(case(row.name.clone(), &[], WITHIN));
@@ -388,9 +392,14 @@ impl Quality {
             min_seconds: table.f64_or("min_seconds", self.min_seconds, Range::between(0.0, 3600.0)),
             max_spp: table.u64_or("max_spp", self.max_spp.into(), 2..=u64::from(u32::MAX)) as u32,
             size: size.map(|size| size.map(|v| v as u32)).or(self.size),
-            packings: table.u64_or("packings", self.packings.into(), 1..=1000) as u32,
+            packings: packings(table).unwrap_or(self.packings),
         }
     }
+}
+
+/// Over how many packings of fibres pictures are averaged, if a table says.
+fn packings(table: &Reader<'_>) -> Option<u32> {
+    table.has("packings").then(|| table.u64_or("packings", 1, 1..=1000) as u32)
 }
 
 fn method(table: &Reader<'_>, key: &str, default: &str) -> Option<Method> {
@@ -415,6 +424,7 @@ fn row(table: Reader<'_>, folder: &Path, lights: &Lightings) -> Row {
     let set = strings(&table, "set");
     let lights = lights.names(&table, "lights");
     let held_out = table.bool_or("held_out", false);
+    let packings = packings(&table);
     let pair = |table: &Reader<'_>, key: &str| table.vec2(key, Range::POSITIVE);
     let paper = table.table("paper").and_then(|paper| {
         let figures = [pair(&paper, "seconds"), pair(&paper, "megabytes"), pair(&paper, "bounces")];
@@ -431,13 +441,13 @@ fn row(table: Reader<'_>, folder: &Path, lights: &Lightings) -> Row {
     // A curve file that is not there is no mistake: it may be one that must not be passed on.
     let absent = curves.as_ref().filter(|path| !path.exists()).cloned();
     match (absent, fallback) {
-        (None, _) => Row { name, scene, curves, set, lights, paper, held_out, missing: None },
+        (None, _) => Row { name, scene, curves, set, lights, paper, held_out, packings, missing: None },
         (Some(_), Some(scene)) => {
-            Row { name, scene, curves: None, set: Vec::new(), lights, paper, held_out, missing: None }
+            Row { name, scene, curves: None, set: Vec::new(), lights, paper, held_out, packings, missing: None }
         }
         (Some(path), None) => {
             let missing = Some(format!("{} is not there", path.display()));
-            Row { name, scene, curves, set, lights, paper, held_out, missing }
+            Row { name, scene, curves, set, lights, paper, held_out, packings, missing }
         }
     }
 }
@@ -452,4 +462,21 @@ fn converge_plan(table: Reader<'_>) -> ConvergePlan {
     };
     table.finish();
     plan
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_may_say_over_how_many_packings_its_pictures_are_averaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("suite.toml");
+        let rows = "[[row]]\nname=\"a\"\nscene=\"s.toml\"\n[[row]]\nname=\"b\"\nscene=\"s.toml\"\npackings=1\n";
+        std::fs::write(&path, format!("measure=\"fidelity\"\npackings=4\n{rows}")).unwrap();
+        let suite = Suite::load(&path, false).unwrap();
+        assert_eq!(suite.cases.iter().map(|case| case.packings).collect::<Vec<_>>(), [4, 1]);
+        std::fs::write(&path, format!("measure=\"fidelity\"\n{}", rows.replace("packings=1", "packings=0"))).unwrap();
+        assert!(Suite::load(&path, false).is_err());
+    }
 }

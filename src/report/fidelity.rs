@@ -31,6 +31,8 @@ pub(crate) struct Row {
     pub held_out: bool,
     /// How far means may be off.
     pub within: f64,
+    /// How many packings of the fibres its pictures are means of.
+    pub packings: u32,
     /// Samples per pixel of the reference.
     pub spp: f64,
     /// The reference's mean on the cloth.
@@ -55,7 +57,7 @@ pub(crate) struct Table {
     pub commit: String,
     /// Mode of the reference.
     pub reference: String,
-    /// How many packings of the fibres pictures are means of.
+    /// How many packings of the fibres pictures are means of where a row does not say otherwise.
     pub packings: u32,
     /// What was measured.
     pub rows: Vec<Row>,
@@ -89,7 +91,9 @@ impl Table {
             self.reference,
             match self.packings {
                 1 => "from two halves of its samples".to_owned(),
-                n => format!("a standard error over {n} packings of the fibres, of which every picture is the mean"),
+                n => format!(
+                    "a standard error over {n} packings of the fibres, of which every picture is the mean (where another number stands behind it, of so many)"
+                ),
             },
             100.0 * SHARE_THAT_COUNTS
         );
@@ -143,7 +147,11 @@ impl Table {
                         number(row.block_noise, 3),
                         number(way.error.relmse_8, 4),
                         way.error.flip,
-                        if k == 0 { format!("{:.1} %", 100.0 * worst) } else { String::new() },
+                        match row.packings {
+                            _ if k > 0 => String::new(),
+                            n if n == self.packings => format!("{:.1} %", 100.0 * worst),
+                            n => format!("{:.1} %, {n}", 100.0 * worst),
+                        },
                     );
                 }
             }
@@ -170,6 +178,7 @@ mod tests {
             name: name.to_owned(),
             held_out,
             within: 0.05,
+            packings: 4,
             spp: 64.0,
             mean,
             mean_error: mean.map(|m| 0.01 * m),
@@ -188,14 +197,14 @@ mod tests {
             packings: 4,
             rows: vec![
                 row("a", false, [1.04, 0.96, 1.5], [1.0, 1.0, 0.01]),
-                row("b", true, [1.04, 0.96, 1.5], [1.0, 1.0, 0.5]),
+                Row { packings: 1, ..row("b", true, [1.04, 0.96, 1.5], [1.0, 1.0, 0.5]) },
             ],
             missing: vec![Missing { name: "m".to_owned(), reason: "gone".to_owned() }],
         };
         let text = table.to_markdown();
         assert!(text.contains("| seen in development | yarn | 1 | 1 | 0 | 0.100 |"), "{text}");
         assert!(text.contains("| held out | yarn | 1 | 0 | 1 | 0.100 |"), "{text}");
-        assert!(text.contains("| b | yarn | 1.040 0.960 1.500 | 0.100, 0.020 | 0.0100 | 0.200 | 1.0 % |"), "{text}");
+        assert!(text.contains("| b | yarn | 1.040 0.960 1.500 | 0.100, 0.020 | 0.0100 | 0.200 | 1.0 %, 1 |"), "{text}");
         assert!(text.contains("over 4 packings of the fibres"), "{text}");
         assert!(text.contains("Missing: m: gone"));
         assert_eq!(serde_json::from_str::<Table>(&table.to_json()).unwrap(), table);

@@ -80,6 +80,7 @@ fn suite(cases: &[&str]) -> Suite {
         paper: None,
         held_out: false,
         within: 0.05,
+        packings: 1,
     };
     Suite {
         path: "suite.toml".to_owned(),
