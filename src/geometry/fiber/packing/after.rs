@@ -14,6 +14,13 @@ use crate::{
     math::sampler::Stream,
 };
 
+/// A line through the discs of a section: its direction, and how far beside the middle it is.
+struct Line<'a> {
+    discs: &'a [DVec2],
+    along: DVec2,
+    offset: f64,
+}
+
 /// A fibre on a line: where the line enters it, and where it is abreast of its centre.
 struct Hit {
     fiber: usize,
@@ -65,11 +72,10 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
     let mut next = || f64::from(stream.next());
     let mut ways = Vec::with_capacity(2 * TURNS * RAYS);
     for ray in 0..RAYS {
-        let discs = &sections[ray % sections.len()];
         let along = DVec2::from_angle(TAU * next());
-        let across = along.perp();
-        let offset = (2.0 * next() - 1.0) * (lines.reach(across) + lines.radius);
-        let mut hits = hits(lines, discs, along, offset);
+        let offset = (2.0 * next() - 1.0) * (lines.reach(along.perp()) + lines.radius);
+        let line = Line { discs: &sections[ray % sections.len()], along, offset };
+        let mut hits = line.hits(lines);
         let Some(first) = (0..hits.len()).min_by(|&a, &b| hits[a].enter.total_cmp(&hits[b].enter)) else {
             continue;
         };
@@ -80,44 +86,50 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
         let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f32))];
         for (later, hit) in looked_at.into_iter().enumerate() {
             let Some((hit, weight)) = hit else { continue };
-            let at = |lies: f64| lies * along + offset * across;
-            let tilt = lines.slopes.half_width(discs[hit.fiber], across);
             for turn in 0..TURNS {
-                let angle = (turn as f64 + next()) / TURNS as f64 * TAU;
-                let w = DVec2::from_angle(angle).rotate(along);
-                let turn = w.dot(along) as f32;
-                // As the model has it: abreast of the fibre's centre, and from where the light came.
-                let from = at(hit.lies) + FRAC_PI_4 * lines.radius * (along.dot(w).max(0.0) * w - along);
-                let Some((expected, offset)) = ahead(lines, ply, from, w, (later == 0 && turn < 0.0).then_some(turn))
-                else {
-                    continue;
-                };
-                ways.push(Way {
-                    later: later > 0,
-                    weight,
-                    turn,
-                    short: if lines.stretch == 1.0 { 0.5 } else { (w.y * w.y) as f32 },
-                    expected: (tilt * expected) as f32,
-                    by_rim: ply.by_rim(offset),
-                    met: met(lines, discs, hit.fiber, at(hit.enter), w),
-                });
+                let turn = (turn as f64 + next()) / TURNS as f64 * TAU;
+                let way = line.turned(lines, ply, hit, later > 0, DVec2::from_angle(turn).rotate(along));
+                ways.extend(way.map(|way| Way { weight, ..way }));
             }
         }
     }
     ways
 }
 
-/// The fibres on a line in a direction, at a distance from the middle.
-fn hits(lines: &Lines, discs: &[DVec2], along: DVec2, offset: f64) -> Vec<Hit> {
-    let across = along.perp();
-    let hit = |(fiber, disc): (usize, &DVec2)| {
-        let off = disc.dot(across) - offset;
-        let half = lines.radius * lines.slopes.half_width(*disc, across);
-        let lies = disc.dot(along);
-        let enter = lies - lines.radius * (1.0 - (off / half).powi(2)).sqrt();
-        (off.abs() < half).then_some(Hit { fiber, enter, lies })
-    };
-    discs.iter().enumerate().filter_map(hit).collect()
+impl Line<'_> {
+    /// The fibres on it.
+    fn hits(&self, lines: &Lines) -> Vec<Hit> {
+        let across = self.along.perp();
+        let hit = |(fiber, disc): (usize, &DVec2)| {
+            let off = disc.dot(across) - self.offset;
+            let half = lines.radius * lines.slopes.half_width(*disc, across);
+            let lies = disc.dot(self.along);
+            let enter = lies - lines.radius * (1.0 - (off / half).powi(2)).sqrt();
+            (off.abs() < half).then_some(Hit { fiber, enter, lies })
+        };
+        self.discs.iter().enumerate().filter_map(hit).collect()
+    }
+
+    /// The way of its light that is turned to a direction at one of them, the first or a later one. `None` if it begins outside of the ply.
+    fn turned(&self, lines: &Lines, ply: &PlyShape, hit: &Hit, later: bool, w: DVec2) -> Option<Way> {
+        let (along, across) = (self.along, self.along.perp());
+        let at = |distance: f64| distance * along + self.offset * across;
+        let turn = w.dot(along);
+        // As the model has it: abreast of the fibre's centre, and from where the light came.
+        let from = at(hit.lies) + FRAC_PI_4 * lines.radius * (turn.max(0.0) * w - along);
+        let swept = (!later && turn < 0.0).then_some(turn as f32);
+        let (expected, offset) = ahead(lines, ply, from, w, swept)?;
+        let tilt = lines.slopes.half_width(self.discs[hit.fiber], across);
+        Some(Way {
+            later,
+            weight: 1.0,
+            turn: turn as f32,
+            short: if lines.stretch == 1.0 { 0.5 } else { (w.y * w.y) as f32 },
+            expected: (tilt * expected) as f32,
+            by_rim: ply.by_rim(offset),
+            met: met(lines, self.discs, hit.fiber, at(hit.enter), w),
+        })
+    }
 }
 
 /// How many others a way from a place on a fibre meets.
