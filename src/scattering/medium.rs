@@ -8,7 +8,7 @@ use std::{
 use super::{
     escape::{self, Leaving, Medium, Solutions},
     fiber::FiberMaterial,
-    kernel::{kappa_of_variance, normalisation},
+    kernel::{DIFFUSE, Latitudes, kappa_of_variance, normalisation, normalised_kernel},
 };
 use crate::{
     geometry::{after_fiber::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
@@ -82,6 +82,25 @@ impl TtWidth {
     }
 }
 
+/// A longitudinal lobe of light that was scattered more often.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MirroredLobe {
+    /// How much of that light it has.
+    pub share: Rgb,
+    /// Inverse width, of [`super::kernel`], and its normalisation.
+    pub kappa: Rgb,
+    /// As above.
+    pub factor: Rgb,
+}
+
+impl MirroredLobe {
+    /// Of a share of light and a variance, radians squared.
+    pub(super) fn new(share: Rgb, variance: Rgb) -> Self {
+        let kappa = kappa_of_variance(variance);
+        Self { share, kappa, factor: normalisation(kappa) }
+    }
+}
+
 /// A ply's fibres as light sees them. Lengths in yarn radii; albedos per channel.
 #[derive(Clone, Debug)]
 pub(crate) struct PlyOptics {
@@ -107,12 +126,9 @@ pub(crate) struct PlyOptics {
     /// What leaves this ply at last of light that meets another fibre after one at a place in it, and what leaves the yarn at last
     /// of light that meets a fibre of this ply on its way from another one.
     pub leaving: Arc<Leaving>,
-    /// Of that light: the share that was only ever reflected, and keeps a longitudinal lobe.
-    pub mirrored: Rgb,
-    /// Inverse width of that lobe, of [`super::kernel`], and its normalisation.
-    pub mirrored_kappa: Rgb,
-    /// As above.
-    pub mirrored_factor: Rgb,
+    /// Of that light: what was only ever reflected keeps a longitudinal lobe. That of what met TT between, and that of what met none, if it is
+    /// told apart.
+    pub mirrored: [MirroredLobe; 2],
     /// Whether R is so much narrower than TT that what met no TT on its way is told from what did.
     pub sharp: bool,
     /// Of light that goes on in chains: TT events per expected fibre.
@@ -152,7 +168,11 @@ impl PlyOptics {
         let fibers = Fibers::new(ply, plies);
         let channels = [0, 1, 2].map(|c| Channel::new(material, &fibers, c));
         let rgb = |of: &dyn Fn(&Channel) -> f64| Rgb::from(channels.each_ref().map(of));
-        let mirrored_kappa = kappa_of_variance(rgb(&|c| c.mirrored_variance(material)));
+        let sharp = material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2);
+        let mirrored = [0, 1].map(|which| {
+            let [share, variance] = [0, 1].map(|of| rgb(&|c| c.mirrored_lobes(material, sharp)[which][of]));
+            MirroredLobe::new(share, variance)
+        });
         let beta_tt_squared = (material.beta_tt * material.beta_tt) as f32;
         Self {
             gaps: fibers.gaps,
@@ -165,10 +185,8 @@ impl PlyOptics {
             albedo: rgb(&|c| c.albedo()),
             leaves_yarn: rgb(&|c| c.closure(c.escape_yarn())),
             leaving: Arc::new(Leaving::new(&channels.each_ref().map(|c| c.medium(material)), stretch, solutions)),
-            mirrored: rgb(&|c| c.mirrored()),
-            mirrored_kappa,
-            mirrored_factor: normalisation(mirrored_kappa),
-            sharp: material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2),
+            mirrored,
+            sharp,
             events: rgb(&|c| c.events()),
             untouched: rgb(&|c| c.untouched()),
             beta_r_squared: (material.beta_r * material.beta_r) as f32,
@@ -329,13 +347,21 @@ impl<'a> Channel<'a> {
         (f64::from(self.fibers.gaps.rate) - self.rho()).max(0.0)
     }
 
+    /// The lobes of light that was only ever reflected, as share and variance: of what met TT between, and, if R is so `sharp` that it is told
+    /// apart, of what met none.
+    ///
     /// Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
-    /// often, and there are three flights and more.
-    fn mirrored_variance(&self, material: &FiberMaterial) -> f64 {
+    /// often, any number of them as in a geometric series, and there are three flights and more.
+    fn mirrored_lobes(&self, material: &FiberMaterial, sharp: bool) -> [[f64; 2]; 2] {
         let again = self.again() * self.reflected();
-        let more = again / (1.0 - again).max(1e-12);
-        let flight = self.events() / self.rho().max(LEAST_RATE) * (1.0 - self.escape());
-        (2.0 + more) * material.beta_r.powi(2) + (3.0 + more) * flight * material.beta_tt.powi(2)
+        let more = |again: f64| again / (1.0 - again).max(1e-12);
+        let passed = self.events() / self.rho().max(LEAST_RATE) * (1.0 - self.escape());
+        let none = (1.0 + passed).recip();
+        let untouched = if sharp { none.powi(3) * (1.0 - again) / (1.0 - again * none).max(1e-12) } else { 0.0 };
+        let reflected = |more: f64| (2.0 + more) * material.beta_r.powi(2);
+        let bent = (3.0 + more(again)) * passed * material.beta_tt.powi(2) / (1.0 - untouched).max(1e-12);
+        let all = self.mirrored();
+        [[all * (1.0 - untouched), reflected(more(again)) + bent], [all * untouched, reflected(more(again * none))]]
     }
 
     /// The length of diffusion, by which light fades, is the mean way over the root of 3 (1 - albedo).
@@ -345,6 +371,16 @@ impl<'a> Channel<'a> {
 }
 
 impl PlyOptics {
+    /// The longitudinal lobe of light that was scattered twice or more.
+    #[inline]
+    pub(crate) fn latitude_of_multiple(&self, at: Latitudes) -> Rgb {
+        let mut latitude = Rgb::splat(DIFFUSE);
+        for lobe in self.mirrored.iter().filter(|lobe| lobe.share.max_channel() > 0.0) {
+            latitude += lobe.share * (normalised_kernel(lobe.kappa, lobe.factor, at) - Rgb::splat(DIFFUSE));
+        }
+        latitude
+    }
+
     /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells
     /// it from the rest, and how many TT events the rest has on the mean.
     #[inline]

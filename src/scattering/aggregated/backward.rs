@@ -12,7 +12,7 @@ use wide::f32x8;
 use super::{
     super::{
         escape::{Leaving, Outwards},
-        kernel::{DIFFUSE, normalised_kernel, sample_sine, sample_sine_diffuse},
+        kernel::{DIFFUSE, sample_sine, sample_sine_diffuse},
         lobe::LobeFrame,
         medium::PlyOptics,
         mis_weight,
@@ -125,11 +125,7 @@ impl Lobe {
     pub(super) fn value(&self, view: &View<'_>, ply: usize, w: Vec3A) -> (Rgb, f32) {
         let optics = &view.yarn.plies[ply];
         let (at, cos) = self.frame.latitudes(w);
-        let mut latitude = Rgb::splat(DIFFUSE);
-        if optics.mirrored.max_channel() > 0.0 {
-            let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
-            latitude += optics.mirrored * (m - latitude);
-        }
+        let latitude = optics.latitude_of_multiple(at);
         let around =
             optics.leaving.towards(self.outwards, azimuth(&self.frame, self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
         (self.energy * latitude * around, latitude.mean() * around.mean())
@@ -270,10 +266,14 @@ impl Lobe {
         // A channel, and then the share of its lobe.
         let at = 3.0 * stream.next();
         let channel = (at as usize).min(2);
-        let sin = if at - (channel as f32) < optics.mirrored.to_array()[channel] {
-            sample_sine(optics.mirrored_kappa.to_array()[channel], frame.sin, frame.cos, lat, stream)
-        } else {
-            sample_sine_diffuse(lat)
+        let mut left = at - channel as f32;
+        let lobe = optics.mirrored.iter().find(|lobe| {
+            left -= lobe.share.to_array()[channel];
+            left < 0.0
+        });
+        let sin = match lobe {
+            Some(lobe) => sample_sine(lobe.kappa.to_array()[channel], frame.sin, frame.cos, lat, stream),
+            None => sample_sine_diffuse(lat),
         };
         direction(&self.frame, sin, optics.leaving.azimuth(self.outwards, stream), self.axes)
     }

@@ -16,9 +16,9 @@ use crate::{
     },
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
     scattering::{
-        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, normalisation, normalised_kernel},
+        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel},
         lobe::LobeFrame,
-        medium::extinction_rate,
+        medium::{MirroredLobe, extinction_rate},
         testing::{SILK, lossless, material, section, silk, sphere},
     },
 };
@@ -134,8 +134,7 @@ fn plain_backward(view: &View<'_>, crossing: &PlyCrossing, energy: Rgb, w: Vec3A
     };
     let thickness = Rgb::from(optics.chain.to_array().map(free_paths));
     let lean = thickness / (thickness + Rgb::splat(10.0)) * 3.2 * (Rgb::ONE - optics.albedo * 0.14);
-    let m = normalised_kernel(optics.mirrored_kappa, optics.mirrored_factor, at);
-    let latitude = Rgb::splat(DIFFUSE) + optics.mirrored * (m - Rgb::splat(DIFFUSE));
+    let latitude = optics.latitude_of_multiple(at);
     let around = lean.min(Rgb::ONE) * across.dot(Vec2::from_angle(to)) + 1.0;
     energy * latitude * around * (cos / TAU)
 }
@@ -228,8 +227,9 @@ fn values_agree_with_the_reference_vectors() {
         for ply in &mut yarn.plies {
             // Chains widen R by their mean, and what was only ever reflected is as wide as two reflections.
             (ply.sharp, ply.events) = (false, ply.chain);
-            ply.mirrored_kappa = Rgb::splat(0.125 / ply.beta_r_squared);
-            ply.mirrored_factor = normalisation(ply.mirrored_kappa);
+            let [touched, untouched] = ply.mirrored.map(|lobe| lobe.share);
+            let two_reflections = Rgb::splat(2.0 * ply.beta_r_squared);
+            ply.mirrored = [touched + untouched, Rgb::ZERO].map(|share| MirroredLobe::new(share, two_reflections));
         }
         let section = section(
             v["theta_c"].as_f64().unwrap() as f32,
