@@ -399,7 +399,7 @@ impl Quality {
 
 /// Over how many packings of fibres pictures are averaged, if a table says.
 fn packings(table: &Reader<'_>) -> Option<u32> {
-    table.has("packings").then(|| table.u64_or("packings", 1, 1..=1000) as u32)
+    table.u64("packings", 1..=1000).map(|count| count as u32)
 }
 
 fn method(table: &Reader<'_>, key: &str, default: &str) -> Option<Method> {

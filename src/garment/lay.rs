@@ -417,25 +417,26 @@ impl<'a> Layer<'a> {
         let from = self.corner(run.line, corner, strand, UNSTRAINED);
         let bulge = self.bulge();
         let at = if self.axis == 0 { [corner, run.line] } else { [run.line, corner] };
-        let inward = (run.last - run.first).min(3) as f32;
-        // From wherever the yarn is, for a float's end lies behind the cloth already: half a round, and back between the feet
-        // of this row and of the next, where no lane is.
+        // How far out it goes, and which share of its way up and behind it has come by then.
+        let way: Vec<(f32, f32)> = if self.shapes.is_woven() || self.sheet.is_turned_in(at[0], at[1]) {
+            [0.3, CUT_END as f32, 1.0].map(|out| (out * bulge, 0.0)).into()
+        } else {
+            // From wherever the yarn is, for a float's end lies behind the cloth already: half a round, and back.
+            let inward = (run.last - run.first).min(3) as f32;
+            let half_round = [(0.4, 0.02), (0.85, 0.2), (1.0, 0.5), (0.85, 0.8), (0.4, 0.98)];
+            let back = [(-0.1, 1.0), (-0.6 * inward, 1.0), (-inward, 0.95)];
+            half_round.map(|(out, share)| (out * bulge, share)).into_iter().chain(back).collect()
+        };
+        // Between the feet of this row and of the next, where no lane is.
         let (up, deep) = (0.5, TAIL_DEEP * self.shapes.diameter as f32);
-        let half_round = [(0.4, 0.02), (0.85, 0.2), (1.0, 0.5), (0.85, 0.8), (0.4, 0.98)];
-        let back = [(-0.1, 1.0), (-0.6 * inward, 1.0), (-inward, 0.95)];
-        let darned = half_round.map(|(out, share)| (out * bulge, share)).into_iter().chain(back);
-        let darned: Vec<_> = darned.map(|(along, share)| (along, share * up, -share * deep)).collect();
-        let cut = [(0.3 * bulge, 0.0, 0.0), (CUT_END as f32 * bulge, 0.0, 0.0), (bulge, 0.0, 0.0)];
-        let is_cut = self.shapes.is_woven() || self.sheet.is_turned_in(at[0], at[1]);
-        let way: &[(f32, f32, f32)] = if is_cut { &cut } else { &darned };
-        let place = |(along, up, out): (f32, f32, f32)| {
+        let place = |&(along, share): &(f32, f32)| {
             let mut p = from;
             p[self.axis] += outward * along;
-            p[1 - self.axis] += up;
-            p.z += out;
+            p[1 - self.axis] += share * up;
+            p.z -= share * deep;
             p
         };
-        let places: Vec<Vec3> = way.iter().copied().map(place).collect();
+        let places: Vec<Vec3> = way.iter().map(place).collect();
         if first {
             places.into_iter().rev().for_each(|p| self.push(p, run, On::Beside(corner)));
         } else {

@@ -203,7 +203,7 @@ fn chains_close_round_without_a_start() {
     // What finishes edges is of no stitch.
     let chains: Vec<&LaidYarn> = yarns.iter().filter(|y| y.coordinates.iter().all(|c| *c == [0.5, 0.5])).collect();
     assert_eq!(chains.len(), 2);
-    let per_link = crate::pattern::tile::chain(3.2).len();
+    let per_link = super::edges::relaxed_link().len();
     for yarn in chains {
         let n = yarn.points.len();
         assert!(yarn.closed && n % per_link == 0, "{n} {per_link}");

@@ -83,7 +83,7 @@ impl AfterFiber {
             (false, true) => &self.back,
             (true, true) => &self.back_later,
         };
-        AfterTurn { missing, shares: turned_shares(turn, short).into() }
+        AfterTurn { missing, shares: shares(turn, short) }
     }
 }
 
@@ -95,13 +95,13 @@ impl MissingFibers {
 
 /// How much each number of a row of [`Missing`] holds of light with a cosine of its turn, and so much along the short axis.
 #[inline]
-pub(crate) fn turned_shares(turn: f32, short: f32) -> [f32; 2 * TURNED] {
+fn shares(turn: f32, short: f32) -> f32x8 {
     let knots = &TURN_COSINES[usize::from(turn < 0.0)];
     let past = |k: usize| ((knots[k] - turn) / (knots[k] - knots[k + 1])).clamp(0.0, 1.0);
     let [a, b, c] = [past(0), past(1), past(2)];
     let long = 1.0 - short;
     let [at0, at1, at2, at3] = [1.0 - a, a - b, b - c, c];
-    [at0 * long, at0 * short, at1 * long, at1 * short, at2 * long, at2 * short, at3 * long, at3 * short]
+    f32x8::new([at0 * long, at0 * short, at1 * long, at1 * short, at2 * long, at2 * short, at3 * long, at3 * short])
 }
 
 /// [`AfterFiber`] on one way.
@@ -113,21 +113,32 @@ pub(crate) struct AfterTurn<'a> {
 }
 
 impl AfterTurn<'_> {
+    /// How much each number of a row of [`Missing`] holds.
+    pub(crate) fn shares(&self) -> f32x8 {
+        self.shares
+    }
+
     /// How many fibres light meets that ends at the first one, where so many are expected, on a way that is so much by the rim.
     #[inline]
     pub(crate) fn met(&self, expected: f32, by_rim: f32) -> f32 {
-        self.less(&self.missing.unscattered, expected, by_rim)
+        self.less(&self.missing.unscattered, expected, AfterFiber::knot(expected), by_rim)
     }
 
     /// How many it meets on the mean.
     #[inline]
     pub(crate) fn counted(&self, expected: f32, by_rim: f32) -> f32 {
-        self.less(&self.missing.counted, expected, by_rim)
+        self.less(&self.missing.counted, expected, AfterFiber::knot(expected), by_rim)
+    }
+
+    /// Both.
+    #[inline]
+    pub(crate) fn met_and_counted(&self, expected: f32, by_rim: f32) -> [f32; 2] {
+        let knot = AfterFiber::knot(expected);
+        [&self.missing.unscattered, &self.missing.counted].map(|missing| self.less(missing, expected, knot, by_rim))
     }
 
     #[inline]
-    fn less(&self, missing: &Missing, expected: f32, by_rim: f32) -> f32 {
-        let (below, at) = AfterFiber::knot(expected);
+    fn less(&self, missing: &Missing, expected: f32, (below, at): (usize, f32), by_rim: f32) -> f32 {
         let [from, to] = [below, below + 1].map(|knot| {
             let [inside, rim] = [&missing.inside, &missing.rim].map(|rows| f32x8::new(rows[knot]));
             inside + (rim - inside) * f32x8::splat(by_rim)

@@ -169,8 +169,9 @@ impl PlyOptics {
         let channels = [0, 1, 2].map(|c| Channel::new(material, &fibers, c));
         let rgb = |of: &dyn Fn(&Channel) -> f64| Rgb::from(channels.each_ref().map(of));
         let sharp = material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2);
+        let lobes = channels.each_ref().map(|c| c.mirrored_lobes(material, sharp));
         let mirrored = [0, 1].map(|which| {
-            let [share, variance] = [0, 1].map(|of| rgb(&|c| c.mirrored_lobes(material, sharp)[which][of]));
+            let [share, variance] = [0, 1].map(|of| Rgb::from(lobes.map(|lobes| lobes[which][of])));
             MirroredLobe::new(share, variance)
         });
         let beta_tt_squared = (material.beta_tt * material.beta_tt) as f32;

@@ -274,7 +274,7 @@ impl Node {
             if way.ply == spot.ply {
                 let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
                 let by_rim = shape.plies[way.ply].by_rim(way.offset);
-                let [met, counted] = [after.met(tilt * ahead, by_rim), after.counted(tilt * ahead, by_rim)];
+                let [met, counted] = after.met_and_counted(tilt * ahead, by_rim);
                 // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
                 let lost = optics.rho * optics.gaps.rate.recip();
                 own += optics.rho * (Rgb::splat(counted) + lost * (met - counted));

@@ -8,7 +8,7 @@ use wide::f32x8;
 use super::lines::Lines;
 use crate::{
     geometry::{
-        after_fiber::{AfterFiber, ClearedStrip, Missing, MissingFibers, turned_shares},
+        after_fiber::{AfterFiber, AfterTurn, ClearedStrip, Missing, MissingFibers},
         yarn::PlyShape,
     },
     math::sampler::Stream,
@@ -47,6 +47,13 @@ struct Way {
     met: u32,
 }
 
+impl Way {
+    /// What it should meet.
+    fn law<'a>(&self, after: &'a AfterFiber) -> AfterTurn<'a> {
+        after.turned(self.later, self.turn, self.short)
+    }
+}
+
 /// Fits what light meets after a fibre to ways through packings: as many get out, and as many fibres are met, as are counted, about each number
 /// of expected fibres and each turn, along each axis, inside and by the rim.
 pub(super) fn after(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> AfterFiber {
@@ -57,7 +64,10 @@ pub(super) fn after(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> A
         // First as if those inside and by the rim and along both axes were alike: of some there are too few to begin with.
         for alike in [true, true, true, false, false, false] {
             let mut sums = Tables::default();
-            ways.iter().for_each(|way| sums.add(way, asked.counted(way), asked.fitted(way, &after)));
+            for way in &ways {
+                let law = way.law(&after);
+                sums.add(way, law.shares(), asked.counted(way), asked.fitted(way, &law));
+            }
             sums.improve(&mut after, asked, alike);
         }
     }
@@ -226,8 +236,7 @@ impl Asked {
         }
     }
 
-    fn fitted(self, way: &Way, after: &AfterFiber) -> f32 {
-        let law = after.turned(way.later, way.turn, way.short);
+    fn fitted(self, way: &Way, law: &AfterTurn<'_>) -> f32 {
         match self {
             Self::Unscattered { rate } => (-rate * law.met(way.expected, way.by_rim)).exp(),
             Self::Counted => law.counted(way.expected, way.by_rim),
@@ -264,10 +273,9 @@ type Table = [[Sums; AfterFiber::KNOTS]; 2];
 struct Tables([Table; 4]);
 
 impl Tables {
-    fn add(&mut self, way: &Way, counted: f32, fitted: f32) {
+    fn add(&mut self, way: &Way, shares: f32x8, counted: f32, fitted: f32) {
         let table = &mut self.0[2 * usize::from(way.turn < 0.0) + usize::from(way.later)];
         let (below, at) = AfterFiber::knot(way.expected);
-        let shares = f32x8::new(turned_shares(way.turn, way.short));
         for (knot, of_knot) in [(below, 1.0 - at), (below + 1, at)] {
             for (rows, of_rim) in table.iter_mut().zip([1.0 - way.by_rim, way.by_rim]) {
                 rows[knot].add(shares * f32x8::splat(of_knot * of_rim), way.weight, counted, fitted);
@@ -349,7 +357,7 @@ mod tests {
             for way in ways(&lines, &others(count, share, stretch), &ply) {
                 let sum = &mut sums[usize::from(way.later)][(way.turn.acos() / PI * 15.0).min(14.0) as usize];
                 let numbers = [Asked::Unscattered { rate }, Asked::Counted]
-                    .map(|asked| [asked.counted(&way), asked.fitted(&way, &law)])
+                    .map(|asked| [asked.counted(&way), asked.fitted(&way, &way.law(&law))])
                     .concat();
                 let weighted = numbers.iter().map(|number| way.weight * number).chain([way.weight]);
                 sum.iter_mut().zip(weighted).for_each(|(sum, number)| *sum += f64::from(number));
