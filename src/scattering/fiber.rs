@@ -44,6 +44,12 @@ impl FiberMaterial {
         2.0 * front_share_of_wrapped_normal(self.beta_n) - 1.0
     }
 
+    /// The mean cosine of the angle by which that share turns, across the fibre.
+    pub(crate) fn chain_cosine(&self) -> f64 {
+        let share = self.chain_share();
+        if share > 1e-9 { ((-0.5 * self.beta_n * self.beta_n).exp() / share).min(1.0) } else { 1.0 }
+    }
+
     /// The colour of thick cloth of such fibres under an even sky, for programs that show curves in one colour: what a
     /// half-space of isotropic scatterers of their albedo reflects (van de Hulst, Multiple Light Scattering, 1980). Linear
     /// Rec.709.

@@ -16,6 +16,30 @@ pub(crate) fn kappa_of_variance(beta_squared: Rgb) -> Rgb {
     Rgb::splat(0.25) / beta_squared.max(Rgb::splat(MIN_VARIANCE))
 }
 
+/// -ln of the mean cosine, I2(kappa) / I1(kappa), by which the lobe whose longitudinal standard deviation in theta_h is `beta` radians turns on
+/// the sphere in four dimensions. Of light that meets one such lobe after another the mean cosines multiply, and these add: 6 beta^2 of a
+/// narrow one.
+pub(crate) fn spread(beta: f64) -> f64 {
+    let kappa = 0.25 / (beta * beta).max(f64::from(MIN_VARIANCE));
+    if kappa > 300.0 {
+        return -(-1.5 / kappa + 0.375 / (kappa * kappa)).ln_1p();
+    }
+    // I2 / I1, I3 / I2 and so on, from orders on that are far beyond kappa.
+    let ratio = (2..400).rev().fold(0.0, |next, order| 1.0 / (2.0 * f64::from(order) / kappa + next));
+    -ratio.ln()
+}
+
+/// kappa of the lobe of such a [`spread`]; relative error below 2e-3.
+#[inline]
+pub(crate) fn kappa_of_spread(spread: Rgb) -> Rgb {
+    let spread = spread.max(Rgb::splat(6.0 * MIN_VARIANCE));
+    let (mean, less) = ((-spread).exp(), spread.one_minus_exp_neg());
+    let square = mean * mean;
+    // Banerjee et al., Clustering on the Unit Hypersphere using von Mises-Fisher Distributions, 2005, Eq. 4.4, and what that is off by.
+    let near = mean * (Rgb::splat(4.0) - square) / (less * (mean + Rgb::ONE));
+    near * (Rgb::ONE - square * mean * less * 0.351)
+}
+
 /// The narrowest lobe that single precision carries, as a variance: beta of about 1e-4 radians, which is a
 /// hundredth of a pixel of any real camera.
 pub(crate) const MIN_VARIANCE: f32 = 1e-8;
@@ -126,6 +150,25 @@ fn sample_polar_cosine(kappa: f32, u: f32, stream: &mut Stream) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spreads_are_those_of_their_lobes() {
+        for i in 0..200 {
+            let beta = 10f64.powf(-3.9 + 0.025 * f64::from(i));
+            let kappa = 0.25 / (beta * beta);
+            let [found, ..] = kappa_of_spread(Rgb::splat(spread(beta) as f32)).to_array();
+            assert!((f64::from(found) / kappa - 1.0).abs() < 2e-3, "{beta}: {found}, not {kappa}");
+        }
+        // The mean cosine of a lobe is that of the latitudes that it sends light to from the equator: of cos(theta) cos(phi) on the sphere.
+        let kappa = 0.25 / 0.3f64.powi(2);
+        let (mut mean, mut sum) = (0.0, 0.0);
+        for i in 0..20_000 {
+            let w = -1.0 + 2.0 * (f64::from(i) + 0.5) / 20_000.0;
+            let share = (1.0 - w * w).sqrt() * (kappa * (w - 1.0)).exp();
+            (mean, sum) = (mean + w * share, sum + share);
+        }
+        assert!((-(mean / sum).ln() / spread(0.3) - 1.0).abs() < 1e-5, "{}", mean / sum);
+    }
     use crate::math::special::bessel_i1_scaled;
 
     fn exact(kappa: f64, ti: f64, to: f64) -> f64 {

@@ -8,17 +8,22 @@ use std::{
 use super::{
     escape::{self, Leaving, Medium, Solutions},
     fiber::FiberMaterial,
-    kernel::{DIFFUSE, Latitudes, kappa_of_variance, normalisation, normalised_kernel},
+    kernel::{DIFFUSE, Latitudes, kappa_of_spread, kappa_of_variance, kernel, normalisation, spread},
 };
 use crate::{
     geometry::{after_fiber::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 
-/// Constants of the aggregated model that were calibrated on explicit fibres (untwisted single plies only).
+/// Constants of the aggregated model that were calibrated: on explicit fibres (untwisted single plies only), or on walks from fibre to fibre in a
+/// circle.
 mod calibrated {
     /// Weight of a fibre's own width in the escape of multiply scattered light.
     pub(super) const ESCAPE_OF_FIBER: f64 = 0.7;
+    /// The power of TT's mean cosine that is taken to go straight on; on walks.
+    pub(super) const STRAIGHT: f64 = 1.6;
+    /// How fast, with the mean way in core radii, the last fibres that B leaves from draw nearer to the axis than the outline; on walks.
+    pub(super) const LAST_PLACE: f32 = -4.6;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
     pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.25;
 }
@@ -71,14 +76,17 @@ pub(crate) struct TtWidth {
     pub factor: f32,
     /// As above.
     pub sigma: f32,
+    /// The mean cosine of the angle by which TT of a chain turns.
+    pub cosine: f32,
 }
 
 impl TtWidth {
-    /// That of these widths, radians squared and radians.
-    fn new(beta_tt_squared: f32, beta_n: f32) -> Self {
-        let kappa = kappa_of_variance(Rgb::splat(beta_tt_squared));
+    /// That of a material.
+    fn new(material: &FiberMaterial) -> Self {
+        let kappa = kappa_of_variance(Rgb::splat(material.beta_tt.powi(2) as f32));
         let [factor, ..] = normalisation(kappa).to_array();
-        Self { kappa: kappa.to_array()[0], factor, sigma: beta_n }
+        let cosine = material.chain_cosine() as f32;
+        Self { kappa: kappa.to_array()[0], factor, sigma: material.beta_n as f32, cosine }
     }
 }
 
@@ -87,17 +95,14 @@ impl TtWidth {
 pub(crate) struct MirroredLobe {
     /// How much of that light it has.
     pub share: Rgb,
-    /// Inverse width, of [`super::kernel`], and its normalisation.
-    pub kappa: Rgb,
-    /// As above.
-    pub factor: Rgb,
+    /// Its [`spread`].
+    pub spread: Rgb,
 }
 
 impl MirroredLobe {
-    /// Of a share of light and a variance, radians squared.
-    pub(super) fn new(share: Rgb, variance: Rgb) -> Self {
-        let kappa = kappa_of_variance(variance);
-        Self { share, kappa, factor: normalisation(kappa) }
+    /// Inverse width, of [`super::kernel`], where it is spread by so much more.
+    pub(super) fn kappa(&self, more: f32) -> Rgb {
+        kappa_of_spread(self.spread + Rgb::splat(more))
     }
 }
 
@@ -108,7 +113,8 @@ pub(crate) struct PlyOptics {
     pub gaps: PlyGaps,
     /// Share of TT that goes on forward in a chain.
     pub chain_share: f32,
-    /// Extinction per expected fibre of light that may pass fibres as TT; at least [`LEAST_RATE`].
+    /// Extinction per expected fibre of light that may pass fibres as TT and then goes on as straight as TT leaves it; at least
+    /// [`LEAST_RATE`].
     pub rho: Rgb,
     /// Weight that TT keeps on its way forward, at each fibre.
     pub chain: Rgb,
@@ -123,6 +129,8 @@ pub(crate) struct PlyOptics {
     /// Of light scattered twice or more, evenly in the ply: the share that leaves the yarn at last, when its other plies are
     /// met at random.
     pub leaves_yarn: Rgb,
+    /// How much the fibres at the wall of the core lean against the ply's axis: the tangent of that angle. 0 where no light keeps its latitude.
+    pub slope: f32,
     /// What leaves this ply at last of light that meets another fibre after one at a place in it, and what leaves the yarn at last
     /// of light that meets a fibre of this ply on its way from another one.
     pub leaving: Arc<Leaving>,
@@ -135,10 +143,12 @@ pub(crate) struct PlyOptics {
     pub events: Rgb,
     /// The share that has met none falls so fast with the fibres passed,
     pub untouched: Rgb,
-    /// Squares of the fibre's widths.
-    pub beta_r_squared: f32,
+    /// The [`spread`] of R, of TT, and of TT where it is met once on the mean, as chance has it.
+    pub spread_r: f32,
     /// As above.
-    pub beta_tt_squared: f32,
+    pub spread_tt: f32,
+    /// As above.
+    pub spread_expected_tt: f32,
     /// The width of one event of TT.
     pub tt: TtWidth,
     /// What light meets after a fibre.
@@ -150,6 +160,12 @@ pub(crate) struct PlyOptics {
     pub mean_way: f32,
     /// As above.
     pub fading: f32,
+}
+
+/// Of light that meets a lobe as often as a Poisson process has it, once on the mean: the mean cosine that it keeps, e^-this, is the mean of
+/// powers of the lobe's.
+fn expected_spread(beta: f64) -> f64 {
+    -(-spread(beta)).exp_m1()
 }
 
 /// The least extinction per fibre. Where TT loses nothing at all a chain ends nowhere; which place is then drawn for an end
@@ -171,10 +187,11 @@ impl PlyOptics {
         let sharp = material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2);
         let lobes = channels.each_ref().map(|c| c.mirrored_lobes(material, sharp));
         let mirrored = [0, 1].map(|which| {
-            let [share, variance] = [0, 1].map(|of| Rgb::from(lobes.map(|lobes| lobes[which][of])));
-            MirroredLobe::new(share, variance)
+            let [share, spread] = [0, 1].map(|of| Rgb::from(lobes.map(|lobes| lobes[which][of])));
+            MirroredLobe { share, spread }
         });
-        let beta_tt_squared = (material.beta_tt * material.beta_tt) as f32;
+        let mean_way = rgb(&|c| c.met_along_radius()).mean().recip().min(10.0);
+        let slope = ply.fiber_rate * ply.core_radius * (0.75 + 0.25 * (calibrated::LAST_PLACE * mean_way).exp()).sqrt();
         Self {
             gaps: fibers.gaps,
             chain_share: material.chain_share() as f32,
@@ -185,17 +202,19 @@ impl PlyOptics {
             single_tt: rgb(&|c| c.single(c.tt_out)),
             albedo: rgb(&|c| c.albedo()),
             leaves_yarn: rgb(&|c| c.closure(c.escape_yarn())),
-            leaving: Arc::new(Leaving::new(&channels.each_ref().map(|c| c.medium(material)), stretch, solutions)),
+            leaving: Arc::new(Leaving::new(&channels.each_ref().map(Channel::medium), stretch, solutions)),
+            slope: if mirrored.iter().any(|lobe| !lobe.share.is_zero()) { slope } else { 0.0 },
             mirrored,
             sharp,
             events: rgb(&|c| c.events()),
             untouched: rgb(&|c| c.untouched()),
-            beta_r_squared: (material.beta_r * material.beta_r) as f32,
-            beta_tt_squared,
-            tt: TtWidth::new(beta_tt_squared, material.beta_n as f32),
+            spread_r: spread(material.beta_r) as f32,
+            spread_tt: spread(material.beta_tt) as f32,
+            spread_expected_tt: expected_spread(material.beta_tt) as f32,
+            tt: TtWidth::new(material),
             after: ply.after.unwrap_or(AfterFiber::free(fibers.gaps.dead_zone)),
             lead: (FRAC_PI_4 * fibers.radius) as f32,
-            mean_way: rgb(&|c| c.radius_optical()).mean().recip().min(10.0),
+            mean_way,
             fading: rgb(&|c| c.fading()).mean(),
         }
     }
@@ -233,6 +252,9 @@ impl Fibers {
 }
 
 /// What one channel of light meets in a ply.
+///
+/// TT bends light, and a bent way out is another one. Of what TT passes on, the share by which its mean cosine falls short of 1 is taken to
+/// turn all round, as an event of its own, and the rest to go straight on.
 struct Channel<'a> {
     fibers: &'a Fibers,
     /// Energies of a fibre's lobes.
@@ -242,12 +264,18 @@ struct Channel<'a> {
     /// The parts of TT that go on forward in a chain and that leave it.
     chain: f64,
     tt_out: f64,
+    /// The part of a chain's light that goes straight on, and the part that turns.
+    straight: f64,
+    turned: f64,
 }
 
 impl<'a> Channel<'a> {
     fn new(material: &FiberMaterial, fibers: &'a Fibers, c: usize) -> Self {
         let (tt, f) = (material.tt[c], material.chain_share());
-        Self { fibers, r: material.r[c], d: material.d[c], tt, chain: tt * f, tt_out: tt * (1.0 - f) }
+        let chain = tt * f;
+        let goes_on = material.chain_cosine().powf(calibrated::STRAIGHT);
+        let (straight, turned) = (goes_on * chain, (1.0 - goes_on) * chain);
+        Self { fibers, r: material.r[c], d: material.d[c], tt, chain, tt_out: tt * (1.0 - f), straight, turned }
     }
 
     /// What ends a chain at a fibre.
@@ -255,8 +283,13 @@ impl<'a> Channel<'a> {
         1.0 - self.chain
     }
 
+    /// What a fibre takes out of light that goes straight on.
+    fn lost(&self) -> f64 {
+        1.0 - self.straight
+    }
+
     fn rho(&self) -> f64 {
-        extinction_rate(self.ended(), self.fibers.dead_zone)
+        extinction_rate(self.lost(), self.fibers.dead_zone)
     }
 
     /// A part of the light that leaves the chain, over what the chain loses; 0 where nothing is lost.
@@ -268,9 +301,18 @@ impl<'a> Channel<'a> {
         self.single(self.r + self.d + self.tt_out)
     }
 
+    /// What is kept of light that leaves its straight way.
+    fn kept(&self) -> f64 {
+        if self.lost() > 0.0 { 1.0 - ((1.0 - self.r - self.d - self.tt) / self.lost()).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
     /// Light that is scattered on starts at fibres, on no line that was drawn: its extinction is the mean medium's.
+    fn rate(&self) -> f64 {
+        extinction_rate(self.lost(), self.fibers.density)
+    }
+
     fn extinction(&self) -> f64 {
-        self.fibers.sigma * extinction_rate(self.ended(), self.fibers.density)
+        self.fibers.sigma * self.rate()
     }
 
     fn radius_optical(&self) -> f64 {
@@ -294,32 +336,28 @@ impl<'a> Channel<'a> {
 
     /// The share that leaves at last where each event lets so much escape.
     fn closure(&self, escape: f64) -> f64 {
-        let gain = self.albedo() * escape;
-        // 1 - c' (1 - E), with 1 - c' from the absorbed light itself.
-        let absorbed = self.single((1.0 - self.r - self.d - self.tt).max(0.0));
+        let (absorbed, gain) = (1.0 - self.kept(), self.kept() * escape);
         if gain > 0.0 { (gain / (absorbed + gain)).min(1.0) } else { 0.0 }
     }
 
-    fn medium(&self, material: &FiberMaterial) -> Medium {
-        let Fibers { core, density, sigma, .. } = *self.fibers;
-        // Chains are bent: a chain that keeps the share a of TT at each fibre gets as far as a straight one that keeps a g, with g the
-        // mean cosine by which TT of a chain turns. Where it turns and goes on nothing is lost.
-        let f = material.chain_share();
-        let straight = if f > 1e-9 { ((-0.5 * material.beta_n.powi(2)).exp() / f).min(1.0) } else { 1.0 };
-        let loss = 1.0 - straight * self.chain;
-        let (rate, bent_rate) = (extinction_rate(self.ended(), density), extinction_rate(loss, density));
-        let albedo = self.albedo();
-        let absorbed = if bent_rate > 0.0 { (1.0 - albedo) * rate / bent_rate } else { 1.0 - albedo };
+    fn medium(&self) -> Medium {
         let taken_back = self.taken_back();
         Medium {
-            radius: sigma * bent_rate * core,
-            // The mean way to the next fibre is one, between the ends of chains 1 / loss.
-            apart: if loss > 1e-9 { (bent_rate / loss - 1.0).max(0.0) } else { 0.0 },
-            albedo: (1.0 - absorbed).clamp(0.0, 1.0),
-            first: albedo,
+            radius: self.radius_optical(),
+            // The mean way to the next fibre is one, to the next that takes light out of its way 1 / lost.
+            apart: if self.lost() > 1e-9 { (self.rate() / self.lost() - 1.0).max(0.0) } else { 0.0 },
+            albedo: self.kept(),
             sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back,
             taken_back,
         }
+    }
+
+    /// Of what is kept of light that leaves its straight way: the share that R and TT send on, in its latitude, and of that the share of R.
+    fn mirrored(&self) -> [f64; 2] {
+        let keeps_latitude = self.r + self.turned;
+        let all = keeps_latitude + self.d + self.tt_out;
+        let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 0.0 };
+        [share(keeps_latitude, all), share(self.r, keeps_latitude)]
     }
 
     /// Of what a fibre sends out of a chain: the share that it reflects.
@@ -330,71 +368,75 @@ impl<'a> Channel<'a> {
 
     /// Of a ply's events: those that another follows.
     fn again(&self) -> f64 {
-        self.albedo() * (1.0 - self.escape_yarn())
+        self.kept() * (1.0 - self.escape_yarn())
     }
 
-    fn mirrored(&self) -> f64 {
-        let (share, again) = (self.reflected(), self.again());
-        share * share * (1.0 - again) / (1.0 - again * share).max(1e-12)
-    }
-
-    /// So that chains end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
+    /// So that straight ways end at their first fibre as often as each hit ends one, and meet TT so often on the mean.
     fn events(&self) -> f64 {
-        let hit = if self.ended() > 1e-9 { self.rho() / self.ended() } else { 1.0 };
-        self.chain * hit
+        let hit = if self.lost() > 1e-9 { self.rho() / self.lost() } else { 1.0 };
+        self.straight * hit
     }
 
     fn untouched(&self) -> f64 {
         (f64::from(self.fibers.gaps.rate) - self.rho()).max(0.0)
     }
 
-    /// The lobes of light that was only ever reflected, as share and variance: of what met TT between, and, if R is so `sharp` that it is told
-    /// apart, of what met none.
+    /// The lobes of light that kept its latitude, as share and spread: of what met TT, and, if R is so `sharp` that it is told apart, of what
+    /// met none.
     ///
-    /// Of a flight that ends within the ply or leaves it, the mean length is what it meets: each of these passes TT so
-    /// often, any number of them as in a geometric series, and there are three flights and more.
+    /// It left its chain by R, and its way once more at least by R or TT. Of a flight that ends within the ply or leaves it, the mean
+    /// length is what it meets: each of these passes TT so often, any number of them as in a geometric series, and there are three
+    /// flights and more, here as if they were three longer ones.
     fn mirrored_lobes(&self, material: &FiberMaterial, sharp: bool) -> [[f64; 2]; 2] {
-        let again = self.again() * self.reflected();
+        let [mirrored, by_r] = self.mirrored();
+        let again = self.again() * mirrored;
         let more = |again: f64| again / (1.0 - again).max(1e-12);
         let passed = self.events() / self.rho().max(LEAST_RATE) * (1.0 - self.escape());
         let none = (1.0 + passed).recip();
-        let untouched = if sharp { none.powi(3) * (1.0 - again) / (1.0 - again * none).max(1e-12) } else { 0.0 };
-        let reflected = |more: f64| (2.0 + more) * material.beta_r.powi(2);
-        let bent = (3.0 + more(again)) * passed * material.beta_tt.powi(2) / (1.0 - untouched).max(1e-12);
-        let all = self.mirrored();
-        [[all * (1.0 - untouched), reflected(more(again)) + bent], [all * untouched, reflected(more(again * none))]]
+        let untouched =
+            if sharp { none.powi(3) * by_r * (1.0 - again) / (1.0 - again * by_r * none).max(1e-12) } else { 0.0 };
+        let r = spread(material.beta_r);
+        let events = 1.0 + more(again);
+        let met_tt = ((3.0 + more(again)) * passed + events * (1.0 - by_r)) / (1.0 - untouched).max(1e-12);
+        let bent = 3.0 * (met_tt / 3.0 * expected_spread(material.beta_tt)).ln_1p();
+        let touched = (1.0 + events * by_r) * r + bent;
+        let reflected = |more: f64| (2.0 + more) * r;
+        let all = self.reflected() * mirrored * (1.0 - self.again()) / (1.0 - again).max(1e-12);
+        [[all * (1.0 - untouched), touched], [all * untouched, reflected(more(again * by_r * none))]]
+    }
+
+    /// How many fibres take light out of its way, on the mean, along a line as long as the core's radius.
+    fn met_along_radius(&self) -> f64 {
+        self.fibers.sigma * self.fibers.core * self.lost()
     }
 
     /// The length of diffusion, by which light fades, is the mean way over the root of 3 (1 - albedo).
     fn fading(&self) -> f64 {
-        self.radius_optical() * (3.0 * (1.0 - self.albedo())).max(0.0).sqrt()
+        self.met_along_radius() * (3.0 * (1.0 - self.kept())).max(0.0).sqrt()
     }
 }
 
 impl PlyOptics {
-    /// The longitudinal lobe of light that was scattered twice or more.
+    /// The longitudinal lobe of light that was scattered twice or more, where what keeps its latitude is spread by a variance.
     #[inline]
-    pub(crate) fn latitude_of_multiple(&self, at: Latitudes) -> Rgb {
+    pub(crate) fn latitude_of_multiple(&self, at: Latitudes, spread: f32) -> Rgb {
         let mut latitude = Rgb::splat(DIFFUSE);
         for lobe in self.mirrored.iter().filter(|lobe| lobe.share.max_channel() > 0.0) {
-            latitude += lobe.share * (normalised_kernel(lobe.kappa, lobe.factor, at) - Rgb::splat(DIFFUSE));
+            latitude += lobe.share * (kernel(lobe.kappa(spread), at) - Rgb::splat(DIFFUSE));
         }
         latitude
     }
 
-    /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells
-    /// it from the rest, and how many TT events the rest has on the mean.
+    /// Of light that `before` fibres passed on before its node, and so many expected ones may after it, of which `untouched` meets none: the
+    /// share that none does, if R tells it from the rest, and by how much the rest is spread.
     #[inline]
-    pub(crate) fn touched(&self, before: f32, after: Rgb) -> (Rgb, Rgb) {
-        let events = self.events * after + Rgb::splat(before);
-        if !self.sharp {
-            return (Rgb::ZERO, events);
+    pub(crate) fn touched(&self, before: f32, after: Rgb, untouched: Rgb) -> (Rgb, Rgb) {
+        let (known, once) = (before * self.spread_tt, Rgb::splat(self.spread_expected_tt));
+        let expected = self.events * after * once;
+        if !self.sharp || before > 0.0 {
+            return (Rgb::ZERO, expected + known);
         }
-        if before > 0.0 {
-            return (Rgb::ZERO, events.max(Rgb::ONE));
-        }
-        let untouched = (-(self.untouched * after)).exp();
-        (untouched, (events / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(Rgb::ONE))
+        (untouched, (expected / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(once))
     }
 }
 

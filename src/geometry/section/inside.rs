@@ -101,6 +101,12 @@ impl Inside {
         v.x * self.x + v.y * self.y
     }
 
+    /// How much of a vector of the section's frame is along the yarn there.
+    #[inline]
+    pub fn along(&self, v: Vec3A) -> f32 {
+        v.dot(self.z)
+    }
+
     /// A vector of the section's frame across the yarn there.
     #[inline]
     pub(super) fn across(&self, v: Vec3A) -> Vec2 {

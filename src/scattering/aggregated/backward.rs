@@ -12,8 +12,8 @@ use wide::f32x8;
 use super::{
     super::{
         escape::{Leaving, Outwards},
-        kernel::{DIFFUSE, sample_sine, sample_sine_diffuse},
-        lobe::LobeFrame,
+        kernel::{DIFFUSE, Latitudes, sample_sine, sample_sine_diffuse},
+        lobe::{LobeFrame, choose, normalised},
         medium::PlyOptics,
         mis_weight,
     },
@@ -49,6 +49,8 @@ pub(super) struct Lobe {
     outwards: Outwards,
     /// Energy that leaves the node's ply, given the direction drawn.
     energy: Rgb,
+    /// What the path then has of each channel, over their mean: by this one is drawn for its direction.
+    channels: Rgb,
     /// Chance that the node's drawn direction does not escape.
     pub(super) chance: f32,
     /// Draws where on a ply's outline it leaves.
@@ -65,6 +67,14 @@ struct Again {
     /// Where each way that meets another ply does so. What the first gives off passes others, what the second does passes whatever
     /// lies there.
     meetings: ArrayVec<Meeting, 2>,
+}
+
+/// The latitude that light arrives with, by its sine and cosine, and by how much it is [`spread`](super::super::kernel::spread).
+#[derive(Clone, Copy, Debug)]
+struct Arriving {
+    sin: f32,
+    cos: f32,
+    spread: f32,
 }
 
 /// A direction that light took.
@@ -107,13 +117,20 @@ impl Backward {
 impl Lobe {
     fn of_node(view: &View<'_>, node: &Node, stream: &mut Stream) -> Self {
         let optics = &view.yarn.plies[node.spot.ply];
-        let energy = node.amplitude * optics.albedo * node.leaves * (Rgb::ONE - node.drawn.value.clear);
+        let left = node.leaves * (Rgb::ONE - node.drawn.value.clear);
+        let energy = node.amplitude * optics.albedo * left;
+        let weight = node.weight * left;
+        let channels = if weight.mean() > 1e-30 { weight * weight.mean().recip() } else { Rgb::ONE };
         let (place, axes) = node.spot.place(view.yarn);
-        let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
+        let mut frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
+        // As the fibres have it that the light met.
+        frame.sin = (node.axial * node.spot.inside.along(frame.z)).clamp(-1.0, 1.0);
+        frame.cos = (1.0 - frame.sin * frame.sin).sqrt();
         let outwards = optics.leaving.draw(&place, stream);
         let axes = axes_across(&frame, axes);
         let u_start = stream.next();
-        let mut lobe = Self { frame, axes, outwards, energy, chance: 1.0 - node.drawn.escape, u_start, again: None };
+        let chance = 1.0 - node.drawn.escape;
+        let mut lobe = Self { frame, axes, outwards, energy, channels, chance, u_start, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             lobe.again = lobe.again(view, node, stream);
         }
@@ -122,13 +139,16 @@ impl Lobe {
 
     /// Value (with the cosine) and density, 1/steradian, of light that leaves the ply towards `w`, whatever lies there.
     #[inline]
-    pub(super) fn value(&self, view: &View<'_>, ply: usize, w: Vec3A) -> (Rgb, f32) {
-        let optics = &view.yarn.plies[ply];
-        let (at, cos) = self.frame.latitudes(w);
-        let latitude = optics.latitude_of_multiple(at);
+    pub(super) fn value(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> (Rgb, f32) {
+        let optics = &view.yarn.plies[spot.ply];
+        let sin = w.dot(self.frame.z).clamp(-1.0, 1.0);
+        let cos = (1.0 - sin * sin).sqrt();
+        let Arriving { sin: sin_i, cos: cos_i, spread } = self.arriving(view, spot, w);
+        let latitude = optics.latitude_of_multiple(Latitudes::new(sin_i, cos_i, sin, cos), spread);
         let around =
             optics.leaving.towards(self.outwards, azimuth(&self.frame, self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
-        (self.energy * latitude * around, latitude.mean() * around.mean())
+        let share = latitude * around;
+        (self.energy * share, share.weighted_mean(self.channels))
     }
 
     /// Where light that has wandered about in the ply of a place leaves it towards `w`, in the section's frame: on the part of its outline
@@ -136,14 +156,7 @@ impl Lobe {
     /// from a point reaches a circle, with a mean way l and with what is lost on the way.
     pub(super) fn start(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Vec3A {
         let shape = view.yarn.occluder().shape();
-        let PlyOptics { mean_way, fading, .. } = view.yarn.plies[spot.ply];
-        let facing = spot.inside.facing(w);
-        let at = spot.inside.in_ply(shape, spot.ply);
-        let [ahead, beside] = [at.dot(facing), facing.perp_dot(at)].map(f32x8::splat);
-        let [cos, sin] = OUTLINE.map(f32x8::new);
-        let (x, y) = (cos - ahead, sin - beside);
-        let square = x * x + y * y;
-        let shares = cos * (square.sqrt() * f32x8::splat(-fading)).exp() / (square + f32x8::splat(mean_way * mean_way));
+        let (facing, shares) = outline(view, spot, w);
         let mut left = self.u_start * shares.reduce_add();
         let mut drawn = OUTLINE[0].len() as f32;
         for (part, share) in shares.to_array().into_iter().enumerate() {
@@ -157,10 +170,37 @@ impl Lobe {
         spot.inside.outline(shape, spot.ply, Vec2::from_angle(angle).rotate(facing))
     }
 
+    /// The latitude against the ply's axis that light had which leaves towards the azimuth of `w`, as the fibres have it that it leaves from.
+    ///
+    /// What the fibres of a ply mirror keeps its part along them ([`Spot::axial`]), which differs from that along the axis by how far from the
+    /// axis the light passes it.
+    #[inline]
+    fn arriving(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Arriving {
+        let LobeFrame { sin, cos, z, .. } = self.frame;
+        let slope = view.yarn.plies[spot.ply].slope;
+        if slope == 0.0 {
+            return Arriving { sin, cos, spread: 0.0 };
+        }
+        let (_, shares) = outline(view, spot, w - w.dot(z) * z);
+        let beside = f32x8::new(OUTLINE[1]);
+        let inverse = shares.reduce_add().max(1e-30).recip();
+        let mean = (shares * beside).reduce_add() * inverse;
+        let off = beside - f32x8::splat(mean);
+        let variance = (shares * off * off).reduce_add() * inverse;
+        // One half of the outline or the other: each leaves an even distribution a quarter of the variance.
+        let side = if self.u_start < 0.5 { -1.0 } else { 1.0 };
+        let lean = -slope * (mean + side * (0.75 * variance).sqrt());
+        // By how much fibres lean there, towards the light: about them it leaves in the latitude in which it came.
+        let lean = Vec2::new(1.0, lean).normalize();
+        let about = (sin * lean.x).clamp(-1.0, 1.0);
+        let sin = (about * lean.x + (1.0 - about * about).sqrt() * lean.y).clamp(-1.0, 1.0);
+        Arriving { sin, cos: (1.0 - sin * sin).sqrt(), spread: 6.0 * 0.25 * 0.25 * slope * slope * variance }
+    }
+
     /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
     fn again(&self, view: &View<'_>, node: &Node, stream: &mut Stream) -> Option<Again> {
-        let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
-        let (value, pdf) = self.value(view, node.spot.ply, w);
+        let w = self.draw(view, &node.spot, stream);
+        let (value, pdf) = self.value(view, &node.spot, w);
         let (open, met) = node.others(view, w, stream);
         let (way, rest) = Taken::new(node, (self.start(view, &node.spot, w), w, value, pdf), open)?;
         let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
@@ -196,7 +236,7 @@ impl Lobe {
         at_node: f32,
         mut visit: impl FnMut(&Spot, Rgb),
     ) {
-        let (first, pdf) = self.value(view, node.spot.ply, w);
+        let (first, pdf) = self.value(view, &node.spot, w);
         let chance = at_node * self.chance;
         match &self.again {
             None => visit(&node.spot, first * mis_weight(light_pdf, chance * pdf)),
@@ -231,8 +271,8 @@ impl Lobe {
     ) -> (Vec3A, Rgb, f32, Vec3A) {
         let (direction, value, pdf, start) = match &self.again {
             None => {
-                let w = self.draw(&view.yarn.plies[node.spot.ply], stream);
-                let (value, pdf) = self.value(view, node.spot.ply, w);
+                let w = self.draw(view, &node.spot, stream);
+                let (value, pdf) = self.value(view, &node.spot, w);
                 (w, value, pdf, self.start(view, &node.spot, w))
             }
             Some(again) => {
@@ -260,22 +300,25 @@ impl Lobe {
 
     /// Draws a direction from the lobe.
     #[inline]
-    fn draw(&self, optics: &PlyOptics, stream: &mut Stream) -> Vec3A {
-        let frame = &self.frame;
+    fn draw(&self, view: &View<'_>, spot: &Spot, stream: &mut Stream) -> Vec3A {
+        let optics = &view.yarn.plies[spot.ply];
         let lat = [stream.next(), stream.next()];
-        // A channel, and then the share of its lobe.
-        let at = 3.0 * stream.next();
-        let channel = (at as usize).min(2);
-        let mut left = at - channel as f32;
+        let channel = choose(normalised(self.channels.to_array()), stream.next());
+        let around = optics.leaving.azimuth(self.outwards, |value| value.to_array()[channel], stream);
+        let mut left = stream.next();
         let lobe = optics.mirrored.iter().find(|lobe| {
             left -= lobe.share.to_array()[channel];
             left < 0.0
         });
         let sin = match lobe {
-            Some(lobe) => sample_sine(lobe.kappa.to_array()[channel], frame.sin, frame.cos, lat, stream),
+            Some(lobe) => {
+                let Arriving { sin, cos, spread } =
+                    self.arriving(view, spot, direction(&self.frame, 0.0, around, self.axes));
+                sample_sine(lobe.kappa(spread).to_array()[channel], sin, cos, lat, stream)
+            }
             None => sample_sine_diffuse(lat),
         };
-        direction(&self.frame, sin, optics.leaving.azimuth(self.outwards, stream), self.axes)
+        direction(&self.frame, sin, around, self.axes)
     }
 }
 
@@ -331,9 +374,24 @@ impl Meeting {
 
     #[inline]
     fn draw_by(&self, view: &View<'_>, frame: &LobeFrame, u: [f32; 2], stream: &mut Stream) -> Vec3A {
-        let around = view.yarn.plies[self.spot.ply].leaving.azimuth(self.outwards, stream);
+        let around = view.yarn.plies[self.spot.ply].leaving.azimuth(self.outwards, Rgb::mean, stream);
         direction(frame, sample_sine_diffuse(u), around, self.axes)
     }
+}
+
+/// The side of a ply's outline that faces a direction, in the axes of [`Inside::in_ply`], and how much of the light leaves there from each part
+/// of it: see [`Lobe::start`].
+#[inline]
+fn outline(view: &View<'_>, spot: &Spot, w: Vec3A) -> (Vec2, f32x8) {
+    let PlyOptics { mean_way, fading, .. } = view.yarn.plies[spot.ply];
+    let facing = spot.inside.facing(w);
+    let at = spot.inside.in_ply(view.yarn.occluder().shape(), spot.ply);
+    let [ahead, beside] = [at.dot(facing), facing.perp_dot(at)].map(f32x8::splat);
+    let [cos, sin] = OUTLINE.map(f32x8::new);
+    let (x, y) = (cos - ahead, sin - beside);
+    let square = x * x + y * y;
+    let shares = cos * (square.sqrt() * f32x8::splat(-fading)).exp() / (square + f32x8::splat(mean_way * mean_way));
+    (facing, shares)
 }
 
 /// Cosine and sine of the azimuth of `w` against axes across a lobe's frame, but for a factor.

@@ -57,6 +57,8 @@ pub(super) struct ChainEnd {
     pub(super) crossing: PlyCrossing,
     /// Fibres that have passed it on before.
     pub(super) before: f32,
+    /// The camera's part along the first fibre of its ply that the light met, whose own part along the yarn is 1.
+    pub(super) axial: f32,
     /// Its energy there over the chance that it was drawn.
     pub(super) amplitude: Rgb,
 }
@@ -227,7 +229,9 @@ impl Forward {
         let before = drawn?;
         let Fiber { spot, back, ended, .. } = self.fibers[before];
         let crossing = *crossings.iter().find(|crossing| crossing.ply == spot.ply).or(crossings.first())?;
-        Some(ChainEnd { spot, back, crossing, before: before as f32, amplitude: ended * (total / energy) })
+        let first = &self.fibers[0].spot;
+        let axial = if first.ply == spot.ply { first } else { &spot }.axial(view.camera);
+        Some(ChainEnd { spot, back, crossing, before: before as f32, axial, amplitude: ended * (total / energy) })
     }
 
     /// F towards `w`: what leaves from the place of each of the fibres.

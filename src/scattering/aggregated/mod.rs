@@ -149,6 +149,15 @@ impl Spot {
         (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 
+    /// How much of a vector is along the fibre, for each unit of the fibre's own part along the yarn.
+    ///
+    /// Fibres of a ply wind around its axis as one screw, so that this stays what it is along straight light and where a fibre mirrors it or
+    /// lets it through in its latitude: whichever fibres of the ply light meets in between.
+    #[inline]
+    fn axial(&self, v: Vec3A) -> f32 {
+        v.dot(self.tangent) / self.inside.along(self.tangent)
+    }
+
     /// How light that came from `back` goes on from here towards `w`. It starts where it met the fibre, on the side where it came from, and is
     /// inside of it first if it goes on forward.
     #[inline]

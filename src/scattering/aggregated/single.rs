@@ -10,15 +10,16 @@ use glam::Vec3A;
 use super::{
     super::{
         LobeValues,
-        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, sample_sine, sample_sine_diffuse},
+        kernel::{DIFFUSE, Latitudes, kappa_of_spread, kernel, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
+        medium::PlyOptics,
     },
     Spot, Turned, View,
     forward::ChainEnd,
 };
 use crate::{
     geometry::{
-        after_fiber::ClearedStrip,
+        after_fiber::{AfterTurn, ClearedStrip},
         section::{PlyAhead, PlyCrossing},
     },
     math::{Rgb, sampler::Stream},
@@ -34,7 +35,9 @@ pub(super) struct Node {
     pub(super) spot: Spot,
     /// The camera's ray in the ply.
     pub(super) crossing: PlyCrossing,
-    /// Sine and cosine of the camera's latitude against the fibre.
+    /// Of light from the camera, as of a chain's end.
+    pub(super) axial: f32,
+    /// Sine and cosine of its latitude against the fibre.
     sin: f32,
     cos: f32,
     /// Where the light came from, across the fibre.
@@ -145,28 +148,27 @@ impl Node {
     /// The node at a chain's end, without a direction.
     #[inline]
     pub(super) fn at(view: &View<'_>, end: &ChainEnd, throughput: Rgb) -> Self {
-        let ChainEnd { spot, back, crossing, before, amplitude } = *end;
+        let ChainEnd { spot, back, crossing, before, axial, amplitude } = *end;
         let optics = &view.yarn.plies[spot.ply];
-        let sin = spot.tangent.dot(view.camera).clamp(-1.0, 1.0);
+        let sin = (axial * spot.inside.along(spot.tangent)).clamp(-1.0, 1.0);
         let weight = throughput * amplitude;
         let leaves = optics.leaving.share(&spot.place(view.yarn).0);
-        let (untouched, events) = optics.touched(before, Rgb::splat(SAMPLING_WIDENING));
+        let widening = Rgb::splat(SAMPLING_WIDENING);
+        let (untouched, spread) = optics.touched(before, widening, (-(optics.untouched * widening)).exp());
         let lobes =
             [optics.single_r * (Rgb::ONE - untouched), optics.single_r * untouched, optics.single_tt, optics.single_d];
-        let beta_tt = optics.beta_tt_squared;
+        let once_more =
+            optics.spread_tt * (1.0 + before) + (optics.events * widening).max_channel() * optics.spread_expected_tt;
         Self {
             spot,
             crossing,
             back,
+            axial,
             sin,
             cos: (1.0 - sin * sin).sqrt(),
             before,
             amplitude,
-            kappa: kappa_of_variance(Rgb::from([
-                optics.beta_r_squared + events.max_channel() * beta_tt,
-                optics.beta_r_squared,
-                (1.0 + before + (optics.events * SAMPLING_WIDENING).max_channel()) * beta_tt,
-            ])),
+            kappa: kappa_of_spread(Rgb::from([optics.spread_r + spread.max_channel(), optics.spread_r, once_more])),
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
             weight: weight * optics.albedo,
             leaves,
@@ -179,14 +181,12 @@ impl Node {
     #[inline]
     pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> NodeValue {
         let optics = &view.yarn.plies[self.spot.ply];
-        let (depth, others) = self.optical_depth(view, w);
-        let clear = (-depth).exp();
+        let way = self.way_out(view, w, |_, _| {});
+        let Passing { clear, after, untouched } = way.passes(optics);
         let sin = w.dot(self.spot.tangent).clamp(-1.0, 1.0);
         let cos = (1.0 - sin * sin).sqrt();
         let at = Latitudes::new(self.sin, self.cos, sin, cos);
         // Chains of TT on both sides widen the lobes.
-        let after = depth / optics.rho;
-        let beta_tt = Rgb::splat(optics.beta_tt_squared);
         let even = cos * (0.5 * FRAC_1_PI);
         let scale = self.amplitude * clear * even;
         let [p_touched, p_untouched, p_tt, p_d] = self.chance;
@@ -198,12 +198,12 @@ impl Node {
             d: optics.single_d * scale * DIFFUSE,
             pdf: p_d * DIFFUSE,
             clear,
-            open: (-others).exp(),
+            open: (-way.others).exp(),
         };
         let mut r = Rgb::ZERO;
-        let (untouched, events) = optics.touched(self.before, after);
+        let (untouched, spread) = optics.touched(self.before, after, untouched);
         if p_touched > 0.0 {
-            r += (Rgb::ONE - untouched) * kernel(kappa_of_variance(events * beta_tt + optics.beta_r_squared), at);
+            r += (Rgb::ONE - untouched) * kernel(kappa_of_spread(spread + Rgb::splat(optics.spread_r)), at);
             value.pdf += p_touched * touched;
         }
         if p_untouched > 0.0 {
@@ -212,7 +212,9 @@ impl Node {
         }
         value.r = optics.single_r * scale * r;
         if p_tt > 0.0 {
-            let m = kernel(kappa_of_variance((optics.events * after + Rgb::splat(1.0 + self.before)) * beta_tt), at);
+            let spread = optics.events * after * optics.spread_expected_tt;
+            let known = Rgb::splat((1.0 + self.before) * optics.spread_tt);
+            let m = kernel(kappa_of_spread(spread + known), at);
             value.tt = optics.single_tt * scale * m;
             value.pdf += p_tt * bent;
         }
@@ -239,52 +241,97 @@ impl Node {
     #[inline]
     pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
         let mut among = Among::default();
-        let (_, others) = self.depth_by_plies(view, w, |way, fibers| among.offer(view, way, fibers, stream));
+        let WayOut { others, .. } = self.way_out(view, w, |way, fibers| among.offer(view, way, fibers, stream));
         ((-others).exp(), among.met)
     }
 
-    /// The optical depth between the node and the outside in a direction of the section's frame, per channel: of all
-    /// plies, and of all but the node's own.
+    /// What lies between the node and the outside in a direction of the section's frame; `other` is told of the fibres in each other ply.
     ///
     /// The way begins as that of F does, and no other fibre is met at once
     /// ([`AfterFiber`](crate::geometry::after_fiber::AfterFiber)). Where it goes back the way that the light
-    /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot".
+    /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot". What TT bends into that
+    /// direction set out in others about it.
     #[inline]
-    pub(super) fn optical_depth(&self, view: &View<'_>, w: Vec3A) -> (Rgb, Rgb) {
-        self.depth_by_plies(view, w, |_, _| {})
-    }
-
-    /// The same; `other` is told of the fibres in each other ply.
-    #[inline]
-    fn depth_by_plies(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> (Rgb, Rgb) {
+    fn way_out(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> WayOut {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
         let thin = view.section.thinness();
         let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
-        let is_swept = turn < 0.0 && self.before == 0.0;
-        let strip = is_swept.then(|| ClearedStrip::new(2.0 * thin * beside * shape.plies[spot.ply].fiber_radius, turn));
+        let later = self.before > 0.0;
+        let width = 2.0 * thin * beside * shape.plies[spot.ply].fiber_radius;
+        let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
         let wide = spot.inside.wide(w);
-        let after = optics.after.turned(self.before > 0.0, turn, spot.inside.along_short_axis(w));
-        let mut own = Rgb::ZERO;
-        let mut others = Rgb::ZERO;
+        let short = spot.inside.along_short_axis(w);
+        let direct = (strip(turn), optics.after.turned(later, turn, short));
+        let cosine = optics.tt.cosine;
+        // A mean over the directions from which TT bends light into this one.
+        let bent = (turn < 0.0 && cosine < 1.0).then(|| {
+            let [turn, squared] = [turn * cosine, 0.5 + (turn * turn - 0.5) * cosine.powi(4)];
+            (strip(-squared.sqrt()), optics.after.turned(later, turn, short))
+        });
+        let mut out = WayOut::default();
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
             let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
             let tilt = way.tilt(shape, view.section, &spot.inside, w, &chord);
             if way.ply == spot.ply {
-                let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
                 let by_rim = shape.plies[way.ply].by_rim(way.offset);
-                let [met, counted] = after.met_and_counted(tilt * ahead, by_rim);
-                // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
-                let lost = optics.rho * optics.gaps.rate.recip();
-                own += optics.rho * (Rgb::splat(counted) + lost * (met - counted));
+                let depth = |(strip, after): &(Option<ClearedStrip>, AfterTurn<'_>)| {
+                    let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
+                    let [met, counted] = after.met_and_counted(tilt * ahead, by_rim);
+                    // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
+                    let lost = optics.rho * optics.gaps.rate.recip();
+                    optics.rho * (Rgb::splat(counted) + lost * (met - counted))
+                };
+                out.own += depth(&direct);
+                if let Some(bent) = &bent {
+                    *out.bent.get_or_insert(Rgb::ZERO) += depth(bent);
+                }
             } else {
                 let fibers = tilt * chord.ahead(-way.foot);
-                others += yarn.plies[way.ply].rho * fibers;
+                out.others += yarn.plies[way.ply].rho * fibers;
                 other(&way, fibers);
             }
         });
-        (own + others, others)
+        out
+    }
+}
+
+/// What lies between a node and the outside, as optical depths per channel.
+#[derive(Clone, Copy, Debug, Default)]
+struct WayOut {
+    /// In the node's ply.
+    own: Rgb,
+    /// There, for light that set out in another direction and that TT bends into this one, if that is another depth.
+    bent: Option<Rgb>,
+    /// In all other plies.
+    others: Rgb,
+}
+
+/// What of the light of a node gets out.
+#[derive(Clone, Copy, Debug)]
+struct Passing {
+    clear: Rgb,
+    /// The fibres that are expected on the way of what TT passes on.
+    after: Rgb,
+    /// The share of it that met no fibre.
+    untouched: Rgb,
+}
+
+impl WayOut {
+    #[inline]
+    fn passes(&self, optics: &PlyOptics) -> Passing {
+        let depth = self.bent.unwrap_or(self.own) + self.others;
+        let after = depth / optics.rho;
+        let clear = (-depth).exp();
+        if self.bent.is_none() {
+            return Passing { clear, after, untouched: (-(optics.untouched * after)).exp() };
+        }
+        // Light that meets nothing is not bent.
+        let unscattered = |fibers: Rgb| (-(fibers * optics.gaps.rate)).exp();
+        let straight = unscattered((self.own + self.others) / optics.rho);
+        let clear = (straight + (clear - unscattered(after)).max(Rgb::ZERO)).min(Rgb::ONE);
+        Passing { clear, after, untouched: straight / clear.max(Rgb::splat(1e-30)) }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::{
     },
     math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
     scattering::{
-        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel},
+        kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, spread},
         lobe::LobeFrame,
         medium::{MirroredLobe, extinction_rate},
         testing::{SILK, lossless, material, section, silk, sphere},
@@ -31,11 +31,12 @@ fn yarn(plies: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64,
 
 /// Single scattering and B in their plain form, without any drawing: (single scattering, B) for each direction.
 ///
-/// Nodes per ply and channel as given; the share that escapes is a mean over 32 directions across the yarn, as the
+/// `beta` are the widths of R and TT, radians. Nodes per ply and channel as given; the share that escapes is a mean over 32 directions across the yarn, as the
 /// specification has it.
 fn quadrature(
     nodes: &[(f64, f64)],
     yarn: &AggregatedYarn,
+    beta: [f64; 2],
     section: &Section<'_>,
     directions: &[Vec3A],
 ) -> Vec<[Rgb; 2]> {
@@ -61,12 +62,12 @@ fn quadrature(
                 let inside = section.inside(yarn.occluder().shape(), section.point(at), c.travel_at(at));
                 let node = (Spot::new(&view, c.ply, inside), c.fibers * x);
                 for (w, out) in directions.iter().zip(&mut out) {
-                    out[0] += amplitude * plain_lobes(&view, &node, *w).0 * only;
+                    out[0] += amplitude * plain_lobes(&view, beta, &node, *w).0 * only;
                 }
                 let mean = (0..32)
                     .map(|i| {
                         let (s, c) = ((i as f32 + 0.5) / 32.0 * TAU).sin_cos();
-                        plain_lobes(&view, &node, Vec3A::new(c, s, 0.0)).1
+                        plain_lobes(&view, beta, &node, Vec3A::new(c, s, 0.0)).1
                     })
                     .fold(Rgb::ZERO, |a, b| a + b)
                     / 32.0;
@@ -84,7 +85,7 @@ fn quadrature(
 
 /// R, TT and D of the plain form for a node with so many expected fibres before it, and what of them passes on the way out: past fibres that
 /// are even over the core, which alone is passed.
-fn plain_lobes(view: &View<'_>, (spot, before): &(Spot, f32), w: Vec3A) -> (Rgb, Rgb) {
+fn plain_lobes(view: &View<'_>, beta: [f64; 2], (spot, before): &(Spot, f32), w: Vec3A) -> (Rgb, Rgb) {
     const SHRINK: f32 = 0.4;
     let shape = view.yarn.occluder().shape();
     let optics = &view.yarn.plies[spot.ply];
@@ -111,8 +112,8 @@ fn plain_lobes(view: &View<'_>, (spot, before): &(Spot, f32), w: Vec3A) -> (Rgb,
     let cosines = sines.map(|sin| (1.0 - sin * sin).sqrt());
     let at = Latitudes::new(sines[0], cosines[0], sines[1], cosines[1]);
     let events = optics.events * (depth / optics.rho + Rgb::splat(*before));
-    let lobe = |own: Rgb| kernel(kappa_of_variance(events * optics.beta_tt_squared + own), at);
-    let [r, tt] = [optics.beta_r_squared, optics.beta_tt_squared].map(|own| lobe(Rgb::splat(own)));
+    let [r, tt] = beta.map(|beta| Rgb::splat((beta * beta) as f32));
+    let [r, tt] = [r, tt].map(|own| kernel(kappa_of_variance(events * tt + own), at));
     let clear = (-depth).exp();
     let lobes = optics.single_r * r + optics.single_tt * tt + optics.single_d * DIFFUSE;
     (lobes * clear * (cosines[1] / TAU), clear)
@@ -134,14 +135,14 @@ fn plain_backward(view: &View<'_>, crossing: &PlyCrossing, energy: Rgb, w: Vec3A
     };
     let thickness = Rgb::from(optics.chain.to_array().map(free_paths));
     let lean = thickness / (thickness + Rgb::splat(10.0)) * 3.2 * (Rgb::ONE - optics.albedo * 0.14);
-    let latitude = optics.latitude_of_multiple(at);
+    let latitude = optics.latitude_of_multiple(at, 0.0);
     let around = lean.min(Rgb::ONE) * across.dot(Vec2::from_angle(to)) + 1.0;
     energy * latitude * around * (cos / TAU)
 }
 
 /// F of the plain form, and T0: the camera's chord alone says how much passes, and the mean number of TT events how far it
 /// is spread. The program has a better F; the chain's rate, the kernel and the wrapped normal are the same.
-fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
+fn plain_forward(yarn: &AggregatedYarn, beta_tt: f64, section: &Section<'_>, directions: &[Vec3A]) -> (Vec<Rgb>, f32) {
     let mut crossings = Crossings::new();
     section.crossings(yarn.occluder().shape(), &mut crossings);
     let view = View::new(yarn, section);
@@ -159,7 +160,7 @@ fn plain_forward(yarn: &AggregatedYarn, section: &Section<'_>, directions: &[Vec
         let (at, cos) = frame.latitudes(*w);
         let off = w.dot(frame.y).atan2(w.dot(frame.x)) - PI;
         let around = Rgb::from((events.sqrt() * optics.tt.sigma).to_array().map(|s| wrapped_normal(off, s)));
-        let m = kernel(kappa_of_variance(events * optics.beta_tt_squared), at);
+        let m = kernel(kappa_of_variance(events * ((beta_tt * beta_tt) as f32)), at);
         (passed - unscattered).max(Rgb::ZERO) * m * around * cos
     };
     (directions.iter().map(value).collect(), unscattered)
@@ -223,13 +224,24 @@ fn values_agree_with_the_reference_vectors() {
             })
             .collect();
         let shape = YarnShape::new(&parameters, 0.0, true);
-        let mut yarn = AggregatedYarn::new(shape, &vec![&m; count as usize]);
-        for ply in &mut yarn.plies {
+        let mut yarn = AggregatedYarn::new(shape.clone(), &vec![&m; count as usize]);
+        // Chains run straight, and what leaves them is even.
+        let (chain, out) = (m.chain_share(), 1.0 - m.chain_share());
+        let straight = FiberMaterial {
+            tt: m.tt.map(|tt| tt * chain),
+            d: std::array::from_fn(|c| m.d[c] + m.tt[c] * out),
+            beta_n: 1e-6,
+            ..m.clone()
+        };
+        let straight = AggregatedYarn::new(shape, &vec![&straight; count as usize]);
+        for (ply, straight) in yarn.plies.iter_mut().zip(straight.plies) {
+            (ply.rho, ply.leaves_yarn, ply.slope) = (straight.rho, straight.leaves_yarn, 0.0);
             // Chains widen R by their mean, and what was only ever reflected is as wide as two reflections.
             (ply.sharp, ply.events) = (false, ply.chain);
-            let [touched, untouched] = ply.mirrored.map(|lobe| lobe.share);
-            let two_reflections = Rgb::splat(2.0 * ply.beta_r_squared);
-            ply.mirrored = [touched + untouched, Rgb::ZERO].map(|share| MirroredLobe::new(share, two_reflections));
+            let [touched, untouched] = straight.mirrored.map(|lobe| lobe.share);
+            let two_reflections = Rgb::splat(spread(2f64.sqrt() * beta[0]) as f32);
+            let lobe = |share| MirroredLobe { share, spread: two_reflections };
+            ply.mirrored = [touched + untouched, Rgb::ZERO].map(lobe);
         }
         let section = section(
             v["theta_c"].as_f64().unwrap() as f32,
@@ -245,8 +257,8 @@ fn values_agree_with_the_reference_vectors() {
                 Vec3A::new(w[0] as f32, w[1] as f32, w[2] as f32)
             })
             .collect();
-        let values = quadrature(&GAUSS_LEGENDRE_4, &yarn, &section, &directions);
-        let (forward, t0) = plain_forward(&yarn, &section, &directions);
+        let values = quadrature(&GAUSS_LEGENDRE_4, &yarn, [beta[0], beta[1]], &section, &directions);
+        let (forward, t0) = plain_forward(&yarn, beta[1], &section, &directions);
         let want = v["T0"].as_f64().unwrap();
         assert!((f64::from(t0) - want).abs() < 1e-4 * want + 1e-5, "vector {index}: T0 {t0}, not {want}");
         for (d, value) in values.iter().enumerate() {
@@ -463,7 +475,7 @@ fn densities_match(pressed: Option<Pressed>) {
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
         let alone = alone.density(view, w);
-        let b = backward.value(view, node.spot.ply, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
+        let b = backward.value(view, &node.spot, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
         for (k, density) in [alone, b].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
         }
@@ -494,7 +506,9 @@ fn the_far_field_of_an_untwisted_ply_is_reciprocal() {
             .map(|i| {
                 let h = -1.0 + 2.0 * (i as f32 + 0.5) / n as f32;
                 // B leans by the camera's offset and is left out, as is the light's own way in F.
-                quadrature(&GAUSS_LEGENDRE_4, &yarn, &section(theta_o, h, 0.0), &[w])[0][0].mean() / n as f32
+                quadrature(&GAUSS_LEGENDRE_4, &yarn, [m.beta_r, m.beta_tt], &section(theta_o, h, 0.0), &[w])[0][0]
+                    .mean()
+                    / n as f32
             })
             .sum::<f32>()
             / theta_i.cos()

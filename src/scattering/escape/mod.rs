@@ -42,8 +42,6 @@ pub(crate) struct Medium {
     pub(crate) apart: f64,
     /// What a meeting keeps.
     pub(crate) albedo: f64,
-    /// What the first meeting keeps.
-    pub(crate) first: f64,
     /// The share of what leaves that other plies send back at once; where the rest of them takes it is followed by direction.
     pub(crate) sent_back: f64,
     /// Of light that comes from other plies: the share of what leaves that returns to them.
@@ -54,21 +52,14 @@ impl Medium {
     /// The next one of those that are told apart: colours that nobody does are solved once. What is not absorbed stays so.
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
-        let kept = |albedo: f64| 1.0 - near(1.0 - albedo).min(1.0);
-        let Self { radius, apart, albedo, first, sent_back, taken_back } = *self;
+        let Self { radius, apart, albedo, sent_back, taken_back } = *self;
         Self {
             radius: near(radius),
             apart: near(apart),
-            albedo: kept(albedo),
-            first: kept(first),
+            albedo: 1.0 - near(1.0 - albedo).min(1.0),
             sent_back: near(sent_back).min(1.0),
             taken_back: near(taken_back).min(1.0),
         }
-    }
-
-    /// What the first meeting keeps over what others do.
-    fn first(&self) -> f64 {
-        if self.albedo > 0.0 { (self.first / self.albedo).min(1.0) } else { 1.0 }
     }
 }
 
@@ -115,7 +106,7 @@ struct OfChannel {
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<[u64; 7], Pending>>);
+pub struct Solutions(Mutex<HashMap<[u64; 6], Pending>>);
 
 /// What one thread solves and others wait for.
 type Pending = Arc<OnceLock<Arc<OfChannel>>>;
@@ -123,8 +114,8 @@ type Pending = Arc<OnceLock<Arc<OfChannel>>>;
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
         let medium = medium.rounded();
-        let Medium { radius, apart, albedo, first, sent_back, taken_back } = medium;
-        let key = [radius, apart, albedo, first, sent_back, taken_back, stretch].map(f64::to_bits);
+        let Medium { radius, apart, albedo, sent_back, taken_back } = medium;
+        let key = [radius, apart, albedo, sent_back, taken_back, stretch].map(f64::to_bits);
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let cell = Arc::clone(all.entry(key).or_default());
         drop(all);
@@ -214,13 +205,13 @@ impl Leaving {
         low + (high - low) * part
     }
 
-    /// Draws an azimuth, as cosine and sine: with the mean of the channels over an even one.
+    /// Draws an azimuth, as cosine and sine: with what `of` makes of the channels, over an even one.
     #[inline]
-    pub(crate) fn azimuth(&self, outwards: Outwards, stream: &mut Stream) -> Vec2 {
+    pub(crate) fn azimuth(&self, outwards: Outwards, of: impl Fn(Rgb) -> f32, stream: &mut Stream) -> Vec2 {
         let mut left = stream.next() * AZIMUTHS as f32;
         let mut chosen = 0;
         for (k, value) in self.azimuths[outwards.0].iter().enumerate() {
-            let value = value.mean();
+            let value = of(*value);
             if value > 0.0 {
                 chosen = k;
                 if left < value {

@@ -115,7 +115,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
     let closed =
         |share: f64| -> Vec<Row> { rows.iter().enumerate().map(|(own, row)| row.closed(own, share)).collect() };
     let near = closed(medium.sent_back);
-    let (out, first) = (leaving(&near, medium.albedo), medium.first());
+    let out = leaving(&near, medium.albedo);
     let mean = |weights: &[f64], out: &[f64], own: usize| {
         let sum: f64 = weights.iter().sum();
         let mut towards = [0.0; AZIMUTHS];
@@ -124,7 +124,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
             let weight = if sum > 0.0 { weight / sum } else { f64::from(u8::from(cell == own)) };
             towards.iter_mut().zip(out).for_each(|(to, from)| *to += weight * from);
         }
-        Outgoing::new(first * towards.iter().sum::<f64>(), towards)
+        Outgoing::new(towards.iter().sum::<f64>(), towards)
     };
     let sectors = (0..QUARTER)
         .map(|sector| {

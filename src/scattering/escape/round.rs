@@ -106,12 +106,11 @@ pub(super) fn solve(medium: &Medium) -> Solved {
     let open = Transport::new(medium);
     let transport = open.closed(medium.sent_back);
     let leaving = transport.leaving(medium.albedo);
-    let first = medium.first();
     let rings = std::array::from_fn(|i| {
         let met: f64 = transport.next[0][i].iter().sum();
         outgoing(std::array::from_fn(|m| {
             let out: f64 = transport.next[m][i].iter().zip(leaving[m]).map(|(chance, out)| chance * out).sum();
-            first * if met > 0.0 { out / met } else { leaving[m][RINGS - 1] }
+            if met > 0.0 { out / met } else { leaving[m][RINGS - 1] }
         }))
     });
     // What enters is met where what leaves would come from.
@@ -120,7 +119,7 @@ pub(super) fn solve(medium: &Medium) -> Solved {
         let leaving = closed.leaving(medium.albedo)[0];
         let enters: f64 = closed.escape[0].iter().sum();
         let out: f64 = closed.escape[0].iter().zip(leaving).map(|(chance, out)| chance * out).sum();
-        first * if enters > 0.0 { out / enters } else { leaving[RINGS - 1] }
+        if enters > 0.0 { out / enters } else { leaving[RINGS - 1] }
     });
     Solved { sectors: vec![rings], entering }
 }

@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 
 fn medium(radius: f64, albedo: f64, apart: f64) -> Medium {
-    Medium { radius, apart, albedo, first: albedo, sent_back: 0.0, taken_back: 0.0 }
+    Medium { radius, apart, albedo, sent_back: 0.0, taken_back: 0.0 }
 }
 
 fn solved(medium: &Medium, stretch: f64) -> Solved {
