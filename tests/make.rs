@@ -98,7 +98,15 @@ fn what_cannot_be_made_is_refused() {
             &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
             "error: more than 2^27 control points",
         ),
-        (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
+        (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has 2 to 10000 points; as in "),
+        (
+            &["knit", "--form", "tube", "--stitches", "2", "-o", "a.bcc"],
+            "error: knitting in the round takes at least 3 stitches\n  hint: ",
+        ),
+        (
+            &["knit", "--yarn-per-stitch", "5", "-o", "a.bcc"],
+            "error: invalid value '5' for '--yarn-per-stitch <D>': expected a number from 6 to 60",
+        ),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
         (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
         (

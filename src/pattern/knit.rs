@@ -31,7 +31,7 @@ pub(super) use self::pressed::{Alike, flatten_where_touching};
 pub use self::{
     colors::{Colors, Work},
     rims::{CastOn, Closing, Rims},
-    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, fits_stitch},
+    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, YARNS_PER_STITCH, fits_stitch},
 };
 use super::{
     PatternStrand,

@@ -7,7 +7,6 @@ use super::{EXAMPLES, Output, RADIUS, write};
 use crate::{
     cli::{Failure, log, positive},
     pattern::{
-        MAX_POINTS,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
     },
@@ -40,13 +39,13 @@ pub(super) struct KnitArgs {
     #[arg(long, value_name = "R,Y", value_parser = profile_point)]
     profile: Vec<[f64; 2]>,
     /// Width of a stitch in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::STITCH_WIDTHS))]
     stitch_width: Option<f64>,
     /// Distance between rows in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::ROW_HEIGHTS))]
     row_height: Option<f64>,
     /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2 times what two yarns need side by side, if not given.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::YARNS_PER_STITCH))]
     yarn_per_stitch: Option<f64>,
     /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
     #[arg(long, default_value = "finished", value_parser = ["finished", "slipped", "live"])]
@@ -94,6 +93,14 @@ fn two(text: &str) -> Option<[f64; 2]> {
     numbers?.try_into().ok()
 }
 
+/// A number from one to another.
+fn within([least, most]: [f64; 2]) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|v| (least..=most).contains(v));
+        number.ok_or_else(|| format!("expected a number from {least} to {most}"))
+    }
+}
+
 fn profile_point(text: &str) -> Result<[f64; 2], String> {
     let problem = "expected a radius of at least 0 and a height, as in 90,20";
     two(text).filter(|[radius, _]| *radius >= 0.0).ok_or_else(|| problem.to_owned())
@@ -102,6 +109,10 @@ fn profile_point(text: &str) -> Result<[f64; 2], String> {
 fn gauge(text: &str) -> Result<[f64; 2], String> {
     let problem = "expected stitches and rows from 0.001 to 1000000, as in 22,30";
     two(text).filter(|n| n.iter().all(|v| (1e-3..=1e6).contains(v))).ok_or_else(|| problem.to_owned())
+}
+
+fn told(Misfit { problem, hint, .. }: Misfit) -> Failure {
+    Failure::Input(format!("error: {problem}\n  hint: {hint}"))
 }
 
 fn wrong(error: &dyn std::fmt::Display) -> Failure {
@@ -146,26 +157,17 @@ impl KnitArgs {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
         let piece = self.sized(&piece, yarn)?;
-        if piece.form != Form::Flat && piece.stitches < 3 {
-            return Err(wrong(&"knitting in the round takes at least 3 stitches"));
-        }
-        if piece.control_points() > MAX_POINTS {
-            return Err(wrong(&"more than 2^27 control points; fewer stitches, rows or points"));
-        }
+        piece.check_counts().map_err(told)?;
         Ok(piece)
     }
 
     fn form(&self, radius: f64) -> Result<Form, Failure> {
         let profile: Vec<DVec2> = self.profile.iter().map(|p| DVec2::from(*p)).collect();
-        if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
-            let problem = "a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80";
-            return Err(wrong(&problem));
+        if !profile.is_empty() {
+            let told = |problem| wrong(&format!("{problem}; as in --profile 90,0 --profile 60,80"));
+            return Form::revolution(profile, radius).map_err(told);
         }
-        Ok(match (profile.is_empty(), self.form.as_str()) {
-            (false, _) => Form::Revolution(profile),
-            (true, "tube") => Form::Tube,
-            _ => Form::Flat,
-        })
+        Ok(if self.form == "tube" { Form::Tube } else { Form::Flat })
     }
 
     /// The piece in the size that is asked for.
@@ -178,7 +180,6 @@ impl KnitArgs {
             height,
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
         };
-        let told = |Misfit { problem, hint, .. }| Failure::Input(format!("error: {problem}\n  hint: {hint}"));
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
         let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {

@@ -15,7 +15,6 @@ use crate::{
         document::Value,
     },
     pattern::{
-        MAX_POINTS,
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
         knitspeak,
@@ -358,7 +357,7 @@ fn counted(
     let in_range = |[least, most]: [f64; 2]| Range::between(least, most);
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
     let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
-    let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+    let yarn_per_stitch = table.f64("yarn_per_stitch", in_range(knit::YARNS_PER_STITCH));
     let yarn = yarns.thickness(flatten(table));
     let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
     let edges = table.one_of_or("edges", Edges::Finished, &kinds);
@@ -402,11 +401,8 @@ fn counted(
         colors: None,
         flat,
     };
-    if knit.control_points() > MAX_POINTS {
-        table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
-    }
-    if knit.form != Form::Flat && knit.stitches < 3 {
-        table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
+    if let Err(wrong) = knit.check_counts() {
+        table.error_at("stitches", wrong.problem, Some(&wrong.hint));
         return None;
     }
     Some(KnitPlan { knit, name, lines, header: table.header(), work, sizes, yarn })
@@ -442,14 +438,5 @@ fn revolution(table: &Reader<'_>, context: &Context<'_>, profile: Option<&[[f64;
         return None;
     };
     let profile: Vec<DVec2> = profile.iter().map(|p| DVec2::from(*p) * context.unit).collect();
-    if !(2..=10_000).contains(&profile.len()) {
-        table.error_at("profile", "a profile has 2 to 10000 points", Some(HINT));
-    } else if profile.iter().any(|p| p.x < 0.0) {
-        table.error_at("profile", "the radius of a profile must be at least 0", Some(HINT));
-    } else if profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
-        table.error_at("profile", "two points of the profile fall together", Some(HINT));
-    } else {
-        return Some(Form::Revolution(profile));
-    }
-    None
+    Form::revolution(profile, radius).map_err(|problem| table.error_at("profile", problem, Some(HINT))).ok()
 }
