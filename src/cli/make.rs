@@ -166,11 +166,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let weft_radius = own(args.weft_radius, 1).unwrap_or(radius);
     let half_width = yarn.as_ref().map_or(1.0, Yarn::half_width);
+    let half_rooms = [radius, weft_radius].map(|radius| radius * half_width);
     let piece = Weave {
         warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
         wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
-        warp_radius: radius * half_width,
-        weft_radius: weft_radius * half_width,
+        half_rooms,
         half_width: [half_width; 2],
         warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
         weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
@@ -182,10 +182,10 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
             "finished" => weave::Edges::Finished,
             "selvedge" => weave::Edges::Selvedge,
-            "fringe" => weave::Edges::Fringe(weave::FRINGE * radius),
+            "fringe" => weave::Edges::Fringe(weave::fringe(half_rooms[0])),
             _ => weave::Edges::Live,
         }),
-        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
+        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
         draft,
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
@@ -195,9 +195,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
     }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
-    let most = weave::LONGEST * radius;
+    let most = weave::longest(half_rooms[0]);
     if piece.pile_height > most {
-        return Err(Failure::Input(format!("error: --pile-height is at most {most}, a thousand radii of the yarn")));
+        return Err(Failure::Input(format!(
+            "error: --pile-height is at most {most}, five hundred times a warp's width"
+        )));
     }
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));

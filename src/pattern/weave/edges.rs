@@ -62,7 +62,7 @@ pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
 
 /// Lets warps go on beyond both ends, each its own way.
 pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f64) {
-    let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.warp_radius);
+    let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.half_rooms[0]);
     let flat = cloth.weave.sized();
     let step = 1.2 * radius;
     let steps = (length / step).ceil().max(2.0) as usize;
