@@ -517,7 +517,7 @@ impl Scene {
     /// A power of two by which light is divided before a film sums it up: 1 for all lights but very faint and very
     /// strong ones, for a film counts in steps that suit radiances about 1.
     pub fn light_scale(&self) -> f32 {
-        let power: f64 = self.lights.iter().map(|l| f64::from(l.power())).sum();
+        let power: f64 = self.lights.iter().map(|l| f64::from(l.irradiance_at_middle())).sum();
         let exponent = if power > 0.0 && power.is_finite() { power.log2().round() } else { 0.0 };
         // Beyond 2^120 the scale itself would leave single precision.
         if exponent.abs() <= 20.0 { 1.0 } else { exponent.clamp(-120.0, 120.0).exp2() as f32 }
