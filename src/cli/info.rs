@@ -1,6 +1,9 @@
 //! `yarnray info`
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use glam::DVec3;
@@ -164,12 +167,12 @@ fn overlap_line(found: Option<Overlap>) -> String {
 }
 
 fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
-    let with_radii: Option<Vec<(&Curve, Vec<f64>)>> = set
-        .curves
-        .iter()
-        .map(|c| Some((c, radius.map(|r| vec![r; c.points.len()]).or_else(|| c.radii.clone())?)))
-        .collect();
-    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, r.as_slice()))));
+    // The radius that is asked for, or the curve's own.
+    fn radii(curve: &Curve, radius: Option<f64>) -> Option<Cow<'_, [f64]>> {
+        radius.map(|r| Cow::Owned(vec![r; curve.points.len()])).or(curve.radii.as_deref().map(Cow::Borrowed))
+    }
+    let with_radii = set.curves.iter().map(|c| Some((c, radii(c, radius)?))).collect::<Option<Vec<_>>>();
+    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, &**r))));
     let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
     let closed = set.curves.iter().filter(|c| c.closed).count();
     let open = set.curves.len() - closed;
