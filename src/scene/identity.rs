@@ -373,7 +373,8 @@ fn in_order(hashes: impl IndexedParallelIterator<Item = Hash>) -> String {
     all.word()
 }
 
-fn hashed(bytes: &[u8]) -> String {
+/// A word for bytes that is the same in every build: XXH3 of 128 bits.
+pub(crate) fn hashed(bytes: &[u8]) -> String {
     format!("{:032x}", XxHash3_128::oneshot(bytes))
 }
 
