@@ -26,7 +26,7 @@ use crate::{
     input::diagnostic::listed,
     plan::{Feature, Memory, Plan},
     render::film_file,
-    scene::{CurveKind, Fabric, GarmentFacts, Scene},
+    scene::{CurveKind, Fabric, GarmentFacts, Scene, Tufts},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -266,7 +266,7 @@ fn garment_json(facts: &GarmentFacts) -> Value {
         "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
         "near": facts.near.map(|(at, radius)| json!({"at_mm": at.to_array(), "radius_mm": radius})),
         "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
-        "overlap": facts.overlap.map(|[share, deepest]| json!({"share": share, "deepest": deepest})),
+        "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest})),
         "control_points": facts.control_points,
         "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
         "repairs": facts.repairs,
@@ -292,7 +292,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
     if let Some(weight) = facts.weight {
         text += &format!("  weight    {weight:.1} g of yarn\n");
     }
-    if let Some([share, deepest]) = facts.overlap {
+    if let Some(Overlap { share, deepest, .. }) = facts.overlap {
         let (share, deepest) = (100.0 * share, 100.0 * deepest);
         text += &format!(
             "  loops     {share:.1} % of the yarn overlaps where it lies flat, by at most {deepest:.0} % of its diameter\n"
@@ -462,8 +462,8 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
         CurveKind::Yarn(yarn) => {
             let yarn = &scene.yarns[yarn];
             let tufts = match fabric.tufts {
-                [0, _] => String::new(),
-                [tufts, strands] => format!("and {tufts} cut tufts ({strands} strands) "),
+                Tufts { yarns: 0, .. } => String::new(),
+                Tufts { yarns, strands } => format!("and {yarns} cut tufts ({strands} strands) "),
             };
             match yarn.plies.len() {
                 1 => format!("yarns {tufts}of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
@@ -475,7 +475,7 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     format!(
         "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
         fabric.origin,
-        fabric.curves.len() - fabric.tufts[1],
+        fabric.curves.len() - fabric.tufts.strands,
         length(fabric) / 1000.0,
         fabric.control_points(),
         estimate.segments

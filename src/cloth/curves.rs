@@ -17,7 +17,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, Mode, Model, Scene, Yarn},
+    scene::{CurveKind, Fabric, Mode, Model, Scene, Tufts, Yarn},
     trace::{CurveGeometry, FiberGeometry, PerVariant, YarnGeometry},
 };
 
@@ -264,8 +264,8 @@ impl Wound<'_> {
 fn plies<'a>(fabric: &Fabric, yarn: &'a Yarn, shape: &'a YarnShape, strands: &'a Strands) -> Plies<'a> {
     let plies = Plies::new(strands, &yarn.plies, shape, fabric.seed);
     match fabric.tufts {
-        [0, _] => plies,
-        [tufts, opened] => plies.with_opened(yarn.radius, opened as f64 / tufts as f64),
+        Tufts { yarns: 0, .. } => plies,
+        Tufts { yarns, strands } => plies.with_opened(yarn.radius, strands as f64 / yarns as f64),
     }
 }
 

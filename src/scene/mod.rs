@@ -33,6 +33,7 @@ use crate::{
         density::{KnownPacking, PlyPacking},
         fiber::{Placement, flyaway::Flyaways, slopes::Twist},
         mesh::Mesh,
+        overlap::Overlap,
         yarn::{PlyParameters, YarnShape, mean_half_width},
     },
     image::{Compression, png::Display, texture::Texture},
@@ -266,6 +267,23 @@ pub enum CurveKind {
     Fiber(usize),
 }
 
+/// Cut tufts of woven pile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tufts {
+    /// Yarns that are cut tufts.
+    pub yarns: usize,
+    /// Curves that are the strands which these open into.
+    pub strands: usize,
+}
+
+impl std::ops::Add for Tufts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { yarns: self.yarns + other.yarns, strands: self.strands + other.strands }
+    }
+}
+
 /// Curves of one kind of yarn or fibre.
 #[derive(Clone, Debug)]
 pub struct Fabric {
@@ -279,8 +297,8 @@ pub struct Fabric {
     pub from_file: bool,
     /// What they are.
     pub kind: CurveKind,
-    /// Of woven pile: how many of its yarns are cut tufts, and how many of its curves are the strands that these open into.
-    pub tufts: [usize; 2],
+    /// The cut tufts of woven pile among its curves.
+    pub tufts: Tufts,
     /// Curves and their radii, millimetres, about the scene's middle. None are left in a render: its yarns are made of them.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.
@@ -387,9 +405,8 @@ pub struct GarmentFacts {
     pub yarn_length: f64,
     /// Weight of all yarns, grams, where every yarn's `tex` is known.
     pub weight: Option<f64>,
-    /// How far the yarns of its cloth run into each other where it lies flat: share of their length, and the deepest in
-    /// diameters. Of several cloths that with the most.
-    pub overlap: Option<[f64; 2]>,
+    /// How far the yarns of its cloth run into each other where it lies flat. Of several cloths that with the most.
+    pub overlap: Option<Overlap>,
     /// About as many control points.
     pub control_points: u64,
     /// 3-D length over length as cut, by area: at 5, 50 and 95 %.

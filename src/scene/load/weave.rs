@@ -14,7 +14,7 @@ use crate::{
         weave::{self, Edges, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
-    scene::Yarn,
+    scene::{Tufts, Yarn},
 };
 
 /// A weave that is checked.
@@ -38,8 +38,8 @@ pub(super) struct Woven {
     pub(super) origin: String,
     /// Warps and wefts, with their places.
     pub(super) sides: [(Vec<Curve>, FabricCoordinates); 2],
-    /// Of each: how many cut tufts there are, and how many curves are strands of them.
-    pub(super) tufts: [[usize; 2]; 2],
+    /// The cut tufts of each.
+    pub(super) tufts: [Tufts; 2],
 }
 
 impl WeavePlan {
@@ -60,7 +60,8 @@ impl WeavePlan {
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
                 let tufts = [&warps, &wefts].map(|side| {
                     let strands = || side.iter().filter(|s| s.share < 1.0);
-                    [strands().map(|s| s.share).sum::<f64>().round() as usize, strands().count()]
+                    let yarns = strands().map(|s| s.share).sum::<f64>().round() as usize;
+                    Tufts { yarns, strands: strands().count() }
                 });
                 let sides = [warps, wefts].map(|side| FabricCoordinates::of(side, cloth.count()));
                 return Some(Woven { origin, sides, tufts });
