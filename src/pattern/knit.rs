@@ -116,6 +116,8 @@ pub const ROW_HEIGHT: f64 = 2.9;
 pub const STITCHES_PER_SQUARE: f64 = 5.5 * 4.2;
 /// Width over height of a yarn's section where stitches press on it, unless asked otherwise.
 pub const FLATTEN: f64 = 1.5;
+/// Stitches, and rows, unless asked otherwise.
+pub const COUNT: u32 = 20;
 /// Control points of a stitch unless asked otherwise.
 pub const POINTS: u32 = 24;
 

@@ -84,9 +84,6 @@ struct SizeArgs {
     circumference: Option<f64>,
 }
 
-/// Stitches, and rows, unless given.
-const COUNT: u32 = 20;
-
 fn two(text: &str) -> Option<[f64; 2]> {
     let numbers: Option<Vec<f64>> =
         text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
@@ -130,10 +127,10 @@ impl KnitArgs {
         let form = self.form(yarn.radius)?;
         // Shaped pieces are knitted once, from the first row of the chart to the last.
         let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
-        let rows = if all { chart.rows() } else { COUNT };
+        let rows = if all { chart.rows() } else { knit::COUNT };
         let piece = Knit {
             chart,
-            stitches: self.stitches.unwrap_or(COUNT),
+            stitches: self.stitches.unwrap_or(knit::COUNT),
             rows: self.rows.unwrap_or(rows),
             form,
             stitch_width: self.stitch_width,

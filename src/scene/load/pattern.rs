@@ -21,8 +21,6 @@ use crate::{
     },
 };
 
-/// Stitches of a knit that says no number.
-const STITCHES: u64 = 20;
 /// Stitches over which a yarn floats before it is caught, and rows that it is carried, unless the knit says so.
 const CATCH_FLOATS: u64 = 7;
 const CARRY_ROWS: u64 = 6;
@@ -246,7 +244,7 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Option<Char
     for other in ["pattern", "chart"].into_iter().filter(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
-    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
     let rows = match knitspeak::chart_rows(text, stitches) {
         Ok(rows) => rows,
         Err(error) => {
@@ -286,7 +284,7 @@ pub(super) fn knit(
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
     let (_, chart, lines) = &charted;
-    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
+    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(knit::COUNT, Chart::rows) } else { knit::COUNT };
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     counted(table, yarns, charted, form, rows, sizes)
 }
@@ -306,7 +304,7 @@ pub(super) fn stockinette(
     let form = Some(Form::Flat);
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     let charted = ("stockinette".to_owned(), Chart::named("stockinette"), Vec::new());
-    counted(table, yarns, charted, form, 20, sizes)
+    counted(table, yarns, charted, form, knit::COUNT, sizes)
 }
 
 /// Over how many stitches a float goes before it is caught, if it is, and over how many rows a yarn is carried.
@@ -352,7 +350,7 @@ fn counted(
     rows: u32,
     sizes: GivenSizes,
 ) -> Option<KnitPlan> {
-    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
     let in_range = |[least, most]: [f64; 2]| Range::between(least, most);
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
