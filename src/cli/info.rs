@@ -257,7 +257,7 @@ fn length(fabric: &Fabric) -> f64 {
     fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
 }
 
-/// A garment for programs: the keys that INTERFACE promises, and what else is known.
+/// A garment for programs: all that is known of it.
 fn garment_json(facts: &GarmentFacts) -> Value {
     let panels: Vec<Value> =
         facts.panels.iter().map(|(name, stitches)| json!({"panel": name, "stitches": stitches})).collect();

@@ -170,7 +170,7 @@ pub struct RenderSettings {
     pub fiber_detail: bool,
     /// Smaller or faster BVH.
     pub compact_bvh: bool,
-    /// Bytes that curves and BVH may take; `None` for no limit.
+    /// Bytes that curves, BVH, film and textures may take together; `None` for no limit.
     pub max_memory: Option<u64>,
     /// Features to bring in though the scene does not need them, for measurements.
     pub force: Vec<String>,

@@ -193,7 +193,7 @@ impl Stage {
     }
 
     /// All visible curves of the objects that `pattern` chooses, at a frame (at the earliest if `None`), in the order of
-    /// the stage. Beside them which object each of them is of, as ranges in that order.
+    /// the stage. Beside them the objects in that order, each with the number of its curves.
     ///
     /// # Errors
     /// An object breaks the rules of its format, or there are more than 2^28 points.

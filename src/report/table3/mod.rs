@@ -397,7 +397,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn json_has_the_keys_of_the_interface() {
+    fn json_has_the_keys_that_scripts_read() {
         let json: serde_json::Value = serde_json::from_str(&table().to_json()).unwrap();
         for key in ["machine", "commit", "metric", "target", "rows"] {
             assert!(!json[key].is_null(), "{key}");
