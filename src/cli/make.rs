@@ -13,7 +13,7 @@ use super::{
     files::{Attempts, Files},
     garment::{self, GarmentArgs},
     level::LevelArgs,
-    log, positive,
+    log, named, positive,
 };
 use crate::{
     files::curve_file,
@@ -118,8 +118,8 @@ struct WeaveArgs {
     #[arg(long, value_name = "X", value_parser = share)]
     crimp: Option<f64>,
     /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
-    #[arg(long, value_parser = ["live", "selvedge", "fringe", "finished"])]
-    edges: Option<String>,
+    #[arg(long, value_parser = named(&weave::Edges::NAMES))]
+    edges: Option<weave::EdgesOf>,
     /// Whole repeats, cut all around: cloth that goes on at one border as it begins at the other.
     #[arg(long, conflicts_with = "edges")]
     tile: bool,
@@ -179,12 +179,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         // Curve files know round yarns only.
         flatten: 1.0,
         points: args.points,
-        edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
-            "finished" => weave::Edges::Finished,
-            "selvedge" => weave::Edges::Selvedge,
-            "fringe" => weave::Edges::Fringe(weave::fringe(half_rooms[0])),
-            _ => weave::Edges::Live,
-        }),
+        edges: args.edges.map_or(weave::Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
         draft,
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),

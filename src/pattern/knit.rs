@@ -66,6 +66,12 @@ pub enum Edges {
     Tile,
 }
 
+impl Edges {
+    /// By name; a tile is asked for otherwise.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("finished", Self::Finished), ("slipped", Self::Slipped), ("live", Self::Live)];
+}
+
 /// A piece of knitting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knit {

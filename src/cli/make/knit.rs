@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use super::{EXAMPLES, Output, RADIUS, write};
 use crate::{
-    cli::{Failure, log, positive},
+    cli::{Failure, log, named, positive},
     pattern::{
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
@@ -33,8 +33,8 @@ pub(super) struct KnitArgs {
     #[command(flatten)]
     size: SizeArgs,
     /// Flat, or round about the y axis.
-    #[arg(long, default_value = "flat", value_parser = ["flat", "tube"])]
-    form: String,
+    #[arg(long, default_value = "flat", value_parser = named(&FORMS))]
+    form: Form,
     /// A point of the profile to knit round over, from the cast-on edge: radius and height (repeatable).
     #[arg(long, value_name = "R,Y", value_parser = profile_point)]
     profile: Vec<[f64; 2]>,
@@ -48,14 +48,14 @@ pub(super) struct KnitArgs {
     #[arg(long, value_name = "D", value_parser = within(knit::YARNS_PER_STITCH))]
     yarn_per_stitch: Option<f64>,
     /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
-    #[arg(long, default_value = "finished", value_parser = ["finished", "slipped", "live"])]
-    edges: String,
+    #[arg(long, default_value = "finished", value_parser = named(&Edges::NAMES))]
+    edges: Edges,
     /// How a finished piece is cast on: with twisted loops, or as a rope.
-    #[arg(long, default_value = "long-tail", value_parser = ["long-tail", "cable"])]
-    cast_on: String,
+    #[arg(long, default_value = "long-tail", value_parser = named(&CastOn::NAMES))]
+    cast_on: CastOn,
     /// How its top is closed; `drawn` together, the yarn through all loops, is for what is knitted round.
-    #[arg(long, default_value = "bound-off", value_parser = ["bound-off", "drawn"])]
-    top: String,
+    #[arg(long, default_value = "bound-off", value_parser = named(&Closing::NAMES))]
+    top: Closing,
     /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
     #[arg(long, conflicts_with_all = ["edges", "form", "profile", "cast_on", "top"])]
     tile: bool,
@@ -83,6 +83,9 @@ struct SizeArgs {
     #[arg(long, value_name = "L", value_parser = positive)]
     circumference: Option<f64>,
 }
+
+/// What is knitted without a profile.
+static FORMS: [(&str, Form); 2] = [("flat", Form::Flat), ("tube", Form::Tube)];
 
 fn two(text: &str) -> Option<[f64; 2]> {
     let numbers: Option<Vec<f64>> =
@@ -135,16 +138,8 @@ impl KnitArgs {
             form,
             stitch_width: self.stitch_width,
             row_height: self.row_height,
-            edges: match self.edges.as_str() {
-                _ if self.tile => Edges::Tile,
-                "live" => Edges::Live,
-                "slipped" => Edges::Slipped,
-                _ => Edges::Finished,
-            },
-            rims: Rims {
-                cast_on: if self.cast_on == "cable" { CastOn::Cable } else { CastOn::LongTail },
-                top: if self.top == "drawn" { Closing::Drawn } else { Closing::BoundOff },
-            },
+            edges: if self.tile { Edges::Tile } else { self.edges },
+            rims: Rims { cast_on: self.cast_on, top: self.top },
             yarn_per_stitch: self.yarn_per_stitch,
             points: self.points,
             colors: None,
@@ -164,7 +159,7 @@ impl KnitArgs {
             let told = |problem| wrong(&format!("{problem}; as in --profile 90,0 --profile 60,80"));
             return Form::revolution(profile, radius).map_err(told);
         }
-        Ok(if self.form == "tube" { Form::Tube } else { Form::Flat })
+        Ok(self.form.clone())
     }
 
     /// The piece in the size that is asked for.

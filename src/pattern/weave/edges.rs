@@ -23,6 +23,19 @@ pub enum Edges {
     Finished,
 }
 
+/// Edges for a length of their fringe, if they have one.
+pub type EdgesOf = fn(f64) -> Edges;
+
+impl Edges {
+    /// All by name.
+    pub const NAMES: [(&'static str, EdgesOf); 4] = [
+        ("finished", |_| Self::Finished),
+        ("selvedge", |_| Self::Selvedge),
+        ("fringe", Self::Fringe),
+        ("live", |_| Self::Live),
+    ];
+}
+
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
 

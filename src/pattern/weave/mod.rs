@@ -16,7 +16,7 @@ mod tests;
 
 use glam::DVec3;
 
-pub use self::edges::Edges;
+pub use self::edges::{Edges, EdgesOf};
 use self::unit_cell::{BEAT, CellOptions, UnitCell, full};
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,

@@ -357,8 +357,7 @@ fn counted(
     let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
     let yarn_per_stitch = table.f64("yarn_per_stitch", in_range(knit::YARNS_PER_STITCH));
     let yarn = yarns.thickness(flatten(table));
-    let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
-    let edges = table.one_of_or("edges", Edges::Finished, &kinds);
+    let edges = table.one_of_or("edges", Edges::Finished, &Edges::NAMES);
     let tile = table.bool_or("tile", false);
     if tile && (table.has("edges") || form.as_ref().is_some_and(|f| *f != Form::Flat)) {
         table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));
@@ -408,11 +407,9 @@ fn counted(
 
 /// `cast_on` and `top` of a finished piece.
 fn rims(table: &Reader<'_>, edges: Edges, form: Option<&Form>) -> Rims {
-    let cast_on = [("long-tail", CastOn::LongTail), ("cable", CastOn::Cable)];
-    let top = [("bound-off", Closing::BoundOff), ("drawn", Closing::Drawn)];
     let rims = Rims {
-        cast_on: table.one_of_or("cast_on", CastOn::LongTail, &cast_on),
-        top: table.one_of_or("top", Closing::BoundOff, &top),
+        cast_on: table.one_of_or("cast_on", CastOn::LongTail, &CastOn::NAMES),
+        top: table.one_of_or("top", Closing::BoundOff, &Closing::NAMES),
     };
     for key in ["cast_on", "top"] {
         if table.has(key) && matches!(edges, Edges::Live | Edges::Tile) {

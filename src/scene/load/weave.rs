@@ -222,9 +222,9 @@ fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, half_room: f64
 /// How the cloth ends.
 fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, unequal: bool) -> Edges {
     let fringe = standing(table, context, "fringe", half_room);
-    let fringed = Edges::Fringe(fringe.unwrap_or_else(|| weave::fringe(half_room)));
-    let names =
-        [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
+    let length = fringe.unwrap_or_else(|| weave::fringe(half_room));
+    let fringed = Edges::Fringe(length);
+    let names = Edges::NAMES.map(|(name, edges)| (name, edges(length)));
     let default = match fringe {
         Some(_) => fringed,
         None if unequal => Edges::Selvedge,
