@@ -91,7 +91,7 @@ fn what_cannot_be_made_is_refused() {
     for (args, message) in [
         (
             &["knit", "-o", "a.xyz"][..],
-            "error: a.xyz: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc\n",
+            "error: a.xyz: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .curves, .usda, .usdc or .usd\n",
         ),
         (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
         (

@@ -68,8 +68,13 @@ enum What {
 /// What all of them share.
 #[derive(Args, Debug)]
 struct Output {
-    /// Where to write; the extension names the format (.bcc, .hair, .obj, .yarns, .txt, .usda, .usdc). Repeatable.
-    #[arg(short, long = "out", value_name = "PATH", required = true)]
+    #[arg(
+        short,
+        long = "out",
+        value_name = "PATH",
+        required = true,
+        help = format!("Where to write; the extension names the format: {}. Repeatable", curve_file::written_extensions())
+    )]
     out: Vec<PathBuf>,
     /// Radius of the yarn; that of --yarn, or of a WIF draft, or 0.5, if not given.
     #[arg(long, value_name = "R", value_parser = positive)]
@@ -299,7 +304,7 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
     match paths.iter().find(|path| !curve_file::can_write(path)) {
         None => Ok(()),
         Some(path) => {
-            let known = ".bcc, .hair, .obj, .yarns, .txt, .usda or .usdc";
+            let known = curve_file::written_extensions();
             Err(Failure::Input(format!("error: {}: expected a name that ends in {known}", path.display())))
         }
     }

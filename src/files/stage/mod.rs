@@ -140,9 +140,12 @@ enum Take<'a> {
     Meshes(&'a mut AddMesh<'a>),
 }
 
+/// Extensions of stages.
+pub(super) const EXTENSIONS: [&str; 5] = ["usda", "usdc", "usd", "usdz", "abc"];
+
 /// Whether a file's name says that it is a stage.
 pub fn is_stage(path: &Path) -> bool {
-    matches!(extension(path).as_deref(), Some("usd" | "usda" | "usdc" | "usdz" | "abc"))
+    extension(path).is_some_and(|found| EXTENSIONS.contains(&found.as_str()))
 }
 
 impl Stage {
