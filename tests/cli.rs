@@ -337,11 +337,17 @@ fn curves_of_a_file_take_the_place_of_the_first_fabric() {
 #[test]
 fn models_answer_differently() {
     let mut means = Vec::new();
+    let mut pictures = Vec::new();
     for model in ["aggregated", "two-stream", "paper", "printed"] {
         let picture = render(SWATCH, &["--model", model]);
         assert_eq!(picture.stats["model"], model);
         assert_eq!(picture.stats["invalid_samples"], 0, "{model}");
         means.push(picture.mean()[1]);
+        let colors = picture.colors();
+        for (other, before) in &pictures {
+            assert_ne!(&colors, before, "{model} and {other}");
+        }
+        pictures.push((model, colors));
     }
     eprintln!("mean green of the models: {means:.4?}");
     assert!(means.iter().all(|m| *m > 0.05 && *m < 2.0), "{means:?}");

@@ -3,16 +3,11 @@
 //! Commands are collected by themselves: the examples of each `--help`, whatever begins with `yarnray` in code of the
 //! README and of docs, and in comments of scenes. Files that a command reads and nobody has written before it are made up.
 
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-    process::Command,
-    sync::LazyLock,
-};
+use std::{collections::BTreeSet, path::Path, process::Command, sync::LazyLock};
 
 use yarnray::pattern::{chart::PATTERNS, draft::NAMES};
 
-use crate::support::{SWATCH, directory, program, project, write, yarnray};
+use crate::support::{SWATCH, directory, program, project, scenes, write, yarnray};
 
 /// Options whose value is written, not read.
 const OUTPUTS: [&str; 6] = ["-o", "--out", "--stats", "--checkpoint", "--cache", "--display"];
@@ -84,17 +79,6 @@ fn examples_of_document(text: &str) -> Vec<String> {
 fn examples_of_scene(text: &str) -> Vec<String> {
     let comments = text.lines().filter_map(|l| l.strip_prefix('#')).map(str::trim);
     comments.filter(|c| c.starts_with("yarnray ")).map(alone).collect()
-}
-
-/// All scene files below a folder, in order.
-fn scenes(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
-    let mut entries: Vec<PathBuf> = entries.collect();
-    entries.sort();
-    let below = |path: PathBuf| if path.is_dir() { scenes(&path) } else { vec![path] };
-    let mut all: Vec<PathBuf> = entries.into_iter().flat_map(below).collect();
-    all.retain(|path| path.extension().is_some_and(|e| e == "toml"));
-    all
 }
 
 /// The words of a command as a shell makes them.

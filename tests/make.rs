@@ -91,14 +91,22 @@ fn what_cannot_be_made_is_refused() {
     for (args, message) in [
         (
             &["knit", "-o", "a.xyz"][..],
-            "error: a.xyz: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc\n",
+            "error: a.xyz: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .curves, .usda, .usdc or .usd\n",
         ),
         (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
         (
             &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
             "error: more than 2^27 control points",
         ),
-        (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has two or more points"),
+        (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has 2 to 10000 points; as in "),
+        (
+            &["knit", "--form", "tube", "--stitches", "2", "-o", "a.bcc"],
+            "error: knitting in the round takes at least 3 stitches\n  hint: ",
+        ),
+        (
+            &["knit", "--yarn-per-stitch", "5", "-o", "a.bcc"],
+            "error: invalid value '5' for '--yarn-per-stitch <D>': expected a number from 6 to 60",
+        ),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
         (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
         (
@@ -272,4 +280,32 @@ fn commands_agree_on_what_a_yarn_is_made_of() {
     assert!(plies.colors.iter().all(Option::is_some) && plies.plies.iter().all(Option::is_some));
     let text = curve_file::read(&d.join("p.txt"), &ReadOptions::default()).unwrap();
     assert_eq!(text.curves.len(), plies.curves.len());
+}
+
+/// Pile and fringe of a plied yarn follow from the room that it takes, whoever weaves it.
+#[test]
+fn commands_and_scenes_weave_the_same_cloth() {
+    let folder = directory();
+    let d = folder.path();
+    let library = project("scenes/yarns.toml");
+    for (draft, edges) in [("terry", "live"), ("plain", "fringe")] {
+        let source =
+            format!("type = \"weave\", draft = {draft:?}, warps = 6, wefts = 6, edges = {edges:?}, flatten = 1");
+        let fabric = format!("[[fabric]]\nyarn = \"polyester1\"\nphase = 0\nsource = {{ {source} }}\n");
+        write(d, "s.toml", format!("library = [{library:?}]\n{fabric}"));
+        yarnray(d, &["make", "fibers", "s.toml", "--mode", "ply", "-o", "scene.usdc"]).good();
+        let counts = ["--warps", "6", "--wefts", "6", "--as", "plies", "-o", "made.usdc"];
+        let command = ["make", "weave", "--draft", draft, "--edges", edges, "--yarn", "polyester1"];
+        yarnray(d, &[command, counts].concat()).good();
+        let size = |file: &str| {
+            let set = curve_file::read(&d.join(file), &ReadOptions::default()).unwrap();
+            let all = || set.curves.iter().flat_map(|c| &c.points).copied();
+            let (low, high) = (all().reduce(|a, b| a.min(b)).unwrap(), all().reduce(|a, b| a.max(b)).unwrap());
+            (all().count(), high - low)
+        };
+        let ((points, made), (wanted_points, wanted)) = (size("made.usdc"), size("scene.usdc"));
+        assert_eq!(points, wanted_points, "{draft}");
+        // Plies turn about their yarns from other places; by the yarns' radii all would be larger by a fifth.
+        assert!(made.abs_diff_eq(wanted, 0.02 * wanted.max_element()), "{draft}: {made}, not {wanted}");
+    }
 }

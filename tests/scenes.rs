@@ -1,8 +1,8 @@
 //! Every scene of the project, and real curve files.
 
-use std::path::Path;
+use std::{path::Path, sync::Mutex};
 
-use crate::support::{Picture, directory, mean, project, render, render_file, shared, write, yarnray};
+use crate::support::{Picture, directory, mean, project, render, render_file, scenes, shared, write, yarnray};
 
 /// No channel may hold what is not a number, and somewhere there must be cloth.
 #[track_caller]
@@ -18,45 +18,63 @@ fn sound(picture: &Picture, name: &str) {
     assert!(picture.mean().iter().all(|&c| c > 0.0), "{name}: black");
 }
 
+/// What a file below `scenes` turned out to be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    Suite,
+    Library,
+    Scene,
+    /// A scene whose curves are not beside the project.
+    Skipped,
+}
+
+/// Holds that a file is sound: a suite down to its rows, a library by itself, a scene as a tiny picture.
+fn check(path: &Path, glove: Option<&Path>) -> Kind {
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    let text = std::fs::read_to_string(path).unwrap();
+    let folder = path.parent().unwrap();
+    if text.contains("[[row]]") {
+        let run = yarnray(folder, &["bench", &name, "--row", "no such row"]);
+        assert_eq!(run.stderr, format!("error: no row of {name} contains no such row\n"));
+        return Kind::Suite;
+    }
+    if !text.contains("[[fabric]]") {
+        yarnray(folder, &["info", &name]).good();
+        return Kind::Library;
+    }
+    let mut curves = Vec::new();
+    if text.contains("--curves") && !text.contains("path =") {
+        let Some(glove) = glove else { return Kind::Skipped };
+        curves = vec!["--curves".to_owned(), glove.to_string_lossy().into_owned()];
+    }
+    let curves: Vec<&str> = curves.iter().map(String::as_str).collect();
+    yarnray(folder, &[&["info", name.as_str()], &curves[..]].concat()).good();
+    let small = ["--width", "32", "--height", "24", "--spp", "2"];
+    sound(&render_file(path, &[&small, &curves[..]].concat()), &name);
+    Kind::Scene
+}
+
 #[test]
 fn every_scene_of_the_project_renders() {
-    let of_folder = |folder| std::fs::read_dir(project(folder)).unwrap().map(|e| e.unwrap().path());
-    let folders = ["scenes", "scenes/patterns", "scenes/table3", "scenes/variants"];
-    let mut names: Vec<_> = folders.into_iter().flat_map(of_folder).collect();
-    names.sort();
     let glove = shared("data/curves/glove.bcc");
-    let mut rendered = 0;
-    for path in names {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if !name.ends_with(".toml") {
-            continue;
+    // Most of the time goes into making cloth, much of it on one core.
+    let waiting = Mutex::new(scenes(&project("scenes")).into_iter());
+    let kinds = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(4) {
+            scope.spawn(|| {
+                loop {
+                    let Some(path) = waiting.lock().unwrap().next() else { break };
+                    let kind = check(&path, glove.as_deref());
+                    kinds.lock().unwrap().push(kind);
+                }
+            });
         }
-        let text = std::fs::read_to_string(&path).unwrap();
-        let folder = path.parent().unwrap();
-        if text.contains("[[row]]") {
-            // A suite: it has to be sound, down to the name of a row.
-            let run = yarnray(folder, &["bench", &name, "--row", "no such row"]);
-            assert_eq!(run.stderr, format!("error: no row of {name} contains no such row\n"));
-            continue;
-        }
-        if !text.contains("[[fabric]]") {
-            // A library: it has to be sound by itself.
-            yarnray(folder, &["info", &name]).good();
-            continue;
-        }
-        let mut args = vec!["--width", "32", "--height", "24", "--spp", "2"];
-        let needs_curves = text.contains("--curves") && !text.contains("path =");
-        let curves = glove.as_ref().map(|g| g.to_string_lossy().into_owned());
-        if needs_curves {
-            let Some(curves) = &curves else { continue };
-            args.extend(["--curves", curves]);
-        }
-        let info = [&["info", name.as_str()][..], if needs_curves { &args[6..] } else { &[] }].concat();
-        yarnray(folder, &info).good();
-        sound(&render_file(&path, &args), &name);
-        rendered += 1;
-    }
-    assert!(rendered >= 2);
+    });
+    let kinds = kinds.into_inner().unwrap();
+    let count = |kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+    let rendered = count(Kind::Scene) + count(Kind::Skipped);
+    assert_eq!([count(Kind::Suite), count(Kind::Library), rendered], [2, 3, 47]);
 }
 
 /// A scene for any curve file: `source` without its path, and the yarn's radius in millimetres.

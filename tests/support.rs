@@ -153,6 +153,17 @@ pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     None
 }
 
+/// All scene files below a folder, in order.
+pub(crate) fn scenes(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    let mut entries: Vec<PathBuf> = entries.collect();
+    entries.sort();
+    let below = |path: PathBuf| if path.is_dir() { scenes(&path) } else { vec![path] };
+    let mut all: Vec<PathBuf> = entries.into_iter().flat_map(below).collect();
+    all.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    all
+}
+
 /// A BCC file of Catmull-Rom curves: closed or not, and the points.
 pub(crate) fn bcc(curves: &[(bool, Vec<[f32; 3]>)]) -> Vec<u8> {
     let mut bytes = b"BCC\x44C0\x03\x01".to_vec();

@@ -1,6 +1,9 @@
 //! `yarnray info`
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use glam::DVec3;
@@ -23,7 +26,7 @@ use crate::{
     input::diagnostic::listed,
     plan::{Feature, Memory, Plan},
     render::film_file,
-    scene::{CurveKind, Fabric, GarmentFacts, Scene},
+    scene::{CurveKind, Fabric, GarmentFacts, Scene, Tufts},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -164,12 +167,12 @@ fn overlap_line(found: Option<Overlap>) -> String {
 }
 
 fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
-    let with_radii: Option<Vec<(&Curve, Vec<f64>)>> = set
-        .curves
-        .iter()
-        .map(|c| Some((c, radius.map(|r| vec![r; c.points.len()]).or_else(|| c.radii.clone())?)))
-        .collect();
-    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, r.as_slice()))));
+    // The radius that is asked for, or the curve's own.
+    fn radii(curve: &Curve, radius: Option<f64>) -> Option<Cow<'_, [f64]>> {
+        radius.map(|r| Cow::Owned(vec![r; curve.points.len()])).or(curve.radii.as_deref().map(Cow::Borrowed))
+    }
+    let with_radii = set.curves.iter().map(|c| Some((c, radii(c, radius)?))).collect::<Option<Vec<_>>>();
+    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, &**r))));
     let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
     let closed = set.curves.iter().filter(|c| c.closed).count();
     let open = set.curves.len() - closed;
@@ -254,7 +257,7 @@ fn length(fabric: &Fabric) -> f64 {
     fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
 }
 
-/// A garment for programs: the keys that INTERFACE promises, and what else is known.
+/// A garment for programs: all that is known of it.
 fn garment_json(facts: &GarmentFacts) -> Value {
     let panels: Vec<Value> =
         facts.panels.iter().map(|(name, stitches)| json!({"panel": name, "stitches": stitches})).collect();
@@ -263,7 +266,7 @@ fn garment_json(facts: &GarmentFacts) -> Value {
         "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
         "near": facts.near.map(|(at, radius)| json!({"at_mm": at.to_array(), "radius_mm": radius})),
         "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
-        "overlap": facts.overlap.map(|[share, deepest]| json!({"share": share, "deepest": deepest})),
+        "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest})),
         "control_points": facts.control_points,
         "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
         "repairs": facts.repairs,
@@ -289,7 +292,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
     if let Some(weight) = facts.weight {
         text += &format!("  weight    {weight:.1} g of yarn\n");
     }
-    if let Some([share, deepest]) = facts.overlap {
+    if let Some(Overlap { share, deepest, .. }) = facts.overlap {
         let (share, deepest) = (100.0 * share, 100.0 * deepest);
         text += &format!(
             "  loops     {share:.1} % of the yarn overlaps where it lies flat, by at most {deepest:.0} % of its diameter\n"
@@ -459,8 +462,8 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
         CurveKind::Yarn(yarn) => {
             let yarn = &scene.yarns[yarn];
             let tufts = match fabric.tufts {
-                [0, _] => String::new(),
-                [tufts, strands] => format!("and {tufts} cut tufts ({strands} strands) "),
+                Tufts { yarns: 0, .. } => String::new(),
+                Tufts { yarns, strands } => format!("and {yarns} cut tufts ({strands} strands) "),
             };
             match yarn.plies.len() {
                 1 => format!("yarns {tufts}of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
@@ -472,7 +475,7 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     format!(
         "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
         fabric.origin,
-        fabric.curves.len() - fabric.tufts[1],
+        fabric.curves.len() - fabric.tufts.strands,
         length(fabric) / 1000.0,
         fabric.control_points(),
         estimate.segments

@@ -13,7 +13,7 @@ use super::{
     files::{Attempts, Files},
     garment::{self, GarmentArgs},
     level::LevelArgs,
-    log, positive,
+    log, named, positive,
 };
 use crate::{
     files::curve_file,
@@ -68,8 +68,13 @@ enum What {
 /// What all of them share.
 #[derive(Args, Debug)]
 struct Output {
-    /// Where to write; the extension names the format (.bcc, .hair, .obj, .yarns, .txt, .usda, .usdc). Repeatable.
-    #[arg(short, long = "out", value_name = "PATH", required = true)]
+    #[arg(
+        short,
+        long = "out",
+        value_name = "PATH",
+        required = true,
+        help = format!("Where to write; the extension names the format: {}. Repeatable", curve_file::written_extensions())
+    )]
     out: Vec<PathBuf>,
     /// Radius of the yarn; that of --yarn, or of a WIF draft, or 0.5, if not given.
     #[arg(long, value_name = "R", value_parser = positive)]
@@ -118,8 +123,8 @@ struct WeaveArgs {
     #[arg(long, value_name = "X", value_parser = share)]
     crimp: Option<f64>,
     /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
-    #[arg(long, value_parser = ["live", "selvedge", "fringe", "finished"])]
-    edges: Option<String>,
+    #[arg(long, value_parser = named(&weave::Edges::NAMES))]
+    edges: Option<weave::EdgesOf>,
     /// Whole repeats, cut all around: cloth that goes on at one border as it begins at the other.
     #[arg(long, conflicts_with = "edges")]
     tile: bool,
@@ -166,11 +171,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
     let weft_radius = own(args.weft_radius, 1).unwrap_or(radius);
     let half_width = yarn.as_ref().map_or(1.0, Yarn::half_width);
+    let half_rooms = [radius, weft_radius].map(|radius| radius * half_width);
     let piece = Weave {
         warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
         wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
-        warp_radius: radius * half_width,
-        weft_radius: weft_radius * half_width,
+        half_rooms,
         half_width: [half_width; 2],
         warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
         weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
@@ -179,13 +184,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         // Curve files know round yarns only.
         flatten: 1.0,
         points: args.points,
-        edges: args.edges.as_deref().map_or(weave::Edges::Live, |name| match name {
-            "finished" => weave::Edges::Finished,
-            "selvedge" => weave::Edges::Selvedge,
-            "fringe" => weave::Edges::Fringe(weave::FRINGE * radius),
-            _ => weave::Edges::Live,
-        }),
-        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, radius)),
+        edges: args.edges.map_or(weave::Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
+        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
         draft,
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
@@ -195,9 +195,11 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
     }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
-    let most = weave::LONGEST * radius;
+    let most = weave::longest(half_rooms[0]);
     if piece.pile_height > most {
-        return Err(Failure::Input(format!("error: --pile-height is at most {most}, a thousand radii of the yarn")));
+        return Err(Failure::Input(format!(
+            "error: --pile-height is at most {most}, five hundred times a warp's width"
+        )));
     }
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
@@ -302,7 +304,7 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
     match paths.iter().find(|path| !curve_file::can_write(path)) {
         None => Ok(()),
         Some(path) => {
-            let known = ".bcc, .hair, .obj, .yarns, .txt, .usda or .usdc";
+            let known = curve_file::written_extensions();
             Err(Failure::Input(format!("error: {}: expected a name that ends in {known}", path.display())))
         }
     }

@@ -304,6 +304,15 @@ fn crop(text: &str) -> Result<[u32; 4], String> {
         .ok_or_else(|| "expected four whole numbers, as in 300,200,460,320".to_owned())
 }
 
+/// Reads the name of a value.
+fn named<T: Clone + Send + Sync>(
+    list: &'static [(&'static str, T)],
+) -> impl clap::builder::TypedValueParser<Value = T> {
+    let value = move |name: &str| list.iter().find(|(known, _)| *known == name).map(|(_, value)| value.clone());
+    clap::builder::TypedValueParser::map(names(list), move |name| value(&name).expect("only known names come here"))
+}
+
+/// Reads a name from a list, and keeps it.
 fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValuesParser {
     list.iter().map(|(name, _)| *name).collect::<Vec<_>>().into()
 }

@@ -17,7 +17,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, Mode, Model, Scene, Yarn},
+    scene::{CurveKind, Fabric, Mode, Model, Scene, Tufts, Yarn},
     trace::{CurveGeometry, FiberGeometry, PerVariant, YarnGeometry},
 };
 
@@ -49,48 +49,30 @@ pub(super) struct Preparation<'a> {
 }
 
 impl<'a> Preparation<'a> {
-    /// For the curves of each fabric of a scene; those handed over are freed on the way.
-    pub(super) fn new(scene: &'a Scene, curves: impl IntoIterator<Item = Given<'a>>) -> Self {
-        let fabrics = scene
-            .fabrics
-            .iter()
-            .zip(curves)
-            .enumerate()
-            .map(|(index, (fabric, curves))| {
-                let of = match fabric.kind {
-                    CurveKind::Yarn(yarn) => {
-                        let yarn = &scene.yarns[yarn];
-                        let shape = Box::new(yarn.shape());
-                        let strands = strands(fabric, curves, yarn, &shape);
-                        Of::Yarns { yarn, shape, strands }
-                    }
-                    CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
-                };
-                Prepared { index, fabric, of }
-            })
-            .collect();
-        Self { scene, fabrics }
-    }
-
-    /// As [`Self::new`], refused if all would take more memory than `limit` with what is taken `beside`, bytes.
+    /// The curves of each fabric of a scene, refused if all would take more memory than `limit` with what is taken `beside`,
+    /// bytes. Curves handed over are freed on the way, and so is what is prepared as soon as it is known to be too much: the
+    /// rest is made one fabric at a time, only to tell what all would take.
     pub(super) fn checked(
         scene: &'a Scene,
         curves: impl IntoIterator<Item = Given<'a>>,
         limit: Option<u64>,
         beside: u64,
     ) -> Result<Self, BuildError> {
-        let preparation = Self::new(scene, curves);
-        let needed: Estimate = preparation.estimates().sum();
-        match limit {
-            Some(limit) if needed.bytes() + beside > limit => Err(BuildError::Memory { needed, beside, limit }),
-            _ => Ok(preparation),
+        let mut fabrics = Vec::with_capacity(scene.fabrics.len());
+        let mut needed = Estimate::default();
+        let too_much = |needed: &Estimate| limit.filter(|limit| needed.bytes() + beside > *limit);
+        for (prepared, estimate) in prepared(scene, curves) {
+            needed = [needed, estimate].into_iter().sum();
+            if too_much(&needed).is_some() {
+                fabrics = Vec::new();
+            } else {
+                fabrics.push(prepared);
+            }
         }
-    }
-
-    /// What each fabric will take.
-    pub(super) fn estimates(&self) -> impl Iterator<Item = Estimate> {
-        let render = &self.scene.render;
-        self.fabrics.iter().map(|prepared| prepared.estimate(render.mode, render.compact_bvh))
+        match too_much(&needed) {
+            Some(limit) => Err(BuildError::Memory { needed, beside, limit }),
+            None => Ok(Self { scene, fabrics }),
+        }
     }
 
     /// The curves for Embree, one entry for each geometry, with how they scatter.
@@ -101,6 +83,32 @@ impl<'a> Preparation<'a> {
         all.retain(|piece| piece.curves.count() > 0);
         all
     }
+}
+
+/// Each fabric of a scene with what it will take, made when it is asked for.
+fn prepared<'a>(
+    scene: &'a Scene,
+    curves: impl IntoIterator<Item = Given<'a>>,
+) -> impl Iterator<Item = (Prepared<'a>, Estimate)> {
+    scene.fabrics.iter().zip(curves).enumerate().map(|(index, (fabric, curves))| {
+        let of = match fabric.kind {
+            CurveKind::Yarn(yarn) => {
+                let yarn = &scene.yarns[yarn];
+                let shape = Box::new(yarn.shape());
+                let strands = strands(fabric, curves, yarn, &shape);
+                Of::Yarns { yarn, shape, strands }
+            }
+            CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
+        };
+        let prepared = Prepared { index, fabric, of };
+        let estimate = prepared.estimate(scene.render.mode, scene.render.compact_bvh);
+        (prepared, estimate)
+    })
+}
+
+/// What each fabric of a scene will take. Only one of them is in memory at a time.
+pub(super) fn estimates<'a>(scene: &'a Scene, curves: impl IntoIterator<Item = Given<'a>>) -> Vec<Estimate> {
+    prepared(scene, curves).map(|(_, estimate)| estimate).collect()
 }
 
 impl Prepared<'_> {
@@ -256,8 +264,8 @@ impl Wound<'_> {
 fn plies<'a>(fabric: &Fabric, yarn: &'a Yarn, shape: &'a YarnShape, strands: &'a Strands) -> Plies<'a> {
     let plies = Plies::new(strands, &yarn.plies, shape, fabric.seed);
     match fabric.tufts {
-        [0, _] => plies,
-        [tufts, opened] => plies.with_opened(yarn.radius, opened as f64 / tufts as f64),
+        Tufts { yarns: 0, .. } => plies,
+        Tufts { yarns, strands } => plies.with_opened(yarn.radius, strands as f64 / yarns as f64),
     }
 }
 

@@ -1,7 +1,6 @@
 //! Converged pictures: two halves of independent seeds, kept on disk under a hash of everything that changes them.
 
 use std::{
-    hash::{DefaultHasher, Hash as _, Hasher as _},
     path::{Path, PathBuf},
     time::UNIX_EPOCH,
 };
@@ -15,6 +14,7 @@ use crate::{
         metric::Halves,
     },
     render::picture::PART_NAMES,
+    scene::identity::hashed,
 };
 
 /// A converged picture.
@@ -145,17 +145,21 @@ pub(crate) fn path(cache: &Path, parts: &[&str]) -> PathBuf {
 
 /// A name for everything in `parts` and for this program.
 pub(crate) fn key(parts: &[&str]) -> String {
-    let mut hasher = DefaultHasher::new();
-    parts.hash(&mut hasher);
-    exr::SOFTWARE.hash(&mut hasher);
+    let mut bytes = Vec::new();
+    // With its length before each, so that no two lists are one text.
+    for part in parts.iter().chain([&exr::SOFTWARE]) {
+        bytes.extend((part.len() as u64).to_le_bytes());
+        bytes.extend(part.as_bytes());
+    }
     // A commit names the program only if nothing was changed since.
     if (exr::SOFTWARE.contains("dirty") || exr::SOFTWARE.contains("unknown"))
         && let Ok(file) = std::env::current_exe().and_then(std::fs::metadata)
     {
         let changed = file.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-        (file.len(), changed.map(|time| time.as_nanos())).hash(&mut hasher);
+        bytes.extend(file.len().to_le_bytes());
+        bytes.extend(changed.map_or(0, |time| time.as_nanos()).to_le_bytes());
     }
-    format!("{:016x}", hasher.finish())
+    hashed(&bytes)
 }
 
 #[cfg(test)]

@@ -144,15 +144,9 @@ fn error_of_mean(references: &[Converged], found: &[Converged], all: &Halves) ->
     })
 }
 
-/// Which pixels the reference covers, if only in part: of half-covered ones alone, methods would be told apart by which of them
-/// have a little more of their yarns' edges.
-fn cloth(reference: &Halves) -> Vec<bool> {
-    reference.alpha.iter().map(|alpha| *alpha > 0.0).collect()
-}
-
 fn cloth_mean(colors: &[[f32; 3]], reference: &Halves) -> [f64; 3] {
     let counted: Vec<&[f32; 3]> =
-        colors.iter().zip(cloth(reference)).filter(|(_, counted)| *counted).map(|(color, _)| color).collect();
+        colors.iter().zip(reference.partly_covered()).filter(|(_, counted)| *counted).map(|(color, _)| color).collect();
     std::array::from_fn(|k| counted.iter().map(|c| f64::from(c[k])).sum::<f64>() / counted.len().max(1) as f64)
 }
 
@@ -163,7 +157,7 @@ fn block_error(test: &[[f32; 3]], reference: &[[f32; 3]], of: &Halves) -> Option
         width: of.width,
         test: test.to_vec(),
         reference: reference.to_vec(),
-        counted: cloth(of),
+        counted: of.partly_covered(),
         variance: None,
         non_finite: [0, 0],
     };

@@ -443,7 +443,7 @@ fn colors(image: &Image) -> Result<Vec<[f32; 3]>, BenchError> {
 
 /// How far one converged picture is from another, on the cloth.
 pub(super) fn model_error(test: &Halves, reference: &Halves) -> Result<ModelError, BenchError> {
-    let cloth: Vec<bool> = reference.alpha.iter().map(|alpha| *alpha >= 0.5).collect();
+    let cloth = reference.mostly_covered();
     let picture = |colors: Vec<[f32; 3]>| {
         let mut image = Image::new(reference.width, cloth.len() / reference.width.max(1));
         for (k, name) in ["R", "G", "B"].into_iter().enumerate() {

@@ -11,3 +11,8 @@ pub(crate) mod heap;
 pub(crate) mod oidn;
 #[cfg(feature = "oiio")]
 pub(crate) mod oiio;
+
+/// The loader's own words, which stand in the source of libloading's error.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}

@@ -12,6 +12,8 @@ use std::{
 
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 
+use super::reason;
+
 /// The library's name where the system has it, of the major version whose functions are declared here.
 const SONAME: &str = "libOpenImageDenoise.so.2";
 
@@ -111,11 +113,6 @@ fn candidates() -> Vec<PathBuf> {
         Some(folder) => ["lib", "lib64", "."].map(|sub| folder.join(sub).join(SONAME)).into(),
         None => vec![PathBuf::from(SONAME)],
     }
-}
-
-/// The loader's own words, which stand in the source of libloading's error.
-fn reason(error: &libloading::Error) -> String {
-    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 /// A device that denoises on the CPU.

@@ -15,6 +15,8 @@ use std::{
     sync::OnceLock,
 };
 
+use super::reason;
+
 /// What bindgen makes from `ffi/oiio.h`.
 #[allow(
     missing_docs,
@@ -342,11 +344,6 @@ fn load() -> Result<face::Face, String> {
     let library = unsafe { Library::open(Some(&path), RTLD_NOW | RTLD_LOCAL) }.map_err(|error| reason(&error))?;
     // SAFETY: the bindings are made from the header that this very library was compiled with.
     unsafe { face::Face::from_library(libloading::Library::from(library)) }.map_err(|error| reason(&error))
-}
-
-/// The loader's own words, which stand in the source of libloading's error.
-fn reason(error: &libloading::Error) -> String {
-    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 fn c_path(path: &Path) -> Result<CString, OiioError> {

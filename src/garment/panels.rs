@@ -83,7 +83,7 @@ impl Panels {
 
         let ratios: Vec<(f64, f64)> =
             faces.iter().map(|f| ((areas.of(f) / areas.in_uv(f).abs()).sqrt(), areas.of(f))).collect();
-        let found = percentile(&ratios, 0.5);
+        let [found] = percentiles(ratios, [0.5]);
         let uv_mm = unit_of(found, uv_mm, &mut notes)?;
         for uv in &mut uvs {
             *uv *= uv_mm;
@@ -94,14 +94,14 @@ impl Panels {
         let sewn: Vec<[u32; 3]> = faces.iter().map(|f| f.points.map(|i| weld[i as usize])).collect();
         non_manifold(&sewn, &faces, mesh, &mut notes);
         let along = along_axes(mesh, &faces, unit_mm, uv_mm);
-        let ratio =
-            LengthRatio { p5: percentile(&along, 0.05), p50: percentile(&along, 0.5), p95: percentile(&along, 0.95) };
         let (mut long, mut all) = (0.0, 0.0);
         for pair in along.chunks_exact(2) {
             all += pair[0].1;
             long += if pair[0].0.max(pair[1].0) > 1.1 { pair[0].1 } else { 0.0 };
         }
         let stretched = long / all;
+        let [p5, p50, p95] = percentiles(along, [0.05, 0.5, 0.95]);
+        let ratio = LengthRatio { p5, p50, p95 };
         Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretched, uv_mm, notes })
     }
 
@@ -131,7 +131,7 @@ impl Panels {
                 values.push((value, area));
             }
         }
-        let ends = |values: Vec<(f64, f64)>| [0.01, 0.99].map(|share| percentile(&values, share));
+        let ends = |values: Vec<(f64, f64)>| percentiles(values, [0.01, 0.99]);
         let of_kind = |values: [Vec<_>; 3]| {
             // No panel may be of a kind.
             if values[0].is_empty() { UNSTRAINED.map(|v| [f64::from(v); 2]) } else { values.map(ends) }
@@ -383,18 +383,19 @@ fn axes([p, q, r]: [DVec3; 3], [a, b, c]: [DVec2; 3]) -> [DVec3; 2] {
 }
 
 /// The value below which a share of the weight lies.
-fn percentile(values: &[(f64, f64)], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = sorted.iter().map(|v| v.1).sum();
-    let mut sum = 0.0;
-    for (value, weight) in &sorted {
-        sum += weight;
-        if sum >= share * total {
-            return *value;
+fn percentiles<const N: usize>(mut values: Vec<(f64, f64)>, shares: [f64; N]) -> [f64; N] {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = values.iter().map(|v| v.1).sum();
+    shares.map(|share| {
+        let mut sum = 0.0;
+        for (value, weight) in &values {
+            sum += weight;
+            if sum >= share * total {
+                return *value;
+            }
         }
-    }
-    sorted.last().map_or(1.0, |v| v.0)
+        values.last().map_or(1.0, |v| v.0)
+    })
 }
 
 /// Millimetres per unit of texture coordinates, from what is said or from the ratio of lengths.

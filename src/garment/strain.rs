@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::pattern::{
     StrandKind,
-    tile::{Section, Tile, TileStrand},
+    tile::{Section, Tile},
 };
 
 use super::mesh::GarmentError;
@@ -147,7 +147,7 @@ impl Shapes {
             .map(|(i, strand)| {
                 let axis = usize::from(strand.step[1] != 0);
                 let count = per_stitch * counts[axis];
-                let places = places(strand, count, tile.period);
+                let places = strand.closer_in_bends(count, tile.period);
                 let control_of = |t: &Tile| -> Vec<Vec3> {
                     let stitch = t.stitch();
                     let to = |p: glam::DVec3| Vec3::new((p.x / stitch.x) as f32, (p.y / stitch.y) as f32, p.z as f32);
@@ -252,20 +252,27 @@ fn beside(tile: &Tile) -> Section {
     Section { half_width: (radius * flatten.sqrt()) as f32, short_axis: Vec3::Z / flatten as f32 }
 }
 
+/// Lengths over those as cut between which a tile is as it was cut.
+const UNSTRETCHED: [f64; 2] = [0.985, 1.015];
+/// The shortest and the longest at which a tile is relaxed; beyond them it keeps that shape.
+const STRETCHES: [f64; 2] = [0.8, 1.6];
+/// Sines of shear below which a tile is as cut, and beyond which it keeps its shape.
+const SHEARS: [f64; 2] = [0.02, 0.7];
+
 /// Strains at which a tile is relaxed: as it is cut, and at the ends of what occurs.
 fn nodes([across, up, shear]: StrainRange) -> [Vec<f64>; 3] {
     let stretch = |[low, high]: [f64; 2]| {
         let mut nodes = vec![1.0];
-        if low < 0.985 {
-            nodes.insert(0, low.max(0.8));
+        if low < UNSTRETCHED[0] {
+            nodes.insert(0, low.max(STRETCHES[0]));
         }
-        if high > 1.015 {
-            nodes.push(high.min(1.6));
+        if high > UNSTRETCHED[1] {
+            nodes.push(high.min(STRETCHES[1]));
         }
         nodes
     };
-    let most = shear[0].abs().max(shear[1].abs()).min(0.7);
-    [stretch(across), stretch(up), if most < 0.02 { vec![0.0] } else { vec![-most, 0.0, most] }]
+    let most = shear[0].abs().max(shear[1].abs()).min(SHEARS[1]);
+    [stretch(across), stretch(up), if most < SHEARS[0] { vec![0.0] } else { vec![-most, 0.0, most] }]
 }
 
 /// A tile relaxed at a strain, its yarns in the tile drawn upright.
@@ -283,11 +290,6 @@ fn upright_sections(tile: &Tile, strand: usize, places: &[f64], (stitch, as_cut)
         Section { short_axis: if axis.dot(as_cut.short_axis) < 0.0 { -axis } else { axis }, ..section }
     };
     tile.strands[strand].sections_at(places).into_iter().zip(as_cut).map(drawn).collect()
-}
-
-/// Places of control points: as many in each stitch, evenly.
-fn places(strand: &TileStrand, count: usize, period: DVec2) -> Vec<f64> {
-    strand.closer_in_bends(count, period)
 }
 
 /// The node before a value, and how far it is to the next; held at both ends.

@@ -51,6 +51,11 @@ impl SegmentUvs {
         self.0.is_empty()
     }
 
+    /// Gives back memory that was taken for more segments.
+    pub fn shrink_to_fit(&mut self) {
+        self.0.shrink_to_fit();
+    }
+
     /// Bytes that they take.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.0)

@@ -14,10 +14,22 @@ use super::{
     oiio,
     png::{self, Display},
 };
-use crate::input::system::in_words;
+use crate::input::{diagnostic::listed, system::in_words};
 
-/// The extensions that can be written, as an error lists them.
-const KNOWN: &str = "exr, png, hdr, tif, tiff, jpg, jpeg, bmp, tga, ppm and webp";
+/// The extensions that can be written.
+const EXTENSIONS: [(&str, Format); 11] = [
+    ("exr", Format::Exr),
+    ("png", Format::Png),
+    ("hdr", Format::Linear),
+    ("tif", Format::Linear),
+    ("tiff", Format::Linear),
+    ("jpg", Format::Screen),
+    ("jpeg", Format::Screen),
+    ("bmp", Format::Screen),
+    ("tga", Format::Screen),
+    ("ppm", Format::Screen),
+    ("webp", Format::Screen),
+];
 
 /// What kind of file the extension of a path asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,9 +38,9 @@ pub enum Format {
     Exr,
     /// PNG: eight bits for a screen.
     Png,
-    /// A format of OpenImageIO with linear floats: hdr, tif, tiff.
+    /// A format of OpenImageIO with linear floats.
     Linear,
-    /// A format of OpenImageIO with eight bits for a screen: jpg, jpeg, bmp, tga, ppm, webp.
+    /// A format of OpenImageIO with eight bits for a screen.
     Screen,
 }
 
@@ -39,14 +51,14 @@ impl Format {
     /// [`ImageError::Write`], which lists the known extensions.
     pub fn of(path: &Path) -> Result<Self, ImageError> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-        match extension.as_deref() {
-            Some("exr") => Ok(Self::Exr),
-            Some("png") => Ok(Self::Png),
-            Some("hdr" | "tif" | "tiff") => Ok(Self::Linear),
-            Some("jpg" | "jpeg" | "bmp" | "tga" | "ppm" | "webp") => Ok(Self::Screen),
-            Some(other) => Err(ImageError::unwritable(path, format!("unknown extension `{other}`; known are {KNOWN}"))),
-            None => Err(ImageError::unwritable(path, format!("it has no extension; known are {KNOWN}"))),
+        let known = |found: &str| EXTENSIONS.iter().find(|(name, _)| *name == found).map(|(_, format)| *format);
+        if let Some(format) = extension.as_deref().and_then(known) {
+            return Ok(format);
         }
+        let problem =
+            extension.map_or_else(|| "it has no extension".to_owned(), |e| format!("unknown extension `{e}`"));
+        let known = listed(EXTENSIONS.map(|(name, _)| name.to_owned()), "and");
+        Err(ImageError::unwritable(path, format!("{problem}; known are {known}")))
     }
 }
 

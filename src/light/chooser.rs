@@ -15,7 +15,12 @@ pub struct LightChooser<'a> {
 impl<'a> LightChooser<'a> {
     /// Between those of `lights` that need shadow rays and shine.
     pub fn new(lights: &'a [Light]) -> Self {
-        Self { lights: lights.iter().filter(|light| light.needs_shadow_rays() && light.power() > 0.0).collect() }
+        Self {
+            lights: lights
+                .iter()
+                .filter(|light| light.needs_shadow_rays() && light.irradiance_at_middle() > 0.0)
+                .collect(),
+        }
     }
 
     /// The place of a light of these in [`Self::chance`]; `None` if shadow rays never look for it.

@@ -87,8 +87,8 @@ const FACING_AWAY: f32 = 0.05;
 
 impl Light {
     /// A measure of how much it lights the cloth: about the irradiance at the scene's middle, and above 0 for every light
-    /// that shines somewhere.
-    pub fn power(&self) -> f32 {
+    /// that shines somewhere, also where [`Self::most_at`] would be 0 there.
+    pub fn irradiance_at_middle(&self) -> f32 {
         match self {
             Self::Environment(environment) => PI * environment.mean().mean(),
             Self::Distant { irradiance, .. } => irradiance.mean(),
@@ -115,7 +115,7 @@ impl Light {
     #[inline]
     pub(super) fn most_at(&self, at: Vec3A) -> f32 {
         match self {
-            Self::Environment(_) | Self::Distant { .. } => self.power(),
+            Self::Environment(_) | Self::Distant { .. } => self.irradiance_at_middle(),
             Self::Point { position, intensity } => intensity.mean() / (*position - at).length_squared().max(1e-8),
             Self::Spot { position, axis, intensity, cos_inner, cos_outer } => {
                 let way = at - *position;
@@ -250,7 +250,8 @@ fn from_point(way: Vec3A, intensity: Rgb) -> Option<LightSample> {
     })
 }
 
-/// The share of its intensity that a spot sends at an angle from its axis: 1 inside, a smooth edge, 0 outside.
+/// The share of its intensity that a spot sends at an angle from its axis: 1 inside, a smooth edge, 0 outside. In single
+/// precision, unlike [`smooth_step`](crate::math::special::smooth_step).
 #[inline]
 fn spot_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     if cos >= cos_inner {
@@ -309,7 +310,7 @@ mod tests {
     fn every_light_that_shines_can_be_chosen() {
         let disk = |normal, two_sided| {
             let shape = Shape::Disk { centre: Vec3A::new(0.0, 10.0, 0.0), normal, radius: 2.0 };
-            Light::Area(AreaLight { shape, radiance: Rgb::ONE, two_sided, visible: true }).power()
+            Light::Area(AreaLight { shape, radiance: Rgb::ONE, two_sided, visible: true }).irradiance_at_middle()
         };
         let want = PI * 4.0 / 104.0;
         assert!((disk(Vec3A::NEG_Y, false) / want - 1.0).abs() < 1e-5);

@@ -31,7 +31,7 @@ pub(super) use self::pressed::{Alike, flatten_where_touching};
 pub use self::{
     colors::{Colors, Work},
     rims::{CastOn, Closing, Rims},
-    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, fits_stitch},
+    size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, YARNS_PER_STITCH, fits_stitch},
 };
 use super::{
     PatternStrand,
@@ -64,6 +64,12 @@ pub enum Edges {
     Live,
     /// No edges at all: a flat patch whose rows are yarns that go on at one border as they begin at the other.
     Tile,
+}
+
+impl Edges {
+    /// By name; a tile is asked for otherwise.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("finished", Self::Finished), ("slipped", Self::Slipped), ("live", Self::Live)];
 }
 
 /// A piece of knitting.
@@ -116,6 +122,8 @@ pub const ROW_HEIGHT: f64 = 2.9;
 pub const STITCHES_PER_SQUARE: f64 = 5.5 * 4.2;
 /// Width over height of a yarn's section where stitches press on it, unless asked otherwise.
 pub const FLATTEN: f64 = 1.5;
+/// Stitches, and rows, unless asked otherwise.
+pub const COUNT: u32 = 20;
 /// Control points of a stitch unless asked otherwise.
 pub const POINTS: u32 = 24;
 

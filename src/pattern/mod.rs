@@ -5,7 +5,8 @@
 //! tile push each other apart until they touch, and `bend` tells where a yarn folds. What overlap is left [`overlap`] measures.
 //!
 //! [`overlap`]: crate::geometry::overlap
-//! Nothing here draws a random number: the same description gives the same curves to the bit.
+//! What happens by chance (how pile leans, where a fringe ends) is a function of its place: the same description gives the
+//! same curves to the bit.
 
 mod bend;
 pub mod chart;

@@ -73,7 +73,7 @@ impl About {
 
     /// What stands in the way of going on with a job about `there`: keys with their values, none if nothing does.
     pub(crate) fn differences(&self, there: &Self) -> Vec<String> {
-        identity::differences(&there.keys, &self.keys)
+        identity::differences(&there.keys, &self.keys, ["there", "here"])
     }
 }
 

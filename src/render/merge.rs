@@ -127,13 +127,13 @@ fn same_render(parts: &[(&Path, Header)]) -> Result<(), MergeError> {
         )));
     }
     for (path, header) in &parts[1..] {
-        let differences = identity::differences(&keys(header), &wanted);
+        let differences = identity::differences(&keys(header), &wanted, ["in the former", "in the latter"]);
         if !differences.is_empty() {
             return Err(MergeError::Parts(format!(
                 "{} and {} are not of one render:\n  {}",
                 path.display(),
                 first.display(),
-                differences.join("\n  ").replace(" there,", " in the former,").replace(" here", " in the latter")
+                differences.join("\n  ")
             )));
         }
     }

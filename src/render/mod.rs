@@ -294,6 +294,9 @@ fn wave(
     )
 }
 
+/// Tells the random numbers of pictures from others that begin with the same seed.
+const STREAM: u32 = 0x79a2_17a5;
+
 /// Takes the pixels of a tile to a number of samples, by their colour on the chessboard.
 fn render_tile(
     scene: &Scene,
@@ -304,7 +307,7 @@ fn render_tile(
 ) -> Counters {
     let settings = &scene.render;
     let mut by_color = [Counters::default(); 2];
-    let seed = hash2(settings.frame.map_or(settings.seed, |f| hash2(settings.seed, f)), 0x79a2_17a5);
+    let seed = hash2(settings.frame.map_or(settings.seed, |f| hash2(settings.seed, f)), STREAM);
     let moves = !scene.camera_path.is_empty() || scene.cloth_moves();
     for y in 0..tile.height {
         for x in 0..tile.width {
@@ -339,6 +342,9 @@ fn render_tile(
     counters
 }
 
+/// Share of a normal distribution beyond three deviations, to each side.
+const BEYOND: f32 = 0.001_349_898;
+
 /// An offset along one axis, in pixels, that follows the filter.
 fn filter_offset(filter: PixelFilter, u: f32) -> f32 {
     match filter {
@@ -348,7 +354,7 @@ fn filter_offset(filter: PixelFilter, u: f32) -> f32 {
             (1.0 - (1.0 - x.abs()).max(0.0).sqrt()).copysign(x) * reach
         }
         // Within three deviations: u is moved into the part of the distribution that is kept.
-        PixelFilter::Gaussian(sigma) => normal(0.001_349_898 + u * (1.0 - 2.0 * 0.001_349_898)) * sigma,
+        PixelFilter::Gaussian(sigma) => normal(BEYOND + u * (1.0 - 2.0 * BEYOND)) * sigma,
     }
 }
 

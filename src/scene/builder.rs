@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::{
     CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene, Storage,
-    Taken, Yarn, bounds, defaults, force, identity,
+    Taken, Tufts, Yarn, bounds, defaults, force, identity,
     view::{CameraSetup, Views},
 };
 use crate::{
@@ -291,7 +291,7 @@ impl Fabric {
             panels: Vec::new(),
             from_file: false,
             kind,
-            tufts: [0; 2],
+            tufts: Tufts::default(),
             motion: FabricMotion::default(),
             variants: Vec::new(),
             material_indices: Vec::new(),

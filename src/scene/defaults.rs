@@ -1,6 +1,7 @@
-//! What holds where neither a program nor a file says otherwise: every default of a scene, in the units of scene files.
+//! What holds where neither a program nor a file says otherwise: defaults of a scene, in the units of scene files.
 //!
-//! Scene files leave keys out, programs begin with `Default` or `new`: both read these numbers, and nothing else does.
+//! Scene files leave keys out, programs begin with `Default` or `new`: both read these numbers. What only a key of a file
+//! has, such as those of motion and hairs, stands where the key is read; what made cloth has, in [`pattern`](crate::pattern).
 
 use super::{Mode, Model, PixelFilter, RenderSettings};
 

@@ -327,9 +327,9 @@ pub(crate) fn fingerprint(identity: &[(String, String)]) -> String {
     hashed(text.as_bytes())
 }
 
-/// Keys whose values differ, or that only one has: "render.seed: 1 there, 2 here", one for each. A table is left out
-/// where one of its own keys tells more.
-pub(crate) fn differences(there: &[(String, String)], here: &[(String, String)]) -> Vec<String> {
+/// Keys whose values differ, or that only one has, each in words with what the two are called: "render.seed: 1 there, 2
+/// here". A table is left out where one of its own keys tells more.
+pub(crate) fn differences(there: &[(String, String)], here: &[(String, String)], [a, b]: [&str; 2]) -> Vec<String> {
     let find = |of: &[(String, String)], key: &str| of.iter().find(|(k, _)| k == key).map(|(_, value)| value.clone());
     let mut differing: Vec<(&String, Option<String>, Option<String>)> = Vec::new();
     for (key, _) in there.iter().chain(here) {
@@ -343,7 +343,7 @@ pub(crate) fn differences(there: &[(String, String)], here: &[(String, String)])
     differing
         .iter()
         .filter(|(key, ..)| !tells_less(key))
-        .map(|(key, there, here)| format!("{key}: {} there, {} here", word(there), word(here)))
+        .map(|(key, there, here)| format!("{key}: {} {a}, {} {b}", word(there), word(here)))
         .collect()
 }
 
@@ -373,7 +373,8 @@ fn in_order(hashes: impl IndexedParallelIterator<Item = Hash>) -> String {
     all.word()
 }
 
-fn hashed(bytes: &[u8]) -> String {
+/// A word for bytes that is the same in every build: XXH3 of 128 bits.
+pub(crate) fn hashed(bytes: &[u8]) -> String {
     format!("{:032x}", XxHash3_128::oneshot(bytes))
 }
 
@@ -407,10 +408,10 @@ mod tests {
         let there = list(&[("render.seed", "1"), ("camera", "a"), ("light.1", "sun"), ("light", "s")]);
         let here = list(&[("render.seed", "2"), ("camera", "a"), ("ground", "flat"), ("light", "t")]);
         assert_eq!(
-            differences(&there, &here),
+            differences(&there, &here, ["there", "here"]),
             ["render.seed: 1 there, 2 here", "light.1: sun there, nothing here", "ground: nothing there, flat here"]
         );
-        assert!(differences(&here, &here).is_empty());
+        assert!(differences(&here, &here, ["there", "here"]).is_empty());
         assert_ne!(fingerprint(&there), fingerprint(&here));
     }
 }

@@ -33,6 +33,7 @@ use crate::{
         density::{KnownPacking, PlyPacking},
         fiber::{Placement, flyaway::Flyaways, slopes::Twist},
         mesh::Mesh,
+        overlap::Overlap,
         yarn::{PlyParameters, YarnShape, mean_half_width},
     },
     image::{Compression, png::Display, texture::Texture},
@@ -169,7 +170,7 @@ pub struct RenderSettings {
     pub fiber_detail: bool,
     /// Smaller or faster BVH.
     pub compact_bvh: bool,
-    /// Bytes that curves and BVH may take; `None` for no limit.
+    /// Bytes that curves, BVH, film and textures may take together; `None` for no limit.
     pub max_memory: Option<u64>,
     /// Features to bring in though the scene does not need them, for measurements.
     pub force: Vec<String>,
@@ -266,6 +267,23 @@ pub enum CurveKind {
     Fiber(usize),
 }
 
+/// Cut tufts of woven pile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tufts {
+    /// Yarns that are cut tufts.
+    pub yarns: usize,
+    /// Curves that are the strands which these open into.
+    pub strands: usize,
+}
+
+impl std::ops::Add for Tufts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { yarns: self.yarns + other.yarns, strands: self.strands + other.strands }
+    }
+}
+
 /// Curves of one kind of yarn or fibre.
 #[derive(Clone, Debug)]
 pub struct Fabric {
@@ -279,8 +297,8 @@ pub struct Fabric {
     pub from_file: bool,
     /// What they are.
     pub kind: CurveKind,
-    /// Of woven pile: how many of its yarns are cut tufts, and how many of its curves are the strands that these open into.
-    pub tufts: [usize; 2],
+    /// The cut tufts of woven pile among its curves.
+    pub tufts: Tufts,
     /// Curves and their radii, millimetres, about the scene's middle. None are left in a render: its yarns are made of them.
     pub curves: Vec<(Curve, Vec<f64>)>,
     /// Where they are at other times.
@@ -387,9 +405,8 @@ pub struct GarmentFacts {
     pub yarn_length: f64,
     /// Weight of all yarns, grams, where every yarn's `tex` is known.
     pub weight: Option<f64>,
-    /// How far the yarns of its cloth run into each other where it lies flat: share of their length, and the deepest in
-    /// diameters. Of several cloths that with the most.
-    pub overlap: Option<[f64; 2]>,
+    /// How far the yarns of its cloth run into each other where it lies flat. Of several cloths that with the most.
+    pub overlap: Option<Overlap>,
     /// About as many control points.
     pub control_points: u64,
     /// 3-D length over length as cut, by area: at 5, 50 and 95 %.
@@ -517,7 +534,7 @@ impl Scene {
     /// A power of two by which light is divided before a film sums it up: 1 for all lights but very faint and very
     /// strong ones, for a film counts in steps that suit radiances about 1.
     pub fn light_scale(&self) -> f32 {
-        let power: f64 = self.lights.iter().map(|l| f64::from(l.power())).sum();
+        let power: f64 = self.lights.iter().map(|l| f64::from(l.irradiance_at_middle())).sum();
         let exponent = if power > 0.0 && power.is_finite() { power.log2().round() } else { 0.0 };
         // Beyond 2^120 the scale itself would leave single precision.
         if exponent.abs() <= 20.0 { 1.0 } else { exponent.clamp(-120.0, 120.0).exp2() as f32 }

@@ -5,9 +5,8 @@ use glam::DVec2;
 
 use super::{EXAMPLES, Output, RADIUS, write};
 use crate::{
-    cli::{Failure, log, positive},
+    cli::{Failure, log, named, positive},
     pattern::{
-        MAX_POINTS,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
     },
@@ -34,29 +33,29 @@ pub(super) struct KnitArgs {
     #[command(flatten)]
     size: SizeArgs,
     /// Flat, or round about the y axis.
-    #[arg(long, default_value = "flat", value_parser = ["flat", "tube"])]
-    form: String,
+    #[arg(long, default_value = "flat", value_parser = named(&FORMS))]
+    form: Form,
     /// A point of the profile to knit round over, from the cast-on edge: radius and height (repeatable).
     #[arg(long, value_name = "R,Y", value_parser = profile_point)]
     profile: Vec<[f64; 2]>,
     /// Width of a stitch in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::STITCH_WIDTHS))]
     stitch_width: Option<f64>,
     /// Distance between rows in yarn diameters.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::ROW_HEIGHTS))]
     row_height: Option<f64>,
     /// Length of yarn in a stitch, in yarn diameters; what suits the gauge, or 16.2 times what two yarns need side by side, if not given.
-    #[arg(long, value_name = "D", value_parser = positive)]
+    #[arg(long, value_name = "D", value_parser = within(knit::YARNS_PER_STITCH))]
     yarn_per_stitch: Option<f64>,
     /// Cast on and bound off, with the first stitch of each row slipped as well, or with open loops.
-    #[arg(long, default_value = "finished", value_parser = ["finished", "slipped", "live"])]
-    edges: String,
+    #[arg(long, default_value = "finished", value_parser = named(&Edges::NAMES))]
+    edges: Edges,
     /// How a finished piece is cast on: with twisted loops, or as a rope.
-    #[arg(long, default_value = "long-tail", value_parser = ["long-tail", "cable"])]
-    cast_on: String,
+    #[arg(long, default_value = "long-tail", value_parser = named(&CastOn::NAMES))]
+    cast_on: CastOn,
     /// How its top is closed; `drawn` together, the yarn through all loops, is for what is knitted round.
-    #[arg(long, default_value = "bound-off", value_parser = ["bound-off", "drawn"])]
-    top: String,
+    #[arg(long, default_value = "bound-off", value_parser = named(&Closing::NAMES))]
+    top: Closing,
     /// A flat patch that repeats, without edges: its rows go on at one border as they begin at the other.
     #[arg(long, conflicts_with_all = ["edges", "form", "profile", "cast_on", "top"])]
     tile: bool,
@@ -85,13 +84,21 @@ struct SizeArgs {
     circumference: Option<f64>,
 }
 
-/// Stitches, and rows, unless given.
-const COUNT: u32 = 20;
+/// What is knitted without a profile.
+static FORMS: [(&str, Form); 2] = [("flat", Form::Flat), ("tube", Form::Tube)];
 
 fn two(text: &str) -> Option<[f64; 2]> {
     let numbers: Option<Vec<f64>> =
         text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     numbers?.try_into().ok()
+}
+
+/// A number from one to another.
+fn within([least, most]: [f64; 2]) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|v| (least..=most).contains(v));
+        number.ok_or_else(|| format!("expected a number from {least} to {most}"))
+    }
 }
 
 fn profile_point(text: &str) -> Result<[f64; 2], String> {
@@ -102,6 +109,10 @@ fn profile_point(text: &str) -> Result<[f64; 2], String> {
 fn gauge(text: &str) -> Result<[f64; 2], String> {
     let problem = "expected stitches and rows from 0.001 to 1000000, as in 22,30";
     two(text).filter(|n| n.iter().all(|v| (1e-3..=1e6).contains(v))).ok_or_else(|| problem.to_owned())
+}
+
+fn told(Misfit { problem, hint, .. }: Misfit) -> Failure {
+    Failure::Input(format!("error: {problem}\n  hint: {hint}"))
 }
 
 fn wrong(error: &dyn std::fmt::Display) -> Failure {
@@ -119,24 +130,16 @@ impl KnitArgs {
         let form = self.form(yarn.radius)?;
         // Shaped pieces are knitted once, from the first row of the chart to the last.
         let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
-        let rows = if all { chart.rows() } else { COUNT };
+        let rows = if all { chart.rows() } else { knit::COUNT };
         let piece = Knit {
             chart,
-            stitches: self.stitches.unwrap_or(COUNT),
+            stitches: self.stitches.unwrap_or(knit::COUNT),
             rows: self.rows.unwrap_or(rows),
             form,
             stitch_width: self.stitch_width,
             row_height: self.row_height,
-            edges: match self.edges.as_str() {
-                _ if self.tile => Edges::Tile,
-                "live" => Edges::Live,
-                "slipped" => Edges::Slipped,
-                _ => Edges::Finished,
-            },
-            rims: Rims {
-                cast_on: if self.cast_on == "cable" { CastOn::Cable } else { CastOn::LongTail },
-                top: if self.top == "drawn" { Closing::Drawn } else { Closing::BoundOff },
-            },
+            edges: if self.tile { Edges::Tile } else { self.edges },
+            rims: Rims { cast_on: self.cast_on, top: self.top },
             yarn_per_stitch: self.yarn_per_stitch,
             points: self.points,
             colors: None,
@@ -146,26 +149,17 @@ impl KnitArgs {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
         let piece = self.sized(&piece, yarn)?;
-        if piece.form != Form::Flat && piece.stitches < 3 {
-            return Err(wrong(&"knitting in the round takes at least 3 stitches"));
-        }
-        if piece.control_points() > MAX_POINTS {
-            return Err(wrong(&"more than 2^27 control points; fewer stitches, rows or points"));
-        }
+        piece.check_counts().map_err(told)?;
         Ok(piece)
     }
 
     fn form(&self, radius: f64) -> Result<Form, Failure> {
         let profile: Vec<DVec2> = self.profile.iter().map(|p| DVec2::from(*p)).collect();
-        if profile.len() == 1 || profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
-            let problem = "a profile has two or more points, all apart; as in --profile 90,0 --profile 60,80";
-            return Err(wrong(&problem));
+        if !profile.is_empty() {
+            let told = |problem| wrong(&format!("{problem}; as in --profile 90,0 --profile 60,80"));
+            return Form::revolution(profile, radius).map_err(told);
         }
-        Ok(match (profile.is_empty(), self.form.as_str()) {
-            (false, _) => Form::Revolution(profile),
-            (true, "tube") => Form::Tube,
-            _ => Form::Flat,
-        })
+        Ok(self.form.clone())
     }
 
     /// The piece in the size that is asked for.
@@ -178,7 +172,6 @@ impl KnitArgs {
             height,
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
         };
-        let told = |Misfit { problem, hint, .. }| Failure::Input(format!("error: {problem}\n  hint: {hint}"));
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
         let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {

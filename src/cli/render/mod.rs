@@ -19,7 +19,7 @@ use super::{
 use crate::{
     cloth::Cloth,
     ffi::oidn::Denoiser,
-    image::{self, Attribute, output::Format, png::ToneMap},
+    image::{self, Attribute, output::Format},
     plan::Memory,
     render::{
         self, Checkpoints, Control, Job, Rendered, Stop,
@@ -141,10 +141,8 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
     if !layered {
         scene.layers = Layers::NONE;
     }
-    match args.tone_map.as_deref() {
-        Some("filmic") => scene.display.tone_map = ToneMap::Filmic,
-        Some(_) => scene.display.tone_map = ToneMap::Srgb,
-        None => {}
+    if let Some(tone_map) = args.tone_map {
+        scene.display.tone_map = tone_map;
     }
     if let Some(exposure) = args.exposure {
         scene.display.exposure = exposure;

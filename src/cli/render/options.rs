@@ -7,8 +7,8 @@ use std::{
 
 use clap::Args;
 
-use super::super::{Failure, SceneArgs, log::LogArgs};
-use crate::{files::has_extension, render::Shard, scene::animation::numbered};
+use super::super::{Failure, SceneArgs, log::LogArgs, named};
+use crate::{files::has_extension, image::png::ToneMap, render::Shard, scene::animation::numbered};
 
 const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml                                  writes out/swatch.exr
@@ -37,8 +37,8 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
     pub(super) display: Option<String>,
     /// Curve of the picture for a screen.
-    #[arg(long, value_parser = ["srgb", "filmic"])]
-    pub(super) tone_map: Option<String>,
+    #[arg(long, value_parser = named(&ToneMap::NAMES))]
+    pub(super) tone_map: Option<ToneMap>,
     /// Exposure of the picture for a screen, in stops.
     #[arg(long, value_name = "STOPS", value_parser = stops)]
     pub(super) exposure: Option<f32>,

@@ -11,8 +11,11 @@ use crate::{
     geometry::curve::{Basis, CurveSet, equal_radii},
 };
 
+/// Extensions of layers that are written.
+pub(super) const EXTENSIONS: [&str; 3] = ["usda", "usdc", "usd"];
+
 pub(super) fn can_write(path: &Path) -> bool {
-    matches!(extension(path).as_deref(), Some("usd" | "usda" | "usdc"))
+    extension(path).is_some_and(|found| EXTENSIONS.contains(&found.as_str()))
 }
 
 /// The most prims for curves that are of one width each.

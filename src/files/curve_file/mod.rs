@@ -35,7 +35,7 @@ use crate::{
         stage::{self, PrimPattern, Stage},
     },
     geometry::curve::{Basis, CurveSet},
-    input::system::hindrance,
+    input::{diagnostic::listed, system::hindrance},
     pattern::tile::Tile,
 };
 
@@ -232,7 +232,10 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
             FileLocation::File,
             "expected a curve file, found neither the letters BCC or HAIR nor a known extension",
         )
-        .hint("name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .usda, .usdc, .usdz or .abc after its content")
+        .hint(format!(
+            "name it {} after its content",
+            dotted(EXTENSIONS.iter().map(|(name, _)| *name).chain(stage::EXTENSIONS))
+        ))
     })?;
     parse(&bytes, format, options)
 }
@@ -266,15 +269,40 @@ fn recognise(bytes: &[u8], path: &Path) -> Option<Format> {
     if bytes.starts_with(yarns::MAGIC) {
         return Some(Format::Yarns);
     }
-    match extension(path)?.as_str() {
-        "bcc" => Some(Format::Bcc),
-        "hair" => Some(Format::Hair),
-        "obj" => Some(Format::Obj),
-        "pyp" => Some(Format::Pyp),
-        "txt" | "curves" => Some(Format::Text),
-        "yarns" => Some(Format::Yarns),
-        _ => None,
-    }
+    of_extension(path)
+}
+
+/// Extensions by which formats are known where the content does not tell, but for stages and stitch meshes.
+const EXTENSIONS: [(&str, Format); 7] = [
+    ("bcc", Format::Bcc),
+    ("hair", Format::Hair),
+    ("pyp", Format::Pyp),
+    ("obj", Format::Obj),
+    ("yarns", Format::Yarns),
+    ("txt", Format::Text),
+    ("curves", Format::Text),
+];
+
+fn of_extension(path: &Path) -> Option<Format> {
+    let found = extension(path)?;
+    EXTENSIONS.iter().find(|(name, _)| *name == found).map(|(_, format)| *format)
+}
+
+/// Extensions with their dots, for messages.
+fn dotted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    listed(names.map(|name| format!(".{name}")), "or")
+}
+
+fn is_written(format: Format) -> bool {
+    format != Format::Pyp
+}
+
+/// The extensions of files that [`write()`] writes, as in "`.bcc, .hair or .obj`".
+pub fn written_extensions() -> String {
+    let own = EXTENSIONS.iter().filter(|(_, format)| is_written(*format)).map(|(name, _)| *name);
+    #[cfg(feature = "usd")]
+    let own = own.chain(layer::EXTENSIONS);
+    dotted(own)
 }
 
 /// Reads curves from bytes of a known format; touches nothing outside its arguments.
@@ -319,14 +347,7 @@ pub fn can_read(path: &Path) -> bool {
 
 /// The format that a file's name asks for, if it can be written.
 fn written_as(path: &Path) -> Option<Format> {
-    match extension(path)?.as_str() {
-        "bcc" => Some(Format::Bcc),
-        "hair" => Some(Format::Hair),
-        "obj" => Some(Format::Obj),
-        "txt" | "curves" => Some(Format::Text),
-        "yarns" => Some(Format::Yarns),
-        _ => None,
-    }
+    of_extension(path).filter(|format| is_written(*format))
 }
 
 /// Whether [`write()`] knows a format by this name.
@@ -354,10 +375,9 @@ pub fn write(path: &Path, set: &CurveSet, out: &mut impl io::Write) -> io::Resul
         Some(Format::Obj) => write_obj_lines(set, out),
         Some(Format::Text) => write_text(set, out),
         Some(Format::Yarns) => write_yarns(set, out),
-        Some(Format::Pyp) | None => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "a curve file ends in .bcc, .hair, .obj, .yarns, .txt, .usda or .usdc",
-        )),
+        Some(Format::Pyp) | None => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, format!("a curve file ends in {}", written_extensions())))
+        }
     }
 }
 

@@ -82,7 +82,8 @@ pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> R
                 let place = |word: Option<&str>| {
                     let (polygon, edge) = word?.split_once('/')?;
                     let (polygon, edge): (usize, i64) = (polygon.parse().ok()?, edge.parse().ok()?);
-                    let (polygon, at) = (polygon.checked_sub(1)?, usize::try_from(edge.abs()).ok()?.checked_sub(1)?);
+                    let (polygon, at) =
+                        (polygon.checked_sub(1)?, usize::try_from(edge.unsigned_abs()).ok()?.checked_sub(1)?);
                     (at < polygons.get(polygon)?.corners.len()).then_some(([polygon, at], edge < 0))
                 };
                 let ends = (place(words.next()), place(words.next()));
@@ -335,6 +336,7 @@ mod tests {
         assert!(wrong(quad).contains("line 10: a face without a type"));
         assert!(wrong("v 0 0 0\nf 1 2 3\n").contains("three or more corners that there are"));
         assert!(wrong(&format!("{quad}T 1\ne 1/2 2/-4\n")).contains("of faces above"));
+        assert!(wrong(&format!("{quad}T 1\ne 1/{} 1/1\n", i64::MIN)).contains("of faces above"));
         assert!(wrong(&format!("{quad}L what x\nT 6\n")).contains("not in the library"));
         assert!(wrong("v 0 nan 0\n").contains("finite number for y"));
         assert!(wrong(&format!("{quad}T 1\n{quad}T 1\ne 1/3 2/-1\ne 1/3 2/-1\n")).contains("joined already"));

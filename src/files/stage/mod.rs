@@ -140,9 +140,12 @@ enum Take<'a> {
     Meshes(&'a mut AddMesh<'a>),
 }
 
+/// Extensions of stages.
+pub(super) const EXTENSIONS: [&str; 5] = ["usda", "usdc", "usd", "usdz", "abc"];
+
 /// Whether a file's name says that it is a stage.
 pub fn is_stage(path: &Path) -> bool {
-    matches!(extension(path).as_deref(), Some("usd" | "usda" | "usdc" | "usdz" | "abc"))
+    extension(path).is_some_and(|found| EXTENSIONS.contains(&found.as_str()))
 }
 
 impl Stage {
@@ -193,7 +196,7 @@ impl Stage {
     }
 
     /// All visible curves of the objects that `pattern` chooses, at a frame (at the earliest if `None`), in the order of
-    /// the stage. Beside them which object each of them is of, as ranges in that order.
+    /// the stage. Beside them the objects in that order, each with the number of its curves.
     ///
     /// # Errors
     /// An object breaks the rules of its format, or there are more than 2^28 points.

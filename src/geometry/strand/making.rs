@@ -49,7 +49,8 @@ pub(super) fn strands(
             .collect();
         if let Cow::Owned(curves) = &mut curves {
             for (curve, radii) in &mut curves[first..end] {
-                (curve.points, *radii) = (Vec::new(), Vec::new());
+                *curve = Curve { points: Vec::new(), radii: None, flattening: None, ..*curve };
+                *radii = Vec::new();
             }
         }
         made.into_iter().for_each(|strand| joined.push(strand));
@@ -276,6 +277,12 @@ impl Joined {
             frames.shrink_to_fit();
             Pose { points: points.into(), frames }
         };
+        self.distances.shrink_to_fit();
+        self.flattening.shrink_to_fit();
+        self.material_indices.shrink_to_fit();
+        self.uvs.shrink_to_fit();
+        self.first_segments.shrink_to_fit();
+        self.tight_bends.shrink_to_fit();
         let mut poses = self.poses.into_iter().map(pose);
         let first = poses.next().expect("yarns are somewhere when the shutter opens");
         let mut later: Vec<Pose> = poses.collect();

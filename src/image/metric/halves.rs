@@ -20,6 +20,17 @@ pub struct Halves {
 }
 
 impl Halves {
+    /// Pixels that cloth covers by half or more: those of whole yarns, for metrics of a picture that is seen.
+    pub fn mostly_covered(&self) -> Vec<bool> {
+        self.alpha.iter().map(|alpha| *alpha >= 0.5).collect()
+    }
+
+    /// Pixels that cloth covers at all, for light that is summed: of half-covered ones alone, methods would be told apart by
+    /// which of them have a little more of their yarns' edges.
+    pub fn partly_covered(&self) -> Vec<bool> {
+        self.alpha.iter().map(|alpha| *alpha > 0.0).collect()
+    }
+
     /// The mean of both.
     pub fn mean(&self) -> Vec<[f32; 3]> {
         let [a, b] = &self.colors;

@@ -203,11 +203,6 @@ impl Draft {
             (0..wefts).filter(|&i| one_side(Box::new((0..warps).map(move |j| self.warp_over(i, j))))).collect(),
         ]
     }
-
-    /// Share of crossings with the warp on top.
-    pub fn warp_share(&self) -> f64 {
-        self.over.iter().filter(|o| **o).count() as f64 / self.over.len() as f64
-    }
 }
 
 #[cfg(test)]

@@ -291,7 +291,7 @@ mod tests {
             }
         }
         let sateen = Draft::named("sateen 5").unwrap();
-        assert_eq!(sateen.warp_share(), 0.2);
+        assert_eq!(sateen.over.iter().filter(|over| **over).count() * 5, sateen.over.len());
     }
 
     #[test]

@@ -19,6 +19,11 @@ pub enum CastOn {
     Cable,
 }
 
+impl CastOn {
+    /// All by name.
+    pub const NAMES: [(&'static str, Self); 2] = [("long-tail", Self::LongTail), ("cable", Self::Cable)];
+}
+
 /// How the last row is closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Closing {
@@ -27,6 +32,11 @@ pub enum Closing {
     BoundOff,
     /// The yarn goes once through all loops and is drawn tight, its tail inside; of what is knitted round.
     Drawn,
+}
+
+impl Closing {
+    /// All by name.
+    pub const NAMES: [(&'static str, Self); 2] = [("bound-off", Self::BoundOff), ("drawn", Self::Drawn)];
 }
 
 /// Both rims of a finished piece.

@@ -3,8 +3,10 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec2;
+
 use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
-use crate::pattern::revolution::Revolution;
+use crate::pattern::{MAX_POINTS, revolution::Revolution};
 
 /// Sizes that a knit was given, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,6 +74,14 @@ const SHORTEST: f64 = 11.0;
 pub const STITCH_WIDTHS: [f64; 2] = [1.5, 20.0];
 /// The lowest and the highest, as [`STITCH_WIDTHS`].
 pub const ROW_HEIGHTS: [f64; 2] = [0.9, 20.0];
+/// The shortest and the longest yarn of a stitch that can be asked for, in diameters of the yarn: below it no loop can be laid,
+/// above it nothing holds.
+pub const YARNS_PER_STITCH: [f64; 2] = [6.0, 60.0];
+/// The fewest stitches that are knitted round, the points that a profile may have, and how far apart they are at least, in
+/// radii of the yarn.
+const FEWEST_ROUND: u32 = 3;
+const PROFILE_POINTS: std::ops::RangeInclusive<usize> = 2..=10_000;
+const CLOSEST_PROFILE_POINTS: f64 = 1e-3;
 /// Width and height of a usual stitch, in units.
 const USUAL: [f64; 2] = [3.0, 2.2];
 /// Yarn of a firm stitch.
@@ -174,7 +184,7 @@ impl Sizes {
             let high = if knit.edges == Edges::Tile { knit.chart.rows() } else { 1 };
             if let Some(width) = open[0] {
                 // A ring of fewer cannot be laid.
-                let least = if knit.form == Form::Flat { 1 } else { 3 };
+                let least = if knit.form == Form::Flat { 1 } else { FEWEST_ROUND };
                 knit.stitches = count(across, width, stitch[0], wide, least)?;
             }
             if let Some(height) = open[1] {
@@ -226,6 +236,44 @@ impl Sizes {
             Form::Revolution(profile) => fits_profile(knit, &Revolution::new(profile), yarn),
             _ => Ok(()),
         }
+    }
+}
+
+impl Form {
+    /// A surface of revolution, for yarn of a radius in the unit of the profile.
+    ///
+    /// # Errors
+    /// What is wrong with the profile.
+    pub fn revolution(profile: Vec<DVec2>, radius: f64) -> Result<Self, String> {
+        let [least, most] = [PROFILE_POINTS.start(), PROFILE_POINTS.end()];
+        if !PROFILE_POINTS.contains(&profile.len()) {
+            Err(format!("a profile has {least} to {most} points"))
+        } else if profile.iter().any(|p| p.x < 0.0) {
+            Err("the radius of a profile must be at least 0".to_owned())
+        } else if profile.windows(2).any(|w| w[0].distance(w[1]) < CLOSEST_PROFILE_POINTS * radius) {
+            Err("two points of the profile fall together".to_owned())
+        } else {
+            Ok(Self::Revolution(profile))
+        }
+    }
+}
+
+impl Knit {
+    /// Whether so many stitches and rows can be knitted in this form.
+    ///
+    /// # Errors
+    /// They are too few, or too many.
+    pub fn check_counts(&self) -> Result<(), Misfit> {
+        let misfit = |problem: String, hint: &str| Misfit { key: Some("stitches"), problem, hint: hint.to_owned() };
+        if self.control_points() > MAX_POINTS {
+            let problem = format!("more than 2^{} control points", MAX_POINTS.ilog2());
+            return Err(misfit(problem, "fewer stitches, rows or points"));
+        }
+        if self.form != Form::Flat && self.stitches < FEWEST_ROUND {
+            let problem = format!("knitting in the round takes at least {FEWEST_ROUND} stitches");
+            return Err(misfit(problem, "fewer are knitted flat"));
+        }
+        Ok(())
     }
 }
 

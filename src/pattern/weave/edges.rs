@@ -23,6 +23,19 @@ pub enum Edges {
     Finished,
 }
 
+/// Edges for a length of their fringe, if they have one.
+pub type EdgesOf = fn(f64) -> Edges;
+
+impl Edges {
+    /// All by name.
+    pub const NAMES: [(&'static str, EdgesOf); 4] = [
+        ("finished", |_| Self::Finished),
+        ("selvedge", |_| Self::Selvedge),
+        ("fringe", Self::Fringe),
+        ("live", |_| Self::Live),
+    ];
+}
+
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
 
@@ -62,7 +75,7 @@ pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
 
 /// Lets warps go on beyond both ends, each its own way.
 pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f64) {
-    let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.warp_radius);
+    let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.half_rooms[0]);
     let flat = cloth.weave.sized();
     let step = 1.2 * radius;
     let steps = (length / step).ceil().max(2.0) as usize;

@@ -16,7 +16,7 @@ mod tests;
 
 use glam::DVec3;
 
-pub use self::edges::Edges;
+pub use self::edges::{Edges, EdgesOf};
 use self::unit_cell::{BEAT, CellOptions, UnitCell, full};
 use super::{
     MAX_POINTS, PatternStrand, StrandKind,
@@ -34,10 +34,8 @@ pub struct Weave {
     pub warps: Extent,
     /// How many wefts, or how high.
     pub wefts: Extent,
-    /// Half of the room that a warp takes where it is round: its radius, or less if it is plied.
-    pub warp_radius: f64,
-    /// Half of the room that a weft takes where it is round.
-    pub weft_radius: f64,
+    /// Half of the room that a warp and that a weft take where they are round: their radii, or less if they are plied.
+    pub half_rooms: [f64; 2],
     /// These over the radii of the yarns themselves: 1, or less for plied yarns, which lie in each other's hollows.
     pub half_width: [f64; 2],
     /// Distance between warps; what the loom gives if absent.
@@ -118,16 +116,24 @@ pub struct Measures {
 pub const POINTS: u32 = 8;
 /// Yarns of each side unless asked otherwise.
 pub const YARNS: u32 = 20;
-/// The longest fringe and the highest pile that can be asked for, in radii of the warp.
-pub const LONGEST: f64 = 1000.0;
-/// Length of a fringe unless asked otherwise, in radii of the warp.
-pub const FRINGE: f64 = 24.0;
 /// Width over height of free yarns in cloth: staple yarns are 1.3 to 2 (Kemp 1958).
 pub const FLATTEN: f64 = 1.5;
-/// How high pile stands unless asked otherwise, for a pile yarn of this radius: four diameters where it is cut, eight as loops.
-pub fn pile_height(draft: &Draft, radius: f64) -> f64 {
-    let diameters = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
-    2.0 * diameters * radius
+
+/// How far a fringe or a pile may stand out, by half of the room that a warp takes: the longest that can be asked for.
+pub fn longest(half_room: f64) -> f64 {
+    1000.0 * half_room
+}
+
+/// Length of a fringe unless asked otherwise, by half of the room that a warp takes.
+pub fn fringe(half_room: f64) -> f64 {
+    24.0 * half_room
+}
+
+/// How high pile stands unless asked otherwise, by half of the room that a warp takes: four times the room where it is
+/// cut, eight times as loops.
+pub fn pile_height(draft: &Draft, half_room: f64) -> f64 {
+    let rooms = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
+    2.0 * rooms * half_room
 }
 
 /// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
@@ -169,13 +175,12 @@ fn sett(draft: &Draft) -> f64 {
 }
 
 impl Weave {
-    /// A weave of one yarn as it comes by itself, cut all around: 20 by 20 yarns.
+    /// A weave of one round yarn as it comes by itself, cut all around: 20 by 20 yarns.
     pub fn of(draft: Draft, radius: f64) -> Self {
         Self {
             warps: Extent::Yarns(YARNS),
             wefts: Extent::Yarns(YARNS),
-            warp_radius: radius,
-            weft_radius: radius,
+            half_rooms: [radius; 2],
             half_width: [1.0; 2],
             warp_spacing: None,
             weft_spacing: None,
@@ -193,24 +198,24 @@ impl Weave {
 
     /// Radii of warp and weft themselves, where they are round.
     pub fn yarn_radii(&self) -> [f64; 2] {
-        [self.warp_radius / self.half_width[0], self.weft_radius / self.half_width[1]]
+        [0, 1].map(|side| self.half_rooms[side] / self.half_width[side])
     }
 
     fn options(&self) -> CellOptions {
-        let [p, q] = [self.warp_radius, self.weft_radius].map(|r| r * r);
+        let [p, q] = self.half_rooms.map(|r| r * r);
         let beat = match self.draft.pile() {
             Some(_) if self.draft.cut_wefts() => CUT_BEAT * BEAT,
             Some(pile) if !pile.cut => LOOP_BEAT * BEAT,
             _ => BEAT,
         };
         CellOptions {
-            radius: [self.warp_radius, self.weft_radius],
+            radius: self.half_rooms,
             aspect: [self.flatten; 2],
             // A strand of fibres that slide is as stiff as they are many; the stiffer side bends less.
             crimp: self.crimp.unwrap_or(q / (p + q)),
             spacing: [self.warp_spacing, self.weft_spacing],
             // Under pressure the crimp of equal yarns would all go into one of them.
-            sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.warp_radius / self.weft_radius)))
+            sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.half_rooms[0] / self.half_rooms[1])))
                 .then(|| sett(&self.draft)),
             beat,
             nodes: self.points as usize,
@@ -394,7 +399,7 @@ impl Cloth<'_> {
                 pile::raise(self, self.strand(side, index, hem), number, i64::from(hem))
             })
         };
-        let diameter = self.weave.warp_radius + self.weave.weft_radius;
+        let diameter = self.weave.half_rooms[0] + self.weave.half_rooms[1];
         let mut strands = pile::settle(strands(0).chain(strands(1)).collect(), diameter);
         if edges != Edges::Live {
             strands = selvedge::selvedges(self, strands, hem);

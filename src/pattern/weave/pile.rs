@@ -49,7 +49,7 @@ mod tests;
 
 /// Mean diameter of warp and weft.
 fn diameter(cloth: &Cloth<'_>) -> f64 {
-    cloth.weave.warp_radius + cloth.weave.weft_radius
+    cloth.weave.half_rooms[0] + cloth.weave.half_rooms[1]
 }
 
 /// A yarn, some of whose points stand free of the ground.
@@ -368,7 +368,7 @@ impl<'a> Raised<'a> {
     }
 
     fn radius(&self) -> f64 {
-        [self.cloth.weave.warp_radius, self.cloth.weave.weft_radius][self.side]
+        self.cloth.weave.half_rooms[self.side]
     }
 
     /// From -1 to 1.

@@ -51,7 +51,7 @@ pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32
         None => from_crossing_to_crossing(&points(&wefts[i]), 0, cloth.cell.nodes).to_vec(),
     };
     let outermost = outermost(&warps);
-    let radius = cloth.weave.weft_radius;
+    let radius = cloth.weave.half_rooms[1];
     // The weft, from the bottom left on.
     let mut way: Vec<Point> = Vec::new();
     for i in 0..wefts.len() {
@@ -173,7 +173,7 @@ impl Plan {
         if !draft.twines() && draft.pile().is_none() && cloth.count[0] >= 2 * (1 + GIVING + HOLDING) {
             return Self { taken: 1, ends: 1, reach: GIVING + HOLDING, spacing: cloth.cell.spacing[0], picks: 1 };
         }
-        let close = cloth.cell.spacing[1] < RIB * (cloth.weave.warp_radius + cloth.weave.weft_radius);
+        let close = cloth.cell.spacing[1] < RIB * (cloth.weave.half_rooms[0] + cloth.weave.half_rooms[1]);
         let picks = 1 + usize::from(close);
         let jammed = with_picks(cloth, Draft::selvedge(picks, 1, false), None);
         let spacing = SLACK * UnitCell::relax(&jammed.draft, &jammed.options()).spacing[0];
@@ -327,7 +327,7 @@ impl<'a> Sides<'a> {
         let last = self.number(right, column) - out as i64;
         let thickness = &self.body.weave.threads[0].thickness;
         let thicker = thickness.get(last.rem_euclid(thickness.len().max(1) as i64) as usize).map_or(0.0, |t| t - 1.0);
-        let apart = self.plan.spacing + thicker.max(0.0) * self.body.weave.warp_radius;
+        let apart = self.plan.spacing + thicker.max(0.0) * self.body.weave.half_rooms[0];
         self.body.position(0, last as f64 + 0.5) + out * apart - self.place(column)
     }
 

@@ -65,7 +65,7 @@ fn yarns_touch_and_hardly_run_into_each_other() {
 
 #[test]
 fn sections_keep_their_area_and_are_not_upright() {
-    let weave = Weave { weft_radius: 0.6, ..weave("satin 5") };
+    let weave = Weave { half_rooms: [weave("satin 5").half_rooms[0], 0.6], ..weave("satin 5") };
     for strand in weave.strands().unwrap() {
         let radius = if strand.kind == StrandKind::Warp { 1.0 } else { 0.6_f64 };
         let (radii, flattening) = (strand.curve.radii.unwrap(), strand.curve.flattening.unwrap());
@@ -249,7 +249,7 @@ fn wefts_turn_without_folding_into_themselves() {
         let weft = made.iter().find(|s| s.kind == StrandKind::Weft).unwrap();
         // Beyond the outermost crossings.
         let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
-            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, weave.weft_radius) };
+            *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, weave.half_rooms[1]) };
             Some(*fold)
         });
         let deepest = fold.fold(0.0, f64::max);

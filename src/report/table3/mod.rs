@@ -170,8 +170,8 @@ fn ratios(mean_ratio: [f64; 3]) -> String {
 }
 
 /// The columns that people read: heading, and each row's text.
-type Column = (&'static str, fn(&Row) -> String);
-const COLUMNS: [Column; 13] = [
+type Column<T> = (&'static str, fn(&T) -> String);
+const COLUMNS: [Column<Row>; 13] = [
     ("row", |r| r.name.clone()),
     ("time, s: fibres / ours", |r| {
         format!("{} / {}", short(r.reference.render_seconds), short(r.aggregated.render_seconds))
@@ -255,62 +255,19 @@ impl Table {
 
     /// Every figure, a line for each row.
     pub(crate) fn to_csv(&self) -> String {
-        let mut out = "row,scene,width,height".to_owned();
-        let sides = ["reference", "aggregated"];
-        let figures = [
-            "render_seconds",
-            "render_seconds_deviation",
-            "build_seconds",
-            "geometry_bytes",
-            "bvh_bytes",
-            "peak_rss_bytes",
-            "mean_bounces",
-            "spp",
-            "rays",
-        ];
-        for side in sides {
-            for figure in figures {
-                let _ = write!(out, ",{side}_{figure}");
-            }
-        }
-        out += ",time_ratio,time_ratio_deviation,memory_ratio,bounce_ratio,mean_ratio_r,mean_ratio_g,mean_ratio_b,relmse,relmse_8,flip\n";
+        let of_run = |side: &str| RUN_COLUMNS.map(|(name, _)| format!("{side}_{name}"));
+        let mut header: Vec<String> = ROW_COLUMNS.iter().map(|(name, _)| (*name).to_owned()).collect();
+        header.extend(of_run("reference"));
+        header.extend(of_run("aggregated"));
+        header.extend(ERROR_COLUMNS.iter().map(|(name, _)| (*name).to_owned()));
+        let mut out = header.join(",") + "\n";
         for row in &self.rows {
-            let _ = write!(
-                out,
-                "\"{}\",\"{}\",{},{}",
-                row.name.replace('"', "\"\""),
-                row.scene.replace('"', "\"\""),
-                row.size[0],
-                row.size[1]
-            );
+            let mut cells: Vec<String> = ROW_COLUMNS.iter().map(|(_, cell)| cell(row)).collect();
             for run in [&row.reference, &row.aggregated] {
-                let _ = write!(
-                    out,
-                    ",{},{},{},{},{},{},{},{},{}",
-                    run.render_seconds,
-                    run.render_seconds_deviation,
-                    run.build_seconds,
-                    run.geometry_bytes,
-                    run.bvh_bytes,
-                    run.peak_rss_bytes,
-                    run.mean_bounces,
-                    run.spp,
-                    run.rays
-                );
+                cells.extend(RUN_COLUMNS.iter().map(|(_, cell)| cell(run)));
             }
-            let e = &row.model_error;
-            let [r, g, b] = e.mean_ratio;
-            let _ = writeln!(
-                out,
-                ",{},{},{},{},{r},{g},{b},{},{},{}",
-                row.time_ratio,
-                row.time_ratio_deviation,
-                row.memory_ratio,
-                row.bounce_ratio,
-                e.relmse,
-                e.relmse_8.map_or(String::new(), |v| v.to_string()),
-                e.flip
-            );
+            cells.extend(ERROR_COLUMNS.iter().map(|(_, cell)| cell(row)));
+            out += &(cells.join(",") + "\n");
         }
         out
     }
@@ -320,6 +277,46 @@ impl Table {
         serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
     }
 }
+
+/// Text in quotes, as CSV has it.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// The columns of the CSV that name a row.
+const ROW_COLUMNS: [Column<Row>; 4] = [
+    ("row", |row| quoted(&row.name)),
+    ("scene", |row| quoted(&row.scene)),
+    ("width", |row| row.size[0].to_string()),
+    ("height", |row| row.size[1].to_string()),
+];
+
+/// Those of each of its two runs.
+const RUN_COLUMNS: [Column<Run>; 9] = [
+    ("render_seconds", |run| run.render_seconds.to_string()),
+    ("render_seconds_deviation", |run| run.render_seconds_deviation.to_string()),
+    ("build_seconds", |run| run.build_seconds.to_string()),
+    ("geometry_bytes", |run| run.geometry_bytes.to_string()),
+    ("bvh_bytes", |run| run.bvh_bytes.to_string()),
+    ("peak_rss_bytes", |run| run.peak_rss_bytes.to_string()),
+    ("mean_bounces", |run| run.mean_bounces.to_string()),
+    ("spp", |run| run.spp.to_string()),
+    ("rays", |run| run.rays.to_string()),
+];
+
+/// Those that compare the two.
+const ERROR_COLUMNS: [Column<Row>; 10] = [
+    ("time_ratio", |row| row.time_ratio.to_string()),
+    ("time_ratio_deviation", |row| row.time_ratio_deviation.to_string()),
+    ("memory_ratio", |row| row.memory_ratio.to_string()),
+    ("bounce_ratio", |row| row.bounce_ratio.to_string()),
+    ("mean_ratio_r", |row| row.model_error.mean_ratio[0].to_string()),
+    ("mean_ratio_g", |row| row.model_error.mean_ratio[1].to_string()),
+    ("mean_ratio_b", |row| row.model_error.mean_ratio[2].to_string()),
+    ("relmse", |row| row.model_error.relmse.to_string()),
+    ("relmse_8", |row| row.model_error.relmse_8.map_or(String::new(), |v| v.to_string())),
+    ("flip", |row| row.model_error.flip.to_string()),
+];
 
 #[cfg(test)]
 pub(super) mod tests {
@@ -400,7 +397,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn json_has_the_keys_of_the_interface() {
+    fn json_has_the_keys_that_scripts_read() {
         let json: serde_json::Value = serde_json::from_str(&table().to_json()).unwrap();
         for key in ["machine", "commit", "metric", "target", "rows"] {
             assert!(!json[key].is_null(), "{key}");

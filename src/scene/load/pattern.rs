@@ -15,15 +15,12 @@ use crate::{
         document::Value,
     },
     pattern::{
-        MAX_POINTS,
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
         knitspeak,
     },
 };
 
-/// Stitches of a knit that says no number.
-const STITCHES: u64 = 20;
 /// Stitches over which a yarn floats before it is caught, and rows that it is carried, unless the knit says so.
 const CATCH_FLOATS: u64 = 7;
 const CARRY_ROWS: u64 = 6;
@@ -247,7 +244,7 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Option<Char
     for other in ["pattern", "chart"].into_iter().filter(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
-    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
     let rows = match knitspeak::chart_rows(text, stitches) {
         Ok(rows) => rows,
         Err(error) => {
@@ -287,7 +284,7 @@ pub(super) fn knit(
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
     let (_, chart, lines) = &charted;
-    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(20, Chart::rows) } else { 20 };
+    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(knit::COUNT, Chart::rows) } else { knit::COUNT };
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     counted(table, yarns, charted, form, rows, sizes)
 }
@@ -307,7 +304,7 @@ pub(super) fn stockinette(
     let form = Some(Form::Flat);
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
     let charted = ("stockinette".to_owned(), Chart::named("stockinette"), Vec::new());
-    counted(table, yarns, charted, form, 20, sizes)
+    counted(table, yarns, charted, form, knit::COUNT, sizes)
 }
 
 /// Over how many stitches a float goes before it is caught, if it is, and over how many rows a yarn is carried.
@@ -353,15 +350,14 @@ fn counted(
     rows: u32,
     sizes: GivenSizes,
 ) -> Option<KnitPlan> {
-    let stitches = table.u64_or("stitches", STITCHES, 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
     let in_range = |[least, most]: [f64; 2]| Range::between(least, most);
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));
     let row_height = table.f64("row_height", in_range(knit::ROW_HEIGHTS));
-    let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+    let yarn_per_stitch = table.f64("yarn_per_stitch", in_range(knit::YARNS_PER_STITCH));
     let yarn = yarns.thickness(flatten(table));
-    let kinds = [("finished", Edges::Finished), ("slipped", Edges::Slipped), ("live", Edges::Live)];
-    let edges = table.one_of_or("edges", Edges::Finished, &kinds);
+    let edges = table.one_of_or("edges", Edges::Finished, &Edges::NAMES);
     let tile = table.bool_or("tile", false);
     if tile && (table.has("edges") || form.as_ref().is_some_and(|f| *f != Form::Flat)) {
         table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));
@@ -402,11 +398,8 @@ fn counted(
         colors: None,
         flat,
     };
-    if knit.control_points() > MAX_POINTS {
-        table.error_at("stitches", "more than 2^27 control points", Some("fewer stitches, rows or points"));
-    }
-    if knit.form != Form::Flat && knit.stitches < 3 {
-        table.error_at("stitches", "knitting in the round takes at least 3 stitches", None);
+    if let Err(wrong) = knit.check_counts() {
+        table.error_at("stitches", wrong.problem, Some(&wrong.hint));
         return None;
     }
     Some(KnitPlan { knit, name, lines, header: table.header(), work, sizes, yarn })
@@ -414,11 +407,9 @@ fn counted(
 
 /// `cast_on` and `top` of a finished piece.
 fn rims(table: &Reader<'_>, edges: Edges, form: Option<&Form>) -> Rims {
-    let cast_on = [("long-tail", CastOn::LongTail), ("cable", CastOn::Cable)];
-    let top = [("bound-off", Closing::BoundOff), ("drawn", Closing::Drawn)];
     let rims = Rims {
-        cast_on: table.one_of_or("cast_on", CastOn::LongTail, &cast_on),
-        top: table.one_of_or("top", Closing::BoundOff, &top),
+        cast_on: table.one_of_or("cast_on", CastOn::LongTail, &CastOn::NAMES),
+        top: table.one_of_or("top", Closing::BoundOff, &Closing::NAMES),
     };
     for key in ["cast_on", "top"] {
         if table.has(key) && matches!(edges, Edges::Live | Edges::Tile) {
@@ -442,14 +433,5 @@ fn revolution(table: &Reader<'_>, context: &Context<'_>, profile: Option<&[[f64;
         return None;
     };
     let profile: Vec<DVec2> = profile.iter().map(|p| DVec2::from(*p) * context.unit).collect();
-    if !(2..=10_000).contains(&profile.len()) {
-        table.error_at("profile", "a profile has 2 to 10000 points", Some(HINT));
-    } else if profile.iter().any(|p| p.x < 0.0) {
-        table.error_at("profile", "the radius of a profile must be at least 0", Some(HINT));
-    } else if profile.windows(2).any(|w| w[0].distance(w[1]) < 1e-3 * radius) {
-        table.error_at("profile", "two points of the profile fall together", Some(HINT));
-    } else {
-        return Some(Form::Revolution(profile));
-    }
-    None
+    Form::revolution(profile, radius).map_err(|problem| table.error_at("profile", problem, Some(HINT))).ok()
 }

@@ -14,7 +14,7 @@ use crate::{
         weave::{self, Edges, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
-    scene::Yarn,
+    scene::{Tufts, Yarn},
 };
 
 /// A weave that is checked.
@@ -38,8 +38,8 @@ pub(super) struct Woven {
     pub(super) origin: String,
     /// Warps and wefts, with their places.
     pub(super) sides: [(Vec<Curve>, FabricCoordinates); 2],
-    /// Of each: how many cut tufts there are, and how many curves are strands of them.
-    pub(super) tufts: [[usize; 2]; 2],
+    /// The cut tufts of each.
+    pub(super) tufts: [Tufts; 2],
 }
 
 impl WeavePlan {
@@ -60,7 +60,8 @@ impl WeavePlan {
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
                 let tufts = [&warps, &wefts].map(|side| {
                     let strands = || side.iter().filter(|s| s.share < 1.0);
-                    [strands().map(|s| s.share).sum::<f64>().round() as usize, strands().count()]
+                    let yarns = strands().map(|s| s.share).sum::<f64>().round() as usize;
+                    Tufts { yarns, strands: strands().count() }
                 });
                 let sides = [warps, wefts].map(|side| FabricCoordinates::of(side, cloth.count()));
                 return Some(Woven { origin, sides, tufts });
@@ -140,13 +141,10 @@ pub(super) fn weave(
         order
     });
     let written = |side: usize| wif.and_then(|w| w.radius[side]).filter(|_| !yarns.has_radius());
-    let own = yarns.radius();
     let weft_of_its_own = weft_yarn.and_then(|name| yarns.library.yarns.get(name));
-    let weft_radius = weft_of_its_own.map_or(own, |y| y.radius);
-    let half_width = yarns.half_width();
-    let half_width = [half_width, weft_of_its_own.map_or(half_width, Yarn::half_width)];
-    let own = written(0).unwrap_or(own) * half_width[0];
-    let weft_radius = written(1).unwrap_or(weft_radius) * half_width[1];
+    let radius = [yarns.radius(), weft_of_its_own.map_or(yarns.radius(), |y| y.radius)];
+    let half_width = [yarns.half_width(), weft_of_its_own.map_or(yarns.half_width(), Yarn::half_width)];
+    let half_rooms = [0, 1].map(|side| written(side).unwrap_or(radius[side]) * half_width[side]);
     let cover = table.f64("cover", Range::between(0.01, 1.0));
     let filed = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
     let asked =
@@ -164,8 +162,8 @@ pub(super) fn weave(
     let crimp = table.f64("crimp", Range::UNIT);
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
-    let pile = standing(table, context, "pile_height", own);
-    let edges = edges(table, context, own, wif.is_some_and(has_unequal_threads));
+    let pile = standing(table, context, "pile_height", half_rooms[0]);
+    let edges = edges(table, context, half_rooms[0], wif.is_some_and(has_unequal_threads));
     let tile = table.bool_or("tile", false);
     if tile && table.has("edges") {
         table.error_at("tile", "a tile has no edges", Some("leave out `edges`"));
@@ -175,13 +173,12 @@ pub(super) fn weave(
     }
     let Drafted { draft, wif } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
-    let default_pile = weave::pile_height(&draft, own);
+    let default_pile = weave::pile_height(&draft, half_rooms[0]);
     let weave = Weave {
         draft,
         warps,
         wefts,
-        warp_radius: own,
-        weft_radius,
+        half_rooms,
         half_width,
         warp_spacing,
         weft_spacing,
@@ -216,18 +213,18 @@ fn has_unequal_threads(wif: &WovenWif) -> bool {
     wif.threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL)
 }
 
-/// How far a fringe or a pile of yarn of a radius stands out, mm.
-fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, radius: f64) -> Option<f64> {
-    let longest = Range::above(0.0).and_at_most(weave::LONGEST * radius / context.unit);
+/// How far a fringe or a pile stands out, mm, where a warp takes twice `half_room`.
+fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, half_room: f64) -> Option<f64> {
+    let longest = Range::above(0.0).and_at_most(weave::longest(half_room) / context.unit);
     table.f64(key, longest).map(|length| length * context.unit)
 }
 
 /// How the cloth ends.
-fn edges(table: &Reader<'_>, context: &Context<'_>, radius: f64, unequal: bool) -> Edges {
-    let fringe = standing(table, context, "fringe", radius);
-    let fringed = Edges::Fringe(fringe.unwrap_or(weave::FRINGE * radius));
-    let names =
-        [("finished", Edges::Finished), ("selvedge", Edges::Selvedge), ("fringe", fringed), ("live", Edges::Live)];
+fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, unequal: bool) -> Edges {
+    let fringe = standing(table, context, "fringe", half_room);
+    let length = fringe.unwrap_or_else(|| weave::fringe(half_room));
+    let fringed = Edges::Fringe(length);
+    let names = Edges::NAMES.map(|(name, edges)| (name, edges(length)));
     let default = match fringe {
         Some(_) => fringed,
         None if unequal => Edges::Selvedge,

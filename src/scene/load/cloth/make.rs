@@ -25,7 +25,7 @@ use crate::{
     geometry::curve::{Basis, Curve, CurveSet},
     math::sampler::Stream,
     pattern::straight,
-    scene::{CurveKind, Fabric, FabricMotion, GarmentFacts, Taken, defaults, transform_curves},
+    scene::{CurveKind, Fabric, FabricMotion, GarmentFacts, Taken, Tufts, defaults, transform_curves},
 };
 
 /// Columns that a yarn counts where nothing is known of its cloth.
@@ -38,8 +38,8 @@ struct Made {
     panels: Vec<(usize, String)>,
     from_file: bool,
     kind: CurveKind,
-    /// How many cut tufts there are, and how many curves are strands of them.
-    tufts: [usize; 2],
+    /// Its cut tufts.
+    tufts: Tufts,
     curves: Vec<(Curve, Vec<f64>)>,
     /// What is known of curves that are not made.
     taken: Taken,
@@ -66,7 +66,7 @@ impl Made {
             panels: Vec::new(),
             from_file: false,
             kind,
-            tufts: [0; 2],
+            tufts: Tufts::default(),
             curves,
             taken: Taken::default(),
             coordinates,
@@ -170,7 +170,7 @@ impl<'a> Base<'a> {
         if weft == self.kind {
             warps.extend(wefts);
             coordinates.join(weft_coordinates);
-            let tufts = [0, 1].map(|k| tufts[0][k] + tufts[1][k]);
+            let tufts = tufts[0] + tufts[1];
             return Some(vec![Made { tufts, dyes: dyes(), ..Made::new(origin, self.kind, warps, Some(coordinates)) }]);
         }
         let warp = Made::new(format!("warp of {origin}"), self.kind, warps, Some(coordinates));

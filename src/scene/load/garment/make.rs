@@ -88,8 +88,7 @@ impl GarmentPlan {
         let mut notes = garment.report().notes.clone();
         let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
         let (stranded, own) = self.stranded((yarn, color), (&garment, &sizes), context, library, warnings)?;
-        let mut facts =
-            GarmentFacts { overlap: overlap.map(|o| [o.share, o.deepest]), ..self.facts(&garment, &stranded, &tex) };
+        let mut facts = GarmentFacts { overlap, ..self.facts(&garment, &stranded, &tex) };
         let meshes = self.posed(&frames, &read, context)?;
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();

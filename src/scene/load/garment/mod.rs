@@ -232,7 +232,8 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
     let kind = table.kind("type", &kinds);
     let made = match kind {
         Some(ClothKind::Knit) => {
-            let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(6.0, 60.0));
+            let [shortest, longest] = knit::YARNS_PER_STITCH;
+            let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(shortest, longest));
             let flatten = pattern::flatten(&table);
             let stranding = pattern::work_of_tile(&table);
             let (name, chart, _) = pattern::chart(&table, context);
@@ -315,7 +316,7 @@ impl ClothPlan {
                     form: Form::Flat,
                     stitch_width: stitch.map(|s| s.x / unit),
                     row_height: stitch.map(|s| s.y / unit),
-                    yarn_per_stitch: Some(length.clamp(6.0, 60.0)),
+                    yarn_per_stitch: Some(length.clamp(knit::YARNS_PER_STITCH[0], knit::YARNS_PER_STITCH[1])),
                     edges: Edges::Live,
                     rims: knit::Rims::default(),
                     points: knit::POINTS,
