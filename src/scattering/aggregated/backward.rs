@@ -18,10 +18,10 @@ use super::{
         mis_weight,
     },
     Spot, View,
-    single::{Among, Met, Node},
+    single::{Among, FibersAhead, Met, Node},
 };
 use crate::{
-    geometry::section::{Inside, PlyAhead},
+    geometry::section::Inside,
     math::{Rgb, sampler::Stream},
 };
 
@@ -212,12 +212,12 @@ impl Lobe {
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
-        let open = first.open(view, w, |way, fibers| among.offer(view, way, fibers, stream));
+        let open = first.open(view, w, |fibers| among.offer(fibers, stream));
         let (way, rest) = Taken::new(node, (self.start(view, &first.spot, w), w, value, pdf), open)?;
         again.ways.push(way);
         again.meetings.push(first);
         if rest.max_channel() > 0.0 {
-            let met = among.met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
+            let met = among.met(view, stream).unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
             let from = (&first.spot.inside, w, met);
             again.meetings.push(Meeting::new(view, &self.frame, from, stream, |of| rest * of.entering));
         }
@@ -251,7 +251,7 @@ impl Lobe {
                         break;
                     };
                     if value.max_channel() > 0.0 {
-                        let open = meeting.open(view, w, |_, _| {});
+                        let open = meeting.open(view, w, |_| {});
                         visit(&meeting.spot, value * open * mis_weight(light_pdf, left * goes_on(open) * pdf));
                     }
                     left *= 1.0 - next.open;
@@ -343,8 +343,8 @@ impl Meeting {
         let shape = view.yarn.occluder().shape();
         let leaving = &view.yarn.plies[met.ply].leaving;
         let inside = view.section.beyond(shape, from, Vec3A::ZERO, w, met.distance);
-        let rim = inside.in_ply(shape, met.ply).normalize_or(Vec2::X);
-        let (place, axes) = leaving.place(rim, inside.short_axis_within());
+        let at = inside.in_ply(shape, met.ply);
+        let (place, axes) = leaving.place(at, inside.short_axis_within());
         Self {
             axes: axes_across(frame, axes.map(|axis| inside.out_of(axis))),
             outwards: leaving.draw(&place, stream),
@@ -364,7 +364,7 @@ impl Meeting {
 
     /// What other plies let pass of that; `other` is told of each, and of the fibres on its way.
     #[inline]
-    fn open(&self, view: &View<'_>, w: Vec3A, other: impl FnMut(&PlyAhead, f32)) -> Rgb {
+    fn open(&self, view: &View<'_>, w: Vec3A, other: impl FnMut(FibersAhead)) -> Rgb {
         (-self.spot.past_own(view, w, other)).exp()
     }
 

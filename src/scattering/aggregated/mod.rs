@@ -30,7 +30,7 @@ use super::{
 use crate::{
     geometry::{
         occluder::{Occluder, Transparency},
-        section::{Crossings, Inside, PlyAhead, PlyCrossing, Section},
+        section::{Crossings, Inside, PlyCrossing, Section},
         yarn::YarnShape,
     },
     math::{
@@ -40,7 +40,7 @@ use crate::{
 };
 use backward::{Backward, Lobe};
 use forward::Forward;
-use single::LateNode;
+use single::{FibersAhead, LateNode};
 
 mod backward;
 mod forward;
@@ -182,17 +182,18 @@ impl Spot {
     /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
     /// fibres on its way.
     #[inline]
-    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> Rgb {
+    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
         let shape = view.yarn.occluder().shape();
         let (thin, wide) = (view.section.thinness(), self.inside.wide(w));
         let mut depth = Rgb::ZERO;
         view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
             if way.ply != self.ply {
                 let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
-                let fibers = way.tilt(shape, view.section, &self.inside, w, &chord) * chord.ahead(-way.foot);
-                if fibers > 0.0 {
-                    depth += view.yarn.plies[way.ply].rho * fibers;
-                    other(&way, fibers);
+                let tilt = way.tilt(shape, view.section, &self.inside, w, &chord);
+                let fibers = FibersAhead::new(&way, chord, tilt);
+                if fibers.expected > 0.0 {
+                    depth += view.yarn.plies[way.ply].rho * fibers.expected;
+                    other(fibers);
                 }
             }
         });

@@ -20,6 +20,7 @@ use super::{
 use crate::{
     geometry::{
         after_fiber::{AfterTurn, ClearedStrip},
+        density::ChordFibers,
         section::{PlyAhead, PlyCrossing},
     },
     math::{Rgb, sampler::Stream},
@@ -181,7 +182,7 @@ impl Node {
     #[inline]
     pub(super) fn toward(&self, view: &View<'_>, w: Vec3A) -> NodeValue {
         let optics = &view.yarn.plies[self.spot.ply];
-        let way = self.way_out(view, w, |_, _| {});
+        let way = self.way_out(view, w, |_| {});
         let Passing { clear, after, untouched } = way.passes(optics);
         let sin = w.dot(self.spot.tangent).clamp(-1.0, 1.0);
         let cos = (1.0 - sin * sin).sqrt();
@@ -241,8 +242,8 @@ impl Node {
     #[inline]
     pub(super) fn others(&self, view: &View<'_>, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
         let mut among = Among::default();
-        let WayOut { others, .. } = self.way_out(view, w, |way, fibers| among.offer(view, way, fibers, stream));
-        ((-others).exp(), among.met)
+        let WayOut { others, .. } = self.way_out(view, w, |fibers| among.offer(fibers, stream));
+        ((-others).exp(), among.met(view, stream))
     }
 
     /// What lies between the node and the outside in a direction of the section's frame; `other` is told of the fibres in each other ply.
@@ -252,7 +253,7 @@ impl Node {
     /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot". What TT bends into that
     /// direction set out in others about it.
     #[inline]
-    fn way_out(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(&PlyAhead<'_>, f32)) -> WayOut {
+    fn way_out(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> WayOut {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
@@ -288,9 +289,9 @@ impl Node {
                     *out.bent.get_or_insert(Rgb::ZERO) += depth(bent);
                 }
             } else {
-                let fibers = tilt * chord.ahead(-way.foot);
-                out.others += yarn.plies[way.ply].rho * fibers;
-                other(&way, fibers);
+                let fibers = FibersAhead::new(&way, chord, tilt);
+                out.others += yarn.plies[way.ply].rho * fibers.expected;
+                other(fibers);
             }
         });
         out
@@ -335,29 +336,58 @@ impl WayOut {
     }
 }
 
-/// Where a way out meets another ply.
+/// Where a way out meets a fibre of another ply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Met {
     pub(super) ply: usize,
-    /// Distance in the section to its rim.
+    /// Distance in the section.
     pub(super) distance: f32,
+}
+
+/// What a way out meets of another ply.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FibersAhead {
+    ply: usize,
+    /// Distance in the section to the chord's middle.
+    foot: f32,
+    chord: ChordFibers,
+    tilt: f32,
+    /// How many are expected.
+    pub(super) expected: f32,
+}
+
+impl FibersAhead {
+    #[inline]
+    pub(super) fn new(way: &PlyAhead<'_>, chord: ChordFibers, tilt: f32) -> Self {
+        Self { ply: way.ply, foot: way.foot, chord, tilt, expected: tilt * chord.ahead(-way.foot) }
+    }
 }
 
 /// One of the plies on a way out, drawn by the fibres in each.
 #[derive(Default)]
 pub(super) struct Among {
     fibers: f32,
-    pub(super) met: Option<Met>,
+    drawn: Option<FibersAhead>,
 }
 
 impl Among {
     #[inline]
-    pub(super) fn offer(&mut self, view: &View<'_>, way: &PlyAhead<'_>, fibers: f32, stream: &mut Stream) {
-        self.fibers += fibers;
-        if fibers > 0.0 && stream.next() * self.fibers < fibers {
-            let radius = view.yarn.occluder().shape().plies[way.ply].radius;
-            let half = (radius * radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
-            self.met = Some(Met { ply: way.ply, distance: (way.foot - half).max(0.0) });
+    pub(super) fn offer(&mut self, fibers: FibersAhead, stream: &mut Stream) {
+        self.fibers += fibers.expected;
+        if fibers.expected > 0.0 && stream.next() * self.fibers < fibers.expected {
+            self.drawn = Some(fibers);
         }
+    }
+
+    /// Where light that goes straight on until a fibre takes it out of its way meets that one in the ply drawn, as the mean of the channels
+    /// has it.
+    #[inline]
+    pub(super) fn met(&self, view: &View<'_>, stream: &mut Stream) -> Option<Met> {
+        let FibersAhead { ply, foot, chord, tilt, expected } = self.drawn?;
+        let rate = view.yarn.plies[ply].rho.mean();
+        let passed = -(-stream.next() * (1.0 - (-rate * expected).exp())).ln_1p() / rate;
+        let behind = (expected - passed).max(0.0) / tilt;
+        let at = chord.place((behind / chord.total().max(1e-20)).min(1.0));
+        Some(Met { ply, distance: (foot + at).max(0.0) })
     }
 }
