@@ -163,7 +163,7 @@ pub(super) fn weave(
     let flatten = table.f64_or("flatten", weave::FLATTEN, Range::between(1.0, 4.0));
     let points = table.u64_or("points", weave::POINTS.into(), 4..=24) as u32;
     let pile = standing(table, context, "pile_height", half_rooms[0]);
-    let edges = edges(table, context, half_rooms[0], wif.is_some_and(has_unequal_threads));
+    let edges = edges(table, context, half_rooms[0], drafted.as_ref());
     let tile = table.bool_or("tile", false);
     if tile && table.has("edges") {
         table.error_at("tile", "a tile has no edges", Some("leave out `edges`"));
@@ -206,8 +206,14 @@ pub(super) fn weave(
     })
 }
 
-/// Thickness of a thread over the mean from which on cloth is not hemmed unless asked: three layers of it do not lie flat.
+/// Thickness of a thread over the mean from which on cloth is not hemmed unless asked.
 const UNEQUAL: f64 = 1.5;
+
+/// Cloth that is not hemmed unless asked: three layers of it do not lie flat, and hems of a small sample would leave no pile.
+fn is_too_thick_for_hems(drafted: &Drafted) -> bool {
+    let Drafted { draft, wif } = drafted;
+    draft.pile().is_some() || draft.layers() > 1 || wif.as_ref().is_some_and(has_unequal_threads)
+}
 
 fn has_unequal_threads(wif: &WovenWif) -> bool {
     wif.threads.iter().flat_map(|t| &t.thickness).any(|t| *t > UNEQUAL)
@@ -220,19 +226,23 @@ fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, half_room: f64
 }
 
 /// How the cloth ends.
-fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, unequal: bool) -> Edges {
+fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, drafted: Option<&Drafted>) -> Edges {
     let fringe = standing(table, context, "fringe", half_room);
     let length = fringe.unwrap_or_else(|| weave::fringe(half_room));
     let fringed = Edges::Fringe(length);
     let names = Edges::NAMES.map(|(name, edges)| (name, edges(length)));
     let default = match fringe {
         Some(_) => fringed,
-        None if unequal => Edges::Selvedge,
+        None if drafted.is_some_and(is_too_thick_for_hems) => Edges::Selvedge,
         None => Edges::Finished,
     };
     let edges = table.one_of_or("edges", default, &names);
     if fringe.is_some() && edges != fringed {
         table.error_at("fringe", "only `edges = \"fringe\"` has a fringe", None);
+    }
+    if edges == fringed && drafted.is_some_and(|d| d.draft.pile().is_some_and(|pile| pile.cut)) {
+        let at = if table.has("edges") { "edges" } else { "fringe" };
+        table.error_at(at, "the strands of a cut pile are not drawn out into a fringe", Some("edges = \"selvedge\""));
     }
     edges
 }

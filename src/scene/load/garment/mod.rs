@@ -244,6 +244,10 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
             let flatten = table.f64_or("flatten", FLATTEN, Range::between(1.0, 4.0));
             let (name, drafted) = weave::draft(&table, context);
             drafted.map(|d| {
+                if d.draft.pile().is_some() {
+                    let hint = "a draft without pile, or the cloth as a piece of its own";
+                    table.error_at("draft", "no pile is laid on a garment", Some(hint));
+                }
                 if d.wif.as_ref().is_some_and(|wif| wif.colors.iter().any(|side| !side.is_empty())) {
                     let hint = "`columns` and `rows` of the fabric name the yarns of warps and wefts";
                     table.warning_at("draft", "colours of a draft's file are not used on a garment", Some(hint));
