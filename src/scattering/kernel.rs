@@ -17,8 +17,7 @@ pub(crate) fn kappa_of_variance(beta_squared: Rgb) -> Rgb {
 }
 
 /// -ln of the mean cosine, I2(kappa) / I1(kappa), by which the lobe whose longitudinal standard deviation in theta_h is `beta` radians turns on
-/// the sphere in four dimensions. Of light that meets one such lobe after another the mean cosines multiply, and these add: 6 beta^2 of a
-/// narrow one.
+/// the sphere in four dimensions. Of light that meets one such lobe after another the mean cosines multiply, and these add.
 pub(crate) fn spread(beta: f64) -> f64 {
     let kappa = 0.25 / (beta * beta).max(f64::from(MIN_VARIANCE));
     if kappa > 300.0 {
@@ -29,10 +28,16 @@ pub(crate) fn spread(beta: f64) -> f64 {
     -ratio.ln()
 }
 
+/// [`spread`] of a narrow lobe, by its variance beta^2.
+#[inline]
+pub(crate) fn narrow_spread(variance: f32) -> f32 {
+    6.0 * variance
+}
+
 /// kappa of the lobe of such a [`spread`]; relative error below 2e-3.
 #[inline]
 pub(crate) fn kappa_of_spread(spread: Rgb) -> Rgb {
-    let spread = spread.max(Rgb::splat(6.0 * MIN_VARIANCE));
+    let spread = spread.max(Rgb::splat(narrow_spread(MIN_VARIANCE)));
     let (mean, less) = ((-spread).exp(), spread.one_minus_exp_neg());
     let square = mean * mean;
     // Banerjee et al., Clustering on the Unit Hypersphere using von Mises-Fisher Distributions, 2005, Eq. 4.4, and what that is off by.

@@ -38,6 +38,13 @@ impl LobeFrame {
         Self { x, y: axis.cross(x), z: axis, sin, cos }
     }
 
+    /// The same with another latitude of the camera, by its sine.
+    #[inline]
+    pub(crate) fn with_latitude(self, sin: f32) -> Self {
+        let sin = sin.clamp(-1.0, 1.0);
+        Self { sin, cos: (1.0 - sin * sin).sqrt(), ..self }
+    }
+
     /// About a ply where a ray passes it, on the bent yarn.
     #[inline]
     pub(crate) fn of_ply(shape: &YarnShape, section: &Section<'_>, crossing: &PlyCrossing, camera: Vec3A) -> Self {

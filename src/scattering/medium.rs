@@ -76,7 +76,7 @@ pub(crate) struct TtWidth {
     pub factor: f32,
     /// As above.
     pub sigma: f32,
-    /// The mean cosine of the angle by which TT of a chain turns.
+    /// The mean cosine of the angle by which TT of a chain turns; 1 without TT.
     pub cosine: f32,
 }
 
@@ -85,7 +85,8 @@ impl TtWidth {
     fn new(material: &FiberMaterial) -> Self {
         let kappa = kappa_of_variance(Rgb::splat(material.beta_tt.powi(2) as f32));
         let [factor, ..] = normalisation(kappa).to_array();
-        let cosine = material.chain_cosine() as f32;
+        let bends = material.tt.iter().any(|tt| *tt > 0.0);
+        let cosine = if bends { material.chain_cosine() as f32 } else { 1.0 };
         Self { kappa: kappa.to_array()[0], factor, sigma: material.beta_n as f32, cosine }
     }
 }
@@ -134,8 +135,7 @@ pub(crate) struct PlyOptics {
     /// What leaves this ply at last of light that meets another fibre after one at a place in it, and what leaves the yarn at last
     /// of light that meets a fibre of this ply on its way from another one.
     pub leaving: Arc<Leaving>,
-    /// Of that light: what was only ever reflected keeps a longitudinal lobe. That of what met TT between, and that of what met none, if it is
-    /// told apart.
+    /// Of that light: what only R and TT sent on keeps a longitudinal lobe. That of what met TT, and that of what met none, if it is told apart.
     pub mirrored: [MirroredLobe; 2],
     /// Whether R is so much narrower than TT that what met no TT on its way is told from what did.
     pub sharp: bool,
@@ -417,7 +417,7 @@ impl<'a> Channel<'a> {
 }
 
 impl PlyOptics {
-    /// The longitudinal lobe of light that was scattered twice or more, where what keeps its latitude is spread by a variance.
+    /// The longitudinal lobe of light that was scattered twice or more, where what keeps its latitude has so much more [`spread`].
     #[inline]
     pub(crate) fn latitude_of_multiple(&self, at: Latitudes, spread: f32) -> Rgb {
         let mut latitude = Rgb::splat(DIFFUSE);
@@ -427,15 +427,16 @@ impl PlyOptics {
         latitude
     }
 
-    /// Of light that `before` fibres passed on before its node, and so many expected ones may after it, of which `untouched` meets none: the
-    /// share that none does, if R tells it from the rest, and by how much the rest is spread.
+    /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells it
+    /// from the rest, and by how much the rest is spread. `untouched` is that share where another way was counted for it.
     #[inline]
-    pub(crate) fn touched(&self, before: f32, after: Rgb, untouched: Rgb) -> (Rgb, Rgb) {
+    pub(crate) fn touched(&self, before: f32, after: Rgb, untouched: Option<Rgb>) -> (Rgb, Rgb) {
         let (known, once) = (before * self.spread_tt, Rgb::splat(self.spread_expected_tt));
         let expected = self.events * after * once;
         if !self.sharp || before > 0.0 {
             return (Rgb::ZERO, expected + known);
         }
+        let untouched = untouched.unwrap_or_else(|| (-(self.untouched * after)).exp());
         (untouched, (expected / (Rgb::ONE - untouched).max(Rgb::splat(1e-6))).max(once))
     }
 }

@@ -12,13 +12,14 @@ use wide::f32x8;
 use super::{
     super::{
         escape::{Leaving, Outwards},
-        kernel::{DIFFUSE, Latitudes, sample_sine, sample_sine_diffuse},
+        kernel::{DIFFUSE, narrow_spread, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
         medium::PlyOptics,
         mis_weight,
     },
     Spot, View,
-    single::{Among, FibersAhead, Met, Node},
+    ahead::FibersAhead,
+    single::{Among, Met, Node},
 };
 use crate::{
     geometry::section::Inside,
@@ -69,14 +70,6 @@ struct Again {
     meetings: ArrayVec<Meeting, 2>,
 }
 
-/// The latitude that light arrives with, by its sine and cosine, and by how much it is [`spread`](super::super::kernel::spread).
-#[derive(Clone, Copy, Debug)]
-struct Arriving {
-    sin: f32,
-    cos: f32,
-    spread: f32,
-}
-
 /// A direction that light took.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
@@ -122,10 +115,9 @@ impl Lobe {
         let weight = node.weight * left;
         let channels = if weight.mean() > 1e-30 { weight * weight.mean().recip() } else { Rgb::ONE };
         let (place, axes) = node.spot.place(view.yarn);
-        let mut frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
+        let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
         // As the fibres have it that the light met.
-        frame.sin = (node.axial * node.spot.inside.along(frame.z)).clamp(-1.0, 1.0);
-        frame.cos = (1.0 - frame.sin * frame.sin).sqrt();
+        let frame = frame.with_latitude(node.axial * node.spot.inside.along(frame.z));
         let outwards = optics.leaving.draw(&place, stream);
         let axes = axes_across(&frame, axes);
         let u_start = stream.next();
@@ -141,10 +133,9 @@ impl Lobe {
     #[inline]
     pub(super) fn value(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> (Rgb, f32) {
         let optics = &view.yarn.plies[spot.ply];
-        let sin = w.dot(self.frame.z).clamp(-1.0, 1.0);
-        let cos = (1.0 - sin * sin).sqrt();
-        let Arriving { sin: sin_i, cos: cos_i, spread } = self.arriving(view, spot, w);
-        let latitude = optics.latitude_of_multiple(Latitudes::new(sin_i, cos_i, sin, cos), spread);
+        let (arriving, spread) = self.arriving(view, spot, w);
+        let (at, cos) = arriving.latitudes(w);
+        let latitude = optics.latitude_of_multiple(at, spread);
         let around =
             optics.leaving.towards(self.outwards, azimuth(&self.frame, self.axes, w)) * (cos * (0.5 * FRAC_1_PI));
         let share = latitude * around;
@@ -170,16 +161,17 @@ impl Lobe {
         spot.inside.outline(shape, spot.ply, Vec2::from_angle(angle).rotate(facing))
     }
 
-    /// The latitude against the ply's axis that light had which leaves towards the azimuth of `w`, as the fibres have it that it leaves from.
+    /// The frame with the latitude that light had which leaves towards the azimuth of `w`, as the fibres have it that it leaves from; and by how
+    /// much that is spread ([`spread`](super::super::kernel::spread)).
     ///
     /// What the fibres of a ply mirror keeps its part along them ([`Spot::axial`]), which differs from that along the axis by how far from the
     /// axis the light passes it.
     #[inline]
-    fn arriving(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Arriving {
-        let LobeFrame { sin, cos, z, .. } = self.frame;
+    fn arriving(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> (LobeFrame, f32) {
+        let LobeFrame { sin, z, .. } = self.frame;
         let slope = view.yarn.plies[spot.ply].slope;
         if slope == 0.0 {
-            return Arriving { sin, cos, spread: 0.0 };
+            return (self.frame, 0.0);
         }
         let (_, shares) = outline(view, spot, w - w.dot(z) * z);
         let beside = f32x8::new(OUTLINE[1]);
@@ -187,14 +179,17 @@ impl Lobe {
         let mean = (shares * beside).reduce_add() * inverse;
         let off = beside - f32x8::splat(mean);
         let variance = (shares * off * off).reduce_add() * inverse;
-        // One half of the outline or the other: each leaves an even distribution a quarter of the variance.
+        // One half of the outline or the other: each has a quarter of an even distribution's variance, and the middles have the rest.
+        const OF_HALF: f32 = 0.25;
         let side = if self.u_start < 0.5 { -1.0 } else { 1.0 };
-        let lean = -slope * (mean + side * (0.75 * variance).sqrt());
+        let lean = -slope * (mean + side * ((1.0 - OF_HALF) * variance).sqrt());
         // By how much fibres lean there, towards the light: about them it leaves in the latitude in which it came.
         let lean = Vec2::new(1.0, lean).normalize();
         let about = (sin * lean.x).clamp(-1.0, 1.0);
-        let sin = (about * lean.x + (1.0 - about * about).sqrt() * lean.y).clamp(-1.0, 1.0);
-        Arriving { sin, cos: (1.0 - sin * sin).sqrt(), spread: 6.0 * 0.25 * 0.25 * slope * slope * variance }
+        let arriving = self.frame.with_latitude(about * lean.x + (1.0 - about * about).sqrt() * lean.y);
+        // theta_h turns by half as much.
+        let spread = narrow_spread(0.25 * OF_HALF * slope * slope * variance);
+        (arriving, spread)
     }
 
     /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
@@ -312,7 +307,7 @@ impl Lobe {
         });
         let sin = match lobe {
             Some(lobe) => {
-                let Arriving { sin, cos, spread } =
+                let (LobeFrame { sin, cos, .. }, spread) =
                     self.arriving(view, spot, direction(&self.frame, 0.0, around, self.axes));
                 sample_sine(lobe.kappa(spread).to_array()[channel], sin, cos, lat, stream)
             }

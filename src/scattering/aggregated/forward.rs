@@ -12,11 +12,11 @@ use super::{
         medium::TtWidth,
     },
     Spot, Turned, View,
+    ahead::{Across, FibersAhead},
 };
 use crate::{
     geometry::{
         after_fiber::AfterTurn,
-        density::ChordFibers,
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -121,18 +121,11 @@ impl Part {
 /// A ply on a way out.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
-    ply: usize,
+    fibers: FibersAhead,
     /// Whether the way begins in it, at a fibre.
     own: bool,
-    /// Distance in the section to the point nearest to the ply's axis.
-    foot: f32,
-    /// How many more fibres are met there than by a way across the yarn.
-    tilt: f32,
-    /// Expected fibres.
-    expected: f32,
     /// The share of light that meets none of them.
     through: f32,
-    chord: ChordFibers,
 }
 
 /// A straight way on from a fibre.
@@ -321,22 +314,21 @@ impl Fiber {
     /// others away.
     #[inline]
     fn follow_way(&self, view: &View<'_>, way: &Way<'_>, mut visit: impl FnMut(Stretch)) -> f32 {
-        let (yarn, spot, thin) = (view.yarn, &self.spot, view.section.thinness());
-        let (shape, wide) = (yarn.occluder().shape(), spot.inside.wide(way.w));
+        let (yarn, spot) = (view.yarn, &self.spot);
+        let shape = yarn.occluder().shape();
+        let across = Across::new(view, &spot.inside, way.w);
         let mut all = 1.0;
         view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
             let gaps = &yarn.plies[ahead.ply].gaps;
-            let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, thin, wide);
+            let fibers = FibersAhead::new(view, &spot.inside, across, &ahead);
             let own = ahead.ply == spot.ply;
-            let tilt = ahead.tilt(shape, view.section, &spot.inside, way.w, &chord);
-            let expected = tilt * chord.ahead(-ahead.foot);
             let through = if own {
-                (-gaps.rate * way.after.met(expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
+                (-gaps.rate * way.after.met(fibers.expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
             } else {
-                gaps.unscattered(expected)
+                gaps.unscattered(fibers.expected)
             };
             all *= through;
-            visit(Stretch { ply: ahead.ply, own, foot: ahead.foot, tilt, expected, through, chord });
+            visit(Stretch { fibers, own, through });
         });
         all
     }
@@ -344,26 +336,24 @@ impl Fiber {
     /// The fibre that light meets next on a way, where so much of it is `left`.
     #[inline]
     fn next(&self, view: &View<'_>, way: &Way<'_>, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
-        stretches.sort_unstable_by(|a, b| a.foot.total_cmp(&b.foot));
-        let stretch = stretches.iter().find(|stretch| {
+        stretches.sort_unstable_by(|a, b| a.fibers.foot.total_cmp(&b.fibers.foot));
+        let Stretch { fibers, own, through } = stretches.iter().find(|stretch| {
             let ends = left >= stretch.through;
             if !ends {
                 left /= stretch.through;
             }
             ends
         })?;
-        let gaps = &view.yarn.plies[stretch.ply].gaps;
-        let passed = if stretch.own {
-            gaps.fibers_to_next(stretch.expected, (1.0 - left) / (1.0 - stretch.through))
+        let gaps = &view.yarn.plies[fibers.ply].gaps;
+        let passed = if *own {
+            gaps.fibers_to_next(fibers.expected, (1.0 - left) / (1.0 - through))
         } else {
             gaps.fibers_passed(left)
         };
-        let behind = (stretch.expected - passed).max(0.0) / stretch.tilt;
-        let at = stretch.chord.place((behind / stretch.chord.total().max(1e-20)).min(1.0));
-        let distance = (stretch.foot + at).max(0.0);
+        let distance = fibers.distance_past(passed);
         let shape = view.yarn.occluder().shape();
         let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
-        let spot = Spot::new(view, stretch.ply, inside);
+        let spot = Spot::new(view, fibers.ply, inside);
         Some(Self::new(view, spot, -way.w, self.passed))
     }
 }

@@ -38,10 +38,12 @@ use crate::{
         sampler::{OneOf, Stream},
     },
 };
+use ahead::{Across, FibersAhead};
 use backward::{Backward, Lobe};
 use forward::Forward;
-use single::{FibersAhead, LateNode};
+use single::LateNode;
 
+mod ahead;
 mod backward;
 mod forward;
 mod single;
@@ -184,13 +186,11 @@ impl Spot {
     #[inline]
     fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
         let shape = view.yarn.occluder().shape();
-        let (thin, wide) = (view.section.thinness(), self.inside.wide(w));
+        let across = Across::new(view, &self.inside, w);
         let mut depth = Rgb::ZERO;
         view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
             if way.ply != self.ply {
-                let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
-                let tilt = way.tilt(shape, view.section, &self.inside, w, &chord);
-                let fibers = FibersAhead::new(&way, chord, tilt);
+                let fibers = FibersAhead::new(view, &self.inside, across, &way);
                 if fibers.expected > 0.0 {
                     depth += view.yarn.plies[way.ply].rho * fibers.expected;
                     other(fibers);

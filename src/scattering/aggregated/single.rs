@@ -15,13 +15,13 @@ use super::{
         medium::PlyOptics,
     },
     Spot, Turned, View,
+    ahead::{Across, FibersAhead},
     forward::ChainEnd,
 };
 use crate::{
     geometry::{
         after_fiber::{AfterTurn, ClearedStrip},
-        density::ChordFibers,
-        section::{PlyAhead, PlyCrossing},
+        section::PlyCrossing,
     },
     math::{Rgb, sampler::Stream},
 };
@@ -155,7 +155,7 @@ impl Node {
         let weight = throughput * amplitude;
         let leaves = optics.leaving.share(&spot.place(view.yarn).0);
         let widening = Rgb::splat(SAMPLING_WIDENING);
-        let (untouched, spread) = optics.touched(before, widening, (-(optics.untouched * widening)).exp());
+        let (untouched, spread) = optics.touched(before, widening, None);
         let lobes =
             [optics.single_r * (Rgb::ONE - untouched), optics.single_r * untouched, optics.single_tt, optics.single_d];
         let once_more =
@@ -257,12 +257,11 @@ impl Node {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
-        let thin = view.section.thinness();
         let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
         let later = self.before > 0.0;
-        let width = 2.0 * thin * beside * shape.plies[spot.ply].fiber_radius;
+        let width = 2.0 * view.section.thinness() * beside * shape.plies[spot.ply].fiber_radius;
         let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
-        let wide = spot.inside.wide(w);
+        let across = Across::new(view, &spot.inside, w);
         let short = spot.inside.along_short_axis(w);
         let direct = (strip(turn), optics.after.turned(later, turn, short));
         let cosine = optics.tt.cosine;
@@ -273,13 +272,13 @@ impl Node {
         });
         let mut out = WayOut::default();
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
-            let chord = shape.plies[way.ply].chord(way.offset, way.length, thin, wide);
-            let tilt = way.tilt(shape, view.section, &spot.inside, w, &chord);
+            let fibers = FibersAhead::new(view, &spot.inside, across, &way);
             if way.ply == spot.ply {
                 let by_rim = shape.plies[way.ply].by_rim(way.offset);
                 let depth = |(strip, after): &(Option<ClearedStrip>, AfterTurn<'_>)| {
-                    let ahead = strip.map_or_else(|| chord.ahead(-way.foot), |strip| strip.fibers(&chord, way.foot));
-                    let [met, counted] = after.met_and_counted(tilt * ahead, by_rim);
+                    let FibersAhead { foot, tilt, ref chord, expected, .. } = fibers;
+                    let ahead = strip.map_or(expected, |strip| tilt * strip.fibers(chord, foot));
+                    let [met, counted] = after.met_and_counted(ahead, by_rim);
                     // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
                     let lost = optics.rho * optics.gaps.rate.recip();
                     optics.rho * (Rgb::splat(counted) + lost * (met - counted))
@@ -289,7 +288,6 @@ impl Node {
                     *out.bent.get_or_insert(Rgb::ZERO) += depth(bent);
                 }
             } else {
-                let fibers = FibersAhead::new(&way, chord, tilt);
                 out.others += yarn.plies[way.ply].rho * fibers.expected;
                 other(fibers);
             }
@@ -315,8 +313,8 @@ struct Passing {
     clear: Rgb,
     /// The fibres that are expected on the way of what TT passes on.
     after: Rgb,
-    /// The share of it that met no fibre.
-    untouched: Rgb,
+    /// The share of it that met no fibre, where that is not as [`PlyOptics::touched`] has it.
+    untouched: Option<Rgb>,
 }
 
 impl WayOut {
@@ -326,13 +324,13 @@ impl WayOut {
         let after = depth / optics.rho;
         let clear = (-depth).exp();
         if self.bent.is_none() {
-            return Passing { clear, after, untouched: (-(optics.untouched * after)).exp() };
+            return Passing { clear, after, untouched: None };
         }
         // Light that meets nothing is not bent.
         let unscattered = |fibers: Rgb| (-(fibers * optics.gaps.rate)).exp();
         let straight = unscattered((self.own + self.others) / optics.rho);
         let clear = (straight + (clear - unscattered(after)).max(Rgb::ZERO)).min(Rgb::ONE);
-        Passing { clear, after, untouched: straight / clear.max(Rgb::splat(1e-30)) }
+        Passing { clear, after, untouched: Some(straight / clear.max(Rgb::splat(1e-30))) }
     }
 }
 
@@ -342,25 +340,6 @@ pub(super) struct Met {
     pub(super) ply: usize,
     /// Distance in the section.
     pub(super) distance: f32,
-}
-
-/// What a way out meets of another ply.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FibersAhead {
-    ply: usize,
-    /// Distance in the section to the chord's middle.
-    foot: f32,
-    chord: ChordFibers,
-    tilt: f32,
-    /// How many are expected.
-    pub(super) expected: f32,
-}
-
-impl FibersAhead {
-    #[inline]
-    pub(super) fn new(way: &PlyAhead<'_>, chord: ChordFibers, tilt: f32) -> Self {
-        Self { ply: way.ply, foot: way.foot, chord, tilt, expected: tilt * chord.ahead(-way.foot) }
-    }
 }
 
 /// One of the plies on a way out, drawn by the fibres in each.
@@ -383,11 +362,9 @@ impl Among {
     /// has it.
     #[inline]
     pub(super) fn met(&self, view: &View<'_>, stream: &mut Stream) -> Option<Met> {
-        let FibersAhead { ply, foot, chord, tilt, expected } = self.drawn?;
-        let rate = view.yarn.plies[ply].rho.mean();
-        let passed = -(-stream.next() * (1.0 - (-rate * expected).exp())).ln_1p() / rate;
-        let behind = (expected - passed).max(0.0) / tilt;
-        let at = chord.place((behind / chord.total().max(1e-20)).min(1.0));
-        Some(Met { ply, distance: (foot + at).max(0.0) })
+        let fibers = self.drawn?;
+        let rate = view.yarn.plies[fibers.ply].rho.mean();
+        let passed = -(-stream.next() * (1.0 - (-rate * fibers.expected).exp())).ln_1p() / rate;
+        Some(Met { ply: fibers.ply, distance: fibers.distance_past(passed) })
     }
 }
