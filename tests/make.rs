@@ -107,6 +107,10 @@ fn what_cannot_be_made_is_refused() {
             &["knit", "--yarn-per-stitch", "5", "-o", "a.bcc"],
             "error: invalid value '5' for '--yarn-per-stitch <D>': expected a number from 6 to 60",
         ),
+        (
+            &["weave", "--draft", "velvet", "--edges", "fringe", "-o", "a.bcc"],
+            "error: the strands of a cut pile are not drawn out into a fringe\n  hint: --edges selvedge",
+        ),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
         (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
         (

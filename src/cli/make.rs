@@ -190,6 +190,9 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
     };
+    if let Err(problem) = piece.edges.suit(&piece.draft) {
+        return Err(Failure::Input(format!("error: {problem}\n  hint: --edges selvedge")));
+    }
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
     if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
         log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));

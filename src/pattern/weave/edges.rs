@@ -8,7 +8,10 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{Cloth, PatternStrand, StrandKind, strand};
-use crate::math::{sampler::hash2, special::smooth_step};
+use crate::{
+    math::{sampler::hash2, special::smooth_step},
+    pattern::draft::Draft,
+};
 
 /// How the cloth ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +37,19 @@ impl Edges {
         ("fringe", Self::Fringe),
         ("live", |_| Self::Live),
     ];
+
+    /// Whether cloth of a draft can end so.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    pub fn suit(self, draft: &Draft) -> Result<(), &'static str> {
+        match self {
+            Self::Fringe(_) if draft.pile().is_some_and(|pile| pile.cut) => {
+                Err("the strands of a cut pile are not drawn out into a fringe")
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.

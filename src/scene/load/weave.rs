@@ -240,9 +240,9 @@ fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, drafted: Opt
     if fringe.is_some() && edges != fringed {
         table.error_at("fringe", "only `edges = \"fringe\"` has a fringe", None);
     }
-    if edges == fringed && drafted.is_some_and(|d| d.draft.pile().is_some_and(|pile| pile.cut)) {
+    if let Some(Err(problem)) = drafted.map(|d| edges.suit(&d.draft)) {
         let at = if table.has("edges") { "edges" } else { "fringe" };
-        table.error_at(at, "the strands of a cut pile are not drawn out into a fringe", Some("edges = \"selvedge\""));
+        table.error_at(at, problem, Some("edges = \"selvedge\""));
     }
     edges
 }
