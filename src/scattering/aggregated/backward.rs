@@ -11,7 +11,7 @@ use wide::f32x8;
 
 use super::{
     super::{
-        escape::{Leaving, Outwards},
+        escape::{Light, Outwards},
         kernel::{DIFFUSE, narrow_spread, sample_sine, sample_sine_diffuse},
         lobe::{LobeFrame, choose, normalised},
         medium::PlyOptics,
@@ -118,7 +118,7 @@ impl Lobe {
         let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
         // As the fibres have it that the light met.
         let frame = frame.with_latitude(node.axial * node.spot.inside.along(frame.z));
-        let outwards = optics.leaving.draw(&place, stream);
+        let outwards = optics.leaving.draw(Light::Onward, &place, stream);
         let axes = axes_across(&frame, axes);
         let u_start = stream.next();
         let chance = 1.0 - node.drawn.escape;
@@ -203,7 +203,7 @@ impl Lobe {
             return Some(again);
         }
         let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
-        let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), stream, |of| rest * of.entering_past);
+        let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), (rest, Light::Met), stream);
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
@@ -214,7 +214,7 @@ impl Lobe {
         if rest.max_channel() > 0.0 {
             let met = among.met(view, stream).unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
             let from = (&first.spot.inside, w, met);
-            again.meetings.push(Meeting::new(view, &self.frame, from, stream, |of| rest * of.entering));
+            again.meetings.push(Meeting::new(view, &self.frame, from, (rest, Light::MetForGood), stream));
         }
         Some(again)
     }
@@ -327,13 +327,13 @@ impl Taken {
 }
 
 impl Meeting {
-    /// Where light from a place meets a ply; `energy` says how much that gives off.
+    /// Where so much light from a place meets a ply.
     fn new(
         view: &View<'_>,
         frame: &LobeFrame,
         (from, w, met): (&Inside, Vec3A, Met),
+        (arrives, light): (Rgb, Light),
         stream: &mut Stream,
-        energy: impl Fn(&Leaving) -> Rgb,
     ) -> Self {
         let shape = view.yarn.occluder().shape();
         let leaving = &view.yarn.plies[met.ply].leaving;
@@ -342,8 +342,8 @@ impl Meeting {
         let (place, axes) = leaving.place(at, inside.short_axis_within());
         Self {
             axes: axes_across(frame, axes.map(|axis| inside.out_of(axis))),
-            outwards: leaving.draw(&place, stream),
-            energy: energy(leaving),
+            outwards: leaving.draw(light, &place, stream),
+            energy: arrives * leaving.share(light, &place),
             spot: Spot::new(view, met.ply, inside),
         }
     }

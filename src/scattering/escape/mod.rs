@@ -49,6 +49,11 @@ pub(crate) struct Medium {
 }
 
 impl Medium {
+    /// Whether no other ply lies around.
+    fn alone(&self) -> bool {
+        self.taken_back == 0.0
+    }
+
     /// The next one of those that are told apart: colours that nobody does are solved once. What is not absorbed stays so.
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
@@ -89,19 +94,24 @@ impl Outgoing {
     }
 }
 
-/// For each sector of a quarter, from the short axis to the long one: light from the middle of each ring that meets something
-/// next. One sector in a circle, where azimuths count from that of the place.
+/// For each sector of a quarter, from the short axis to the long one, and each ring: what leaves of light that is scattered there.
+/// One sector in a circle, where azimuths count from that of the place.
 struct Solved {
-    sectors: Vec<[Outgoing; RINGS]>,
-    /// Of light that enters from all sides, the share that leaves at last: if other plies send some of it back, and past them.
-    entering: [f64; 2],
+    /// Of [`Light::Onward`].
+    onward: Vec<[Outgoing; RINGS]>,
+    /// Of [`Light::Met`], and the share of [`Light::MetForGood`]: nothing of plies that are alone.
+    met: Vec<[Outgoing; RINGS]>,
+    for_good: Vec<[f64; RINGS]>,
+    /// Of light that meets something where what leaves would come from: the share that leaves for good.
+    entering: f64,
 }
 
-/// What leaves a ply of one channel: by sectors and rings, as [`Leaving`] holds it, and of light that enters from all sides.
+/// What leaves a ply of one channel, as [`Leaving`] holds it.
 #[derive(Debug)]
 struct OfChannel {
-    cells: Vec<Outgoing>,
-    entering: [f64; 2],
+    held: Vec<Outgoing>,
+    for_good: Vec<f64>,
+    entering: f64,
 }
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
@@ -128,31 +138,42 @@ impl Solutions {
 pub(crate) struct Leaving {
     /// How many sectors there are in a quarter, with both axes.
     sectors: usize,
-    /// Of light that comes from a place and meets something: sector by sector, ring by ring of equal area from the axis on, and at the
-    /// rim.
+    /// How many cells: sector by sector, ring by ring of equal area from the axis on, and at the rim.
+    cells: usize,
+    /// Of each [`Light`] for itself, in their order: the share of all cells.
     shares: Vec<Rgb>,
+    /// And where to it leaves, but for light that leaves for good.
     azimuths: Vec<[Rgb; AZIMUTHS]>,
-    /// Of light that comes from other plies, the share that leaves them all at last.
+    /// Of light that meets something anywhere by the rim, the share that leaves for good.
     pub(crate) entering: Rgb,
-    /// The share that leaves this one, wherever it goes.
-    pub(crate) entering_past: Rgb,
+}
+
+/// Light of a place in a ply of which a share leaves at last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Light {
+    /// It comes from there and meets something next.
+    Onward,
+    /// It meets something there: what leaves the ply then, wherever it goes. Only of yarns of several plies.
+    Met,
+    /// The same: what leaves all plies of the yarn.
+    MetForGood,
 }
 
 impl Leaving {
     /// For each channel, in a section of long over short axis `stretch`.
     pub(crate) fn new(channels: &[Medium; 3], stretch: f64, solutions: &Solutions) -> Self {
         let tables = channels.map(|medium| solutions.of(&medium, stretch));
-        let rgb = |value: &dyn Fn(&Outgoing) -> f64, cell: usize| {
-            Rgb::from([0, 1, 2].map(|c: usize| value(&tables[c].cells[cell])))
-        };
-        let cells = 0..tables[0].cells.len();
-        let azimuths = |cell| std::array::from_fn(|k| rgb(&|out| out.azimuths[k], cell));
+        let rgb = |value: &dyn Fn(&OfChannel) -> f64| Rgb::from([0, 1, 2].map(|c: usize| value(&tables[c])));
+        let held = tables[0].held.len();
+        let cells = if channels[0].alone() { held } else { held / 2 };
+        let shares = (0..held).map(|i| rgb(&|of| of.held[i].share));
+        let azimuths = |i: usize| std::array::from_fn(|k| rgb(&|of| of.held[i].azimuths[k]));
         Self {
             sectors: if stretch > NEARLY_ROUND { pressed::QUARTER } else { 1 },
-            shares: cells.clone().map(|cell| rgb(&|out| out.share, cell)).collect(),
-            azimuths: cells.map(azimuths).collect(),
-            entering: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering[0])),
-            entering_past: Rgb::from([0, 1, 2].map(|c: usize| tables[c].entering[1])),
+            cells,
+            shares: shares.chain((0..held - cells).map(|i| rgb(&|of| of.for_good[i]))).collect(),
+            azimuths: (0..held).map(azimuths).collect(),
+            entering: rgb(&|of| of.entering),
         }
     }
 
@@ -162,36 +183,48 @@ impl Leaving {
         let looked_at = Medium { radius: medium.radius.min(THICKEST), ..*medium };
         let solved =
             if stretch > NEARLY_ROUND { pressed::solve(&looked_at, stretch) } else { round::solve(&looked_at) };
-        let mut cells = Vec::with_capacity(solved.sectors.len() * (RINGS + 1));
-        for rings in &solved.sectors {
+        let with_rim = |rings: &[Outgoing; RINGS]| {
             let rim = rings[RINGS - 1].towards(&rings[RINGS - 2], -0.5);
-            let at = |ring: usize| rings.get(ring).unwrap_or(&rim);
-            cells.extend((0..=RINGS).map(|i| {
-                let r = ((i as f64 + 0.5) / RINGS as f64).min(1.0).sqrt();
-                let (ring, part) = between((1.0 - (1.0 - r) * thicker).max(0.0).powi(2) as f32);
-                if thicker > 1.0 { at(ring).towards(at(ring + 1), f64::from(part)) } else { *at(i) }
-            }));
+            let at = |ring: usize| *rings.get(ring).unwrap_or(&rim);
+            (0..=RINGS)
+                .into_iter()
+                .enumerate()
+                .map(|(i, _)| {
+                    let r = ((i as f64 + 0.5) / RINGS as f64).min(1.0).sqrt();
+                    let (ring, part) = between((1.0 - (1.0 - r) * thicker).max(0.0).powi(2) as f32);
+                    if thicker > 1.0 { at(ring).towards(&at(ring + 1), f64::from(part)) } else { at(i) }
+                })
+                .collect::<Vec<_>>()
+        };
+        let Solved { onward, met, for_good, entering } = solved;
+        let for_good = for_good.iter().map(|rings| rings.map(|share| Outgoing::new(share, [1.0; AZIMUTHS])));
+        OfChannel {
+            held: onward.iter().chain(&met).flat_map(with_rim).collect(),
+            for_good: for_good.flat_map(|rings| with_rim(&rings)).map(|out| out.share).collect(),
+            entering: entering.clamp(0.0, 1.0),
         }
-        OfChannel { cells, entering: solved.entering.map(|share| share.clamp(0.0, 1.0)) }
     }
 
-    /// Of light that comes from a place and meets something: the share that leaves at last.
+    /// The share of a place's light that leaves at last.
     #[inline]
-    pub(crate) fn share(&self, place: &Place) -> Rgb {
-        let mix = |from: usize| {
-            let [low, high] = [self.shares[from + place.ring], self.shares[from + place.ring + 1]];
+    pub(crate) fn share(&self, light: Light, place: &Place) -> Rgb {
+        let first = light as usize * self.cells;
+        let mix = |sector: usize| {
+            let from = first + sector * (RINGS + 1) + place.ring;
+            let [low, high] = [self.shares[from], self.shares[from + 1]];
             low + (high - low) * place.beyond
         };
-        let from = mix(place.sector * (RINGS + 1));
-        if self.sectors == 1 { from } else { from + (mix((place.sector + 1) * (RINGS + 1)) - from) * place.turned }
+        let from = mix(place.sector);
+        if self.sectors == 1 { from } else { from + (mix(place.sector + 1) - from) * place.turned }
     }
 
     /// Where to it leaves from there: one of the places around it, as likely as it is near.
     #[inline]
-    pub(crate) fn draw(&self, place: &Place, stream: &mut Stream) -> Outwards {
+    pub(crate) fn draw(&self, light: Light, place: &Place, stream: &mut Stream) -> Outwards {
         let ring = place.ring + usize::from(stream.next() < place.beyond);
         let sector = place.sector + usize::from(self.sectors > 1 && stream.next() < place.turned);
-        Outwards(sector * (RINGS + 1) + ring)
+        let first = if matches!(light, Light::Onward) { 0 } else { self.cells };
+        Outwards(first + sector * (RINGS + 1) + ring)
     }
 
     /// What leaves towards an azimuth, given by its cosine and sine, over what would go there if it left evenly.

@@ -116,6 +116,9 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         |share: f64| -> Vec<Row> { rows.iter().enumerate().map(|(own, row)| row.closed(own, share)).collect() };
     let near = closed(medium.sent_back);
     let out = leaving(&near, medium.albedo);
+    let cells = |of: &dyn Fn(usize) -> Outgoing| -> Vec<[Outgoing; RINGS]> {
+        (0..QUARTER).map(|sector| std::array::from_fn(|ring| of(ring * SECTORS + sector))).collect()
+    };
     let mean = |weights: &[f64], out: &[f64], own: usize| {
         let sum: f64 = weights.iter().sum();
         let mut towards = [0.0; AZIMUTHS];
@@ -126,21 +129,18 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         }
         Outgoing::new(towards.iter().sum::<f64>(), towards)
     };
-    let sectors = (0..QUARTER)
-        .map(|sector| {
-            std::array::from_fn(|ring| {
-                let own = ring * SECTORS + sector;
-                mean(&near[own].next, &out, own)
-            })
-        })
-        .collect();
-    // What enters is met where what leaves would come from.
-    let entering = |taken_back: f64| {
-        let outer = closed(taken_back);
-        let enters: Vec<f64> = outer.iter().map(|row| row.escape.iter().sum()).collect();
-        let solved = (taken_back != medium.sent_back).then(|| leaving(&outer, medium.albedo));
-        mean(&enters, solved.as_ref().unwrap_or(&out), CELLS - 1).share
-    };
-    let past = entering(0.0);
-    Solved { sectors, entering: [if medium.taken_back > 0.0 { entering(medium.taken_back) } else { past }, past] }
+    let onward = cells(&|own| mean(&near[own].next, &out, own));
+    let mut solved = Solved { onward, met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
+    if !medium.alone() {
+        let [past, for_good] = [0.0, medium.taken_back].map(|share| leaving(&closed(share), medium.albedo));
+        let of = |out: &[f64], cell: usize| {
+            let towards: [f64; AZIMUTHS] = std::array::from_fn(|k| out[cell * AZIMUTHS + k]);
+            Outgoing::new(towards.iter().sum(), towards)
+        };
+        solved.met = cells(&|cell| of(&past, cell));
+        solved.for_good = cells(&|cell| of(&for_good, cell)).iter().map(|rings| rings.map(|out| out.share)).collect();
+        let enters: Vec<f64> = rows.iter().map(|row| row.escape.iter().sum()).collect();
+        solved.entering = mean(&enters, &for_good, CELLS - 1).share;
+    }
+    solved
 }

@@ -106,20 +106,22 @@ pub(super) fn solve(medium: &Medium) -> Solved {
     let open = Transport::new(medium);
     let transport = open.closed(medium.sent_back);
     let leaving = transport.leaving(medium.albedo);
-    let rings = std::array::from_fn(|i| {
+    let onward = std::array::from_fn(|i| {
         let met: f64 = transport.next[0][i].iter().sum();
         outgoing(std::array::from_fn(|m| {
             let out: f64 = transport.next[m][i].iter().zip(leaving[m]).map(|(chance, out)| chance * out).sum();
             if met > 0.0 { out / met } else { leaving[m][RINGS - 1] }
         }))
     });
-    // What enters is met where what leaves would come from.
-    let entering = [medium.taken_back, 0.0].map(|taken_back| {
-        let closed = open.closed(taken_back);
-        let leaving = closed.leaving(medium.albedo)[0];
-        let enters: f64 = closed.escape[0].iter().sum();
-        let out: f64 = closed.escape[0].iter().zip(leaving).map(|(chance, out)| chance * out).sum();
-        if enters > 0.0 { out / enters } else { leaving[RINGS - 1] }
-    });
-    Solved { sectors: vec![rings], entering }
+    let mut solved = Solved { onward: vec![onward], met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
+    if !medium.alone() {
+        let past = open.leaving(medium.albedo);
+        solved.met.push(std::array::from_fn(|i| outgoing(std::array::from_fn(|m| past[m][i]))));
+        let for_good = open.closed(medium.taken_back).leaving(medium.albedo)[0];
+        solved.for_good.push(for_good);
+        let enters: f64 = open.escape[0].iter().sum();
+        let out: f64 = open.escape[0].iter().zip(for_good).map(|(chance, out)| chance * out).sum();
+        solved.entering = if enters > 0.0 { out / enters } else { for_good[RINGS - 1] };
+    }
+    solved
 }
