@@ -167,6 +167,29 @@ impl YarnShape {
         }
     }
 
+    /// Where plies lie in each other: the share of a ply's section that no fibre of another ply covers, 1 where none does.
+    pub fn uncovered(&self, ply: usize) -> f64 {
+        const RINGS: u32 = 16;
+        const SECTORS: u32 = 32;
+        let own = &self.plies[ply];
+        // In the circle that a ply becomes, and back from there.
+        let axes = |of: &PlyShape| [of.direction, of.direction.perp()].map(|axis| (axis, of.distance * of.direction));
+        let open_at = |k: u32| {
+            let r = ((f64::from(k / SECTORS) + 0.5) / f64::from(RINGS)).sqrt() as f32 * own.radius;
+            let circle = r * Vec2::from_angle((TAU * (f64::from(k % SECTORS) + 0.5) / f64::from(SECTORS)) as f32);
+            let [(x, centre), (y, _)] = axes(own);
+            let at = centre + circle.x / own.stretch.x * x + circle.y / own.stretch.y * y;
+            let others = self.plies.iter().enumerate().filter(|(other, _)| *other != ply);
+            let open = others.map(|(_, of)| {
+                let [(x, centre), (y, _)] = axes(of);
+                let circle = of.stretch * Vec2::new((at - centre).dot(x), (at - centre).dot(y));
+                if circle.length() < of.radius { 1.0 - of.density() } else { 1.0 }
+            });
+            open.product::<f64>()
+        };
+        (0..RINGS * SECTORS).map(open_at).sum::<f64>() / f64::from(RINGS * SECTORS)
+    }
+
     /// The same with the fibres of each ply packed as they are measured to be; without it they are even.
     ///
     /// # Panics

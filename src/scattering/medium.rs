@@ -117,6 +117,8 @@ pub(crate) struct PlyOptics {
     /// Extinction per expected fibre of light that may pass fibres as TT and then goes on as straight as TT leaves it; at least
     /// [`LEAST_RATE`].
     pub rho: Rgb,
+    /// Area fraction of the fibres in the ply.
+    pub density: f32,
     /// Weight that TT keeps on its way forward, at each fibre.
     pub chain: Rgb,
     /// Energy of single scattering by R, over what leaves the chain.
@@ -196,6 +198,7 @@ impl PlyOptics {
             gaps: fibers.gaps,
             chain_share: material.chain_share() as f32,
             rho: rgb(&|c| c.rho().max(LEAST_RATE)),
+            density: fibers.density as f32,
             chain: rgb(&|c| c.chain),
             single_r: rgb(&|c| c.single(c.r)),
             single_d: rgb(&|c| c.single(c.d)),
@@ -417,6 +420,14 @@ impl<'a> Channel<'a> {
 }
 
 impl PlyOptics {
+    /// The optical depth of a way on which light that ends at the first fibre meets so many of the ply, and light that passes nearly all so
+    /// many on the mean. Chains that keep nothing end at the first one, and those that keep all pass by as many as there are.
+    #[inline]
+    pub(crate) fn depth(&self, met: f32, counted: f32) -> Rgb {
+        let lost = self.rho * self.gaps.rate.recip();
+        self.rho * (Rgb::splat(counted) + lost * (met - counted))
+    }
+
     /// The longitudinal lobe of light that was scattered twice or more, where what keeps its latitude has so much more [`spread`].
     #[inline]
     pub(crate) fn latitude_of_multiple(&self, at: Latitudes, spread: f32) -> Rgb {

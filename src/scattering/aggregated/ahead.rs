@@ -1,12 +1,67 @@
-//! What a way out of a yarn meets of a ply.
+//! What a straight way meets of the plies of a yarn.
 
+use arrayvec::ArrayVec;
 use glam::Vec3A;
 
 use super::View;
-use crate::geometry::{
-    density::ChordFibers,
-    section::{Inside, PlyAhead},
+use crate::{
+    geometry::{
+        density::ChordFibers,
+        section::{Inside, PlyAhead},
+    },
+    math::{Rgb, sampler::Stream},
 };
+
+/// A ply on a straight way.
+pub(super) trait Stretch {
+    /// The share of light that meets none of its fibres.
+    fn through(&self) -> f32;
+    /// The distance from which on it may meet one.
+    fn begins(&self) -> f32;
+    /// The distance at which it meets the first one, where so much is left of the light: at least [`Self::through`].
+    fn meets(&self, left: f32) -> f32;
+}
+
+/// The ply on a way in which light meets its first fibre, and the distance where it does: what has met none is `left` by then. The last
+/// ply stops what all let pass. `None` if there is none.
+///
+/// Plies may lie in each other. Each has its first fibre for itself, and the nearest is the one that is met: of the first ply that
+/// stops the light at all, or of those behind it, which may begin before.
+#[inline]
+pub(super) fn nearest<S: Stretch>(
+    plies: impl Iterator<Item = S>,
+    mut left: f32,
+    stream: &mut Stream,
+) -> Option<(S, f32)> {
+    let mut plies = plies.peekable();
+    let (mut met, mut distance) = loop {
+        let ply = plies.next()?;
+        let through = ply.through();
+        if left >= through || plies.peek().is_none() {
+            let distance = ply.meets(left);
+            break (ply, distance);
+        }
+        left = (left / through.max(1e-30)).min(1.0);
+    };
+    for ply in plies {
+        if ply.begins() < distance {
+            let left = stream.next();
+            if left >= ply.through() {
+                let before = ply.meets(left);
+                if before < distance {
+                    (met, distance) = (ply, before);
+                }
+            }
+        }
+    }
+    Some((met, distance))
+}
+
+/// The most stretches of plies that are told apart on a way out.
+pub(super) const STRETCHES: usize = 16;
+
+/// The plies on a way out, in no order.
+pub(super) type PliesAhead = ArrayVec<FibersAhead, STRETCHES>;
 
 /// How fibres look across a way: in units of those of the round yarn, for [`FibersAhead::new`].
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +83,8 @@ impl Across {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FibersAhead {
     pub(super) ply: usize,
+    /// Signed distance of the way from the ply's axis, in the circle of the ply's radius.
+    pub(super) offset: f32,
     /// Distance in the section to the point nearest to the ply's axis.
     pub(super) foot: f32,
     /// How many more are met there than by a way across the yarn.
@@ -38,15 +95,38 @@ pub(super) struct FibersAhead {
 }
 
 impl FibersAhead {
-    /// Of a ply that lies ahead of a place.
+    /// Of a ply that lies ahead of a place, from the distance `free` on: the middles of other fibres are no nearer.
     #[inline]
-    pub(super) fn new(view: &View<'_>, from: &Inside, across: Across, ahead: &PlyAhead<'_>) -> Self {
+    pub(super) fn new(view: &View<'_>, from: &Inside, across: Across, ahead: &PlyAhead<'_>, free: f32) -> Self {
         let Across { w, thin, wide } = across;
         let shape = view.yarn.occluder().shape();
         let &PlyAhead { ply, foot, offset, length, .. } = ahead;
         let chord = shape.plies[ply].chord(offset, length, thin, wide);
         let tilt = ahead.tilt(shape, view.section, from, w, &chord);
-        Self { ply, foot, tilt, chord, expected: tilt * chord.ahead(-foot) }
+        Self { ply, offset, foot, tilt, chord, expected: tilt * chord.ahead(free - foot) }
+    }
+
+    /// Where plies lie in each other: the share of the fibres that light meets which passes nearly all, of those that it meets in this ply
+    /// alone. Others begin within a fibre of another ply on the way, which it has met already.
+    #[inline]
+    pub(super) fn uncovered(&self, view: &View<'_>, all: &[Self]) -> f32 {
+        if !view.yarn.plies_overlap {
+            return 1.0;
+        }
+        let stretch = |of: &Self| ((of.foot - of.chord.half).max(0.0), (of.foot + of.chord.half).max(0.0));
+        let (from, to) = stretch(self);
+        let open = all.iter().filter(|other| other.ply != self.ply).map(|other| {
+            let (begins, ends) = stretch(other);
+            let both = (to.min(ends) - from.max(begins)).max(0.0);
+            1.0 - view.yarn.plies[other.ply].density * both / (to - from).max(1e-6)
+        });
+        open.product()
+    }
+
+    /// The optical depth of a ply other than that in which the way begins, among `all` on the way.
+    #[inline]
+    pub(super) fn depth(&self, view: &View<'_>, all: &[Self]) -> Rgb {
+        view.yarn.plies[self.ply].depth(self.expected, self.expected * self.uncovered(view, all))
     }
 
     /// Distance in the section at which so many of them are passed.

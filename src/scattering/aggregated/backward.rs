@@ -19,7 +19,7 @@ use super::{
     },
     Spot, View,
     ahead::FibersAhead,
-    single::{Among, Met, Node},
+    single::{Among, Drawn, Met, Node, NodeValue},
 };
 use crate::{
     geometry::section::Inside,
@@ -40,15 +40,19 @@ pub(super) struct Backward {
     stream: Stream,
 }
 
-/// Multiply scattered light of the node's ply.
+/// Multiply scattered light of the ply in which light from the node meets a fibre next.
 #[derive(Clone, Debug)]
 pub(super) struct Lobe {
+    /// Where it begins: the node, or where light from there meets a fibre of another ply.
+    spot: Spot,
+    /// Whether that is another ply.
+    away: bool,
     frame: LobeFrame,
     /// The axes against which azimuths count, as unit vectors across the frame's.
     axes: [Vec2; 2],
     /// Where to it leaves.
     outwards: Outwards,
-    /// Energy that leaves the node's ply, given the direction drawn.
+    /// Energy that leaves the ply, given the direction drawn.
     energy: Rgb,
     /// What the path then has of each channel, over their mean: by this one is drawn for its direction.
     channels: Rgb,
@@ -110,19 +114,42 @@ impl Backward {
 impl Lobe {
     fn of_node(view: &View<'_>, node: &Node, stream: &mut Stream) -> Self {
         let optics = &view.yarn.plies[node.spot.ply];
-        let left = node.leaves * (Rgb::ONE - node.drawn.value.clear);
-        let energy = node.amplitude * optics.albedo * left;
-        let weight = node.weight * left;
-        let channels = if weight.mean() > 1e-30 { weight * weight.mean().recip() } else { Rgb::ONE };
-        let (place, axes) = node.spot.place(view.yarn);
         let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
         // As the fibres have it that the light met.
         let frame = frame.with_latitude(node.axial * node.spot.inside.along(frame.z));
-        let outwards = optics.leaving.draw(Light::Onward, &place, stream);
-        let axes = axes_across(&frame, axes);
-        let u_start = stream.next();
-        let chance = 1.0 - node.drawn.escape;
-        let mut lobe = Self { frame, axes, outwards, energy, channels, chance, u_start, again: None };
+        // Light in the direction drawn meets a fibre in its own ply, or gets out of that and meets one in another.
+        let Drawn { direction, value: NodeValue { clear, open, .. }, escape, .. } = node.drawn;
+        let out_of_own = (clear / open.max(Rgb::splat(1e-30))).min(Rgb::ONE);
+        let stays = node.leaves * (Rgb::ONE - out_of_own);
+        let goes = out_of_own * (Rgb::ONE - open);
+        let mut away = None;
+        let (mut left, mut drawn) = (stays, 1.0);
+        if goes.max_channel() > 0.0 {
+            let [at_home, elsewhere] = [stays, goes * node.leaves_again].map(|left| (node.weight * left).mean());
+            let chance = elsewhere / (at_home + elsewhere).max(1e-30);
+            drawn = 1.0 - chance;
+            if stream.next() < chance {
+                let (_, met) = node.others(view, direction, stream);
+                let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
+                let there = Meeting::new(view, &frame, (&node.spot.inside, direction, met), (goes, Light::Met), stream);
+                (left, drawn) = (there.energy, chance);
+                away = Some(there);
+            }
+        }
+        let left = left * drawn.max(1e-30).recip();
+        let energy = node.amplitude * optics.albedo * left;
+        let weight = node.weight * left;
+        let channels = if weight.mean() > 1e-30 { weight * weight.mean().recip() } else { Rgb::ONE };
+        let (spot, axes, outwards) = match &away {
+            Some(Meeting { spot, axes, outwards, .. }) => (*spot, *axes, *outwards),
+            None => {
+                let (place, axes) = node.spot.place(view.yarn);
+                (node.spot, axes_across(&frame, axes), optics.leaving.draw(Light::Onward, &place, stream))
+            }
+        };
+        let (u_start, chance) = (stream.next(), 1.0 - escape);
+        let away = away.is_some();
+        let mut lobe = Self { spot, away, frame, axes, outwards, energy, channels, chance, u_start, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
             lobe.again = lobe.again(view, node, stream);
         }
@@ -131,9 +158,9 @@ impl Lobe {
 
     /// Value (with the cosine) and density, 1/steradian, of light that leaves the ply towards `w`, whatever lies there.
     #[inline]
-    pub(super) fn value(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> (Rgb, f32) {
-        let optics = &view.yarn.plies[spot.ply];
-        let (arriving, spread) = self.arriving(view, spot, w);
+    pub(super) fn value(&self, view: &View<'_>, w: Vec3A) -> (Rgb, f32) {
+        let optics = &view.yarn.plies[self.spot.ply];
+        let (arriving, spread) = self.arriving(view, w);
         let (at, cos) = arriving.latitudes(w);
         let latitude = optics.latitude_of_multiple(at, spread);
         let around =
@@ -167,13 +194,13 @@ impl Lobe {
     /// What the fibres of a ply mirror keeps its part along them ([`Spot::axial`]), which differs from that along the axis by how far from the
     /// axis the light passes it.
     #[inline]
-    fn arriving(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> (LobeFrame, f32) {
+    fn arriving(&self, view: &View<'_>, w: Vec3A) -> (LobeFrame, f32) {
         let LobeFrame { sin, z, .. } = self.frame;
-        let slope = view.yarn.plies[spot.ply].slope;
+        let slope = view.yarn.plies[self.spot.ply].slope;
         if slope == 0.0 {
             return (self.frame, 0.0);
         }
-        let (_, shares) = outline(view, spot, w - w.dot(z) * z);
+        let (_, shares) = outline(view, &self.spot, w - w.dot(z) * z);
         let beside = f32x8::new(OUTLINE[1]);
         let inverse = shares.reduce_add().max(1e-30).recip();
         let mean = (shares * beside).reduce_add() * inverse;
@@ -192,18 +219,28 @@ impl Lobe {
         (arriving, spread)
     }
 
+    /// What other plies let pass in a direction, and where light meets one of them, if it does.
+    fn others(&self, view: &View<'_>, node: &Node, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
+        if !self.away {
+            return node.others(view, w, stream);
+        }
+        let mut among = Among::default();
+        let depth = self.spot.past_own(view, w, |fibers| among.offer(fibers, stream));
+        ((-depth).exp(), among.met(view, stream))
+    }
+
     /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
     fn again(&self, view: &View<'_>, node: &Node, stream: &mut Stream) -> Option<Again> {
-        let w = self.draw(view, &node.spot, stream);
-        let (value, pdf) = self.value(view, &node.spot, w);
-        let (open, met) = node.others(view, w, stream);
-        let (way, rest) = Taken::new(node, (self.start(view, &node.spot, w), w, value, pdf), open)?;
+        let w = self.draw(view, stream);
+        let (value, pdf) = self.value(view, w);
+        let (open, met) = self.others(view, node, w, stream);
+        let (way, rest) = Taken::new(node, (self.start(view, &self.spot, w), w, value, pdf), open)?;
         let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
         if rest.max_channel() <= 0.0 {
             return Some(again);
         }
-        let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
-        let first = Meeting::new(view, &self.frame, (&node.spot.inside, w, met), (rest, Light::Met), stream);
+        let met = met.unwrap_or(Met { ply: self.spot.ply, distance: 0.0 });
+        let first = Meeting::new(view, &self.frame, (&self.spot.inside, w, met), (rest, Light::Met), stream);
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
@@ -231,13 +268,14 @@ impl Lobe {
         at_node: f32,
         mut visit: impl FnMut(&Spot, Rgb),
     ) {
-        let (first, pdf) = self.value(view, &node.spot, w);
+        let (first, pdf) = self.value(view, w);
+        let open = if self.away { (-self.spot.past_own(view, w, |_| {})).exp() } else { open };
         let chance = at_node * self.chance;
         match &self.again {
-            None => visit(&node.spot, first * mis_weight(light_pdf, chance * pdf)),
+            None => visit(&self.spot, first * mis_weight(light_pdf, chance * pdf)),
             Some(again) => {
                 let goes_on = |open: Rgb| node.chance_out(open, node.leaves_again);
-                visit(&node.spot, first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf));
+                visit(&self.spot, first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf));
                 let mut left = chance * (1.0 - again.ways[0].open);
                 for (i, meeting) in again.meetings.iter().enumerate() {
                     let (value, pdf) = meeting.value(view, &self.frame, w);
@@ -266,9 +304,9 @@ impl Lobe {
     ) -> (Vec3A, Rgb, f32, Vec3A) {
         let (direction, value, pdf, start) = match &self.again {
             None => {
-                let w = self.draw(view, &node.spot, stream);
-                let (value, pdf) = self.value(view, &node.spot, w);
-                (w, value, pdf, self.start(view, &node.spot, w))
+                let w = self.draw(view, stream);
+                let (value, pdf) = self.value(view, w);
+                (w, value, pdf, self.start(view, &self.spot, w))
             }
             Some(again) => {
                 let mut chance = 1.0;
@@ -295,8 +333,8 @@ impl Lobe {
 
     /// Draws a direction from the lobe.
     #[inline]
-    fn draw(&self, view: &View<'_>, spot: &Spot, stream: &mut Stream) -> Vec3A {
-        let optics = &view.yarn.plies[spot.ply];
+    fn draw(&self, view: &View<'_>, stream: &mut Stream) -> Vec3A {
+        let optics = &view.yarn.plies[self.spot.ply];
         let lat = [stream.next(), stream.next()];
         let channel = choose(normalised(self.channels.to_array()), stream.next());
         let around = optics.leaving.azimuth(self.outwards, |value| value.to_array()[channel], stream);
@@ -308,7 +346,7 @@ impl Lobe {
         let sin = match lobe {
             Some(lobe) => {
                 let (LobeFrame { sin, cos, .. }, spread) =
-                    self.arriving(view, spot, direction(&self.frame, 0.0, around, self.axes));
+                    self.arriving(view, direction(&self.frame, 0.0, around, self.axes));
                 sample_sine(lobe.kappa(spread).to_array()[channel], sin, cos, lat, stream)
             }
             None => sample_sine_diffuse(lat),

@@ -12,11 +12,12 @@ use super::{
         medium::TtWidth,
     },
     Spot, Turned, View,
-    ahead::{Across, FibersAhead},
+    ahead::{Across, FibersAhead, STRETCHES, Stretch, nearest},
 };
 use crate::{
     geometry::{
         after_fiber::AfterTurn,
+        occluder::PlyGaps,
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},
@@ -32,8 +33,6 @@ const LAST: usize = FOLLOWED - 1;
 /// Below such a share of what the first fibre passes on, light is followed farther by chance only: where light is sampled at
 /// the vertex, which sees all of F, and where it is not. There a path takes one way on whether F ends before or is not chosen.
 const LITTLE: [f32; 2] = [0.25, 1.0];
-/// The most stretches of plies that are told apart on a way out.
-const STRETCHES: usize = 16;
 
 /// Light that the first fibre on the camera's ray passes on, for one such fibre and one way on from it.
 #[derive(Clone, Debug)]
@@ -120,12 +119,52 @@ impl Part {
 
 /// A ply on a way out.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+struct PlyOnWay {
     fibers: FibersAhead,
+    gaps: PlyGaps,
     /// Whether the way begins in it, at a fibre.
     own: bool,
     /// The share of light that meets none of them.
     through: f32,
+}
+
+impl Stretch for PlyOnWay {
+    fn through(&self) -> f32 {
+        self.through
+    }
+
+    fn begins(&self) -> f32 {
+        self.fibers.distance_past(0.0)
+    }
+
+    fn meets(&self, left: f32) -> f32 {
+        let Self { fibers, gaps, own, through } = self;
+        fibers.distance_past(if *own {
+            gaps.fibers_to_next(fibers.expected, (1.0 - left) / (1.0 - through))
+        } else {
+            gaps.fibers_passed(left)
+        })
+    }
+}
+
+/// A ply on the camera's ray.
+#[derive(Clone, Copy)]
+struct Crossed<'v>(&'v View<'v>, PlyCrossing);
+
+impl Stretch for Crossed<'_> {
+    fn through(&self) -> f32 {
+        self.1.gaps.unscattered(self.1.fibers)
+    }
+
+    fn begins(&self) -> f32 {
+        self.1.enter
+    }
+
+    fn meets(&self, left: f32) -> f32 {
+        let Self(view, crossing) = self;
+        let met = crossing.gaps.fibers_passed(left).min(crossing.fibers);
+        view.depth(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 })
+    }
 }
 
 /// A straight way on from a fibre.
@@ -134,6 +173,8 @@ struct Way<'a> {
     w: Vec3A,
     /// From the fibre's place to where the way begins.
     shift: Vec3A,
+    /// How far from there on fibres of other plies are.
+    free: f32,
     /// What it meets in the own ply.
     after: AfterTurn<'a>,
 }
@@ -150,9 +191,9 @@ impl Forward {
         u_first: f32,
         stream: &mut Stream,
     ) -> Option<Self> {
-        let (first, met) = first_fiber(crossings, unscattered, u_first)?;
-        let crossing = &crossings[first];
-        let spot = view.spot(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 });
+        let crossed = crossings.iter().map(|crossing| Crossed(view, *crossing));
+        let (Crossed(_, crossing), depth) = nearest(crossed, 1.0 - u_first * (1.0 - unscattered), stream)?;
+        let spot = view.spot(&crossing, depth);
         let fiber = Fiber::new(view, spot, view.camera, Rgb::ONE);
         let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
         Some(Self::follow(view, fiber, weight, little, stream))
@@ -181,7 +222,7 @@ impl Forward {
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
             let way = fiber.way(view, fiber.direction(stream), !forward.fibers.is_empty());
-            let mut stretches = ArrayVec::<Stretch, STRETCHES>::new();
+            let mut stretches = ArrayVec::<PlyOnWay, STRETCHES>::new();
             let through = if forward.fibers.len() == LAST {
                 1.0
             } else {
@@ -192,7 +233,8 @@ impl Forward {
             if left < through {
                 forward.drawn = Drawn::new(way.w, &forward.part(view, &fiber, fiber.lobe(way.w), through));
             } else {
-                next = fiber.next(view, &way, &mut stretches, left);
+                stretches.sort_unstable_by(|a, b| a.fibers.foot.total_cmp(&b.fibers.foot));
+                next = fiber.next(view, &way, (&stretches, left), stream);
             }
             if next.is_none() {
                 // What F does not send out.
@@ -305,71 +347,47 @@ impl Fiber {
     /// The way in the direction `w`.
     #[inline]
     fn way<'a>(&self, view: &View<'a>, w: Vec3A, later: bool) -> Way<'a> {
-        let Turned { cos: turn, shift, .. } = self.spot.turned(view, self.back, w);
+        let Turned { cos: turn, shift, free, .. } = self.spot.turned(view, self.back, w);
         let after = view.yarn.plies[self.spot.ply].after.turned(later, turn, self.spot.inside.along_short_axis(w));
-        Way { w, shift, after }
+        Way { w, shift, free, after }
     }
 
     /// The share of light on a way that meets no other fibre; `visit` is told of the plies there, in no order. The fibre's own chord keeps
     /// others away.
     #[inline]
-    fn follow_way(&self, view: &View<'_>, way: &Way<'_>, mut visit: impl FnMut(Stretch)) -> f32 {
+    fn follow_way(&self, view: &View<'_>, way: &Way<'_>, mut visit: impl FnMut(PlyOnWay)) -> f32 {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let across = Across::new(view, &spot.inside, way.w);
         let mut all = 1.0;
         view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
-            let gaps = &yarn.plies[ahead.ply].gaps;
-            let fibers = FibersAhead::new(view, &spot.inside, across, &ahead);
+            let gaps = yarn.plies[ahead.ply].gaps;
             let own = ahead.ply == spot.ply;
+            let fibers = FibersAhead::new(view, &spot.inside, across, &ahead, if own { 0.0 } else { way.free });
             let through = if own {
                 (-gaps.rate * way.after.met(fibers.expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
             } else {
                 gaps.unscattered(fibers.expected)
             };
             all *= through;
-            visit(Stretch { fibers, own, through });
+            visit(PlyOnWay { fibers, gaps, own, through });
         });
         all
     }
 
-    /// The fibre that light meets next on a way, where so much of it is `left`.
+    /// The fibre that light meets next on a way that these plies lie on, where so much of it is left.
     #[inline]
-    fn next(&self, view: &View<'_>, way: &Way<'_>, stretches: &mut [Stretch], mut left: f32) -> Option<Self> {
-        stretches.sort_unstable_by(|a, b| a.fibers.foot.total_cmp(&b.fibers.foot));
-        let Stretch { fibers, own, through } = stretches.iter().find(|stretch| {
-            let ends = left >= stretch.through;
-            if !ends {
-                left /= stretch.through;
-            }
-            ends
-        })?;
-        let gaps = &view.yarn.plies[fibers.ply].gaps;
-        let passed = if *own {
-            gaps.fibers_to_next(fibers.expected, (1.0 - left) / (1.0 - through))
-        } else {
-            gaps.fibers_passed(left)
-        };
-        let distance = fibers.distance_past(passed);
+    fn next(
+        &self,
+        view: &View<'_>,
+        way: &Way<'_>,
+        (plies, left): (&[PlyOnWay], f32),
+        stream: &mut Stream,
+    ) -> Option<Self> {
+        let (met, distance) = nearest(plies.iter().copied(), left, stream)?;
         let shape = view.yarn.occluder().shape();
         let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
-        let spot = Spot::new(view, fibers.ply, inside);
+        let spot = Spot::new(view, met.fibers.ply, inside);
         Some(Self::new(view, spot, -way.w, self.passed))
     }
-}
-
-/// The crossing in which a ray meets its first fibre, and the expected fibres before it there: `u` of the light that is
-/// not unscattered has met one by then.
-#[inline]
-fn first_fiber(crossings: &[PlyCrossing], unscattered: f32, u: f32) -> Option<(usize, f32)> {
-    let mut left = 1.0 - u * (1.0 - unscattered);
-    let (last, before) = crossings.split_last()?;
-    for (index, c) in before.iter().enumerate() {
-        let through = c.gaps.unscattered(c.fibers);
-        if left > through {
-            return Some((index, c.gaps.fibers_passed(left).min(c.fibers)));
-        }
-        left = (left / through.max(1e-30)).min(1.0);
-    }
-    Some((before.len(), last.gaps.fibers_passed(left).min(last.fibers)))
 }

@@ -38,7 +38,7 @@ use crate::{
         sampler::{OneOf, Stream},
     },
 };
-use ahead::{Across, FibersAhead};
+use ahead::{Across, FibersAhead, PliesAhead};
 use backward::{Backward, Lobe};
 use forward::Forward;
 use single::LateNode;
@@ -53,6 +53,8 @@ mod single;
 pub struct AggregatedYarn {
     occluder: Occluder,
     plies: Vec<PlyOptics>,
+    /// Whether plies lie in each other.
+    plies_overlap: bool,
     /// Expected energy of a node in each ply, for choosing between plies.
     node_gain: Vec<Rgb>,
 }
@@ -83,7 +85,8 @@ impl AggregatedYarn {
         let plies = shape.plies.iter().zip(materials);
         let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, count, stretch, solutions)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, node_gain }
+        let plies_overlap = (0..plies.len()).any(|ply| shape.uncovered(ply) < 0.999);
+        Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, plies_overlap, node_gain }
     }
 
     /// The yarn without its colours: what rays see that only ask whether they pass.
@@ -125,11 +128,10 @@ impl<'a> View<'a> {
         (crossing.foot - crossing.chord.place(x) / self.section.cos).max(0.0)
     }
 
-    /// The place there.
+    /// The place at a depth in it.
     #[inline]
-    fn spot(&self, crossing: &PlyCrossing, x: f32) -> Spot {
+    fn spot(&self, crossing: &PlyCrossing, depth: f32) -> Spot {
         let Self { yarn, section, .. } = self;
-        let depth = self.depth(crossing, x);
         let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
         Spot::new(self, crossing.ply, inside)
     }
@@ -168,9 +170,11 @@ impl Spot {
         let length = out.length().max(1e-6);
         let out = out / length;
         let cos = -back.dot(out);
+        let lead = view.section.thinness() * view.yarn.plies[self.ply].lead;
         Turned {
             cos,
-            shift: view.section.thinness() * view.yarn.plies[self.ply].lead * (back + cos.max(0.0) * out),
+            shift: lead * (back + cos.max(0.0) * out),
+            free: lead * (1.0 + cos.max(0.0)),
             beside: (1.0 - w.z * w.z).max(0.0).sqrt() / length,
         }
     }
@@ -187,16 +191,18 @@ impl Spot {
     fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
         let shape = view.yarn.occluder().shape();
         let across = Across::new(view, &self.inside, w);
-        let mut depth = Rgb::ZERO;
+        let free = 2.0 * view.section.thinness() * view.yarn.plies[self.ply].lead;
+        let mut ahead = PliesAhead::new();
         view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
-            if way.ply != self.ply {
-                let fibers = FibersAhead::new(view, &self.inside, across, &way);
-                if fibers.expected > 0.0 {
-                    depth += view.yarn.plies[way.ply].rho * fibers.expected;
-                    other(fibers);
-                }
+            if way.ply != self.ply || view.yarn.plies_overlap {
+                let _ = ahead.try_push(FibersAhead::new(view, &self.inside, across, &way, free));
             }
         });
+        let mut depth = Rgb::ZERO;
+        for fibers in ahead.iter().filter(|of| of.ply != self.ply && of.expected > 0.0) {
+            depth += fibers.depth(view, &ahead);
+            other(*fibers);
+        }
         depth
     }
 }
@@ -208,6 +214,8 @@ struct Turned {
     cos: f32,
     /// From the fibre's place to where the way on begins.
     shift: Vec3A,
+    /// How far from there on fibres of plies in which it may lie have their middles: the fibre keeps them away, or lies in them.
+    free: f32,
     /// How much of the section it passes for each unit across the fibre.
     beside: f32,
 }

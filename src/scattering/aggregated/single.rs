@@ -16,7 +16,7 @@ use super::{
         medium::PlyOptics,
     },
     Spot, Turned, View,
-    ahead::{Across, FibersAhead},
+    ahead::{Across, FibersAhead, PliesAhead},
     forward::ChainEnd,
 };
 use crate::{
@@ -258,7 +258,7 @@ impl Node {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
-        let Turned { cos: turn, shift, beside } = spot.turned(view, self.back, w);
+        let Turned { cos: turn, shift, free, beside } = spot.turned(view, self.back, w);
         let later = self.before > 0.0;
         let width = 2.0 * view.section.thinness() * beside * shape.plies[spot.ply].fiber_radius;
         let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
@@ -271,28 +271,31 @@ impl Node {
             let [turn, squared] = [turn * cosine, 0.5 + (turn * turn - 0.5) * cosine.powi(4)];
             (strip(-squared.sqrt()), optics.after.turned(later, turn, short))
         });
-        let mut out = WayOut::default();
+        let mut ahead = PliesAhead::new();
         view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
-            let fibers = FibersAhead::new(view, &spot.inside, across, &way);
-            if way.ply == spot.ply {
-                let by_rim = shape.plies[way.ply].by_rim(way.offset);
+            let free = if way.ply == spot.ply { 0.0 } else { free };
+            let _ = ahead.try_push(FibersAhead::new(view, &spot.inside, across, &way, free));
+        });
+        let mut out = WayOut::default();
+        for fibers in &ahead {
+            if fibers.ply == spot.ply {
+                let by_rim = shape.plies[fibers.ply].by_rim(fibers.offset);
+                let uncovered = fibers.uncovered(view, &ahead);
                 let depth = |(strip, after): &(Option<ClearedStrip>, AfterTurn<'_>)| {
-                    let FibersAhead { foot, tilt, ref chord, expected, .. } = fibers;
+                    let FibersAhead { foot, tilt, ref chord, expected, .. } = *fibers;
                     let ahead = strip.map_or(expected, |strip| tilt * strip.fibers(chord, foot));
                     let [met, counted] = after.met_and_counted(ahead, by_rim);
-                    // Chains that keep nothing end at the first fibre that they meet, and those that keep all pass by as many as there are.
-                    let lost = optics.rho * optics.gaps.rate.recip();
-                    optics.rho * (Rgb::splat(counted) + lost * (met - counted))
+                    optics.depth(met, counted * uncovered)
                 };
                 out.own += depth(&direct);
                 if let Some(bent) = &bent {
                     *out.bent.get_or_insert(Rgb::ZERO) += depth(bent);
                 }
             } else {
-                out.others += yarn.plies[way.ply].rho * fibers.expected;
-                other(fibers);
+                out.others += fibers.depth(view, &ahead);
+                other(*fibers);
             }
-        });
+        }
         out
     }
 }

@@ -475,7 +475,7 @@ fn densities_match(pressed: Option<Pressed>) {
     let backward = vertex.backward.of(view, node);
     for (w, dw) in sphere(1600, 1200) {
         let alone = alone.density(view, w);
-        let b = backward.value(view, &node.spot, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
+        let b = backward.value(view, w).1 * (1.0 - vertex.forward_chance()) * backward.chance;
         for (k, density) in [alone, b].into_iter().enumerate() {
             expected[k][cell(w)] += f64::from(density) * dw * f64::from(n);
         }
