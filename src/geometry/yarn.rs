@@ -167,27 +167,26 @@ impl YarnShape {
         }
     }
 
-    /// Where plies lie in each other: the share of a ply's section that no fibre of another ply covers, 1 where none does.
-    pub fn uncovered(&self, ply: usize) -> f64 {
-        const RINGS: u32 = 16;
-        const SECTORS: u32 = 32;
-        let own = &self.plies[ply];
-        // In the circle that a ply becomes, and back from there.
-        let axes = |of: &PlyShape| [of.direction, of.direction.perp()].map(|axis| (axis, of.distance * of.direction));
-        let open_at = |k: u32| {
-            let r = ((f64::from(k / SECTORS) + 0.5) / f64::from(RINGS)).sqrt() as f32 * own.radius;
-            let circle = r * Vec2::from_angle((TAU * (f64::from(k % SECTORS) + 0.5) / f64::from(SECTORS)) as f32);
-            let [(x, centre), (y, _)] = axes(own);
-            let at = centre + circle.x / own.stretch.x * x + circle.y / own.stretch.y * y;
-            let others = self.plies.iter().enumerate().filter(|(other, _)| *other != ply);
-            let open = others.map(|(_, of)| {
-                let [(x, centre), (y, _)] = axes(of);
-                let circle = of.stretch * Vec2::new((at - centre).dot(x), (at - centre).dot(y));
-                if circle.length() < of.radius { 1.0 - of.density() } else { 1.0 }
-            });
-            open.product::<f64>()
+    /// Whether plies lie in each other: more than a thousandth of the section of one in another.
+    pub fn plies_overlap(&self) -> bool {
+        const RINGS: u16 = 32;
+        const SECTORS: u16 = 64;
+        let inside = |of: &PlyShape, at: Vec2| {
+            let from = at - of.distance * of.direction;
+            let circle = of.stretch * Vec2::new(from.dot(of.direction), from.dot(of.direction.perp()));
+            circle.length_squared() < of.radius * of.radius
         };
-        (0..RINGS * SECTORS).map(open_at).sum::<f64>() / f64::from(RINGS * SECTORS)
+        let covered = |(ply, own): (usize, &PlyShape)| {
+            let within = (0..RINGS * SECTORS).filter(|place| {
+                let radius = own.radius * ((f32::from(place / SECTORS) + 0.5) / f32::from(RINGS)).sqrt();
+                let angle = std::f32::consts::TAU * (f32::from(place % SECTORS) + 0.5) / f32::from(SECTORS);
+                let section = radius * Vec2::from_angle(angle) / own.stretch;
+                let at = own.distance * own.direction + section.rotate(own.direction);
+                self.plies.iter().enumerate().any(|(other, of)| other != ply && inside(of, at))
+            });
+            1000 * within.count() > usize::from(RINGS * SECTORS)
+        };
+        self.plies.iter().enumerate().any(covered)
     }
 
     /// The same with the fibres of each ply packed as they are measured to be; without it they are even.
@@ -258,6 +257,24 @@ pub(crate) mod tests {
     /// A yarn of [`touching`] plies.
     pub(crate) fn touching_yarn(count: u32, fibers: u32, density: f64, ply_twist: f64, fiber_twist: f64) -> YarnShape {
         YarnShape::new(&touching(count, fibers, density, fiber_twist), ply_twist, true)
+    }
+
+    #[test]
+    fn plies_overlap_where_one_lies_in_another() {
+        let touching = |count| touching(count, 40, 0.5, 0.0);
+        for count in [1, 2, 3, 7] {
+            let plies = touching(count);
+            assert!(!YarnShape::new(&plies, 0.3, true).plies_overlap(), "{count} touching");
+            let wider: Vec<_> =
+                plies.iter().map(|ply| PlyParameters { radius: 1.05 * ply.radius, ..ply.clone() }).collect();
+            assert_eq!(YarnShape::new(&wider, 0.3, true).plies_overlap(), count > 1, "{count}");
+        }
+        // The short axis lies along the line to the yarn's axis, where the other one is.
+        let flat: Vec<_> = touching(2)
+            .iter()
+            .map(|ply| PlyParameters { radius: 1.05 * ply.radius, aspect: 0.8, ..ply.clone() })
+            .collect();
+        assert!(!YarnShape::new(&flat, 0.3, true).plies_overlap());
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    escape::{self, Leaving, Medium, Solutions},
+    escape::{self, Bends, Leaving, Medium, Solutions},
     fiber::FiberMaterial,
     kernel::{DIFFUSE, Latitudes, kappa_of_spread, kappa_of_variance, kernel, normalisation, spread},
 };
@@ -270,6 +270,8 @@ struct Channel<'a> {
     /// The part of a chain's light that goes straight on, and the part that turns.
     straight: f64,
     turned: f64,
+    /// The deviation of the angle by which TT of a chain turns, radians.
+    sigma: f64,
 }
 
 impl<'a> Channel<'a> {
@@ -278,7 +280,17 @@ impl<'a> Channel<'a> {
         let chain = tt * f;
         let goes_on = material.chain_cosine().powf(calibrated::STRAIGHT);
         let (straight, turned) = (goes_on * chain, (1.0 - goes_on) * chain);
-        Self { fibers, r: material.r[c], d: material.d[c], tt, chain, tt_out: tt * (1.0 - f), straight, turned }
+        Self {
+            fibers,
+            r: material.r[c],
+            d: material.d[c],
+            tt,
+            chain,
+            tt_out: tt * (1.0 - f),
+            straight,
+            turned,
+            sigma: material.beta_n,
+        }
     }
 
     /// What ends a chain at a fibre.
@@ -350,8 +362,23 @@ impl<'a> Channel<'a> {
             // The mean way to the next fibre is one, to the next that takes light out of its way 1 / lost.
             apart: if self.lost() > 1e-9 { (self.rate() / self.lost() - 1.0).max(0.0) } else { 0.0 },
             albedo: self.kept(),
+            bends: (self.turned > 0.0).then(|| self.bends()),
+            alone: self.fibers.neighbours == 0.0,
             sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back,
             taken_back,
+        }
+    }
+
+    /// Light that ends at each fibre, and goes on from there.
+    fn bends(&self) -> Bends {
+        let rate = extinction_rate(1.0, self.fibers.density);
+        Bends {
+            radius: self.fibers.sigma * rate * self.fibers.core,
+            apart: rate - 1.0,
+            chain: self.chain,
+            other: self.r + self.d + self.tt_out,
+            sigma: self.sigma,
+            share: self.chain / self.tt,
         }
     }
 

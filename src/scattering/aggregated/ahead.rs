@@ -137,3 +137,59 @@ impl FibersAhead {
         (self.foot + at).max(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ply in which light meets fibres at random, one per length from where it begins, in an evenly dense `length`.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Even {
+        begins: f32,
+        length: f32,
+    }
+
+    impl Stretch for Even {
+        fn through(&self) -> f32 {
+            (-self.length).exp()
+        }
+
+        fn begins(&self) -> f32 {
+            self.begins
+        }
+
+        fn meets(&self, left: f32) -> f32 {
+            self.begins - left.ln()
+        }
+    }
+
+    /// Where plies lie in each other light meets the nearest fibre: the places are those of fibres of all of them, thrown at random.
+    #[test]
+    fn of_plies_that_lie_in_each_other_the_nearest_fiber_is_met() {
+        let plies = [(0.0, 2.0), (0.5, 1.0), (1.0, 2.5), (4.0, 1.0)].map(|(begins, length)| Even { begins, length });
+        let all: f32 = plies.iter().map(|ply| ply.through()).product();
+        let mut stream = Stream::new(3);
+        const RAYS: usize = 200_000;
+        let (mut found, mut want) = ([[0.0f32; 10]; 4], [[0.0f32; 10]; 4]);
+        for _ in 0..RAYS {
+            let left = 1.0 - stream.next() * (1.0 - all);
+            let (ply, distance) = nearest(plies.iter().copied(), left, &mut stream).expect("there are plies");
+            let index = plies.iter().position(|of| *of == ply).expect("one of them");
+            found[index][((2.0 * distance) as usize).min(9)] += 1.0 / RAYS as f32;
+        }
+        // The chance to get to a place past all plies, and then to meet a fibre of one.
+        const STEP: f32 = 1e-3;
+        let inside = |ply: &Even, at: f32| (at >= ply.begins && at < ply.begins + ply.length) as u8 as f32;
+        let mut left = 1.0;
+        for step in 0..5000 {
+            let at = (step as f32 + 0.5) * STEP;
+            for (want, ply) in want.iter_mut().zip(&plies) {
+                want[((2.0 * at) as usize).min(9)] += left * inside(ply, at) * STEP / (1.0 - all);
+            }
+            left *= (-STEP * plies.iter().map(|ply| inside(ply, at)).sum::<f32>()).exp();
+        }
+        for (found, want) in found.as_flattened().iter().zip(want.as_flattened()) {
+            assert!((found - want).abs() < 0.004, "{found} {want}");
+        }
+    }
+}

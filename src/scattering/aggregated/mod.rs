@@ -85,7 +85,7 @@ impl AggregatedYarn {
         let plies = shape.plies.iter().zip(materials);
         let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, count, stretch, solutions)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
-        let plies_overlap = (0..plies.len()).any(|ply| shape.uncovered(ply) < 0.999);
+        let plies_overlap = shape.plies_overlap();
         Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, plies_overlap, node_gain }
     }
 

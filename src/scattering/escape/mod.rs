@@ -11,6 +11,7 @@ use glam::Vec2;
 
 use crate::math::{Rgb, frame::sin_cos, sampler::Stream};
 
+mod bent;
 mod linear;
 mod pressed;
 mod round;
@@ -42,23 +43,46 @@ pub(crate) struct Medium {
     pub(crate) apart: f64,
     /// What a meeting keeps.
     pub(crate) albedo: f64,
+    /// How TT bends light, if there is any: with it a meeting sends light all round only on the mean.
+    pub(crate) bends: Option<Bends>,
+    /// Whether no other ply lies around.
+    pub(crate) alone: bool,
     /// The share of what leaves that other plies send back at once; where the rest of them takes it is followed by direction.
     pub(crate) sent_back: f64,
     /// Of light that comes from other plies: the share of what leaves that returns to them.
     pub(crate) taken_back: f64,
 }
 
-impl Medium {
-    /// Whether no other ply lies around.
-    fn alone(&self) -> bool {
-        self.taken_back == 0.0
-    }
+/// The same section by each fibre that light meets, which passes it on as TT or sends it all round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bends {
+    /// The radius in mean free paths, and how far from each fibre no other is, beyond which these count.
+    pub(crate) radius: f64,
+    /// As above.
+    pub(crate) apart: f64,
+    /// What goes on as TT.
+    pub(crate) chain: f64,
+    /// What goes all round.
+    pub(crate) other: f64,
+    /// The deviation of the angle by which TT turns light, radians.
+    pub(crate) sigma: f64,
+    /// The share of TT that this is; the rest turns evenly and counts as sent all round.
+    pub(crate) share: f64,
+}
 
+impl Medium {
     /// The next one of those that are told apart: colours that nobody does are solved once. What is not absorbed stays so.
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
-        let Self { radius, apart, albedo, sent_back, taken_back } = *self;
+        let Self { radius, apart, albedo, bends, alone, sent_back, taken_back } = *self;
+        let bends = bends.map(|Bends { radius, apart, chain, other, sigma, share }| {
+            let rest = 1.0 - near(1.0 - chain - other);
+            let chain = near(chain).min(rest);
+            Bends { radius: near(radius), apart: near(apart), chain, other: rest - chain, sigma, share }
+        });
         Self {
+            bends,
+            alone,
             radius: near(radius),
             apart: near(apart),
             albedo: 1.0 - near(1.0 - albedo).min(1.0),
@@ -106,6 +130,13 @@ struct Solved {
     entering: f64,
 }
 
+/// Light of cells leaves towards azimuths that were found with directions: those of light that meets something there, or goes on.
+fn turn(cells: &mut [[Outgoing; RINGS]], bent: &[[Outgoing; 2]], which: usize) {
+    for (cell, of) in cells.iter_mut().flatten().zip(bent) {
+        cell.azimuths = of[which].azimuths;
+    }
+}
+
 /// What leaves a ply of one channel, as [`Leaving`] holds it.
 #[derive(Debug)]
 struct OfChannel {
@@ -116,7 +147,7 @@ struct OfChannel {
 
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<[u64; 6], Pending>>);
+pub struct Solutions(Mutex<HashMap<Vec<u64>, Pending>>);
 
 /// What one thread solves and others wait for.
 type Pending = Arc<OnceLock<Arc<OfChannel>>>;
@@ -124,8 +155,14 @@ type Pending = Arc<OnceLock<Arc<OfChannel>>>;
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
         let medium = medium.rounded();
-        let Medium { radius, apart, albedo, sent_back, taken_back } = medium;
-        let key = [radius, apart, albedo, sent_back, taken_back, stretch].map(f64::to_bits);
+        let Medium { radius, apart, albedo, bends, alone, sent_back, taken_back } = medium;
+        let bent = bends
+            .map_or([0.0; 5], |Bends { radius, apart, chain, other, sigma, .. }| [radius, apart, chain, other, sigma]);
+        let key = [radius, apart, albedo, f64::from(u8::from(alone)), sent_back, taken_back, stretch]
+            .into_iter()
+            .chain(bent)
+            .map(f64::to_bits);
+        let key = key.collect();
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let cell = Arc::clone(all.entry(key).or_default());
         drop(all);
@@ -165,7 +202,7 @@ impl Leaving {
         let tables = channels.map(|medium| solutions.of(&medium, stretch));
         let rgb = |value: &dyn Fn(&OfChannel) -> f64| Rgb::from([0, 1, 2].map(|c: usize| value(&tables[c])));
         let held = tables[0].held.len();
-        let cells = if channels[0].alone() { held } else { held / 2 };
+        let cells = if channels[0].alone { held } else { held / 2 };
         let shares = (0..held).map(|i| rgb(&|of| of.held[i].share));
         let azimuths = |i: usize| std::array::from_fn(|k| rgb(&|of| of.held[i].azimuths[k]));
         Self {
@@ -180,7 +217,8 @@ impl Leaving {
     fn of_channel(medium: &Medium, stretch: f64) -> OfChannel {
         // Of thicker sections the outer part is as deep below the rim as in the one that is looked at.
         let thicker = (medium.radius / THICKEST).max(1.0);
-        let looked_at = Medium { radius: medium.radius.min(THICKEST), ..*medium };
+        let bends = medium.bends.map(|bends| Bends { radius: bends.radius / thicker, ..bends });
+        let looked_at = Medium { radius: medium.radius.min(THICKEST), bends, ..*medium };
         let solved =
             if stretch > NEARLY_ROUND { pressed::solve(&looked_at, stretch) } else { round::solve(&looked_at) };
         let with_rim = |rings: &[Outgoing; RINGS]| {

@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, linear};
+use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, linear};
 
 /// Sectors of the whole, a multiple of 4, and those from the short axis to the long one, with both.
-const SECTORS: usize = 12;
+pub(super) const SECTORS: usize = 12;
 pub(super) const QUARTER: usize = SECTORS / 4 + 1;
-const CELLS: usize = RINGS * SECTORS;
+pub(super) const CELLS: usize = RINGS * SECTORS;
 /// Directions, twice the azimuths that are held, and places along each, that are looked at from every cell.
 const DIRECTIONS: usize = 2 * AZIMUTHS;
 const PLACES: usize = 12;
@@ -39,26 +39,12 @@ impl Row {
             for m in 0..PLACES {
                 let u = (m as f64 + 0.5) / PLACES as f64;
                 let s = if met > 1e-9 { apart - (-u * met).ln_1p() } else { u * length };
-                out.meets((x + s * dx, y + s * dy), met / (DIRECTIONS * PLACES) as f64);
+                for (cell, weight) in landing((x + s * dx, y + s * dy)) {
+                    out.next[cell] += weight * met / (DIRECTIONS * PLACES) as f64;
+                }
             }
         }
         out
-    }
-
-    /// Light that meets something at a point: by a cubic between the sectors, or it would spread around.
-    fn meets(&mut self, (x, y): (f64, f64), met: f64) {
-        let ring = (((x * x + y * y) * RINGS as f64) as usize).min(RINGS - 1);
-        let at = y.atan2(x) / TAU * SECTORS as f64 + SECTORS as f64;
-        let (sector, t) = (at as usize, at.fract());
-        let weights = [
-            -t * (t - 1.0) * (t - 2.0) / 6.0,
-            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-            -t * (t + 1.0) * (t - 2.0) / 2.0,
-            t * (t + 1.0) * (t - 1.0) / 6.0,
-        ];
-        for (k, weight) in weights.into_iter().enumerate() {
-            self.next[ring * SECTORS + (sector + SECTORS + k - 1) % SECTORS] += met * weight;
-        }
     }
 
     /// The same for the cell `own`, if of what leaves the share `taken_back` returns.
@@ -86,6 +72,20 @@ impl Row {
         let next = (0..CELLS).map(|cell| self.next[cell / SECTORS * SECTORS + image(cell % SECTORS, SECTORS)]);
         Self { escape: std::array::from_fn(|k| self.escape[image(k, AZIMUTHS)]), next: next.collect() }
     }
+}
+
+/// In which cells a point is, and how much in each: by a cubic between the sectors, or light would spread around.
+pub(super) fn landing((x, y): (f64, f64)) -> [(usize, f64); 4] {
+    let ring = (((x * x + y * y) * RINGS as f64) as usize).min(RINGS - 1);
+    let at = y.atan2(x) / TAU * SECTORS as f64 + SECTORS as f64;
+    let (sector, t) = (at as usize, at.fract());
+    let weights = [
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -t * (t + 1.0) * (t - 2.0) / 2.0,
+        t * (t + 1.0) * (t - 1.0) / 6.0,
+    ];
+    std::array::from_fn(|k| (ring * SECTORS + (sector + SECTORS + k - 1) % SECTORS, weights[k]))
 }
 
 /// Of light that meets something in each cell: what leaves at last towards each azimuth.
@@ -129,15 +129,22 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         }
         Outgoing::new(towards.iter().sum::<f64>(), towards)
     };
-    let onward = cells(&|own| mean(&near[own].next, &out, own));
+    let mut onward = cells(&|own| mean(&near[own].next, &out, own));
+    let bent = medium.bends.map(|bends| bent::solve(medium, &bends, stretch, |cell, k| out[cell * AZIMUTHS + k]));
+    if let Some(bent) = &bent {
+        super::turn(&mut onward, bent, 1);
+    }
     let mut solved = Solved { onward, met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
-    if !medium.alone() {
+    if !medium.alone {
         let [past, for_good] = [0.0, medium.taken_back].map(|share| leaving(&closed(share), medium.albedo));
         let of = |out: &[f64], cell: usize| {
             let towards: [f64; AZIMUTHS] = std::array::from_fn(|k| out[cell * AZIMUTHS + k]);
             Outgoing::new(towards.iter().sum(), towards)
         };
         solved.met = cells(&|cell| of(&past, cell));
+        if let Some(bent) = &bent {
+            super::turn(&mut solved.met, bent, 0);
+        }
         solved.for_good = cells(&|cell| of(&for_good, cell)).iter().map(|rings| rings.map(|out| out.share)).collect();
         let enters: Vec<f64> = rows.iter().map(|row| row.escape.iter().sum()).collect();
         solved.entering = mean(&enters, &for_good, CELLS - 1).share;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, linear};
+use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, linear, pressed::SECTORS};
 
 /// Directions, and places along each, that are looked at from every ring.
 const DIRECTIONS: usize = 24;
@@ -113,10 +113,25 @@ pub(super) fn solve(medium: &Medium) -> Solved {
             if met > 0.0 { out / met } else { leaving[m][RINGS - 1] }
         }))
     });
-    let mut solved = Solved { onward: vec![onward], met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
-    if !medium.alone() {
+    let mut onward = vec![onward];
+    let alike: [Outgoing; RINGS] = std::array::from_fn(|i| outgoing(std::array::from_fn(|m| leaving[m][i])));
+    let bent = medium.bends.map(|bends| {
+        bent::solve(medium, &bends, 1.0, |cell, k| {
+            let turned = k + AZIMUTHS - cell % SECTORS * (AZIMUTHS / SECTORS);
+            let of = &alike[cell / SECTORS];
+            of.share * of.azimuths[turned % AZIMUTHS] / AZIMUTHS as f64
+        })
+    });
+    if let Some(bent) = &bent {
+        super::turn(&mut onward, bent, 1);
+    }
+    let mut solved = Solved { onward, met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
+    if !medium.alone {
         let past = open.leaving(medium.albedo);
         solved.met.push(std::array::from_fn(|i| outgoing(std::array::from_fn(|m| past[m][i]))));
+        if let Some(bent) = &bent {
+            super::turn(&mut solved.met, bent, 0);
+        }
         let for_good = open.closed(medium.taken_back).leaving(medium.albedo)[0];
         solved.for_good.push(for_good);
         let enters: f64 = open.escape[0].iter().sum();

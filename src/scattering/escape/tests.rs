@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 
 fn medium(radius: f64, albedo: f64, apart: f64) -> Medium {
-    Medium { radius, apart, albedo, sent_back: 0.0, taken_back: 0.0 }
+    Medium { radius, apart, albedo, bends: None, alone: true, sent_back: 0.0, taken_back: 0.0 }
 }
 
 fn solved(medium: &Medium, stretch: f64) -> Solved {
@@ -15,13 +15,16 @@ fn nothing_is_lost_that_is_not_absorbed() {
     for stretch in [1.0, 1.5, 4.0] {
         for radius in [1e-6, 0.1, 1.0, 4.0, 20.0, 200.0, 1e9] {
             for (apart, taken_back) in [(0.0, 0.0), (0.5, 0.2)] {
-                let white = Medium { taken_back, ..medium(radius, 1.0, apart) };
-                let leaving = Leaving::new(
-                    &[white, medium(radius, 0.0, apart), medium(radius, 0.3, apart)],
-                    stretch,
-                    &Solutions::default(),
-                );
-                for share in leaving.shares.iter().chain([&leaving.entering]) {
+                // What other plies take of nothing is nothing.
+                let of = |taken_back, albedo| {
+                    let alone = apart == 0.0;
+                    Medium { alone, taken_back, ..medium(radius, albedo, apart) }
+                };
+                let channels = [of(taken_back, 1.0), of(0.0, 0.0), of(taken_back, 0.3)];
+                let leaving = Leaving::new(&channels, stretch, &Solutions::default());
+                // Nothing enters a ply that is alone.
+                let entering = (taken_back > 0.0).then_some(&leaving.entering);
+                for share in leaving.shares.iter().chain(entering) {
                     let [white, black, grey] = share.to_array();
                     assert!((white - 1.0).abs() < 1e-5, "{stretch} {radius} {apart}: {white}");
                     assert!(black == 0.0 && (0.0..0.31).contains(&grey), "{stretch} {radius} {apart}: {black} {grey}");
@@ -39,12 +42,12 @@ fn nothing_is_lost_that_is_not_absorbed() {
 #[test]
 fn both_solutions_agree_where_the_section_is_nearly_round() {
     for (radius, albedo, apart) in [(2.0, 0.9, 0.0), (6.0, 0.9, 0.8), (6.0, 0.3, 0.4), (6.0, 1.0, 0.8)] {
-        let medium = medium(radius, albedo, apart);
+        let medium = Medium { alone: false, taken_back: 0.2, ..medium(radius, albedo, apart) };
         let (round, pressed) = (round::solve(&medium), pressed::solve(&medium, 1.0));
-        for (a, b) in round.entering.into_iter().zip(pressed.entering) {
-            assert!((a - b).abs() < 0.01, "{a} {b}");
-        }
-        for (i, (a, b)) in round.sectors[0].iter().zip(&pressed.sectors[0]).enumerate() {
+        let (a, b) = (round.entering, pressed.entering);
+        assert!((a - b).abs() < 0.01 && a > 0.0, "{a} {b}");
+        let met = round.met[0].iter().zip(&pressed.met[0]);
+        for (i, (a, b)) in round.onward[0].iter().zip(&pressed.onward[0]).chain(met).enumerate() {
             assert!((a.share - b.share).abs() < 0.01 * a.share + 1e-3, "{medium:?}, ring {i}: {} {}", a.share, b.share);
             for (a, b) in a.azimuths.iter().zip(b.azimuths) {
                 assert!((a - b).abs() < 0.12, "{medium:?}, ring {i}: {a} {b}");
@@ -89,8 +92,8 @@ fn as_much_leaves_a_section_towards_each_side_as_is_found_step_by_step() {
         let medium = medium(radius, albedo, apart);
         let solved = solved(&medium, stretch);
         for ring in [2, 9, 15] {
-            for (sector, cells) in solved.sectors.iter().enumerate() {
-                let angle = 0.5 * PI * sector as f64 / (solved.sectors.len().max(2) - 1) as f64;
+            for (sector, cells) in solved.onward.iter().enumerate() {
+                let angle = 0.5 * PI * sector as f64 / (solved.onward.len().max(2) - 1) as f64;
                 let want = walked(&medium, stretch, ring, angle);
                 let cell = &cells[ring];
                 // Each quarter reaches three azimuths to either side, with half of the outermost ones.
@@ -104,6 +107,68 @@ fn as_much_leaves_a_section_towards_each_side_as_is_found_step_by_step() {
                     assert!(
                         (found - want).abs() < 0.012 + 0.05 * want,
                         "{medium:?} {stretch}, ring {ring}, sector {sector}, side {q}: {found:.4}, not {want:.4}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Light that starts in the middle of a ring, followed from fibre to fibre, where TT bends it or it goes all round: what leaves towards each
+/// azimuth, in twelve of them, and what of it does so before anything turned it all round or straightened it.
+fn walked_by_fibers(bends: &Bends, stretch: f64, ring: usize, angle: f64) -> [f64; 12] {
+    let mut stream = Stream::new(5);
+    let axes = [bends.radius / stretch.sqrt(), bends.radius * stretch.sqrt()];
+    let r = ((ring as f64 + 0.5) / RINGS as f64).sqrt();
+    let mut out = [0.0; 12];
+    const WALKS: usize = 100_000;
+    for _ in 0..WALKS {
+        let (mut x, mut y) = (r * angle.cos(), r * angle.sin());
+        let mut phi = TAU * f64::from(stream.next());
+        let mut weight = 1.0;
+        loop {
+            let s = bends.apart - (1.0 - f64::from(stream.next())).ln();
+            (x, y) = (x + s * phi.cos() / axes[0], y + s * phi.sin() / axes[1]);
+            if x * x + y * y >= 1.0 {
+                out[((phi / TAU * 12.0 + 0.5).rem_euclid(12.0)) as usize % 12] += weight / WALKS as f64;
+                break;
+            }
+            weight *= bends.chain + bends.other;
+            if f64::from(stream.next()) * (bends.chain + bends.other) < bends.chain {
+                phi += bends.sigma * f64::from(crate::math::warp::normal(stream.next()));
+            } else {
+                phi = TAU * f64::from(stream.next());
+            }
+        }
+    }
+    out
+}
+
+/// Of light that meets something in a cell, and is turned all round there: its azimuths are those of light that goes on evenly.
+#[test]
+fn light_that_tt_bends_leaves_towards_where_it_is_found_fiber_by_fiber() {
+    for (stretch, chain, other) in [(1.0, 0.75, 0.2), (1.6, 0.75, 0.2), (1.6, 0.5, 0.1), (2.2, 0.6, 0.39)] {
+        let bends = Bends { radius: 6.0, apart: 0.6, chain, other, sigma: 0.45, share: 1.0 };
+        let lost = 1.0 - chain * 0.83;
+        let bent = Medium {
+            bends: Some(bends),
+            taken_back: 0.1,
+            ..medium(6.0 * lost, 1.0 - (1.0 - chain - other) / lost, 0.3)
+        };
+        let solved = solved(&bent, stretch);
+        for ring in [2, 9, 15] {
+            for (sector, cells) in solved.met.iter().enumerate() {
+                let angle = 0.5 * PI * sector as f64 / (solved.met.len().max(2) - 1) as f64;
+                let walked = walked_by_fibers(&bends, stretch, ring, angle);
+                let all: f64 = walked.iter().sum();
+                for (k, want) in walked.into_iter().enumerate() {
+                    // Each twelfth has an azimuth in its middle and half of each beside.
+                    let at = |k: usize| cells[ring].azimuths[k % AZIMUTHS] / AZIMUTHS as f64;
+                    let found = at(2 * k) + 0.5 * (at(2 * k + 1) + at(2 * k + AZIMUTHS - 1));
+                    let want = want / all;
+                    assert!(
+                        (found - want).abs() < 0.008 + 0.06 * want,
+                        "{stretch} {chain} {other}, ring {ring}, sector {sector}, azimuth {k}: {found:.4}, not {want:.4}"
                     );
                 }
             }

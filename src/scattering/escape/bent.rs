@@ -1,0 +1,166 @@
+//! Transport in an ellipse with the directions into which TT bends light: towards where light of a place leaves.
+
+use std::f64::consts::TAU;
+
+use wide::f32x8;
+
+use super::{
+    AZIMUTHS, Bends, Medium, Outgoing, RINGS,
+    pressed::{CELLS, SECTORS, landing},
+};
+
+/// Directions, one for each azimuth that is held, and places along each, that are looked at from every cell.
+const DIRECTIONS: usize = AZIMUTHS;
+const PLACES: usize = 12;
+/// Events that are followed by direction. Light that is still inside goes on as that of which nobody knows where it came from.
+const FOLLOWED: usize = 12;
+/// Azimuths from the short axis to the long one, with both: for the others the section is mirrored.
+const SOLVED: usize = AZIMUTHS / 4 + 1;
+
+/// For each cell and direction: what leaves without meeting anything, and where something is met next, and how likely.
+struct Flights {
+    escape: Vec<f32>,
+    next: Vec<[(u16, f32); 4 * PLACES]>,
+}
+
+impl Flights {
+    fn new(axes: [f64; 2], apart: f64) -> Self {
+        let mut out = Self { escape: Vec::new(), next: Vec::new() };
+        for cell in 0..CELLS {
+            for k in 0..DIRECTIONS {
+                let flight = Flight::new(cell, k, axes, apart);
+                let mut next = [(0, 0.0); 4 * PLACES];
+                for m in 0..PLACES {
+                    let at = flight.at((m as f64 + 0.5) / PLACES as f64);
+                    for (to, (cell, weight)) in next[4 * m..].iter_mut().zip(landing(at)) {
+                        *to = (cell as u16, (flight.met * weight / PLACES as f64) as f32);
+                    }
+                }
+                out.escape.push((1.0 - flight.met) as f32);
+                out.next.push(next);
+            }
+        }
+        out
+    }
+}
+
+/// A way from the middle of a cell.
+struct Flight {
+    from: (f64, f64),
+    /// In the circle that the section becomes, for each mean free path.
+    step: (f64, f64),
+    /// To the rim, in mean free paths, of which the first `apart` are free.
+    length: f64,
+    apart: f64,
+    /// The chance to meet something.
+    met: f64,
+}
+
+impl Flight {
+    fn new(cell: usize, direction: usize, [short, long]: [f64; 2], apart: f64) -> Self {
+        let r2 = ((cell / SECTORS) as f64 + 0.5) / RINGS as f64;
+        let (sin, cos) = (TAU * (cell % SECTORS) as f64 / SECTORS as f64).sin_cos();
+        let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
+        let (sin, cos) = (TAU * direction as f64 / DIRECTIONS as f64).sin_cos();
+        let (dx, dy) = (cos / short, sin / long);
+        let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
+        let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
+        let met = -(-(length - apart).max(0.0)).exp_m1();
+        Self { from: (x, y), step: (dx, dy), length, apart, met }
+    }
+
+    /// Where light meets something of which the share `u` has done so before.
+    fn at(&self, u: f64) -> (f64, f64) {
+        let s = if self.met > 1e-9 { self.apart - (-u * self.met).ln_1p() } else { u * self.length };
+        (self.from.0 + s * self.step.0, self.from.1 + s * self.step.1)
+    }
+}
+
+/// How likely TT of a chain turns light by each number of directions: a wrapped normal distribution without what is the same all round.
+fn turns(sigma: f64, share: f64) -> [f32; DIRECTIONS] {
+    const PARTS: usize = 8;
+    let width = TAU / DIRECTIONS as f64;
+    let density = |angle: f64| {
+        let of = |turn: i32| (-0.5 * ((angle + f64::from(turn) * TAU) / sigma).powi(2)).exp();
+        (-2..=2).map(of).sum::<f64>()
+    };
+    let part = |k: usize| {
+        let from = k as f64 - 0.5;
+        (0..PARTS).map(|i| density((from + (i as f64 + 0.5) / PARTS as f64) * width)).sum::<f64>()
+    };
+    let parts: [f64; DIRECTIONS] = std::array::from_fn(part);
+    let all: f64 = parts.iter().sum();
+    let parts = parts.map(|part| (part / all - (1.0 - share) / DIRECTIONS as f64).max(0.0));
+    let all: f64 = parts.iter().sum();
+    parts.map(|part| (part / all) as f32)
+}
+
+/// Where to light leaves of each cell between the short axis and the long one, by `sectors` of them and by rings, but for a factor: of
+/// light that meets something in the cell, and of light that goes on from there and is not counted as going straight out.
+/// `without` is what leaves of each cell towards an azimuth where no direction is known, of light that meets something there.
+pub(super) fn solve(
+    medium: &Medium,
+    bends: &Bends,
+    stretch: f64,
+    without: impl Fn(usize, usize) -> f64,
+) -> Vec<[Outgoing; 2]> {
+    let axes = |radius: f64| [radius / stretch.sqrt(), radius * stretch.sqrt()];
+    let flights = Flights::new(axes(bends.radius), bends.apart);
+    let turns = turns(bends.sigma, bends.share).map(|chance| f32x8::splat(bends.chain as f32 * chance));
+    let even = f32x8::splat((bends.other / DIRECTIONS as f64) as f32);
+    let lanes =
+        |of: &dyn Fn(usize) -> f64| f32x8::new(std::array::from_fn(|k| if k < SOLVED { of(k) as f32 } else { 0.0 }));
+    let kept = (bends.chain + bends.other).max(1e-12);
+    // What leaves of light that meets something in a cell on its way in a direction.
+    let mut met: Vec<f32x8> = Vec::with_capacity(CELLS * DIRECTIONS);
+    for cell in 0..CELLS {
+        let start = lanes(&|k| without(cell, k) / medium.albedo.max(1e-12) * kept * AZIMUTHS as f64);
+        met.extend([start; DIRECTIONS]);
+    }
+    // Of light that goes on from there in one.
+    let onward = |met: &[f32x8]| -> Vec<f32x8> {
+        let flights = flights.escape.iter().zip(&flights.next).enumerate();
+        let of = flights.map(|(i, (escape, next))| {
+            let direction = i % DIRECTIONS;
+            let out = lanes(&|k| if k == direction { f64::from(*escape) * AZIMUTHS as f64 } else { 0.0 });
+            next.iter().fold(out, |sum, (cell, chance)| {
+                sum + met[usize::from(*cell) * DIRECTIONS + direction] * f32x8::splat(*chance)
+            })
+        });
+        of.collect()
+    };
+    for _ in 0..FOLLOWED {
+        let onward = onward(&met);
+        for (met, onward) in met.chunks_exact_mut(DIRECTIONS).zip(onward.chunks_exact(DIRECTIONS)) {
+            let around = onward.iter().fold(f32x8::ZERO, |sum, of| sum + *of) * even;
+            for (k, met) in met.iter_mut().enumerate() {
+                let of = turns.iter().enumerate();
+                *met = of.fold(around, |sum, (turn, chance)| sum + onward[(k + turn) % DIRECTIONS] * *chance);
+            }
+        }
+    }
+    // Light goes on evenly around from where the tables begin.
+    let mean: Vec<[f32; 8]> = onward(&met)
+        .chunks_exact(DIRECTIONS)
+        .map(|onward| {
+            (onward.iter().fold(f32x8::ZERO, |sum, of| sum + *of) / f32x8::splat(DIRECTIONS as f32)).to_array()
+        })
+        .collect();
+    let half = SECTORS / 2;
+    let towards = |ring: usize, sector: usize, k: usize| {
+        // Mirrored about the axes, until it is between them.
+        let (k, sector) = if 2 * k > AZIMUTHS { (AZIMUTHS - k, SECTORS - sector) } else { (k, sector) };
+        let (k, sector) = if k >= SOLVED { (AZIMUTHS / 2 - k, half + SECTORS - sector) } else { (k, sector) };
+        f64::from(mean[ring * SECTORS + sector % SECTORS][k])
+    };
+    let quarter = SECTORS / 4 + 1;
+    (0..quarter * RINGS)
+        .map(|i| {
+            let (sector, ring) = (i / RINGS, i % RINGS);
+            let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
+            let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, k, axes(medium.radius), medium.apart).met;
+            let rest = std::array::from_fn(|k| all[k] - straight(k));
+            [Outgoing::new(1.0, all), Outgoing::new(1.0, rest)]
+        })
+        .collect()
+}
