@@ -307,7 +307,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
 /// What is told of a scene.
 struct SceneFacts<'a> {
     scene: &'a Scene,
-    /// What each fabric takes, and all of them with what is not laid.
+    /// What each fabric takes, and all of them.
     estimates: Vec<Estimate>,
     total: Estimate,
     plan: Plan,
@@ -341,9 +341,7 @@ fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
 impl<'a> SceneFacts<'a> {
     fn new(scene: &'a Scene) -> Self {
         let estimates = cloth::estimates(scene);
-        // A survey lays nothing on garments: their fabrics have no curves.
-        let not_laid = scene.garments.iter().map(|g| Estimate::of_yarns(g.control_points, scene.render.compact_bvh));
-        let total: Estimate = estimates.iter().copied().chain(not_laid).sum();
+        let total: Estimate = estimates.iter().copied().sum();
         let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
         let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));

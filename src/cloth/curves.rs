@@ -17,7 +17,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, Mode, Model, Scene, Tufts, Yarn},
+    scene::{CurveKind, Fabric, Mode, Model, Sample, Scene, Tufts, Yarn},
     trace::{CurveGeometry, FiberGeometry, PerVariant, YarnGeometry},
 };
 
@@ -90,7 +90,25 @@ fn prepared<'a>(
     scene: &'a Scene,
     curves: impl IntoIterator<Item = Given<'a>>,
 ) -> impl Iterator<Item = (Prepared<'a>, Estimate)> {
-    scene.fabrics.iter().zip(curves).enumerate().map(|(index, (fabric, curves))| {
+    let numbered = scene.fabrics.iter().zip(curves).enumerate();
+    numbered.map(|(index, (fabric, curves))| Prepared::new(scene, index, fabric, curves))
+}
+
+/// What each fabric of a scene will take, also of curves that a survey has not made. Only one of them is in memory at a time.
+pub(super) fn estimates(scene: &Scene) -> Vec<Estimate> {
+    let estimate = |fabric: &Fabric| Prepared::new(scene, 0, fabric, Cow::Borrowed(&*fabric.curves)).1;
+    let of_all = |fabric: &Fabric| match fabric.kind {
+        CurveKind::Yarn(yarn) => fabric
+            .sample(scene.yarns[yarn].radius)
+            .map_or_else(|| estimate(fabric), |Sample { fabric, times }| estimate(&fabric).times(times)),
+        CurveKind::Fiber(_) => estimate(fabric),
+    };
+    scene.fabrics.iter().map(of_all).collect()
+}
+
+impl<'a> Prepared<'a> {
+    /// The curves of a fabric, with what they will take.
+    fn new(scene: &'a Scene, index: usize, fabric: &'a Fabric, curves: Given<'a>) -> (Self, Estimate) {
         let of = match fabric.kind {
             CurveKind::Yarn(yarn) => {
                 let yarn = &scene.yarns[yarn];
@@ -100,18 +118,11 @@ fn prepared<'a>(
             }
             CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
         };
-        let prepared = Prepared { index, fabric, of };
+        let prepared = Self { index, fabric, of };
         let estimate = prepared.estimate(scene.render.mode, scene.render.compact_bvh);
         (prepared, estimate)
-    })
-}
+    }
 
-/// What each fabric of a scene will take. Only one of them is in memory at a time.
-pub(super) fn estimates<'a>(scene: &'a Scene, curves: impl IntoIterator<Item = Given<'a>>) -> Vec<Estimate> {
-    prepared(scene, curves).map(|(_, estimate)| estimate).collect()
-}
-
-impl Prepared<'_> {
     fn estimate(&self, mode: Mode, compact: bool) -> Estimate {
         let mut estimate = Estimate::default();
         match &self.of {

@@ -98,11 +98,11 @@ impl Estimate {
         self.geometry_bytes + self.bvh_bytes
     }
 
-    /// That of aggregated yarns of so many control points in all.
-    pub fn of_yarns(points: u64, compact: bool) -> Self {
-        let mut estimate = Self::default();
-        estimate.add(points, points, true, compact);
-        estimate
+    /// That of so many times as much.
+    pub(super) fn times(self, times: f64) -> Self {
+        let [points, segments, geometry_bytes, bvh_bytes] =
+            [self.points, self.segments, self.geometry_bytes, self.bvh_bytes].map(|n| (n as f64 * times) as u64);
+        Self { points, segments, geometry_bytes, bvh_bytes, tight_bends: self.tight_bends }
     }
 
     pub(super) fn add(&mut self, points: u64, segments: u64, framed: bool, compact: bool) {

@@ -146,7 +146,7 @@ fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
 
 /// What the curves of each fabric will take, without making them.
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
-    curves::estimates(scene, borrowed(scene))
+    curves::estimates(scene)
 }
 
 #[cfg(test)]

@@ -187,3 +187,32 @@ fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
     assert!(within > 1000 && same as f64 > 0.92 * within as f64, "{same} of {within}");
     assert!((missed as f64) < 0.01 * within as f64, "{missed} of {within} miss what is ahead");
 }
+
+#[test]
+fn cloth_that_is_not_laid_is_estimated_in_every_mode() {
+    use crate::scene::load::load;
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = "v 0 0 0\nv 60 0 0\nv 60 60 0\nv 0 60 0\nvt 0 0\nvt 60 0\nvt 60 60\nvt 0 60\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.path().join("m.obj"), mesh).unwrap();
+    let text = |mode: &str, cloth: &str| {
+        format!(
+            "[render]\nmode = \"{mode}\"\n[[light]]\ntype = \"environment\"\nradiance = 1\n\
+             [[fabric]]\nyarn = \"wool\"\nsource = {{ type = \"garment\", path = \"m.obj\", unit = \"mm\", uv_unit = \"mm\", \
+             cloth = {{ {cloth} }} }}\n"
+        )
+    };
+    for cloth in ["type = \"knit\", pattern = \"stockinette\"", "type = \"weave\", draft = \"plain\""] {
+        for mode in ["yarn", "ply", "fiber"] {
+            let path = folder.path().join("s.toml");
+            std::fs::write(&path, text(mode, cloth)).unwrap();
+            let bytes = |survey: bool| -> f64 {
+                let scene = load(&path, &LoadOptions { survey, ..LoadOptions::default() }).unwrap();
+                assert_eq!(scene.fabrics[0].curves.is_empty(), survey);
+                estimates(&scene).iter().map(|e| e.bytes() as f64).sum()
+            };
+            let (told, true_bytes) = (bytes(true), bytes(false));
+            // Seams and finished edges are not known before.
+            assert!((0.7..1.1).contains(&(told / true_bytes)), "{cloth}, {mode}: {told} of {true_bytes}");
+        }
+    }
+}

@@ -98,8 +98,8 @@ pub(crate) struct Report {
     pub cloth: Vec<usize>,
     /// Length of the yarns of each cloth, about, without what finishes edges; mm.
     pub yarn_length: Vec<f64>,
-    /// About as many control points.
-    pub control_points: u64,
+    /// About as many control points of each cloth.
+    pub control_points: Vec<u64>,
     /// 3-D length over length as cut.
     pub ratio: LengthRatio,
     /// Share of the area that is stretched by more than a tenth along u or v.
@@ -217,19 +217,14 @@ impl Garment {
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
         let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let mut stitches_of = vec![0; shapes.len()];
+        lattices.iter().zip(&cloth).for_each(|(lattice, own)| stitches_of[*own] += lattice.stitches);
         let report = Report {
             stitches: lattices.iter().map(|l| l.stitches).collect(),
-            yarn_length: (0..shapes.len())
-                .map(|own| {
-                    let lattices = lattices.iter().zip(&cloth).filter(|(_, c)| **c == own);
-                    lattices.map(|(l, _)| l.stitches as f64 * shapes[own].length).sum()
-                })
+            yarn_length: stitches_of.iter().zip(&shapes).map(|(n, shape)| *n as f64 * shape.length).collect(),
+            control_points: (stitches_of.iter().zip(&shapes).zip(&options.cloths))
+                .map(|((n, shape), cloth)| n * cloth.points as u64 * if shape.has_axis(1) { 2 } else { 1 })
                 .collect(),
-            control_points: lattices
-                .iter()
-                .zip(&cloth)
-                .map(|(l, &c)| l.stitches * options.cloths[c].points as u64 * if shapes[c].has_axis(1) { 2 } else { 1 })
-                .sum(),
             cloth,
             ratio: panels.ratio,
             stretched: panels.stretched,

@@ -328,17 +328,27 @@ pub struct Fabric {
 }
 
 /// What is known of curves that a fabric does not hold: a render has taken them, or a survey has not made them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Taken {
     points: usize,
     pressed: bool,
+    /// Length of curves that a survey has not made, in yarn radii; 0 of those that a render has taken.
+    length: f64,
 }
 
 impl Taken {
-    /// Of curves that a survey does not make, whose points are told elsewhere.
-    pub(crate) fn not_made(pressed: bool) -> Self {
-        Self { points: 0, pressed }
+    /// Of curves that a survey does not make: about so many points, and so many yarn radii of length.
+    pub(crate) fn not_made(points: u64, length: f64, pressed: bool) -> Self {
+        Self { points: points as usize, pressed, length }
     }
+}
+
+/// A straight piece of a fabric's yarn in place of all its curves.
+pub(crate) struct Sample {
+    /// The fabric, with this one curve.
+    pub fabric: Fabric,
+    /// How many times as much the fabric has.
+    pub times: f64,
 }
 
 /// The points of a fabric's curves at other times: for each time, for each curve, millimetres.
@@ -369,6 +379,29 @@ impl Fabric {
         self.taken.points + self.curves.iter().map(|(c, _)| c.points.len()).sum::<usize>()
     }
 
+    /// What stands for curves that a survey has not made: a piece of yarn of as many points on its length; `None` where
+    /// there are none such.
+    pub(crate) fn sample(&self, radius: f64) -> Option<Sample> {
+        /// Enough that what is at its ends does not count.
+        const POINTS: usize = 10_000;
+        let Taken { points, pressed, length } = self.taken;
+        if points < 2 || length <= 0.0 {
+            return None;
+        }
+        let count = points.clamp(4, POINTS);
+        let step = length * radius / points as f64;
+        let curve = Curve {
+            basis: Basis::BSpline,
+            closed: false,
+            points: (0..count).map(|i| DVec3::new(step * i as f64, 0.0, 0.0)).collect(),
+            radii: None,
+            flattening: pressed.then(|| vec![glam::Vec3::Y * 0.8; count]),
+        };
+        let curves = vec![(curve, vec![radius; count])];
+        let fabric = Self { curves, motion: FabricMotion::default(), taken: Taken::default(), ..self.clone() };
+        Some(Sample { fabric, times: points as f64 / count as f64 })
+    }
+
     /// Whether any of its yarns is pressed flat.
     pub fn is_pressed(&self) -> bool {
         self.taken.pressed || self.curves.iter().any(|(curve, _)| curve.flattening.is_some())
@@ -383,7 +416,7 @@ impl Fabric {
 
     /// Takes the curves out of it, and leaves what statistics tell of them.
     pub fn take_curves(&mut self) -> Vec<(Curve, Vec<f64>)> {
-        self.taken = Taken { points: self.control_points(), pressed: self.is_pressed() };
+        self.taken = Taken { points: self.control_points(), pressed: self.is_pressed(), length: 0.0 };
         std::mem::take(&mut self.curves)
     }
 }

@@ -236,7 +236,8 @@ impl Made {
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
-            Some(Basis::BSpline) => Basis::BSpline,
+            // Only made cloth has none yet.
+            Some(Basis::BSpline) | None => Basis::BSpline,
             _ => Basis::CatmullRom,
         };
         let mut fabric = Fabric {

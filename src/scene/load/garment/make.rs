@@ -48,6 +48,11 @@ impl Rule {
         library.yarns.get(self.yarn.as_deref().unwrap_or(yarn))?.tex
     }
 
+    /// Radius of its yarn, or this one where it names none; mm.
+    fn radius(&self, own: f64, library: &Library) -> f64 {
+        self.yarn.as_ref().and_then(|name| library.yarns.get(name)).map_or(own, |yarn| yarn.radius)
+    }
+
     /// What messages call it.
     fn origin(&self, mesh: &Path) -> String {
         let group = self.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
@@ -88,7 +93,8 @@ impl GarmentPlan {
         let mut notes = garment.report().notes.clone();
         let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
         let (stranded, own) = self.stranded((yarn, color), (&garment, &sizes), context, library, warnings)?;
-        let mut facts = GarmentFacts { overlap, ..self.facts(&garment, &stranded, &tex) };
+        let amounts = amounts(&garment, &stranded);
+        let mut facts = GarmentFacts { overlap, ..self.facts(&garment, &amounts, &tex) };
         let meshes = self.posed(&frames, &read, context)?;
         let kept = kept(&meshes, frames.shown);
         let shown = kept.iter().filter(|i| **i < frames.shown).count();
@@ -96,7 +102,8 @@ impl GarmentPlan {
         if detail.survey {
             self.bodies(&kept, unit, false, detail, (context, warnings))?;
             facts.repairs.clone_from(&notes);
-            return Some((self.not_laid(&garment, &sizes, shown), facts));
+            let radii: Vec<f64> = self.rules.iter().map(|rule| rule.radius(radius, library)).collect();
+            return Some((self.not_laid(&garment, &sizes, (&amounts, &radii), shown), facts));
         }
         let mut meshes: Vec<GarmentMesh> =
             meshes.into_iter().enumerate().filter(|(i, _)| kept.contains(i)).map(|(_, mesh)| mesh).collect();
@@ -205,16 +212,9 @@ impl GarmentPlan {
     }
 
     /// What is known before yarns are laid; of their overlap nothing.
-    fn facts(&self, garment: &Garment, stranded: &[Option<Stranded>], tex: &[Option<f64>]) -> GarmentFacts {
+    fn facts(&self, garment: &Garment, amounts: &[(f64, u64)], tex: &[Option<f64>]) -> GarmentFacts {
         let report = garment.report();
-        let mut lengths = report.yarn_length.clone();
-        let mut control_points = report.control_points;
-        for (i, stranded) in stranded.iter().enumerate() {
-            let Some(stranded) = stranded else { continue };
-            let (_, length, points) = garment.floats(i, stranded);
-            lengths[i] += length;
-            control_points += points;
-        }
+        let (lengths, points): (Vec<f64>, Vec<u64>) = amounts.iter().copied().unzip();
         GarmentFacts {
             path: self.path.display().to_string(),
             cloth: self.rules[0].cloth.name.clone(),
@@ -224,7 +224,7 @@ impl GarmentPlan {
             yarn_length: lengths.iter().sum(),
             weight: weight(&lengths, tex),
             overlap: None,
-            control_points,
+            control_points: points.iter().sum(),
             uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
             stretched: report.stretched,
             uv_mm: report.uv_mm,
@@ -256,7 +256,13 @@ impl GarmentPlan {
     }
 
     /// What a survey tells of each rule that has panels: all but its yarns, which are not laid.
-    fn not_laid(self, garment: &Garment, sizes: &[DVec2], shown: usize) -> Vec<MadePanels> {
+    fn not_laid(
+        self,
+        garment: &Garment,
+        sizes: &[DVec2],
+        (amounts, radii): (&[(f64, u64)], &[f64]),
+        shown: usize,
+    ) -> Vec<MadePanels> {
         let mut out = Vec::new();
         for (i, rule) in self.rules.into_iter().enumerate() {
             if garment.counts(i).is_none() {
@@ -268,7 +274,7 @@ impl GarmentPlan {
                 yarn: rule.yarn,
                 color: rule.color,
                 curves: Vec::new(),
-                taken: Taken::not_made(garment.is_pressed(i)),
+                taken: Taken::not_made(amounts[i].1, amounts[i].0 / radii[i], garment.is_pressed(i)),
                 panels: Vec::new(),
                 coordinates: FabricCoordinates::laid(Vec::new(), garment.kinds(i), extent, stitch),
                 motion: FabricMotion { later: vec![Vec::new(); shown - 1], ..FabricMotion::default() },
@@ -382,6 +388,20 @@ impl GarmentPlan {
         }
         Some(out)
     }
+}
+
+/// Length of the yarns of each rule, mm, and about as many control points, with what floats.
+fn amounts(garment: &Garment, stranded: &[Option<Stranded>]) -> Vec<(f64, u64)> {
+    let report = garment.report();
+    let bare = report.yarn_length.iter().copied().zip(report.control_points.iter().copied());
+    let with_floats = |(i, (length, points))| match stranded.get(i).and_then(Option::as_ref) {
+        Some(stranded) => {
+            let (_, floating, more) = garment.floats(i, stranded);
+            (length + floating, points + more)
+        }
+        None => (length, points),
+    };
+    bare.enumerate().map(with_floats).collect()
 }
 
 /// Columns and rows of the largest panel of a rule.
