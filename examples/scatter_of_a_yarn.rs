@@ -25,7 +25,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let [(back, forward), (true_back, true_forward)] = [model.energies(), fibers.energies()];
         println!(
             "{degrees:>8} {:>16.3} {:>8.3} {:>16.3} {:>8.3}   +- {:.3}",
-            back[2].mean, forward[2].mean, true_back[2].mean, true_forward[2].mean, true_back[2].se
+            back[2].mean,
+            forward[2].mean,
+            true_back[2].mean,
+            true_forward[2].mean,
+            true_back[2].se.unwrap_or(f64::NAN)
         );
     }
     Ok(())

@@ -23,6 +23,19 @@ use crate::{
     trace::{CurveGeometry, World},
 };
 
+/// What a table says of what is not known, such as the standard error of one sample.
+pub(crate) const UNKNOWN: &str = "n/a";
+
+/// How far a figure may be off, behind its sign; nothing where that is not known.
+pub(crate) fn plus_minus(error: Option<f64>, sign: &str, show: impl Fn(f64) -> String) -> String {
+    error.map_or(String::new(), |error| sign.to_owned() + &show(error))
+}
+
+/// A cell of a CSV file: empty where its figure is not known.
+pub(crate) fn csv_cell(figure: Option<f64>, show: impl Fn(f64) -> String) -> String {
+    figure.map_or(String::new(), show)
+}
+
 /// Seconds of each phase.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Phases {

@@ -90,7 +90,7 @@ fn crops_and_shards_of_crops_make_the_whole_frame() {
     let without = merge(d, "left.film a.film b.film -o x.exr");
     assert_eq!(without.status, Some(2));
     assert_eq!(
-        without.stderr, "error: pixels 19,0 to 48,9 are missing\nhint: `--partial` merges what there is\n",
+        without.stderr, "error: pixels 19,0 to 48,9 are missing\n  hint: `--partial` merges what there is\n",
         "{}",
         without.stderr
     );
@@ -136,7 +136,7 @@ fn merging_refuses_what_is_not_one_picture() {
     assert!(message("1.film 2.film other.film").contains("render.spp: 8 in the former, 7 in the latter"));
     assert_eq!(
         message("1.film 3.film"),
-        "error: samples 2 to 4 of 7 are missing: shard 2/3\nhint: `--partial` merges what there is\n"
+        "error: samples 2 to 4 of 7 are missing: shard 2/3\n  hint: `--partial` merges what there is\n"
     );
     assert!(message("2.film").contains("samples 0 to 2 of 7 are missing: shard 1/3"));
     assert!(message("1.film 1.film 2.film 3.film").contains("1.film and 1.film both hold samples 0 to 2"));

@@ -125,7 +125,7 @@ fn what_cannot_be_made_is_refused() {
         ),
         (
             &["knit", "--rows", "200", "--height", "0.6", "-o", "a.bcc"],
-            "error: 200 rows on a height of 0.6 mm are 0.00 yarn diameters high; 0.9 to 20 can be knitted\n  hint: about 1 rows",
+            "error: 200 rows on a height of 0.6 mm are 0.00 yarn diameters high; 0.9 to 20 can be knitted\n  hint: about 1 row in yarn ",
         ),
         (
             &["knit", "--stitches", "2", "--width", "1e12", "-o", "a.bcc"],

@@ -43,6 +43,49 @@ fn scatter_writes_every_format_and_sweeps_any_key() {
 }
 
 #[test]
+fn scatter_takes_any_yarn_of_a_scene() {
+    let directory = directory();
+    let d = directory.path();
+    let source = "source = { type = \"straight\", count = 1, length = 2 }";
+    let both = format!("[[fabric]]\nyarn = \"wool\"\n{source}\n[[fabric]]\nyarn = \"silk\"\n{source}\n");
+    crate::support::write(d, "s.toml", format!("unit = \"cm\"\n{both}"));
+    let args = ["scatter", "s.toml", "--samples", "2000", "--seed", "3"];
+    let run = yarnray(d, &args);
+    assert!(run.stderr.contains("silk, wool"), "{}", run.stderr);
+    let own = |more: &[&str], library: &[&str]| {
+        let of_scene = yarnray(d, &[&args[..], &["--yarn", "wool"], more].concat()).good().stdout;
+        let of_library =
+            yarnray(d, &[&["scatter", "wool", "--samples", "2000", "--seed", "3"], library].concat()).good().stdout;
+        assert_eq!(of_scene, of_library);
+    };
+    own(&[], &[]);
+    for more in [["--set", "beta_n=40"], ["--set", "fibers=10"], ["--sweep", "ply_twist=0..30:2"]] {
+        own(&more, &more);
+    }
+}
+
+#[test]
+fn the_error_of_one_sample_is_not_known() {
+    let directory = directory();
+    let run = yarnray(directory.path(), &["scatter", "silk1", "--samples", "1"]).good();
+    assert!(run.stdout.contains("+- n/a n/a n/a\n"), "{}", run.stdout);
+    let run = yarnray(directory.path(), &["scatter", "silk1", "--samples", "1", "--json"]).good();
+    let report: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert!(report["forward_se"][0].is_null() && report["unscattered_se"].is_null());
+    let run = yarnray(directory.path(), &["scatter", "silk1", "--samples", "1", "--sweep", "theta=0..60:2"]).good();
+    assert!(run.stdout.lines().nth(1).unwrap().ends_with(','), "{}", run.stdout);
+}
+
+#[test]
+fn a_sweep_goes_by_round_steps() {
+    let directory = directory();
+    let args = ["scatter", "silk1", "--samples", "50", "--sweep", "density=0.1..0.7:7"];
+    let run = yarnray(directory.path(), &args).good();
+    let at: Vec<&str> = run.stdout.lines().skip(1).map(|line| line.split(',').next().unwrap()).collect();
+    assert_eq!(at, ["0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]);
+}
+
+#[test]
 fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
     let directory = directory();
     for (args, word) in [
@@ -55,6 +98,8 @@ fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
         (&["scatter", "silk1", "--sweep", "density=0.1"], "KEY=A..B:N"),
         (&["scatter", "silk1", "--sweep", "nonsense=1..2:2"], "unknown key `nonsense`"),
         (&["scatter", "silk1", "--sweep", "density=0..1:2"], "density"),
+        (&["scatter", "silk1", "--sweep", "fibers=10..11:3"], "--sweep fibers=10..11:2 takes every one"),
+        (&["scatter", "silk1", "--sweep", "yarn.silk1.fibers=1.5..3.5:2"], "takes whole numbers, but 1.5"),
         (&["scatter", "silk1", "-o", "x.exr"], ".json, .csv, .svg or .png"),
         (&["scatter", "absent.toml"], "no such file"),
         (&["scatter", "--fiber", "wol"], "did you mean \"wool\"?"),

@@ -20,6 +20,7 @@ use crate::{
         suite::{ConvergePlan, Measure, Suite},
         table3::{self, BenchError, Processes},
     },
+    math::words::counted,
     report::{
         fidelity::Table as FidelityTable,
         page::Picture,
@@ -190,7 +191,7 @@ fn plot(
     if let Some((svg, text)) = kept {
         return Ok(Plot { caption: text, svg });
     }
-    say(&format!("{name}: error against time, {} seeds", plan.seeds));
+    say(&format!("{name}: error against time, {}", counted(plan.seeds, "seed")));
     let (pool, threads) = thread_pool(threads)?;
     let options = converge::Options {
         methods: vec![suite.reference, suite.tested],

@@ -54,6 +54,9 @@ pub(super) struct CompareArgs {
     /// Where to write: an error map (.png) or a page with metrics and pictures (.html). Repeatable.
     #[arg(short, long = "out", value_name = "PATH")]
     out: Vec<PathBuf>,
+    /// Only the result, without notes.
+    #[arg(long, short)]
+    quiet: bool,
     /// What the error map shows: FLIP from 0 to 1, or the root of each pixel's relMSE up to its 99.9th percentile.
     #[arg(long, value_parser = ["flip", "relative"], default_value = "flip")]
     map: String,
@@ -88,7 +91,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         .reads("REFERENCE", [&args.reference])
         .reads("--mask", args.mask.iter().filter(|m| *m != Path::new("alpha")))
         .writes("-o", &args.out)
-        .check(true)?;
+        .check(args.quiet)?;
     let names = [&args.test, &args.reference].map(|path| path.display().to_string());
     let [test, reference] = [image::read(&args.test)?, image::read(&args.reference)?];
     let mut pair = Pair::new(&test, &reference)
@@ -108,7 +111,9 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         ))
     })?;
     let names = names.each_ref().map(String::as_str);
-    if let Some((shown, linear)) = of_different_kinds([&args.test, &args.reference]) {
+    if let Some((shown, linear)) = of_different_kinds([&args.test, &args.reference])
+        && !args.quiet
+    {
         log::say(&format!(
             "note: {shown} holds colours for a screen with the exposure and tone curve that it was written with, \
              {linear} radiance: compare pictures of one kind"

@@ -78,11 +78,11 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
         if let Some(model) = method.model {
             options.model = Some(model.name().to_owned());
         }
-        options.load(&args.scene).map_err(|error| error.to_string())
+        options.load(&args.scene, true).map_err(|error| error.to_string())
     };
     let outputs = Files::default().reads("SCENE", [&args.scene]).writes("-o", &files);
     outputs.refuse()?;
-    let plain = args.options.load(&args.scene)?;
+    let plain = args.options.load(&args.scene, args.quiet)?;
     outputs.check(args.quiet)?;
     let methods = if args.methods.is_empty() {
         let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };

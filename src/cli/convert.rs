@@ -22,6 +22,7 @@ use crate::{
         curve::{Basis, CurveSet},
         proposal::UNITS,
     },
+    math::words::counted,
 };
 
 const EXAMPLES: &str = "Examples:
@@ -159,10 +160,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     if let Some(yarn) = args.level.yarn()? {
         let unit = unit.ok_or_else(|| {
             let hint = "--unit cm; `yarnray info` of it proposes one";
-            Failure::Input(format!(
-                "error: {}: a yarn needs the unit of its curves\n  hint: {hint}",
-                args.input.display()
-            ))
+            Failure::hinted(format!("{}: a yarn needs the unit of its curves", args.input.display()), hint)
         })?;
         scale(&mut set, unit);
         set = args.level.apply(set, &yarn)?;
@@ -179,7 +177,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
             log::say(&format!("{}: {line}", args.output.display()));
         }
         let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        log::say(&format!("wrote {}: {} curves, {points} points", args.output.display(), set.curves.len()));
+        log::say(&format!(
+            "wrote {}: {}, {}",
+            args.output.display(),
+            counted(set.curves.len(), "curve"),
+            counted(points, "point")
+        ));
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     cloth::{self, Estimate},
+    math::words::{bytes_in_words, counted},
     scene::Mode,
 };
 
@@ -47,7 +48,7 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     let files =
         Files::default().reads("SCENE", [&args.scene]).reads("--curves", &args.options.curves).writes("-o", &args.out);
     files.refuse()?;
-    let mut scene = args.options.load(&args.scene)?;
+    let mut scene = args.options.load(&args.scene, args.quiet)?;
     // Yarns are what the scene's own curve files hold: this command is for what is in them.
     if scene.render.mode == Mode::Yarn {
         scene.render.mode = Mode::Fiber;
@@ -55,11 +56,11 @@ pub(super) fn run(args: &FibersArgs) -> Result<(), Failure> {
     if args.estimate {
         let total: Estimate = cloth::estimates(&scene).into_iter().sum();
         print(&format!(
-            "{} control points, {} segments; {} of curves and {} of BVH when rendered\n",
-            total.points,
-            total.segments,
-            super::bytes_in_words(total.geometry_bytes),
-            super::bytes_in_words(total.bvh_bytes)
+            "{}, {}; {} of curves and {} of BVH when rendered\n",
+            counted(total.points, "control point"),
+            counted(total.segments, "segment"),
+            bytes_in_words(total.geometry_bytes),
+            bytes_in_words(total.bvh_bytes)
         ))?;
     }
     if args.out.is_empty() {

@@ -47,13 +47,8 @@ impl Files {
         for (i, file) in self.list.iter().enumerate() {
             let clash = |other: &&File| (file.written || other.written) && same_file(&file.path, &other.path);
             if let Some(other) = self.list[..i].iter().find(clash) {
-                return Err(Failure::Input(format!(
-                    "error: {} {} and {} {} name the same file\n  hint: give each its own name",
-                    other.role,
-                    other.path.display(),
-                    file.role,
-                    file.path.display()
-                )));
+                let [a, b] = [other, file].map(|f| format!("{} {}", f.role, f.path.display()));
+                return Err(Failure::hinted(format!("{a} and {b} name the same file"), "give each its own name"));
             }
         }
         self.written().try_for_each(output::check_place).map_err(Failure::from)

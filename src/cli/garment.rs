@@ -11,6 +11,7 @@ use super::{
     log,
     make::{refuse_unknown, write_all},
 };
+use crate::math::words::counted;
 
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc
@@ -43,7 +44,7 @@ pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
     let files =
         Files::default().reads("scene", [&args.scene]).reads("--curves", &args.options.curves).writes("-o", &args.out);
     files.refuse()?;
-    let mut scene = args.options.load(&args.scene)?;
+    let mut scene = args.options.load(&args.scene, args.quiet)?;
     if scene.garments.is_empty() {
         let hint = "source = { type = \"garment\", path = \"pullover.obj\", cloth = { type = \"knit\" } }";
         let problem = format!("error: {}: no fabric is laid on a garment\n  help: {hint}", args.scene.display());
@@ -55,7 +56,7 @@ pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
     write_all(&args.out, &set, args.quiet)?;
     if !args.quiet {
         let stitches: u64 = scene.garments.iter().map(|f| f.stitches).sum();
-        log::say(&format!("{stitches} stitches"));
+        log::say(&counted(stitches, "stitch"));
         for note in scene.garments.iter().flat_map(|f| &f.repairs) {
             log::say(&format!("note: {note}"));
         }

@@ -9,7 +9,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, bytes_in_words, overlap_in_words, positive, terminal::print};
+use super::{Failure, SceneArgs, overlap_in_words, positive, terminal::print};
 use crate::{
     cloth::{self, Estimate},
     files::{
@@ -24,6 +24,7 @@ use crate::{
         proposal::{self, Proposal},
     },
     input::diagnostic::listed,
+    math::words::{bytes_in_words, counted},
     plan::{Feature, Memory, Plan},
     render::film_file,
     scene::{CurveKind, Fabric, GarmentFacts, Scene, Tufts},
@@ -47,6 +48,9 @@ pub(super) struct InfoArgs {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// No progress.
+    #[arg(long, short)]
+    quiet: bool,
     #[command(flatten)]
     options: SceneArgs,
 }
@@ -56,7 +60,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let (report, text) = if film_file::is_film(&args.file) {
         film_report(&args.file)?
     } else if is_scene {
-        let scene = args.options.load_or_survey(&args.file, true)?;
+        let scene = args.options.load_or_survey(&args.file, args.quiet, true)?;
         scene_report(&scene)
     } else {
         file_report(&args.file, args.radius)?
@@ -92,12 +96,13 @@ fn mesh_report(path: &Path, facts: &MeshFacts) -> (Value, String) {
     });
     let closed = match open_edges {
         0 => "closed".to_owned(),
-        open => format!("open at {open} edges"),
+        open => format!("open at {}", counted(open as u64, "edge")),
     };
     let uvs = uvs.map_or("none: a garment needs them".to_owned(), |(low, high)| format!("{low:.4} to {high:.4}"));
     let text = format!(
-        "{}\n  mesh      {vertices} vertices, {triangles} triangles, {closed}\n  groups    {}\n  bounds    {low:.4} to {high:.4}\n  uvs       {uvs}\n  unit      {}\n",
+        "{}\n  mesh      {vertices} vertices, {}, {closed}\n  groups    {}\n  bounds    {low:.4} to {high:.4}\n  uvs       {uvs}\n  unit      {}\n",
         path.display(),
+        counted(triangles as u64, "triangle"),
         listed(facts.groups.iter().map(|name| format!("`{name}`")), "and"),
         unit_in_words(unit_mm),
     );
@@ -179,7 +184,8 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     let all = || set.curves.iter().flat_map(|c| &c.points);
     let low = all().copied().reduce(DVec3::min).unwrap_or_default();
     let high = all().copied().reduce(DVec3::max).unwrap_or_default();
-    let length: f64 = set.curves.iter().map(Curve::polygon_length).sum();
+    // A sum of nothing is -0.
+    let length = set.curves.iter().map(Curve::polygon_length).fold(0.0, |a, b| a + b);
     let basis = match set.curves.first().map(|c| c.basis) {
         Some(Basis::CatmullRom) => "catmull-rom",
         Some(Basis::BSpline) => "b-spline",
@@ -219,7 +225,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     );
     if colored > 0 {
         let how = "`colors = true` in a scene's source dyes the yarns";
-        text += &format!("  colours   {} on {colored} curves; {how}\n", distinct.len());
+        text += &format!("  colours   {} on {}; {how}\n", distinct.len(), counted(colored, "curve"));
     }
     if let (Some(first), Some(last)) = (numbered.first(), numbered.last()) {
         text += &format!("  ids       {} from {first} to {last}\n", numbered.len());
@@ -276,14 +282,14 @@ fn garment_json(facts: &GarmentFacts) -> Value {
 fn garment_lines(facts: &GarmentFacts) -> String {
     let [p5, p50, p95] = facts.uv_ratio;
     let mut text = format!(
-        "  garment   {}: {} stitches of {} in {} panels, about {:.1} m of yarn, {} control points\n  stretch   3-D over \
+        "  garment   {}: {} of {} in {}, about {:.1} m of yarn, {}\n  stretch   3-D over \
          flat lengths {p5:.3} to {p95:.3}, median {p50:.3}; {:.1} % of the cloth is stretched by more than a tenth\n",
         facts.path,
-        facts.stitches,
+        counted(facts.stitches, "stitch"),
         facts.cloth,
-        facts.panels.len(),
+        counted(facts.panels.len(), "panel"),
         facts.yarn_length / 1000.0,
-        facts.control_points,
+        counted(facts.control_points, "control point"),
         100.0 * facts.stretched
     );
     if let Some((at, radius)) = facts.near {
@@ -456,26 +462,26 @@ impl<'a> SceneFacts<'a> {
 }
 
 fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
-    let what = match fabric.kind {
+    let (noun, of) = match fabric.kind {
         CurveKind::Yarn(yarn) => {
             let yarn = &scene.yarns[yarn];
             let tufts = match fabric.tufts {
                 Tufts { yarns: 0, .. } => String::new(),
-                Tufts { yarns, strands } => format!("and {yarns} cut tufts ({strands} strands) "),
+                Tufts { yarns, strands } => {
+                    format!("and {} ({}) ", counted(yarns, "cut tuft"), counted(strands, "strand"))
+                }
             };
-            match yarn.plies.len() {
-                1 => format!("yarns {tufts}of `{}` (one ply of {} fibres)", yarn.name, yarn.plies[0].fibers),
-                plies => format!("yarns {tufts}of `{}` ({plies} plies of {} fibres)", yarn.name, yarn.plies[0].fibers),
-            }
+            let (plies, fibers) = (counted(yarn.plies.len(), "ply"), counted(yarn.plies[0].fibers, "fibre"));
+            ("yarn", format!("{tufts}of `{}` ({plies} of {fibers})", yarn.name))
         }
-        CurveKind::Fiber(fiber) => format!("fibres of `{}`", scene.fibers[fiber].0),
+        CurveKind::Fiber(fiber) => ("fibre", format!("of `{}`", scene.fibers[fiber].0)),
     };
     format!(
-        "  fabric    {}: {} {what}, {:.1} m, {} points given, {} segments to make\n",
+        "  fabric    {}: {} {of}, {:.1} m, {} given, {} to make\n",
         fabric.origin,
-        fabric.curves.len() - fabric.tufts.strands,
+        counted(fabric.curves.len() - fabric.tufts.strands, noun),
         length(fabric) / 1000.0,
-        fabric.control_points(),
-        estimate.segments
+        counted(fabric.control_points(), "point"),
+        counted(estimate.segments, "segment")
     )
 }

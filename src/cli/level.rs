@@ -54,10 +54,7 @@ impl LevelArgs {
                 return Ok(None);
             }
             let hint = "--yarn wool takes a yarn of the built-in library, --library FILE.toml one of a file";
-            return Err(Failure::Input(format!(
-                "error: --as {} needs to know what the yarn is made of\n  hint: {hint}",
-                self.level
-            )));
+            return Err(Failure::hinted(format!("--as {} needs to know what the yarn is made of", self.level), hint));
         };
         let definitions = load_definitions(self.library.as_deref(), &LoadOptions::default())?;
         Ok(Some(definitions.yarn(name)?.clone()))

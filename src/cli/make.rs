@@ -14,6 +14,7 @@ use super::{
     garment::{self, GarmentArgs},
     level::LevelArgs,
     log, named, positive,
+    working::Working,
 };
 use crate::{
     files::curve_file,
@@ -23,6 +24,7 @@ use crate::{
     },
     image::output,
     input::system::in_words,
+    math::words::counted,
     pattern::{
         PatternStrand, StrandKind,
         draft::{Draft, DraftError},
@@ -191,11 +193,12 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         tile: args.tile,
     };
     if let Err(problem) = piece.edges.suit(&piece.draft) {
-        return Err(Failure::Input(format!("error: {problem}\n  hint: --edges selvedge")));
+        return Err(Failure::hinted(problem, "--edges selvedge"));
     }
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
+    let task = format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]);
     if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
-        log::say(&format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]));
+        log::say(&task);
     }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
     let most = weave::longest(half_rooms[0]);
@@ -204,7 +207,9 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
             "error: --pile-height is at most {most}, five hundred times a warp's width"
         )));
     }
+    let working = Working::on(task, args.output.quiet);
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
+    drop(working);
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
@@ -229,10 +234,12 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
             if given[usize::from(!warp)] {
                 format!("error: --{name}-spacing leaves the yarns no room to pass; at least {least:.4} here")
             } else {
-                format!(
-                    "error: the {name} spacing of the draft leaves the yarns no room to pass; at least {least:.4} here\n  \
-                     hint: thinner yarns (--radius), or a spacing of your own (--{name}-spacing)"
-                )
+                return Failure::hinted(
+                    format!(
+                        "the {name} spacing of the draft leaves the yarns no room to pass; at least {least:.4} here"
+                    ),
+                    format!("thinner yarns (--radius), or a spacing of your own (--{name}-spacing)"),
+                );
             }
         }
         Impossible::TooMuchCover { most } => {
@@ -292,6 +299,7 @@ fn write(
         }
     };
     write_all(&output.out, &set, output.quiet)?;
+    let _working = Working::on("looking for yarns that overlap", output.quiet);
     if !output.quiet && set.plies.is_empty() {
         let half_width = yarn.map_or(1.0, Yarn::half_width);
         let curves = set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?, half_width)));
@@ -317,6 +325,7 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
 pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Result<(), Failure> {
     let mut attempts = Attempts::default();
     for path in paths {
+        let _working = Working::on(format!("writing {}", path.display()), quiet);
         if attempts.note(write_curves(path, set)) && !quiet {
             log::say(&format!("wrote {}", path.display()));
         }
@@ -324,8 +333,8 @@ pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Resul
     if !quiet {
         set.notes.iter().for_each(|note| log::say(&format!("note: {note}")));
         let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-        let what = if set.plies.is_empty() { "yarns" } else { "curves" };
-        log::say(&format!("{} {what}, {points} control points", set.curves.len()));
+        let what = if set.plies.is_empty() { "yarn" } else { "curve" };
+        log::say(&format!("{}, {}", counted(set.curves.len(), what), counted(points, "control point")));
     }
     attempts.finish()
 }

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     image::output,
+    math::words::counted,
     render::{film_file, merge::merge, picture},
     report,
 };
@@ -76,8 +77,8 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
         spp_min = least,
         spp_mean = mean,
         spp_max = most,
-        "{} parts, {spp}",
-        args.parts.len()
+        "{}, {spp}",
+        counted(args.parts.len(), "part")
     );
     if least == 0 {
         tracing::warn!("some pixels have no sample: they are black");

@@ -21,18 +21,20 @@ mod scatter;
 mod signals;
 mod stress;
 mod terminal;
+mod working;
 
 use std::{ops::RangeInclusive, path::PathBuf, process::ExitCode};
 
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
+use self::working::Working;
 use crate::{
     cloth::BuildError,
     experiment::{converge::ConvergeError, table3::BenchError},
     ffi::heap,
     geometry::overlap::{self, Overlap},
     image::output,
-    input::document::Value,
+    input::{diagnostic::hinted, document::Value},
     plan,
     render::OutOfMemory,
     scene::{
@@ -98,6 +100,13 @@ enum Failure {
     Closed,
 }
 
+impl Failure {
+    /// What is wrong with usage or input, with what to do about it.
+    fn hinted(problem: impl std::fmt::Display, hint: impl std::fmt::Display) -> Self {
+        Self::Input(hinted(format!("error: {problem}"), hint))
+    }
+}
+
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
         Self::Input(error.to_string())
@@ -112,28 +121,29 @@ impl From<crate::image::ImageError> for Failure {
 
 impl From<BuildError> for Failure {
     fn from(error: BuildError) -> Self {
-        let hint = match &error {
-            BuildError::Embree(_) => "",
-            BuildError::Memory { .. } => {
-                "\n  hint: --max-memory GIGABYTES allows more; fewer yarns or pixels, or --mode yarn, take less"
-            }
-        };
-        Self::Input(format!("error: {error}{hint}"))
+        match &error {
+            BuildError::Embree(_) => Self::Input(format!("error: {error}")),
+            BuildError::Memory { .. } => Self::hinted(
+                error,
+                "--max-memory GIGABYTES allows more; fewer yarns or pixels, or --mode yarn, take less",
+            ),
+        }
     }
 }
 
 impl From<plan::TooLarge> for Failure {
     fn from(error: plan::TooLarge) -> Self {
-        Self::Input(format!(
-            "error: {error}\n  hint: --crop renders a part, and `yarnray merge` puts parts together; output.layers = [] takes less; \
-             --max-memory GIGABYTES allows more"
-        ))
+        Self::hinted(
+            error,
+            "--crop renders a part, and `yarnray merge` puts parts together; output.layers = [] takes less; \
+             --max-memory GIGABYTES allows more",
+        )
     }
 }
 
 impl From<OutOfMemory> for Failure {
     fn from(error: OutOfMemory) -> Self {
-        Self::Input(format!("error: {error}\n  hint: --crop renders a part, and `yarnray merge` puts parts together"))
+        Self::hinted(error, "--crop renders a part, and `yarnray merge` puts parts together")
     }
 }
 
@@ -318,13 +328,13 @@ fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValues
 }
 
 impl SceneArgs {
-    /// Loads a scene with these options.
-    fn load(&self, path: &std::path::Path) -> Result<Scene, LoadError> {
-        self.load_or_survey(path, false)
+    /// Loads a scene with these options, and shows that it does unless `quiet`.
+    fn load(&self, path: &std::path::Path, quiet: bool) -> Result<Scene, LoadError> {
+        self.load_or_survey(path, quiet, false)
     }
 
     /// As [`Self::load`]; a survey lays no yarns on garments.
-    fn load_or_survey(&self, path: &std::path::Path, survey: bool) -> Result<Scene, LoadError> {
+    fn load_or_survey(&self, path: &std::path::Path, quiet: bool, survey: bool) -> Result<Scene, LoadError> {
         let mut options = LoadOptions {
             survey,
             assignments: self.set.clone(),
@@ -362,6 +372,7 @@ impl SceneArgs {
             let [x0, y0, x1, y1] = crop;
             options.assignments.push(format!("render.crop=[{x0},{y0},{x1},{y1}]"));
         }
+        let _working = Working::on(format!("loading {}", path.display()), quiet);
         load(path, &options)
     }
 }
@@ -383,17 +394,6 @@ fn overlap_in_words(o: &Overlap) -> String {
         100.0 * overlap::TOLERATED,
         o.nearest
     )
-}
-
-/// A number of bytes for people.
-fn bytes_in_words(bytes: u64) -> String {
-    let b = bytes as f64;
-    match bytes {
-        0..1_000 => format!("{bytes} B"),
-        1_000..1_000_000 => format!("{:.1} kB", b / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.1} MB", b / 1e6),
-        _ => format!("{:.2} GB", b / 1e9),
-    }
 }
 
 #[cfg(test)]

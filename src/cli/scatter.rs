@@ -1,6 +1,9 @@
 //! `yarnray scatter`
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -23,6 +26,8 @@ use crate::{
     },
     files::{extension, has_extension},
     input::document::Value as Setting,
+    math::words::counted,
+    report::UNKNOWN,
     scene::{
         Model, Yarn,
         load::{Definitions, LoadOptions, load_definitions},
@@ -136,10 +141,38 @@ impl Sweep {
         if !(1..=1000).contains(&count) || key.trim().is_empty() {
             return Err(input(format!("--sweep {text}: a range has 1 to 1000 values")));
         }
-        let step = if count > 1 { (to - from) / f64::from(count - 1) } else { 0.0 };
-        let values = (0..count).map(|i| from + step * f64::from(i)).collect();
-        Ok(Self { key: key.trim().to_owned(), values })
+        let key = key.trim().to_owned();
+        let value = |i: u32| match i {
+            0 => from,
+            i if i + 1 == count => to,
+            i => decimal(from + (to - from) * f64::from(i) / f64::from(count - 1)),
+        };
+        let values: Vec<f64> = (0..count).map(value).collect();
+        if let Some(between) = values.iter().find(|v| is_whole(&key) && v.fract() != 0.0) {
+            let every = match (to - from).abs() + 1.0 {
+                all if from.fract() == 0.0 && to.fract() == 0.0 && all <= 1000.0 => {
+                    format!("--sweep {key}={from}..{to}:{all} takes every one")
+                }
+                _ => format!("--sweep {key}={}..{}:2 takes whole numbers", from.floor(), to.ceil()),
+            };
+            let problem = format!(
+                "--sweep {text}: `{key}` takes whole numbers, but {between} is among its {}",
+                counted(count, "value")
+            );
+            return Err(Failure::hinted(problem, every));
+        }
+        Ok(Self { key, values })
     }
+}
+
+/// The number that a person would write: of twelve digits.
+fn decimal(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
+/// Whether a key, or a dotted path to it, takes whole numbers only.
+fn is_whole(key: &str) -> bool {
+    matches!(key.rsplit('.').next(), Some("fibers" | "plies"))
 }
 
 /// One thing on the goniometer, seen from somewhere.
@@ -177,9 +210,29 @@ impl ScatterArgs {
     }
 
     fn load(&self, set: &[String], extra: Option<(String, Setting, String)>) -> Result<Definitions, Failure> {
+        let file = self.file();
+        if let Some(path) = &file
+            && self.fiber.is_none()
+            && !(set.is_empty() && extra.is_none())
+        {
+            // Keys are set where the yarn is described: in the built-in library, if the scene only names it.
+            let plain = load_definitions(Some(path), &LoadOptions::default())?;
+            if plain.is_built_in(&self.yarn(&plain)?.name) {
+                return self.load_from(None, set, extra);
+            }
+        }
+        self.load_from(file.as_deref(), set, extra)
+    }
+
+    fn load_from(
+        &self,
+        file: Option<&Path>,
+        set: &[String],
+        extra: Option<(String, Setting, String)>,
+    ) -> Result<Definitions, Failure> {
         let settings = extra.into_iter().collect();
         let options = LoadOptions { assignments: set.to_vec(), settings, ..LoadOptions::default() };
-        Ok(load_definitions(self.file().as_deref(), &options)?)
+        Ok(load_definitions(file, &options)?)
     }
 
     fn yarn<'a>(&self, definitions: &'a Definitions) -> Result<&'a Yarn, Failure> {
@@ -246,10 +299,8 @@ impl ScatterArgs {
             "flatten" => view.flatten = at,
             _ => {
                 let path = self.path_of(&sweep.key)?;
-                let whole = matches!(path.rsplit('.').next(), Some("fibers" | "plies"));
-                let value = if whole { Setting::Integer(at.round() as i64) } else { Setting::Float(at) };
-                let shown = if whole { at.round() } else { at };
-                let label = format!("--sweep {}={shown}", sweep.key);
+                let value = if is_whole(&path) { Setting::Integer(at as i64) } else { Setting::Float(at) };
+                let label = format!("--sweep {}={at}", sweep.key);
                 return Ok(Job { definitions: self.load(set, Some((path, value, label)))?, view });
             }
         }
@@ -268,7 +319,17 @@ impl ScatterArgs {
         }
         let definitions = self.load(&[], None)?;
         let yarn = self.yarn(&definitions)?;
-        Ok(if of_fiber { format!("fiber.{}.{key}", yarn.fibers[0].0) } else { format!("yarn.{}.{key}", yarn.name) })
+        if !of_fiber {
+            return Ok(format!("yarn.{}.{key}", yarn.name));
+        }
+        let fiber = &yarn.fibers[0].0;
+        if !definitions.fibers.contains_key(fiber) && !definitions.is_built_in(&yarn.name) {
+            let problem =
+                format!("{key}: `{}` is of the built-in fibre `{fiber}`, which this file does not describe", yarn.name);
+            let hint = format!("a [fiber.{fiber}] in the file, or `yarnray scatter --fiber {fiber}`");
+            return Err(Failure::hinted(problem, hint));
+        }
+        Ok(format!("fiber.{fiber}.{key}"))
     }
 
     fn measure(&self, job: &Job) -> Result<Found, Failure> {
@@ -401,18 +462,24 @@ fn report_text(args: &ScatterArgs, found: &Found) -> String {
         args.theta,
         args.offset.map_or("averaged over the width".to_owned(), |h| format!("offset {h}"))
     );
+    let error = |m: Mean| m.se.map_or(UNKNOWN.to_owned(), |se| format!("{se:.4}"));
     let line = |text: &mut String, name: &str, m: &[Mean; 3]| {
         let _ = writeln!(
             text,
-            "  {name:14} {:.4} {:.4} {:.4}   +- {:.4} {:.4} {:.4}",
-            m[0].mean, m[1].mean, m[2].mean, m[0].se, m[1].se, m[2].se
+            "  {name:14} {:.4} {:.4} {:.4}   +- {} {} {}",
+            m[0].mean,
+            m[1].mean,
+            m[2].mean,
+            error(m[0]),
+            error(m[1]),
+            error(m[2])
         );
     };
     for (name, m) in &found.all {
-        let _ = writeln!(text, "{name} ({} samples)", m.paths);
+        let _ = writeln!(text, "{name} ({})", counted(m.paths, "sample"));
         line(&mut text, "backward", &m.scattered.backward);
         line(&mut text, "forward", &m.scattered.forward);
-        let _ = writeln!(text, "  {:14} {:.4}   +- {:.4}", "unscattered", m.unscattered.mean, m.unscattered.se);
+        let _ = writeln!(text, "  {:14} {:.4}   +- {}", "unscattered", m.unscattered.mean, error(m.unscattered));
         for (lobe, half) in LOBES.iter().zip(m.lobes.iter().flatten()) {
             let sum: [f64; 3] = std::array::from_fn(|c| half.forward[c].mean + half.backward[c].mean);
             if sum.iter().any(|s| *s > 0.0) {

@@ -54,7 +54,7 @@ pub(super) fn run(args: &StressArgs) -> Result<(), Failure> {
     for name in &args.case {
         if !all.iter().any(|c| c.name == name) {
             let (message, hint) = unknown_name("case", name, all.iter().map(|c| c.name));
-            return Err(Failure::Input(format!("error: {message}\n  hint: {hint}")));
+            return Err(Failure::hinted(message, hint));
         }
     }
     for path in &args.out {

@@ -2,7 +2,10 @@
 
 use std::{fmt, iter::Sum};
 
-use crate::trace::EmbreeError;
+use crate::{
+    math::words::{bytes_in_words, counted},
+    trace::EmbreeError,
+};
 
 /// Bytes of Embree's BVH for a cubic segment: compact and fast, measured on fibres and on yarns.
 const BVH_BYTES: [f64; 2] = [44.0, 119.0];
@@ -46,17 +49,15 @@ impl fmt::Display for BuildError {
         match self {
             Self::Embree(error) => error.fmt(f),
             Self::Memory { needed, beside, limit } => {
-                let gigabytes = |bytes: u64| bytes as f64 / 1e9;
                 write!(
                     f,
-                    "the scene needs about {:.2} GB ({:.2} GB of curves, {:.2} GB of BVH, {} segments, {:.2} GB of film and \
-                     textures), but may take {:.2} GB",
-                    gigabytes(needed.bytes() + beside),
-                    gigabytes(needed.geometry_bytes),
-                    gigabytes(needed.bvh_bytes),
-                    needed.segments,
-                    gigabytes(*beside),
-                    gigabytes(*limit)
+                    "the scene needs about {} ({} of curves, {} of BVH, {}, {} of film and textures), but may take {}",
+                    bytes_in_words(needed.bytes() + beside),
+                    bytes_in_words(needed.geometry_bytes),
+                    bytes_in_words(needed.bvh_bytes),
+                    counted(needed.segments, "segment"),
+                    bytes_in_words(*beside),
+                    bytes_in_words(*limit)
                 )
             }
         }

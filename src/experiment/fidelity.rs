@@ -139,7 +139,7 @@ fn error_of_mean(references: &[Converged], found: &[Converged], all: &Halves) ->
     let of_all = cloth_mean(&all.mean(), all);
     std::array::from_fn(|k| {
         let beside: Vec<f64> = pairs.iter().map(|(reference, found)| reference[k] / found[k].max(1e-30)).collect();
-        let share = Estimate::of(&beside).filter(|e| e.mean > 0.0).map_or(0.0, |e| e.relative_deviation());
+        let share = Estimate::of(&beside).filter(|e| e.mean > 0.0).and_then(|e| e.relative_deviation()).unwrap_or(0.0);
         share / (pairs.len() as f64).sqrt() * of_all[k]
     })
 }

@@ -12,7 +12,7 @@ use std::{
 
 use glam::{DVec2, DVec3};
 
-use crate::{files::stage::PolygonMesh, input::system::in_words};
+use crate::{files::stage::PolygonMesh, input::system::in_words, math::words::counted};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 30;
@@ -195,7 +195,7 @@ impl GarmentMesh {
         if mesh.faces.is_empty() {
             return Err(GarmentError::at(0, "there are no faces in it", "is this an OBJ file?"));
         }
-        polygons.note("faces of more than four corners were cut into triangles", &mut mesh.notes);
+        polygons.note("face", "of more than four corners, cut into triangles", &mut mesh.notes);
         Ok(mesh)
     }
 
@@ -273,11 +273,12 @@ impl Counted {
         self.count
     }
 
-    /// Says it, once.
-    pub(super) fn note(&self, what: &str, notes: &mut Vec<String>) {
+    /// Says of so many of a thing what they are, once.
+    pub(super) fn note(&self, noun: &str, what: &str, notes: &mut Vec<String>) {
         if self.count > 0 {
             let line = if self.line > 0 { format!(", line {}", self.line) } else { String::new() };
-            notes.push(format!("{} {what} (first in panel `{}`{line})", self.count, self.panel));
+            let things = counted(self.count as u64, noun);
+            notes.push(format!("{things} {what} (first in panel `{}`{line})", self.panel));
         }
     }
 }

@@ -45,6 +45,7 @@ pub(crate) use self::{
 use crate::{
     files::stage::glob,
     geometry::mesh::Mesh,
+    math::words::counted,
     pattern::{StrandKind, tile::Tile},
 };
 
@@ -309,7 +310,7 @@ impl Garment {
                 self.surface.turn_normals(pose);
             }
             if pushed > 0 && i == 0 {
-                notes.push(format!("{pushed} points of the cloth were moved out of the body or off its skin"));
+                notes.push(format!("{} of the cloth moved out of the body or off its skin", counted(pushed, "point")));
             }
         }
         for (lattice, &cloth) in self.lattices.iter().zip(&self.report.cloth) {

@@ -191,7 +191,7 @@ impl Areas<'_> {
         for face in faces.iter().filter(|f| !sound(f)) {
             flat.add(self.group(face), face.line as usize);
         }
-        flat.note("triangles without area were left out", notes);
+        flat.note("triangle", "without area, left out", notes);
         Ok((faces.iter().copied().filter(sound).collect(), 1e-7 * (total_uv / count).sqrt()))
     }
 
@@ -242,13 +242,13 @@ impl Areas<'_> {
                 }
             }
         }
-        mirrored.note("panels are mirrored in their texture coordinates: they were turned round", notes);
+        mirrored.note("panel", "mirrored in its texture coordinates, turned round", notes);
         if flipped.count() * 20 > faces.len() {
             let problem =
                 format!("{} of {} triangles lie upside down in the texture coordinates", flipped.count(), faces.len());
             return Err(GarmentError::at(0, problem, "panels must lie flat, without folds over themselves"));
         }
-        flipped.note("triangles lie upside down in the texture coordinates and hold no stitches", notes);
+        flipped.note("triangle", "upside down in the texture coordinates, without stitches", notes);
         Ok(panels)
     }
 }
@@ -359,7 +359,7 @@ fn non_manifold(sewn: &[[u32; 3]], faces: &[Face], mesh: &GarmentMesh, notes: &m
             }
         }
     }
-    many.note("edges have more than two faces: panels end there instead of being sewn", notes);
+    many.note("edge", "of more than two faces: panels end there instead of being sewn", notes);
 }
 
 /// 3-D lengths over flat lengths along both axes of each face, with its area.

@@ -1,4 +1,4 @@
-//! Numbers, not yarns: colours in one register, frames, special functions, sample points, exact sums, small statistics.
+//! Numbers, not yarns: colours in one register, frames, special functions, sample points, exact sums, small statistics, numbers in words.
 //!
 //! Knows nothing of curves, light or files. `f32` serves rays and directions, `f64` tables and sums.
 
@@ -10,5 +10,6 @@ pub(crate) mod special;
 pub(crate) mod srgb;
 pub(crate) mod stats;
 pub(crate) mod warp;
+pub(crate) mod words;
 
 pub use rgb::Rgb;

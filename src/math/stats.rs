@@ -11,8 +11,8 @@ const STUDENT: [f64; 30] = [
 pub(crate) struct Estimate {
     /// Their mean.
     pub mean: f64,
-    /// Their standard deviation (n - 1 in the denominator); 0 for one measurement.
-    pub deviation: f64,
+    /// Their standard deviation (n - 1 in the denominator); not known from one measurement.
+    pub deviation: Option<f64>,
     /// Their number.
     pub count: usize,
 }
@@ -26,27 +26,28 @@ impl Estimate {
         }
         let mean = values.iter().sum::<f64>() / count as f64;
         let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-        let deviation = if count > 1 { (square / (count - 1) as f64).sqrt() } else { 0.0 };
+        let deviation = (count > 1).then(|| (square / (count - 1) as f64).sqrt());
         Some(Self { mean, deviation, count })
     }
 
-    /// Half the width of the interval that holds the expected value with 95 % (Student); infinite for one measurement.
-    pub(crate) fn half_width(&self) -> f64 {
-        let Some(freedom) = self.count.checked_sub(2) else { return f64::INFINITY };
-        STUDENT.get(freedom).copied().unwrap_or(1.96 + 2.5 / self.count as f64) * self.deviation
-            / (self.count as f64).sqrt()
+    /// Half the width of the interval that holds the expected value with 95 % (Student); not known from one measurement.
+    pub(crate) fn half_width(&self) -> Option<f64> {
+        let quantile = STUDENT.get(self.count.checked_sub(2)?).copied().unwrap_or(1.96 + 2.5 / self.count as f64);
+        Some(quantile * self.deviation? / (self.count as f64).sqrt())
     }
 
     /// Deviation over mean.
-    pub(crate) fn relative_deviation(&self) -> f64 {
-        self.deviation / self.mean.abs()
+    pub(crate) fn relative_deviation(&self) -> Option<f64> {
+        Some(self.deviation? / self.mean.abs())
     }
 }
 
-/// The ratio of two means and its standard deviation, from the relative deviations of both (they vary independently).
-pub(crate) fn ratio(above: &Estimate, below: &Estimate) -> (f64, f64) {
+/// The ratio of two means and its standard deviation, from the relative deviations of both (they vary independently), where
+/// these are known.
+pub(crate) fn ratio(above: &Estimate, below: &Estimate) -> (f64, Option<f64>) {
     let ratio = above.mean / below.mean;
-    (ratio, ratio.abs() * above.relative_deviation().hypot(below.relative_deviation()))
+    let deviation = || Some(ratio.abs() * above.relative_deviation()?.hypot(below.relative_deviation()?));
+    (ratio, deviation())
 }
 
 /// A power law through points: value = scale x argument^slope.
@@ -54,8 +55,8 @@ pub(crate) fn ratio(above: &Estimate, below: &Estimate) -> (f64, f64) {
 pub(crate) struct PowerLaw {
     /// The exponent.
     pub slope: f64,
-    /// Standard error of the exponent; 0 for two points.
-    pub slope_error: f64,
+    /// Standard error of the exponent; not known from two points.
+    pub slope_error: Option<f64>,
     /// log10 of the value where the argument is 1.
     pub log_scale: f64,
 }
@@ -78,7 +79,7 @@ impl PowerLaw {
         let slope = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum::<f64>() / sxx;
         let log_scale = my - slope * mx;
         let rest: f64 = logs.iter().map(|(x, y)| (y - log_scale - slope * x).powi(2)).sum();
-        let slope_error = if logs.len() > 2 { (rest / (n - 2.0) / sxx).sqrt() } else { 0.0 };
+        let slope_error = (logs.len() > 2).then(|| (rest / (n - 2.0) / sxx).sqrt());
         Some(Self { slope, slope_error, log_scale })
     }
 
@@ -132,30 +133,31 @@ mod tests {
     fn means_and_intervals() {
         let e = Estimate::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
         assert_eq!((e.mean, e.count), (3.0, 5));
-        assert!((e.deviation - 2.5f64.sqrt()).abs() < 1e-12);
-        assert!((e.half_width() - 2.776 * (2.5f64 / 5.0).sqrt()).abs() < 1e-12);
-        assert_eq!(Estimate::of(&[7.0]).unwrap().half_width(), f64::INFINITY);
+        assert!((e.deviation.unwrap() - 2.5f64.sqrt()).abs() < 1e-12);
+        assert!((e.half_width().unwrap() - 2.776 * (2.5f64 / 5.0).sqrt()).abs() < 1e-12);
+        assert_eq!(Estimate::of(&[7.0]).unwrap().half_width(), None);
         assert_eq!(Estimate::of(&[]), None);
-        let many = Estimate { mean: 0.0, deviation: 1.0, count: 100 };
-        assert!((many.half_width() - 0.1984).abs() < 2e-4, "{}", many.half_width());
+        let many = Estimate { mean: 0.0, deviation: Some(1.0), count: 100 };
+        assert!((many.half_width().unwrap() - 0.1984).abs() < 2e-4, "{:?}", many.half_width());
     }
 
     #[test]
     fn ratios_carry_both_uncertainties() {
         let (a, b) = (Estimate::of(&[9.0, 10.0, 11.0]).unwrap(), Estimate::of(&[1.8, 2.0, 2.2]).unwrap());
         let (value, deviation) = ratio(&a, &b);
-        assert!((value - 5.0).abs() < 1e-12 && (deviation - 5.0 * 0.02f64.sqrt()).abs() < 1e-12);
+        assert!((value - 5.0).abs() < 1e-12 && (deviation.unwrap() - 5.0 * 0.02f64.sqrt()).abs() < 1e-12);
+        assert_eq!(ratio(&a, &Estimate::of(&[2.0]).unwrap()), (5.0, None));
     }
 
     #[test]
     fn power_laws_are_found_again() {
         let points: Vec<(f64, f64)> = (0..8).map(|i| 2f64.powi(i)).map(|x| (x, 3.0 * x.powf(-1.0))).collect();
         let fit = PowerLaw::fit(&points).unwrap();
-        assert!((fit.slope + 1.0).abs() < 1e-12 && fit.slope_error < 1e-7 && (fit.at(1.0) - 3.0).abs() < 1e-9);
+        assert!((fit.slope + 1.0).abs() < 1e-12 && fit.slope_error.unwrap() < 1e-7 && (fit.at(1.0) - 3.0).abs() < 1e-9);
         let noisy: Vec<(f64, f64)> =
             points.iter().enumerate().map(|(i, (x, y))| (*x, y * if i % 2 == 0 { 1.1 } else { 1.0 / 1.1 })).collect();
         let fit = PowerLaw::fit(&noisy).unwrap();
-        assert!((fit.slope + 1.0).abs() < 3.0 * fit.slope_error && fit.slope_error > 0.01, "{fit:?}");
+        assert!((fit.slope + 1.0).abs() < 3.0 * fit.slope_error.unwrap() && fit.slope_error.unwrap() > 0.01, "{fit:?}");
         assert_eq!(PowerLaw::fit(&[(1.0, 1.0), (1.0, 2.0)]), None);
         assert_eq!(PowerLaw::fit(&[(1.0, 1.0), (2.0, -1.0)]), None);
     }

@@ -12,6 +12,8 @@ use std::{
 
 pub use woven::{WifUse, WovenWif};
 
+use crate::math::words::counted;
+
 /// The most threads of one system, and the most crossings.
 const MAX_THREADS: u64 = 1 << 20;
 const MAX_CROSSINGS: u64 = 1 << 27;
@@ -358,8 +360,8 @@ fn colors(
     let missing = out.iter().filter(|c| c.is_none()).count();
     if missing > 0 {
         let first = palette.values().next().copied().unwrap_or([1.0; 3]);
-        notes
-            .push(format!("{missing} threads of the {} have no colour: the first of the table", system.to_lowercase()));
+        let (missing, system) = (counted(missing as u64, "thread"), system.to_lowercase());
+        notes.push(format!("{missing} of the {system} without a colour: the first of the table"));
         return Ok(out.into_iter().map(|c| c.unwrap_or(first)).collect());
     }
     Ok(out.into_iter().flatten().collect())
@@ -402,9 +404,9 @@ fn measures(
         return Ok(Vec::new());
     }
     if given.len() < count {
-        let missing = count - given.len();
+        let missing = counted(count - given.len(), "thread");
         let (system, what) = (system.to_lowercase(), what.to_lowercase());
-        notes.push(format!("{missing} threads of the {system} have no {what}: the mean of the others"));
+        notes.push(format!("{missing} of the {system} without a {what}: the mean of the others"));
     }
     let mean = given.iter().sum::<f64>() / given.len() as f64;
     Ok(out.into_iter().map(|v| v.unwrap_or(mean)).collect())

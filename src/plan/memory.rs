@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{film::Film, light::Light, scene::Scene};
+use crate::{film::Film, light::Light, math::words::bytes_in_words, scene::Scene};
 
 /// Bytes of a pixel that the denoiser is given and gives back: colour, albedo, normal, the result.
 const DENOISER_BYTES: u64 = 4 * size_of::<[f32; 3]>() as u64;
@@ -64,17 +64,12 @@ impl Memory {
 impl fmt::Display for TooLarge {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Memory { pixels: [width, height], film, textures, denoiser, limit } = self.0;
-        let gigabytes = |bytes: u64| bytes as f64 / 1e9;
-        write!(f, "{width} x {height} pixels need {:.2} GB of film", gigabytes(film))?;
+        write!(f, "{width} x {height} pixels need {} of film", bytes_in_words(film))?;
         if textures + denoiser > 0 {
-            write!(
-                f,
-                ", {:.2} GB of textures and {:.2} GB for the denoiser",
-                gigabytes(textures),
-                gigabytes(denoiser)
-            )?;
+            let [textures, denoiser] = [textures, denoiser].map(bytes_in_words);
+            write!(f, ", {textures} of textures and {denoiser} for the denoiser")?;
         }
-        write!(f, "; all may take {:.2} GB", gigabytes(limit.unwrap_or(u64::MAX)))
+        write!(f, "; all may take {}", bytes_in_words(limit.unwrap_or(u64::MAX)))
     }
 }
 

@@ -78,7 +78,7 @@ pub(crate) fn merge(paths: &[PathBuf], partial: bool) -> Result<(About, Job), Me
     }
     let crop = rectangle(&parts, partial, &mut problems)?;
     if !problems.is_empty() {
-        problems.push("hint: `--partial` merges what there is".to_owned());
+        problems.push("  hint: `--partial` merges what there is".to_owned());
         return Err(MergeError::Parts(problems.join("\n")));
     }
 

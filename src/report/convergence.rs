@@ -4,10 +4,17 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::plot::{self, Series};
+use super::{
+    csv_cell,
+    plot::{self, Series},
+    plus_minus,
+};
 use crate::{
     image::metric::EPSILON,
-    math::stats::{Estimate, PowerLaw, Reached, reach},
+    math::{
+        stats::{Estimate, PowerLaw, Reached, reach},
+        words::counted,
+    },
 };
 
 /// What was measured of one scene.
@@ -132,7 +139,7 @@ impl Convergence {
                 for e in [Some(p.noise), p.error] {
                     match e {
                         Some(e) => {
-                            let _ = write!(out, ",{:.6e},{:.6e}", e.mean, e.half_width());
+                            let _ = write!(out, ",{:.6e},{}", e.mean, csv_cell(e.half_width(), |w| format!("{w:.6e}")));
                         }
                         None => out += ",,",
                     }
@@ -188,10 +195,15 @@ impl Convergence {
         let mut series = Vec::new();
         for (group, c) in self.curves.iter().enumerate() {
             let slope = |f: Option<PowerLaw>| {
-                f.map_or(String::new(), |f| format!(", slope {:.2} ± {:.2}", f.slope, f.slope_error))
+                f.map_or(String::new(), |f| {
+                    format!(", slope {:.2}{}", f.slope, plus_minus(f.slope_error, " ± ", |v| format!("{v:.2}")))
+                })
             };
             let points = |get: &dyn Fn(&Point) -> Option<Estimate>| -> Vec<[f64; 3]> {
-                c.points.iter().filter_map(|p| get(p).map(|e| [p.seconds.mean, e.mean, e.half_width()])).collect()
+                c.points
+                    .iter()
+                    .filter_map(|p| get(p).map(|e| [p.seconds.mean, e.mean, e.half_width().unwrap_or(0.0)]))
+                    .collect()
             };
             let name = format!("{}: noise{}", c.method, slope(c.noise_fit()));
             let fit = c.noise_fit();
@@ -201,7 +213,7 @@ impl Convergence {
                 series.push(Series { name, points: points(&|p| p.error), group, dashed: true, fit: None });
             }
         }
-        let title = format!("{}, {} x {}, {} seeds", self.scene, self.size[0], self.size[1], self.seeds);
+        let title = format!("{}, {} x {}, {}", self.scene, self.size[0], self.size[1], counted(self.seeds, "seed"));
         plot::log_log(&title, ["seconds of rendering", "relMSE"], &series, Some(self.target))
     }
 
@@ -209,7 +221,8 @@ impl Convergence {
     pub(crate) fn to_text(&self) -> String {
         let mut out = String::new();
         for c in &self.curves {
-            let slope = c.noise_fit().map_or("?".to_owned(), |f| format!("{:.3} +- {:.3}", f.slope, f.slope_error));
+            let error = |f: PowerLaw| plus_minus(f.slope_error, " +- ", |v| format!("{v:.3}"));
+            let slope = c.noise_fit().map_or("?".to_owned(), |f| format!("{:.3}{}", f.slope, error(f)));
             let noise = reached_text(c.time_of_noise(self.target));
             let _ = write!(
                 out,
@@ -238,7 +251,7 @@ mod tests {
         let points = (0..6).map(|i| {
             let t = 0.1 * 2f64.powi(i);
             let noise = scale / t;
-            let spread = |e: f64| Estimate { mean: e, deviation: 0.05 * e, count: 5 };
+            let spread = |e: f64| Estimate { mean: e, deviation: Some(0.05 * e), count: 5 };
             Point { spp: 1 << i, seconds: spread(t), noise: spread(noise), error: floor.map(|f| spread(noise + f)) }
         });
         Curve { method: method.to_owned(), setup_seconds: 0.5, converged_spp: 512.0, points: points.collect() }
@@ -279,5 +292,14 @@ mod tests {
         let json = alone.to_json();
         assert!(json["curves"][0]["time_of_error"].is_null() && json["curves"][0]["error_fit"].is_null());
         assert!(json["curves"][0]["time_of_noise"]["seconds"].is_number());
+        // Of one seed nothing is known of the spread, and of two waves nothing of the line's.
+        let mut one = alone.clone();
+        one.curves[0].points.truncate(2);
+        one.curves[0].points.iter_mut().for_each(|p| p.noise.deviation = None);
+        assert!(one.to_csv().lines().nth(1).unwrap().ends_with("e0,,,"), "{}", one.to_csv());
+        assert!(one.to_text().contains("slope -1.000; "), "{}", one.to_text());
+        let json = one.to_json();
+        assert!(json["curves"][0]["points"][0]["noise"]["half_width_95"].is_null());
+        assert!(json["curves"][0]["noise_fit"]["slope_error"].is_null());
     }
 }

@@ -5,7 +5,8 @@ use glam::DVec2;
 
 use super::{EXAMPLES, Output, RADIUS, write};
 use crate::{
-    cli::{Failure, log, named, positive},
+    cli::{Failure, log, named, positive, working::Working},
+    math::words::counted,
     pattern::{
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
@@ -112,7 +113,7 @@ fn gauge(text: &str) -> Result<[f64; 2], String> {
 }
 
 fn told(Misfit { problem, hint, .. }: Misfit) -> Failure {
-    Failure::Input(format!("error: {problem}\n  hint: {hint}"))
+    Failure::hinted(problem, hint)
 }
 
 fn wrong(error: &dyn std::fmt::Display) -> Failure {
@@ -187,7 +188,10 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     // Curve files know round yarns only.
     let thickness = Thickness { half_width: yarn.as_ref().map_or(1.0, Yarn::half_width), ..Thickness::round(radius) };
     let piece = args.piece(&thickness)?;
+    let task = format!("knitting {} x {}", counted(piece.stitches, "stitch"), counted(piece.rows, "row"));
+    let working = Working::on(task, args.output.quiet);
     let Knitted { strands, gauge, .. } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
+    drop(working);
     let length: f64 = strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
     write(strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;

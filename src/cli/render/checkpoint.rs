@@ -27,15 +27,17 @@ pub(super) fn check_shard(args: &RenderArgs, scene: &Scene, outputs: &Outputs) -
     let r = &scene.render;
     let wrong = [("time", r.time.is_some()), ("noise", r.noise.is_some()), ("adaptive", r.adaptive)];
     if let Some((name, _)) = wrong.iter().find(|(_, set)| *set) {
-        return Err(Failure::Input(format!(
-            "error: --shard with render.{name}: a shard takes just its samples, or the shards would not make one picture\n  \
-             hint: leave out --{name}; --spp says how many samples all shards take together"
-        )));
+        return Err(Failure::hinted(
+            format!(
+                "--shard with render.{name}: a shard takes just its samples, or the shards would not make one picture"
+            ),
+            format!("leave out --{name}; --spp says how many samples all shards take together"),
+        ));
     }
     if outputs.films.is_empty() && args.checkpoint.is_none() {
-        return Err(Failure::Input(
-            "error: --shard without a film: pictures of shards cannot be merged\n  hint: -o PART.film, or --checkpoint PART.film"
-                .to_owned(),
+        return Err(Failure::hinted(
+            "--shard without a film: pictures of shards cannot be merged",
+            "-o PART.film, or --checkpoint PART.film",
         ));
     }
     Ok(())
@@ -56,10 +58,8 @@ impl Lock {
         path.push(".lock");
         let path = PathBuf::from(path);
         Self::at(path).map_err(|Taken| {
-            Failure::Input(format!(
-                "error: another run renders to {}\n  hint: wait for it, or give this one a checkpoint of its own",
-                checkpoint.display()
-            ))
+            let problem = format!("another run renders to {}", checkpoint.display());
+            Failure::hinted(problem, "wait for it, or give this one a checkpoint of its own")
         })
     }
 
@@ -105,10 +105,8 @@ impl Drop for Lock {
 pub(super) fn old_checkpoint(args: &RenderArgs) -> Result<Option<(About, Job)>, Failure> {
     let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) else { return Ok(None) };
     if !args.resume {
-        return Err(Failure::Input(format!(
-            "error: {} is there already\n  hint: --resume goes on with it; remove it to begin anew",
-            path.display()
-        )));
+        let problem = format!("{} is there already", path.display());
+        return Err(Failure::hinted(problem, "--resume goes on with it; remove it to begin anew"));
     }
     Ok(Some(film_file::read(path)?))
 }
@@ -118,11 +116,8 @@ pub(super) fn resumed((there, mut job): (About, Job), about: &About, args: &Rend
     let path = args.checkpoint.as_deref().unwrap_or(Path::new("")).display();
     let differences = about.differences(&there);
     if !differences.is_empty() {
-        return Err(Failure::Input(format!(
-            "error: {path} is a checkpoint of another render:\n  {}\n  hint: render with the same keys, or remove it to begin \
-             anew",
-            differences.join("\n  ")
-        )));
+        let problem = format!("{path} is a checkpoint of another render:\n  {}", differences.join("\n  "));
+        return Err(Failure::hinted(problem, "render with the same keys, or remove it to begin anew"));
     }
     tracing::info!(checkpoint = %path, spp = job.done, "resumed from {path} at {} spp", job.done);
     if about.shard.is_none() {

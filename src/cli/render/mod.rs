@@ -50,7 +50,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         Format::of(path)?;
     }
     files(args, &outputs).refuse()?;
-    let mut scene = args.options.load(&args.scene)?;
+    let mut scene = args.options.load(&args.scene, args.log.quiet || args.log.log_json)?;
     check_and_apply(args, &outputs, &mut scene)?;
     let memory = Memory::new(&scene);
     memory.check()?;

@@ -8,11 +8,9 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::{
-    super::{bytes_in_words, log},
-    options::RenderArgs,
-};
+use super::{super::log, options::RenderArgs};
 use crate::{
+    math::words::{bytes_in_words, counted},
     render::{Progress, Rendered},
     report::{self, Phases},
     scene::Scene,
@@ -54,9 +52,6 @@ pub(super) fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usi
             let (yarn, segment, fold) = (bend.yarn, bend.segment, bend.fold);
             tracing::debug!("yarn {yarn} folds at segment {segment} by {fold:.2} of its radius, at {at:.1} mm");
         }
-    }
-    if scene.lights.is_empty() {
-        tracing::warn!("the scene has no light: the picture will be black");
     }
 }
 
@@ -119,7 +114,7 @@ pub(super) fn summary(world: &World, rendered: &Rendered, phases: &Phases, outpu
         c.shadow
     );
     if c.invalid > 0 {
-        tracing::warn!("{} samples were not finite and were left out", c.invalid);
+        tracing::warn!("{} not finite, left out", counted(c.invalid, "sample"));
     }
     if least == 0 && most > 0 {
         tracing::warn!("some pixels have no sample and are black: the time was too short for one sample each");

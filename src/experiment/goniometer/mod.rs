@@ -64,8 +64,8 @@ const BATCHES: u64 = 32;
 pub struct Mean {
     /// The mean.
     pub mean: f64,
-    /// Its standard error.
-    pub se: f64,
+    /// Its standard error; not known from one sample.
+    pub se: Option<f64>,
 }
 
 impl Mean {
@@ -79,7 +79,7 @@ impl Mean {
         }
         let mean = sum / n;
         let variance = (square / n - mean * mean).max(0.0);
-        Self { mean, se: (variance / f64::max(n - 1.0, 1.0)).sqrt() }
+        Self { mean, se: (n > 1.0).then(|| (variance / (n - 1.0)).sqrt()) }
     }
 }
 
@@ -292,7 +292,8 @@ fn errors(m: &[Mean; 3]) -> Value {
 impl Measurement {
     /// Reflected share and transmitted share, the latter with what met no fibre, per channel.
     pub fn energies(&self) -> ([Mean; 3], [Mean; 3]) {
-        let with = |m: Mean| Mean { mean: m.mean + self.unscattered.mean, se: m.se.hypot(self.unscattered.se) };
+        let error = |m: Mean| Some(m.se?.hypot(self.unscattered.se?));
+        let with = |m: Mean| Mean { mean: m.mean + self.unscattered.mean, se: error(m) };
         (self.scattered.backward, self.scattered.forward.map(with))
     }
 

@@ -5,7 +5,10 @@ use std::{f64::consts::TAU, fmt::Write as _, path::Path};
 use super::{COLUMNS, Distribution, Mean, Measurement, ROWS};
 use crate::{
     image::{ImageError, png, png::Display},
-    report::plot::{self, escaped},
+    report::{
+        csv_cell,
+        plot::{self, escaped},
+    },
 };
 
 /// Edge of a cell in the map, pixels.
@@ -243,7 +246,7 @@ pub fn sweep_csv(key: &str, names: &[&str], rows: &[SweepRow]) -> String {
         let _ = write!(out, "{}", row.at);
         for (reflected, transmitted) in &row.energies {
             for m in reflected.iter().chain(transmitted) {
-                let _ = write!(out, ",{:.6},{:.2e}", m.mean, m.se);
+                let _ = write!(out, ",{:.6},{}", m.mean, csv_cell(m.se, |se| format!("{se:.2e}")));
             }
         }
         out.push('\n');
@@ -304,7 +307,8 @@ pub fn sweep_svg(title: &str, key: &str, names: &[&str], rows: &[SweepRow]) -> S
                 if *name == "truth" {
                     for row in rows {
                         let v = of(row, m)[channel];
-                        let (px, a, b) = (x(row.at), y(v.mean - 2.0 * v.se), y(v.mean + 2.0 * v.se));
+                        let error = v.se.unwrap_or(0.0);
+                        let (px, a, b) = (x(row.at), y(v.mean - 2.0 * error), y(v.mean + 2.0 * error));
                         let _ = writeln!(
                             svg,
                             r#"<circle cx="{px:.1}" cy="{:.1}" r="3" fill="{color}"/><path d="M{px:.1} {a:.1}V{b:.1}" stroke="{color}"/>"#,

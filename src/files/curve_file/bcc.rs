@@ -20,8 +20,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, FileLocation, ReadOptions, counted, quoted};
-use crate::geometry::curve::{Basis, CurveSet};
+use super::{CurveFileError, FileLocation, ReadOptions, quoted};
+use crate::{
+    geometry::curve::{Basis, CurveSet},
+    math::words::counted,
+};
 
 /// The first bytes of every BCC file.
 pub(super) const MAGIC: &[u8] = b"BCC";

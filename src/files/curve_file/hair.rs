@@ -20,7 +20,10 @@ use glam::DVec3;
 
 use super::repair::{Ends, Repair};
 use super::{CurveFileError, FileLocation, ReadOptions};
-use crate::geometry::curve::{Basis, CurveSet};
+use crate::{
+    geometry::curve::{Basis, CurveSet},
+    math::words::counted,
+};
 
 /// The first bytes of every cyHair file.
 pub(super) const MAGIC: &[u8] = b"HAIR";
@@ -115,7 +118,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         first += count;
     }
     if first < points as usize {
-        repair.note(format!("{} of {points} points belong to no strand; ignored", points as usize - first));
+        repair.note(format!("{} of {points} of no strand; ignored", counted(points as usize - first, "point")));
     }
     Ok(repair.finish())
 }

@@ -416,8 +416,3 @@ fn quoted(token: &str) -> String {
     let dots = if head.len() < token.len() { "..." } else { "" };
     format!("\"{}{dots}\"", head.escape_debug())
 }
-
-/// A number of things with its noun, in the plural where needed.
-fn counted(count: u64, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
-}

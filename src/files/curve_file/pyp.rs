@@ -15,9 +15,10 @@ use arrayvec::ArrayVec;
 use glam::{DVec2, DVec3};
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, FileLocation, ReadOptions, counted, lines, number, quoted};
+use super::{CurveFileError, FileLocation, ReadOptions, lines, number, quoted};
 use crate::{
     geometry::curve::{Basis, CurveSet},
+    math::words::counted,
     pattern::{
         StrandKind,
         tile::{Tile, TileStrand},

@@ -2,8 +2,10 @@
 
 use glam::DVec3;
 
-use super::counted;
-use crate::geometry::curve::{Basis, Curve, CurveSet};
+use crate::{
+    geometry::curve::{Basis, Curve, CurveSet},
+    math::words::counted,
+};
 
 /// A closing gap this many times the median segment is a curve wrongly marked closed (Yuksel's tea cozy has 174).
 const WIDE_GAP: f64 = 10.0;

@@ -8,12 +8,15 @@
 use glam::{DVec2, DVec3};
 
 use super::{
-    CurveFileError, FileLocation, Line, ReadOptions, counted,
+    CurveFileError, FileLocation, Line, ReadOptions,
     faces::{Crossing, Face, Library},
     lines, number, quoted,
     yarns::through_middles,
 };
-use crate::geometry::curve::{Basis, Curve, CurveSet};
+use crate::{
+    geometry::curve::{Basis, Curve, CurveSet},
+    math::words::counted,
+};
 
 /// A polygon of the mesh.
 struct Polygon<'a> {

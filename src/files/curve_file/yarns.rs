@@ -20,7 +20,10 @@ use glam::DVec3;
 use super::{CurveFileError, FileLocation, ReadOptions};
 use crate::{
     geometry::curve::{Basis, Curve, CurveSet},
-    math::srgb::{linear_to_srgb, srgb_to_linear},
+    math::{
+        srgb::{linear_to_srgb, srgb_to_linear},
+        words::counted,
+    },
 };
 
 /// The first bytes of every such file.
@@ -86,7 +89,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         set.ids.push(Some(i as i64));
     }
     if too_short > 0 {
-        set.notes.push(format!("{too_short} yarns of fewer than two points were left out"));
+        set.notes.push(format!("{} of fewer than two points, left out", counted(too_short, "yarn")));
     }
     Ok(set)
 }

@@ -12,6 +12,7 @@ use std::{cell::RefCell, fmt::Write as _};
 
 pub(crate) use names::{listed, shortened};
 pub(crate) use names::{nearest, unknown_name};
+pub(crate) use show::hinted;
 use show::render_one;
 
 /// How many diagnostics [`Diagnostics::render`] shows before it says "and N more".
@@ -132,6 +133,16 @@ pub(crate) enum Severity {
     Warning,
 }
 
+impl Severity {
+    /// What stands before the message.
+    fn label(self) -> &'static str {
+        match self {
+            Self::Error => "error: ",
+            Self::Warning => "warning: ",
+        }
+    }
+}
+
 /// One thing the user should know.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Diagnostic {
@@ -205,11 +216,6 @@ impl Diagnostics {
         (1..=MOST).contains(&names.len()).then(|| listed(names, "and"))
     }
 
-    /// Whether there is nothing to tell.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.list.borrow().is_empty()
-    }
-
     /// How many errors there are; warnings do not count.
     pub(crate) fn error_count(&self) -> usize {
         self.list.borrow().iter().filter(|diagnostic| diagnostic.severity == Severity::Error).count()
@@ -240,12 +246,22 @@ impl Diagnostics {
         list
     }
 
+    /// All that is collected, for who says himself that these are warnings: each with its line and a caret.
+    pub(crate) fn warnings(&self, sources: &Sources) -> Vec<String> {
+        let shown = |diagnostic: &Diagnostic| {
+            let mut text = String::new();
+            render_one(&mut text, diagnostic, sources, "");
+            text.trim_end().to_owned()
+        };
+        self.sorted().iter().map(shown).collect()
+    }
+
     /// The text for the user: each diagnostic with its line and a caret, the first [`MAX_SHOWN`] of them.
     pub(crate) fn render(&self, sources: &Sources) -> String {
         let list = self.sorted();
         let mut text = String::new();
         for diagnostic in list.iter().take(MAX_SHOWN) {
-            render_one(&mut text, diagnostic, sources);
+            render_one(&mut text, diagnostic, sources, diagnostic.severity.label());
         }
         if list.len() > MAX_SHOWN {
             let _ = writeln!(text, "and {} more", list.len() - MAX_SHOWN);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Diagnostic, Severity, Sources, Span};
+use super::{Diagnostic, Sources, Span};
 
 /// Lines of text longer than this many columns are cut around the caret.
 const MAX_LINE_COLUMNS: usize = 160;
@@ -12,11 +12,16 @@ const COLUMNS_BEFORE_CARET: usize = 60;
 
 const TAB: &str = "    ";
 
-pub(super) fn render_one(output: &mut String, diagnostic: &Diagnostic, sources: &Sources) {
-    let severity = match diagnostic.severity {
-        Severity::Error => "error",
-        Severity::Warning => "warning",
-    };
+/// What a hint stands behind where no caret has room for it, on a line of its own.
+const HINT: &str = "  hint: ";
+
+/// A message with a hint on the line below.
+pub(crate) fn hinted(message: impl std::fmt::Display, hint: impl std::fmt::Display) -> String {
+    format!("{message}\n{HINT}{hint}")
+}
+
+/// `label` says how severe it is.
+pub(super) fn render_one(output: &mut String, diagnostic: &Diagnostic, sources: &Sources, label: &str) {
     let message = escaped(&diagnostic.message);
     let hint = diagnostic.hint.as_deref().map(escaped);
     let place = diagnostic.span.and_then(|span| Some((span, sources.get(span.source)?)));
@@ -24,22 +29,22 @@ pub(super) fn render_one(output: &mut String, diagnostic: &Diagnostic, sources: 
     // Writing into a string cannot fail.
     let (indent, excerpt) = match place {
         None => {
-            let _ = writeln!(output, "{severity}: {message}");
+            let _ = writeln!(output, "{label}{message}");
             (None, None)
         }
         Some((span, source)) if source.is_option => {
             let excerpt = excerpt(&source.text, 0, source.text.len(), span);
-            let _ = writeln!(output, "{}: {severity}: {message}", excerpt.line);
+            let _ = writeln!(output, "{}: {label}{message}", excerpt.line);
             (Some(String::new()), (!span.is_whole()).then_some(excerpt))
         }
         Some((span, source)) if span.is_whole() => {
-            let _ = writeln!(output, "{}: {severity}: {message}", escaped(&source.name));
+            let _ = writeln!(output, "{}: {label}{message}", escaped(&source.name));
             (None, None)
         }
         Some((span, source)) => {
             let position = Position::of(&source.text, span);
             let (line, column) = (position.line, position.column);
-            let _ = writeln!(output, "{}:{line}:{column}: {severity}: {message}", escaped(&source.name));
+            let _ = writeln!(output, "{}:{line}:{column}: {label}{message}", escaped(&source.name));
             let excerpt = excerpt(&source.text, position.line_start, position.line_end, span);
             let number = format!("{line:>5} | ");
             let _ = writeln!(output, "{}", format!("{number}{}", excerpt.line).trim_end());
@@ -58,7 +63,7 @@ pub(super) fn render_one(output: &mut String, diagnostic: &Diagnostic, sources: 
             }
         }
         (_, _, Some(hint)) => {
-            let _ = writeln!(output, "      = {hint}");
+            let _ = writeln!(output, "{HINT}{hint}");
         }
         (_, _, None) => {}
     }

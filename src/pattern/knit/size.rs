@@ -6,7 +6,10 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
-use crate::pattern::{MAX_POINTS, revolution::Revolution};
+use crate::{
+    math::words::counted,
+    pattern::{MAX_POINTS, revolution::Revolution},
+};
 
 /// Sizes that a knit was given, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -329,7 +332,7 @@ fn fits_profile(knit: &Knit, surface: &Revolution, yarn: &Thickness) -> Result<(
                 row + 1,
                 width * unit
             ),
-            hint: format!("about {most} stitches there, or yarn of a radius of {radius:.3} mm"),
+            hint: format!("about {} there, or yarn of a radius of {radius:.3} mm", counted(most as u64, "stitch")),
         });
     }
     if height < ROW_HEIGHTS[0] * d {
@@ -342,7 +345,7 @@ fn fits_profile(knit: &Knit, surface: &Revolution, yarn: &Thickness) -> Result<(
                 surface.length(),
                 height / yarn.diameter()
             ),
-            hint: format!("about {most} rows fit yarn {:.3} mm thick", yarn.diameter()),
+            hint: format!("about {} in yarn {:.3} mm thick", counted(most as u64, "row"), yarn.diameter()),
         });
     }
     Ok(())

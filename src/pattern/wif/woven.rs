@@ -153,9 +153,9 @@ mod tests {
             ("weft_color too small", "line 32: [WARP COLORS] names colour 0, the [COLOR TABLE] has 1 to 10"),
         ];
         let notes = [
-            ("default warp color missing", "8 threads of the warp have no colour: the first of the table"),
-            ("default warp spacing missing", "9 threads of the warp have no spacing: the mean of the others"),
-            ("default warp thickness missing", "9 threads of the warp have no thickness: the mean of the others"),
+            ("default warp color missing", "8 threads of the warp without a colour: the first of the table"),
+            ("default warp spacing missing", "9 threads of the warp without a spacing: the mean of the others"),
+            ("default warp thickness missing", "9 threads of the warp without a thickness: the mean of the others"),
             (
                 "missing_color_table_warp",
                 "colours of the warp are numbers without a [COLOR TABLE]: they are left aside",

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
+use super::{csv_cell, plus_minus};
 use crate::image::metric::EPSILON;
 
 /// What one way took to reach the target, means over repeated runs.
@@ -15,8 +16,8 @@ pub(crate) struct Run {
     pub method: String,
     /// Seconds of rendering.
     pub render_seconds: f64,
-    /// Their standard deviation over the runs.
-    pub render_seconds_deviation: f64,
+    /// Their standard deviation over the runs; not known from one.
+    pub render_seconds_deviation: Option<f64>,
     /// Seconds for making curves and the BVH.
     pub build_seconds: f64,
     /// Control points, indices and what is kept for each point.
@@ -91,8 +92,8 @@ pub(crate) struct Row {
     pub aggregated: Run,
     /// Seconds of rendering, reference over aggregated.
     pub time_ratio: f64,
-    /// Standard deviation of that ratio, from the spread of both.
-    pub time_ratio_deviation: f64,
+    /// Standard deviation of that ratio, from the spread of both where that is known.
+    pub time_ratio_deviation: Option<f64>,
     /// Geometry and BVH, aggregated over reference.
     pub memory_ratio: f64,
     /// Mean bounces, aggregated over reference.
@@ -176,7 +177,7 @@ const COLUMNS: [Column<Row>; 13] = [
     ("time, s: fibres / ours", |r| {
         format!("{} / {}", short(r.reference.render_seconds), short(r.aggregated.render_seconds))
     }),
-    ("ratio", |r| format!("{} ± {}", short(r.time_ratio), short(r.time_ratio_deviation))),
+    ("ratio", |r| short(r.time_ratio) + &plus_minus(r.time_ratio_deviation, " ± ", short)),
     ("spp", |r| format!("{:.0} / {:.0}", r.reference.spp, r.aggregated.spp)),
     ("build, s", |r| format!("{} / {}", short(r.reference.build_seconds), short(r.aggregated.build_seconds))),
     ("geometry, MB", |r| {
@@ -294,7 +295,7 @@ const ROW_COLUMNS: [Column<Row>; 4] = [
 /// Those of each of its two runs.
 const RUN_COLUMNS: [Column<Run>; 9] = [
     ("render_seconds", |run| run.render_seconds.to_string()),
-    ("render_seconds_deviation", |run| run.render_seconds_deviation.to_string()),
+    ("render_seconds_deviation", |run| csv_cell(run.render_seconds_deviation, |v| v.to_string())),
     ("build_seconds", |run| run.build_seconds.to_string()),
     ("geometry_bytes", |run| run.geometry_bytes.to_string()),
     ("bvh_bytes", |run| run.bvh_bytes.to_string()),
@@ -307,14 +308,14 @@ const RUN_COLUMNS: [Column<Run>; 9] = [
 /// Those that compare the two.
 const ERROR_COLUMNS: [Column<Row>; 10] = [
     ("time_ratio", |row| row.time_ratio.to_string()),
-    ("time_ratio_deviation", |row| row.time_ratio_deviation.to_string()),
+    ("time_ratio_deviation", |row| csv_cell(row.time_ratio_deviation, |v| v.to_string())),
     ("memory_ratio", |row| row.memory_ratio.to_string()),
     ("bounce_ratio", |row| row.bounce_ratio.to_string()),
     ("mean_ratio_r", |row| row.model_error.mean_ratio[0].to_string()),
     ("mean_ratio_g", |row| row.model_error.mean_ratio[1].to_string()),
     ("mean_ratio_b", |row| row.model_error.mean_ratio[2].to_string()),
     ("relmse", |row| row.model_error.relmse.to_string()),
-    ("relmse_8", |row| row.model_error.relmse_8.map_or(String::new(), |v| v.to_string())),
+    ("relmse_8", |row| csv_cell(row.model_error.relmse_8, |v| v.to_string())),
     ("flip", |row| row.model_error.flip.to_string()),
 ];
 
@@ -326,7 +327,7 @@ pub(super) mod tests {
         Run {
             method: "fiber".to_owned(),
             render_seconds: seconds,
-            render_seconds_deviation: 0.1 * seconds,
+            render_seconds_deviation: Some(0.1 * seconds),
             build_seconds: 0.5,
             geometry_bytes: bytes,
             bvh_bytes: 2 * bytes,
@@ -350,7 +351,7 @@ pub(super) mod tests {
             reference: run(30.0, 50_000_000),
             aggregated: run(2.0, 100_000),
             time_ratio: 15.0,
-            time_ratio_deviation: 2.0,
+            time_ratio_deviation: Some(2.0),
             memory_ratio: 0.002,
             bounce_ratio: 0.2,
             model_error: error.clone(),

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns, yarns::Library};
 use crate::{
     input::{
-        diagnostic::{Diagnostics, Sources, unknown_name},
+        diagnostic::{Diagnostics, Sources, hinted, unknown_name},
         document::{Document, Node, Value},
         reader::Reader,
     },
@@ -25,8 +25,10 @@ static BUILT_IN_DEFINITIONS: LazyLock<Option<Definitions>> =
 pub struct Definitions {
     /// Fibres by name.
     pub fibers: BTreeMap<String, FiberMaterial>,
-    /// Yarns by name.
+    /// Yarns by name; also those of the library inside the program that fabrics of the file name.
     pub yarns: BTreeMap<String, Yarn>,
+    /// Names of yarns that the file describes itself, or a library that it names.
+    described: Vec<String>,
 }
 
 impl Definitions {
@@ -36,6 +38,11 @@ impl Definitions {
     /// There is none of this name; the message names the nearest.
     pub fn yarn(&self, name: &str) -> Result<&Yarn, LoadError> {
         find(&self.yarns, "yarn", name)
+    }
+
+    /// Whether the file only names this yarn, which the library inside the program describes.
+    pub fn is_built_in(&self, name: &str) -> bool {
+        !self.described.iter().any(|of| of == name)
     }
 
     /// A fibre by name.
@@ -50,7 +57,7 @@ impl Definitions {
 fn find<'a, T>(all: &'a BTreeMap<String, T>, kind: &str, name: &str) -> Result<&'a T, LoadError> {
     all.get(name).ok_or_else(|| {
         let (message, hint) = unknown_name(kind, name, all.keys().map(String::as_str));
-        LoadError(format!("error: {message}\n  = help: {hint}\n"))
+        LoadError(hinted(format!("error: {message}"), hint) + "\n")
     })
 }
 
@@ -135,8 +142,12 @@ pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<De
         let root = Reader::new(&document, &diagnostics);
         let unit = root.one_of_or("unit", 1.0, &UNITS);
         let context = Context::new(&sources, &diagnostics, unit, true);
-        let library = yarns::read(&root, &context, true);
-        Some(Definitions { fibers: library.fibers, yarns: library.yarns })
+        let mut library = yarns::read(&root, &context, true);
+        let described = library.yarn_names.clone();
+        if path.is_some() {
+            add_built_in(&mut library, root.node("fabric"), true);
+        }
+        Some(Definitions { fibers: library.fibers, yarns: library.yarns, described })
     });
     match definitions {
         Some(definitions) if !diagnostics.has_errors() => Ok(definitions),

@@ -44,7 +44,7 @@ use super::{
 use crate::files::curve_file;
 use crate::geometry::proposal::UNITS;
 use crate::input::{
-    diagnostic::{Diagnostic, Diagnostics, Sources, Span, unknown_name},
+    diagnostic::{Diagnostic, Diagnostics, Sources, Span, hinted, unknown_name},
     document::{Document, MAX_FILE_BYTES, Value},
     reader::{Range, Reader},
     system::in_words,
@@ -199,10 +199,11 @@ impl Context<'_> {
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let name = path.display().to_string();
     if curve_file::can_read(path) && path.is_file() {
-        return Err(LoadError(format!(
-            "{name}: error: a curve file is no scene\n  hint: `yarnray render SCENE.toml --curves {name}` renders it in a scene, \
-             such as scenes/glove.toml; `yarnray info {name}` tells what it holds\n"
-        )));
+        let hint = format!(
+            "`yarnray render SCENE.toml --curves {name}` renders it in a scene, such as scenes/glove.toml; `yarnray info {name}` tells \
+             what it holds\n"
+        );
+        return Err(LoadError(hinted(format!("{name}: error: a curve file is no scene"), hint)));
     }
     let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
     parse(&name, &text, options)
@@ -256,15 +257,20 @@ fn threads(name: &str, text: &str, options: &LoadOptions) -> Option<usize> {
     settings::threads(&Reader::new(&document, &diagnostics).table_or_empty("render"))
 }
 
+/// Said of a scene without a light, which is no mistake: its depth, normals and masks are there.
+const NO_LIGHT: &str =
+    "the scene has no light: the picture will be black (without `light = []` it has a sky and a sun)";
+
 /// Loads a scene on the threads that there are.
 fn parse_here(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, LoadError> {
     let mut sources = Sources::new();
     let diagnostics = Diagnostics::new();
     match load_text(name, text, options, &mut sources, &diagnostics) {
         Some(mut scene) if !diagnostics.has_errors() => {
-            if !diagnostics.is_empty() {
-                scene.warnings.push(diagnostics.render(&sources).trim_end().to_owned());
+            if scene.lights.is_empty() {
+                scene.warnings.push(NO_LIGHT.to_owned());
             }
+            scene.warnings.extend(diagnostics.warnings(&sources));
             Ok(scene)
         }
         _ => Err(LoadError(diagnostics.render(&sources))),

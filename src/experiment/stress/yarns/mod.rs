@@ -384,7 +384,7 @@ fn energy(scale: Scale, checks: &mut Checks) {
                     let (back, on) = m.energies();
                     let total = back[1].mean + on[1].mean;
                     // Batches share a sequence of sample points: their spread is that of the sum, not of its parts.
-                    let slack = 4.0 * back[1].se.hypot(on[1].se);
+                    let slack = 4.0 * back[1].se.unwrap_or(0.0).hypot(on[1].se.unwrap_or(0.0));
                     let at = || {
                         format!(
                             "{plies} plies, twist {ply_twist} {fiber_twist}, density {density}, theta {theta}, {}: {total:.5} +- {:.5}",

@@ -21,6 +21,7 @@ use crate::{
     files::mesh_file,
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
     geometry::{curve::Curve, mesh::Mesh},
+    math::words::counted,
     scene::{FabricMotion, GarmentFacts, Taken, Yarn},
 };
 
@@ -378,7 +379,8 @@ impl GarmentPlan {
         if open > 0 {
             let path = own.rest.path.display();
             warnings.push(format!(
-                "{path}: the body is open: {open} edges have a face on one side only, where yarns may get into it"
+                "{path}: the body is open: {} with a face on one side only, where yarns may get into it",
+                counted(open as u64, "edge")
             ));
         }
         let last = own.poses.len() - 1;
