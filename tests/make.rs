@@ -111,6 +111,15 @@ fn what_cannot_be_made_is_refused() {
             &["weave", "--draft", "velvet", "--edges", "fringe", "-o", "a.bcc"],
             "error: the strands of a cut pile are not drawn out into a fringe\n  hint: --edges selvedge",
         ),
+        (
+            &["weave", "--draft", "corduroy", "--edges", "selvedge", "-o", "a.bcc"],
+            "error: wefts that are cut do not turn at a selvedge\n  hint: --edges live",
+        ),
+        (
+            &["weave", "--draft", "double cloth", "--edges", "finished", "-o", "a.bcc"],
+            "error: cloth of more than one layer is too thick to be folded into hems\n  hint: --edges selvedge",
+        ),
+        (&["knit", "--instructions", "Row 1: k, frobnicate", "-o", "a.bcc"], "error: --instructions: line 1: "),
         (&["weave", "--draft", "twil", "-o", "a.bcc"], "error: unknown weave \"twil\"; "),
         (&["weave", "--warp-spacing", "0.7", "-o", "a.bcc"], "error: --warp-spacing leaves the yarns no room to pass"),
         (
@@ -311,5 +320,49 @@ fn commands_and_scenes_weave_the_same_cloth() {
         assert_eq!(points, wanted_points, "{draft}");
         // Plies turn about their yarns from other places; by the yarns' radii all would be larger by a fifth.
         assert!(made.abs_diff_eq(wanted, 0.02 * wanted.max_element()), "{draft}: {made}, not {wanted}");
+    }
+}
+
+#[test]
+fn make_garment_writes_the_yarns_of_any_scene() {
+    let folder = directory();
+    let d = folder.path();
+    let source = "source = { type = \"knit\", stitches = 6, rows = 5 }";
+    write(d, "s.toml", format!("[[fabric]]\nyarn = \"wool\"\n{source}\n"));
+    let run = yarnray(d, &["make", "garment", "s.toml", "-o", "y.txt"]).good();
+    assert!(run.stderr.contains("1 yarn, ") && !run.stderr.contains("stitch"), "{}", run.stderr);
+    assert!(!curve_file::read(&d.join("y.txt"), &ReadOptions::default()).unwrap().curves.is_empty());
+}
+
+#[test]
+fn written_instructions_are_knitted_from_the_command_line_and_from_a_file() {
+    let folder = directory();
+    let d = folder.path();
+    let text = "Row 1 (RS): *k2, p2; rep from * to end.\nRow 2: *k2, p2; rep from * to end.\n";
+    write(d, "rib.txt", text);
+    let size = ["--stitches", "8", "--rows", "6"];
+    for (how, out) in [(text, "a.txt"), ("@rib.txt", "b.txt")] {
+        yarnray(d, &[&["make", "knit", "--instructions", how, "-o", out], &size[..]].concat()).good();
+    }
+    let read = |name: &str| std::fs::read(d.join(name)).unwrap();
+    assert_eq!(read("a.txt"), read("b.txt"));
+    yarnray(d, &[&["make", "knit", "--pattern", "rib2x2", "-o", "c.txt"], &size[..]].concat()).good();
+    assert_eq!(read("a.txt").len(), read("c.txt").len());
+}
+
+#[test]
+fn info_and_render_warn_alike_and_once() {
+    let folder = directory();
+    let d = folder.path();
+    let draft = "source = { type = \"weave\", draft = [\"##\", \"##\"], warps = 2, wefts = 2, edges = \"live\" }";
+    write(d, "s.toml", format!("light = []\n[[fabric]]\nyarn = \"wool\"\n{draft}\n"));
+    let small = ["--width", "8", "--height", "6", "--spp", "1", "-o", "a.png"];
+    let rendered = yarnray(d, &[&["render", "s.toml"], &small[..]].concat()).good().stderr;
+    let info: serde_json::Value =
+        serde_json::from_str(&yarnray(d, &["info", "s.toml", "--json"]).good().stdout).unwrap();
+    let told: Vec<&str> = info["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap()).collect();
+    assert!(told.iter().any(|w| w.contains("no light")) && told.iter().any(|w| w.contains("does not interlace")));
+    for warning in told {
+        assert!(rendered.contains(&format!("warning: {warning}\n")) && !warning.contains("warning"), "{rendered}");
     }
 }

@@ -1,4 +1,4 @@
-//! `yarnray make garment`: the yarns of a scene's cloth as curve files.
+//! `yarnray make garment`: the yarns of a scene's cloth as curve files, whether it is laid on a garment or not.
 
 use std::path::PathBuf;
 
@@ -15,6 +15,7 @@ use crate::math::words::counted;
 
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc
+  yarnray make garment scenes/beanie.toml -o beanie.usdc          what a scene knits or weaves without a mesh as well
   yarnray make garment scenes/pullover.toml --set render.frame=12 -o pullover.0012.usdc
   yarnray info scenes/pullover.toml                               how many stitches there would be
 
@@ -45,18 +46,15 @@ pub(super) fn run(args: &GarmentArgs) -> Result<(), Failure> {
         Files::default().reads("scene", [&args.scene]).reads("--curves", &args.options.curves).writes("-o", &args.out);
     files.refuse()?;
     let mut scene = args.options.load(&args.scene, args.quiet)?;
-    if scene.garments.is_empty() {
-        let hint = "source = { type = \"garment\", path = \"pullover.obj\", cloth = { type = \"knit\" } }";
-        let problem = format!("error: {}: no fabric is laid on a garment\n  help: {hint}", args.scene.display());
-        return Err(Failure::Input(problem));
-    }
     files.check(args.quiet)?;
     scene.render.mode = level::mode(&args.level);
     let set = level::curves(&scene)?;
     write_all(&args.out, &set, args.quiet)?;
     if !args.quiet {
-        let stitches: u64 = scene.garments.iter().map(|f| f.stitches).sum();
-        log::say(&counted(stitches, "stitch"));
+        if !scene.garments.is_empty() {
+            let stitches: u64 = scene.garments.iter().map(|f| f.stitches).sum();
+            log::say(&counted(stitches, "stitch"));
+        }
         for note in scene.garments.iter().flat_map(|f| &f.repairs) {
             log::say(&format!("note: {note}"));
         }

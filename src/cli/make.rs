@@ -192,8 +192,8 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
     };
-    if let Err(problem) = piece.edges.suit(&piece.draft) {
-        return Err(Failure::hinted(problem, "--edges selvedge"));
+    if let Err((problem, instead)) = piece.edges.suit(&piece.draft) {
+        return Err(Failure::hinted(problem, format!("--edges {}", instead.name())));
     }
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
     let task = format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]);

@@ -18,14 +18,14 @@ use crate::{
 
 const EXAMPLES: &str = "Examples:
   yarnray stress                              every case, in minutes
-  yarnray stress --quick                      every case, smaller, in two minutes
+  yarnray stress --quick                      every case, smaller, in three minutes
   yarnray stress --case radii --case twist    some of them
   yarnray stress -o stress.md -o stress.json  the report in two formats";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct StressArgs {
-    /// Smaller cases: two minutes in place of many.
+    /// Smaller cases: three minutes in place of many.
     #[arg(long)]
     quick: bool,
     /// Only this case (repeatable).

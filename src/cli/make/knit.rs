@@ -1,5 +1,7 @@
 //! `yarnray make knit`
 
+use std::path::Path;
+
 use clap::Args;
 use glam::DVec2;
 
@@ -10,8 +12,9 @@ use crate::{
     pattern::{
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
+        knitspeak,
     },
-    scene::Yarn,
+    scene::{Yarn, load::read_text},
 };
 
 #[derive(Args, Debug)]
@@ -25,6 +28,9 @@ pub(super) struct KnitArgs {
     /// A row of a chart, from the cast-on edge, as in 'k2 p2', '12: k' or 'k3 mb k3' (repeatable); the README lists the steps.
     #[arg(long, value_name = "ROW")]
     chart: Vec<String>,
+    /// Written instructions, as in 'Row 1 (RS): *k2, p2; rep from * to end.', over the stitches cast on; lines, or `@FILE`.
+    #[arg(long, value_name = "TEXT", conflicts_with_all = ["pattern", "chart"])]
+    instructions: Option<String>,
     /// Stitches cast on; 20, or as many as the width takes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     stitches: Option<u32>,
@@ -120,10 +126,28 @@ fn wrong(error: &dyn std::fmt::Display) -> Failure {
     Failure::Input(format!("error: {error}"))
 }
 
+/// The chart of written instructions over so many stitches, or of those in a file whose name stands behind `@`.
+fn written(text: &str, stitches: u32) -> Result<Chart, Failure> {
+    let (text, name) = match text.strip_prefix('@') {
+        None => (text.to_owned(), "--instructions".to_owned()),
+        Some(path) => {
+            let read = read_text(Path::new(path)).map_err(|problem| wrong(&format!("{path}: {problem}")))?;
+            (read, path.to_owned())
+        }
+    };
+    let rows = knitspeak::chart_rows(&text, stitches).map_err(|error| {
+        let line = error.line.map_or(String::new(), |line| format!("line {}: ", line + 1));
+        Failure::hinted(format!("{name}: {line}{}", error.problem), error.hint)
+    })?;
+    Chart::parse(&rows).map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))
+}
+
 impl KnitArgs {
     /// What is to be knitted, of yarn of a thickness.
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
-        let chart = if self.chart.is_empty() {
+        let chart = if let Some(text) = &self.instructions {
+            written(text, self.stitches.unwrap_or(knit::COUNT))?
+        } else if self.chart.is_empty() {
             Chart::named(self.pattern.as_deref().unwrap_or("stockinette")).ok_or_else(|| wrong(&"unknown pattern"))?
         } else {
             Chart::parse(&self.chart).map_err(|e| wrong(&e))?

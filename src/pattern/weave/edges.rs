@@ -41,13 +41,30 @@ impl Edges {
     /// Whether cloth of a draft can end so.
     ///
     /// # Errors
-    /// Why it cannot.
-    pub fn suit(self, draft: &Draft) -> Result<(), &'static str> {
+    /// Why it cannot, and how it can.
+    pub fn suit(self, draft: &Draft) -> Result<(), (&'static str, Self)> {
+        let cut_warps = draft.pile().is_some_and(|pile| pile.cut) && !draft.cut_wefts();
         match self {
-            Self::Fringe(_) if draft.pile().is_some_and(|pile| pile.cut) => {
-                Err("the strands of a cut pile are not drawn out into a fringe")
+            Self::Fringe(_) if cut_warps => {
+                Err(("the strands of a cut pile are not drawn out into a fringe", Self::Selvedge))
+            }
+            Self::Selvedge | Self::Finished if draft.cut_wefts() => {
+                Err(("wefts that are cut do not turn at a selvedge", Self::Live))
+            }
+            Self::Finished if draft.layers() > 1 => {
+                Err(("cloth of more than one layer is too thick to be folded into hems", Self::Selvedge))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Live => "live",
+            Self::Selvedge => "selvedge",
+            Self::Fringe(_) => "fringe",
+            Self::Finished => "finished",
         }
     }
 }

@@ -387,8 +387,7 @@ impl Cloth<'_> {
         let Measures { thickness, size, .. } = self.measures();
         let cut = self.weave.draft.cut_wefts();
         let edges = match self.weave.edges {
-            _ if cut => Edges::Live,
-            Edges::Finished if !edges::has_room_for_hems(size[1], thickness) => Edges::Selvedge,
+            Edges::Finished if cut || !edges::has_room_for_hems(size[1], thickness) => Edges::Selvedge,
             edges => edges,
         };
         let hem = if edges == Edges::Finished { edges::hem_wefts(thickness, self.cell.spacing[1]) } else { 0 };
@@ -401,7 +400,8 @@ impl Cloth<'_> {
         };
         let diameter = self.weave.half_rooms[0] + self.weave.half_rooms[1];
         let mut strands = pile::settle(strands(0).chain(strands(1)).collect(), diameter);
-        if edges != Edges::Live {
+        // Wefts that are cut end where warps are drawn out.
+        if edges != Edges::Live && !cut {
             strands = selvedge::selvedges(self, strands, hem);
         }
         if let Edges::Fringe(length) = edges {

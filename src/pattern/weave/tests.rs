@@ -290,6 +290,27 @@ fn fringes_are_as_long_as_they_are_asked_to_be() {
     }
 }
 
+/// The warps of a corduroy are all of the ground: they alone are drawn out, and its pile stays as it is.
+#[test]
+fn a_corduroy_has_a_fringe_of_its_warps() {
+    let [cut, drawn] = [Edges::Live, Edges::Fringe(20.0)].map(|edges| Weave { edges, ..weave("corduroy") });
+    let live = cut.relax().unwrap();
+    let half = 0.5 * live.measures().size[1];
+    let fringed = drawn.relax().unwrap().strands();
+    let (bare, mut warps) = (live.strands(), 0);
+    assert_eq!(bare.len(), fringed.len());
+    for (before, after) in bare.iter().zip(&fringed) {
+        if after.kind == StrandKind::Warp {
+            let (first, last) = (after.curve.points[0].y, after.curve.points.last().unwrap().y);
+            assert!((-first - half - 20.0).abs() < 2.0 && (last - half - 20.0).abs() < 2.0, "{first} {last} {half}");
+            warps += 1;
+        } else {
+            assert_eq!(before.curve.points, after.curve.points);
+        }
+    }
+    assert!(warps > 0);
+}
+
 #[test]
 fn pile_is_made_in_pieces_of_any_size() {
     for (name, sizes) in [("terry", 1..9), ("velvet", 1..5), ("corduroy", 1..7)] {

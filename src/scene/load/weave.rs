@@ -233,6 +233,7 @@ fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, drafted: Opt
     let names = Edges::NAMES.map(|(name, edges)| (name, edges(length)));
     let default = match fringe {
         Some(_) => fringed,
+        None if drafted.is_some_and(|d| d.draft.cut_wefts()) => Edges::Live,
         None if drafted.is_some_and(is_too_thick_for_hems) => Edges::Selvedge,
         None => Edges::Finished,
     };
@@ -240,9 +241,9 @@ fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, drafted: Opt
     if fringe.is_some() && edges != fringed {
         table.error_at("fringe", "only `edges = \"fringe\"` has a fringe", None);
     }
-    if let Some(Err(problem)) = drafted.map(|d| edges.suit(&d.draft)) {
+    if let Some(Err((problem, instead))) = drafted.map(|d| edges.suit(&d.draft)) {
         let at = if table.has("edges") { "edges" } else { "fringe" };
-        table.error_at(at, problem, Some("edges = \"selvedge\""));
+        table.error_at(at, problem, Some(&format!("edges = \"{}\"", instead.name())));
     }
     edges
 }
