@@ -44,7 +44,8 @@ fn info_tells_of_scenes() {
     let directory = directory();
     write(directory.path(), "s.toml", SWATCH);
     let text = yarnray(directory.path(), &["info", "s.toml"]).good().stdout;
-    for part in ["s.toml\n", "48 x 36, 8 spp, mode yarn, model aggregated", "yarns of `wool3` (3 plies of 60 fibres)"] {
+    for part in ["s.toml\n", "48 x 36, 8 spp, mode yarn, model aggregated", "1 yarn of `wool3` (3 plies of 60 fibres)"]
+    {
         assert!(text.contains(part), "{part}: {text}");
     }
     let json = yarnray(directory.path(), &["info", "s.toml", "--json", "--spp", "3"]).good().stdout;

@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
 use crate::{
-    math::words::counted,
+    math::words,
     pattern::{MAX_POINTS, revolution::Revolution},
 };
 
@@ -217,19 +217,20 @@ impl Sizes {
             // Nothing holds beyond so many diameters of the yarn, however flat it is pressed.
             let most = most / unit;
             if let Some(size) = size.filter(|s| !(least..=most).contains(s)) {
+                let noun = if counted == "rows" { "row" } else { "stitch" };
                 let whole = size * f64::from(count) * d;
                 let [size, least, most] = [size, least, most].map(|s| s * unit);
                 return Err(Misfit {
                     key: Some(counted),
                     problem: format!(
-                        "{count} {counted} on a {key} of {whole:.1} mm are {size:.2} yarn diameters {word}; \
-                         {} to {} can be knitted",
+                        "{} on a {key} of {whole:.1} mm are {size:.2} yarn diameters {word}; {} to {} can be knitted",
+                        words::counted(count, noun),
                         rounded(least),
                         rounded(most)
                     ),
                     hint: format!(
-                        "about {:.0} {counted} fit yarn {:.3} mm thick",
-                        (whole / (usual * d)).round().clamp(1.0, MOST),
+                        "about {} in yarn {:.3} mm thick",
+                        words::counted((whole / (usual * d)).round().clamp(1.0, MOST) as u64, noun),
                         yarn.diameter()
                     ),
                 });
@@ -332,7 +333,10 @@ fn fits_profile(knit: &Knit, surface: &Revolution, yarn: &Thickness) -> Result<(
                 row + 1,
                 width * unit
             ),
-            hint: format!("about {} there, or yarn of a radius of {radius:.3} mm", counted(most as u64, "stitch")),
+            hint: format!(
+                "about {} there, or yarn of a radius of {radius:.3} mm",
+                words::counted(most as u64, "stitch")
+            ),
         });
     }
     if height < ROW_HEIGHTS[0] * d {
@@ -345,7 +349,7 @@ fn fits_profile(knit: &Knit, surface: &Revolution, yarn: &Thickness) -> Result<(
                 surface.length(),
                 height / yarn.diameter()
             ),
-            hint: format!("about {} in yarn {:.3} mm thick", counted(most as u64, "row"), yarn.diameter()),
+            hint: format!("about {} in yarn {:.3} mm thick", words::counted(most as u64, "row"), yarn.diameter()),
         });
     }
     Ok(())
