@@ -95,8 +95,15 @@ impl Chain {
         } else {
             spline_through(distinct.iter().copied())
         };
-        for p in &mut points {
-            p.w = p.w.max(0.0);
+        // Where radii jump a spline through them would go below them, down to nothing.
+        const LEAST: f64 = 0.5;
+        let last = points.len() - 1;
+        let radius = |i: usize| knots[i.min(knots.len() - 1)].w;
+        for (i, p) in points.iter_mut().enumerate() {
+            let near = [i.saturating_sub(2), i.saturating_sub(1), i.min(last)].map(radius);
+            if p.w <= 0.0 {
+                p.w = LEAST * near.into_iter().fold(f64::MAX, f64::min).max(0.0);
+            }
         }
         Self { basis, points }
     }
@@ -314,6 +321,17 @@ mod tests {
             Curve { basis, closed, points, radii: None, flattening: None },
             (0..n).map(|i| 0.2 + 0.1 * at(i).cos()).collect(),
         )
+    }
+
+    #[test]
+    fn radii_that_jump_stay_above_nothing() {
+        let points = (0..12).map(|i| DVec3::X * f64::from(i)).collect();
+        let radii: Vec<f64> = (0..12).map(|i| if i == 5 { 0.3 } else { 1.2 }).collect();
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
+        let chain = Chain::new(&curve, &radii);
+        let knots: Vec<(usize, f64)> = (0..11).map(|i| (i, 0.0)).chain([(10, 1.0)]).collect();
+        let smooth = chain.through(&knots, false, Basis::BSpline);
+        assert!(smooth.points.iter().all(|p| p.w >= 0.15), "{:?}", smooth.points);
     }
 
     #[test]
