@@ -9,7 +9,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, overlap_in_words, positive, terminal::print};
+use super::{Failure, SceneArgs, folds_in_words, overlap_in_words, positive, terminal::print};
 use crate::{
     cloth::{self, Estimate},
     files::{
@@ -22,6 +22,7 @@ use crate::{
         curve::{Basis, Curve, CurveSet},
         overlap::{Overlap, TOLERATED, overlap, overlap_of_plied},
         proposal::{self, Proposal},
+        strand::Folds,
     },
     input::diagnostic::listed,
     math::words::{bytes_in_words, counted},
@@ -316,6 +317,8 @@ struct SceneFacts<'a> {
     /// What each fabric takes, and all of them.
     estimates: Vec<Estimate>,
     total: Estimate,
+    /// What is told of it as a render would.
+    warnings: Vec<String>,
     plan: Plan,
     memory: Memory,
     /// The box around all cloth, millimetres, where the scene's file has it.
@@ -346,7 +349,12 @@ fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
 
 impl<'a> SceneFacts<'a> {
     fn new(scene: &'a Scene) -> Self {
-        let estimates = cloth::estimates(scene);
+        let (estimates, folds): (Vec<Estimate>, Vec<_>) = cloth::surveyed(scene).into_iter().unzip();
+        let folded = scene.fabrics.iter().zip(folds).filter_map(|(fabric, folds)| {
+            let folds = folds.filter(Folds::are_seen)?;
+            Some(folds_in_words(scene, fabric, &folds, fabric.curves.len()))
+        });
+        let warnings = scene.warnings.iter().cloned().chain(folded).collect();
         let total: Estimate = estimates.iter().copied().sum();
         let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
         let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -354,7 +362,7 @@ impl<'a> SceneFacts<'a> {
         // Of garments that are not laid only their tile is measured.
         let overlap = overlap_of(scene);
         let (plan, memory) = (Plan::new(scene), Memory::new(scene));
-        Self { scene, estimates, total, plan, memory, bounds: [low, high], overlap }
+        Self { scene, estimates, total, warnings, plan, memory, bounds: [low, high], overlap }
     }
 
     /// Features that are used, or those left out.
@@ -398,7 +406,7 @@ impl<'a> SceneFacts<'a> {
             },
             "pixels": pixels,
             "used": reasons(true), "left_out": reasons(false),
-            "warnings": scene.warnings,
+            "warnings": self.warnings,
         })
     }
 
@@ -431,7 +439,7 @@ impl<'a> SceneFacts<'a> {
                 text += &format!("    {:18}{}{}\n", f.name, f.reason, memory.unwrap_or_default());
             }
         }
-        for warning in &scene.warnings {
+        for warning in &self.warnings {
             text += &format!("  warning   {warning}\n");
         }
         text

@@ -32,13 +32,16 @@ use crate::{
     cloth::BuildError,
     experiment::{converge::ConvergeError, table3::BenchError},
     ffi::heap,
-    geometry::overlap::{self, Overlap},
+    geometry::{
+        overlap::{self, Overlap},
+        strand::Folds,
+    },
     image::output,
     input::{diagnostic::hinted, document::Value},
     plan,
     render::OutOfMemory,
     scene::{
-        Mode, Model, Scene,
+        Fabric, Mode, Model, Scene,
         load::{LoadError, LoadOptions, load},
     },
 };
@@ -381,6 +384,30 @@ impl SceneArgs {
 fn write_text(path: &std::path::Path, text: &str) -> Result<(), Failure> {
     use std::io::Write as _;
     Ok(output::write_file(path, |file| file.write_all(text.as_bytes()))?)
+}
+
+/// Where the yarns of a fabric fold into themselves, for people: `yarns` are all that it has.
+fn folds_in_words(scene: &Scene, fabric: &Fabric, folds: &Folds, yarns: usize) -> String {
+    let Folds { worst, places, .. } = folds;
+    let at = folds.at + scene.middle;
+    format!(
+        "{}: {} of {yarns} yarns bend so tightly at {places} place{} that they fold into themselves and their plies break; the \
+         worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
+        fabric.origin,
+        folds.yarns,
+        if *places == 1 { "" } else { "s" },
+        worst.yarn,
+        worst.segment,
+        fabric.panel_of(worst.yarn).map_or(String::new(), |name| format!(" of panel `{name}`")),
+        at.x,
+        at.y,
+        at.z,
+        worst.fold,
+        match fabric.from_file && 2 * folds.yarns > yarns {
+            true => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
+            false => "",
+        }
+    )
 }
 
 /// What was measured of yarns that run into each other, for people.

@@ -12,7 +12,7 @@ use crate::{
         fiber::{Plies, flyaway::Flyaways},
         material_indices::MaterialIndices,
         segment_uvs::SegmentUvs,
-        strand::{Along, StrandMotion, StrandOptions, Strands, Unevenness},
+        strand::{Along, Folds, StrandMotion, StrandOptions, Strands, Unevenness},
         tube::Tubes,
         yarn::{PlyParameters, YarnShape},
     },
@@ -94,14 +94,23 @@ fn prepared<'a>(
     numbered.map(|(index, (fabric, curves))| Prepared::new(scene, index, fabric, curves))
 }
 
-/// What each fabric of a scene will take, also of curves that a survey has not made. Only one of them is in memory at a time.
-pub(super) fn estimates(scene: &Scene) -> Vec<Estimate> {
-    let estimate = |fabric: &Fabric| Prepared::new(scene, 0, fabric, Cow::Borrowed(&*fabric.curves)).1;
+/// What each fabric of a scene will take, also of curves that a survey has not made, and where its yarns fold, of curves that there are. Only
+/// one of them is in memory at a time.
+pub(super) fn estimates(scene: &Scene) -> Vec<(Estimate, Option<Folds>)> {
+    let prepared = |fabric: &Fabric| {
+        let (prepared, estimate) = Prepared::new(scene, 0, fabric, Cow::Borrowed(&*fabric.curves));
+        let folds = match &prepared.of {
+            Of::Yarns { strands, .. } => strands.folds(),
+            Of::Fibers { .. } => None,
+        };
+        (estimate, folds)
+    };
     let of_all = |fabric: &Fabric| match fabric.kind {
-        CurveKind::Yarn(yarn) => fabric
-            .sample(scene.yarns[yarn].radius)
-            .map_or_else(|| estimate(fabric), |Sample { fabric, times }| estimate(&fabric).times(times)),
-        CurveKind::Fiber(_) => estimate(fabric),
+        CurveKind::Yarn(yarn) => match fabric.sample(scene.yarns[yarn].radius) {
+            Some(Sample { fabric, times }) => (prepared(&fabric).0.times(times), None),
+            None => prepared(fabric),
+        },
+        CurveKind::Fiber(_) => prepared(fabric),
     };
     scene.fabrics.iter().map(of_all).collect()
 }

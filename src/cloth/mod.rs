@@ -12,7 +12,7 @@ use std::{
 };
 
 use crate::{
-    geometry::{section::Section, tube::TubePlace},
+    geometry::{section::Section, strand::Folds, tube::TubePlace},
     scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
     scene::Scene,
     trace::{CurveGeometry, FiberGeometry, Hit, HitPlace, SurfacePlace, TriangleMesh, World, YarnGeometry},
@@ -146,6 +146,11 @@ fn borrowed(scene: &Scene) -> Vec<Given<'_>> {
 
 /// What the curves of each fabric will take, without making them.
 pub fn estimates(scene: &Scene) -> Vec<Estimate> {
+    surveyed(scene).into_iter().map(|(estimate, _)| estimate).collect()
+}
+
+/// The same, with where the yarns of each fabric fold into themselves, if they do.
+pub(crate) fn surveyed(scene: &Scene) -> Vec<(Estimate, Option<Folds>)> {
     curves::estimates(scene)
 }
 

@@ -59,6 +59,30 @@ pub struct TightBend {
     pub places: usize,
 }
 
+/// Where the yarns of a fabric fold into themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Folds {
+    /// How many of the yarns do.
+    pub yarns: usize,
+    /// At how many places.
+    pub places: usize,
+    /// The worst place.
+    pub worst: TightBend,
+    /// Where that is, in the space of the points.
+    pub at: DVec3,
+    /// Length of all yarns, in diameters.
+    pub length: f64,
+}
+
+impl Folds {
+    /// Whether they are seen: plies break widely at one of them, or they come so often that some are in every picture.
+    pub fn are_seen(&self) -> bool {
+        const WIDE: f64 = 2.0;
+        const APART: f64 = 1000.0;
+        self.worst.fold > WIDE || self.places as f64 * APART > self.length
+    }
+}
+
 /// Yarns of one kind in one geometry of Embree; where they move, at times evenly spaced over the shutter's.
 #[derive(Clone, Debug)]
 pub struct Strands {
@@ -185,6 +209,28 @@ impl Strands {
     /// The tightest place of each yarn that bends more tightly than its radius allows.
     pub fn tight_bends(&self) -> &[TightBend] {
         &self.tight_bends
+    }
+
+    /// Where a yarn bends most tightly, in the space of the points.
+    pub fn place_of(&self, bend: &TightBend) -> DVec3 {
+        let segment = self.segments_of(bend.yarn).start + bend.segment as u32;
+        self.frame(segment, 0.5).centre.as_dvec3()
+    }
+
+    /// What is known of all bends that are too tight, if there are any.
+    pub fn folds(&self) -> Option<Folds> {
+        let worst = *self.tight_bends.iter().max_by(|a, b| a.fold.total_cmp(&b.fold))?;
+        // Yarns are as thick all along, or nearly.
+        const SOME: usize = 97;
+        let radii = || self.points.iter().step_by(SOME).map(|p| f64::from(p.w));
+        let radius = radii().sum::<f64>() / radii().count().max(1) as f64;
+        Some(Folds {
+            yarns: self.tight_bends.len(),
+            places: self.tight_bends.iter().map(|bend| bend.places).sum(),
+            worst,
+            at: self.place_of(&worst),
+            length: self.length / (2.0 * radius).max(1e-300),
+        })
     }
 
     /// Whether any yarn is pressed flat somewhere.

@@ -27,7 +27,7 @@ use crate::{
         ray::{Ray, YarnPlace},
         section::{Crossings, Section},
         segment_uvs::SegmentUvs,
-        strand::{Strands, TightBend},
+        strand::{Folds, Strands, TightBend},
         tube::{TubePlace, Tubes},
         walk::Walker,
     },
@@ -235,11 +235,15 @@ impl World {
             CurveGeometry::Yarns(yarns) if yarns.fabric == fabric => Some(&yarns.strands),
             _ => None,
         });
-        let place = |of: &Strands, bend: &TightBend| {
-            let segment = of.segments_of(bend.yarn).start + bend.segment as u32;
-            of.frame(segment, 0.5).centre.as_dvec3()
-        };
-        strands.flat_map(|of| of.tight_bends().iter().map(move |bend| (bend, place(of, bend)))).collect()
+        strands.flat_map(|of| of.tight_bends().iter().map(move |bend| (bend, of.place_of(bend)))).collect()
+    }
+
+    /// What is known of the bends of a fabric that are too tight, if there are any.
+    pub fn folds(&self, fabric: usize) -> Option<Folds> {
+        self.geometries.iter().find_map(|geometry| match geometry {
+            CurveGeometry::Yarns(yarns) if yarns.fabric == fabric => yarns.strands.folds(),
+            _ => None,
+        })
     }
 }
 

@@ -8,7 +8,10 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::{super::log, options::RenderArgs};
+use super::{
+    super::{folds_in_words, log},
+    options::RenderArgs,
+};
 use crate::{
     math::words::{bytes_in_words, counted},
     render::{Progress, Rendered},
@@ -23,30 +26,15 @@ pub(super) fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usi
         tracing::warn!("{warning}");
     }
     for (i, fabric) in scene.fabrics.iter().enumerate() {
+        let Some(folds) = world.folds(i) else { continue };
+        let told = folds_in_words(scene, fabric, &folds, yarns[i]);
+        if folds.are_seen() {
+            let more = if args.log.verbose > 0 { "" } else { " (-v shows all)" };
+            tracing::warn!("{told}{more}");
+        } else {
+            tracing::debug!("{told}");
+        }
         let bends = world.tight_bends(i);
-        let Some((worst, at)) = bends.iter().max_by(|(a, _), (b, _)| a.fold.total_cmp(&b.fold)) else { continue };
-        let places: usize = bends.iter().map(|(bend, _)| bend.places).sum();
-        let at = *at + scene.middle;
-        tracing::warn!(
-            "{}: {} of {} yarns bend so tightly at {places} place{} that they fold into themselves and their plies break; the \
-             worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
-            fabric.origin,
-            bends.len(),
-            yarns[i],
-            if places == 1 { "" } else { "s" },
-            worst.yarn,
-            worst.segment,
-            fabric.panel_of(worst.yarn).map_or(String::new(), |name| format!(" of panel `{name}`")),
-            at.x,
-            at.y,
-            at.z,
-            worst.fold,
-            match (fabric.from_file && 2 * bends.len() > yarns[i], args.log.verbose > 0) {
-                (true, _) => "; is the radius or the unit of the file another one? `yarnray info` of it proposes both",
-                (false, false) => " (-v shows all)",
-                (false, true) => "",
-            }
-        );
         for (bend, at) in bends {
             let at = at + scene.middle;
             let (yarn, segment, fold) = (bend.yarn, bend.segment, bend.fold);
