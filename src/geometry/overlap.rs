@@ -126,10 +126,10 @@ pub fn overlap_of_plied<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], 
     Some(Overlap::of(&pieces, &rings, Looked::All))
 }
 
-/// About [`Overlap::share`] of the same, by one in eight pieces: to warn of much.
-pub fn share_of_overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<f64> {
+/// About the same, by one in eight pieces: to warn of much.
+pub fn sampled_overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<Overlap> {
     let (pieces, rings) = pieces(curves)?;
-    Some(Overlap::of(&pieces, &rings, Looked::Eighth).share)
+    Some(Overlap::of(&pieces, &rings, Looked::Eighth))
 }
 
 /// The pieces that are looked at.

@@ -7,10 +7,10 @@
 //! | `k`, `k4`, `p`, `p2` | knit and purl stitches |
 //! | `ktbl`, `ptbl` | the same through the back of the loop, which twists it |
 //! | `k2tog`, `ssk`, `p2tog`, `ssp` | one stitch of two; the left one of the two on top (leans right), or the right one (leans left) |
-//! | `k3tog`, `sssk`, `p3tog`, `cdd` | one stitch of three; the left, the right or the middle one on top |
+//! | `k3tog`, `sssk`, `cdd`, `p3tog`, `sssp`, `cddp` | one stitch of three; the left, the right or the middle one on top |
 //! | `yo` | a stitch of none: an eyelet |
-//! | `m1l`, `m1r` | a stitch out of the strand between two stitches of the row below, twisted to the left or the right |
-//! | `kfb` | two stitches of one |
+//! | `m1l`, `m1r`, `m1lp`, `m1rp` | a stitch out of the strand between two stitches of the row below, twisted to the left or the right, knitted or purled |
+//! | `kfb`, `pfb` | two stitches of one |
 //! | `sl`, `sl2`, `slwyif`, `miss` | a stitch that is slipped: the yarn passes behind it, or in front (`slwyif`) |
 //! | `tuck` | a stitch that is slipped with a yarn over, to be worked together with it: brioche is made of these |
 //! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
@@ -55,13 +55,18 @@ pub enum Step {
         top: Top,
     },
     /// One stitch becomes two.
-    FrontBack,
+    FrontBack {
+        /// As in [`Step::Plain`].
+        purl: bool,
+    },
     /// A stitch out of nothing.
     YarnOver,
     /// A stitch out of the strand between two of the row below, twisted.
     MakeOne {
         /// Whether its left leg is on top: it leans to the left.
         left: bool,
+        /// As in [`Step::Plain`].
+        purl: bool,
     },
     /// A stitch that is not worked.
     Slip {
@@ -93,7 +98,7 @@ impl Step {
         match self {
             Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble | Self::Unworked => (1, 1),
             Self::Together { take, .. } => (take.into(), 1),
-            Self::FrontBack => (1, 2),
+            Self::FrontBack { .. } => (1, 2),
             Self::YarnOver | Self::MakeOne { .. } => (0, 1),
             Self::Cable { front, back, .. } => (u32::from(front) + u32::from(back), u32::from(front) + u32::from(back)),
         }
@@ -216,7 +221,8 @@ const MOST_STEPS: usize = 20_000;
 pub(super) const WIDEST_CABLE: u8 = 24;
 /// How far from what is asked a number of stitches is looked for that a chart fits.
 const LARGEST_STEP_ASIDE: usize = 200;
-const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, \
+const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, cdd, p3tog, sssp, cddp, \
+                     kfb, pfb, m1l, m1r, m1lp, m1rp, \
                      sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, -, ds, with spaces between them";
 
 impl Chart {
@@ -311,13 +317,12 @@ impl Chart {
         self.rows.iter().any(|row| row.steps.contains(&Step::Tuck))
     }
 
-    /// The first row, from 0, that has more stitches than it finds in rows of so many, and how many it has: the rest of it is
-    /// left out.
-    pub fn cut_short(&self, cast_on: u32, widths: &[u32]) -> Option<(usize, u32)> {
-        let found = std::iter::once(cast_on).chain(widths.iter().copied());
-        let rows = self.rows.iter().cycle().zip(found).take(widths.len()).enumerate();
-        let mut rows = rows.map(|(r, (row, found))| (r, row.takes_and_makes().0, found));
-        rows.find(|(_, takes, found)| takes > found).map(|(r, takes, _)| (r, takes))
+    /// How many stitches the widest cable has, if there is one.
+    pub fn widest_cable(&self) -> Option<u32> {
+        let wide = |step: &Step| {
+            if let Step::Cable { front, back, .. } = step { Some(u32::from(*front) + u32::from(*back)) } else { None }
+        };
+        self.rows.iter().flat_map(|row| row.steps.iter()).filter_map(wide).max()
     }
 
     /// The next numbers of stitches to cast on, fewer and more, that `rows` rows fit; empty if none is near.
@@ -342,9 +347,10 @@ impl Chart {
             let row = &self.rows[r as usize % self.rows.len()];
             let fit = row.fit();
             let Some(made) = fit.made_of(found) else {
-                let (does, hint) = match fit.short {
-                    true => ("is written for", "a short row says what becomes of every stitch"),
-                    false => (
+                let (does, hint) = match (fit.short, fit.plain) {
+                    (true, _) => ("is written for", "a short row says what becomes of every stitch"),
+                    (false, true) => ("has", "a row may be cut where it is repeated, and is there once as a whole"),
+                    (false, false) => (
                         "repeats over",
                         "the number of stitches must be a multiple of what a row with shaping or cables takes",
                     ),
@@ -387,7 +393,7 @@ impl Fit {
         match found.checked_rem(self.takes)? {
             _ if self.short => (found == self.takes).then_some(self.makes.into()),
             0 => Some(u64::from(found / self.takes) * u64::from(self.makes)),
-            _ => self.plain.then_some(found.into()),
+            _ => (self.plain && found > self.takes).then_some(found.into()),
         }
     }
 }
@@ -432,9 +438,11 @@ impl Row {
             match *step {
                 Step::Plain { purl, twisted } => out.push(Stitch { purl, twisted, ..plain }),
                 Step::Together { take, purl, top } => out.push(Stitch { purl, parents: take, top, ..plain }),
-                Step::FrontBack => out.extend([plain, plain]),
+                Step::FrontBack { purl } => out.extend([Stitch { purl, ..plain }; 2]),
                 Step::YarnOver => out.push(Stitch { act: Act::Over, parents: 0, ..plain }),
-                Step::MakeOne { left } => out.push(Stitch { act: Act::Lift { left }, parents: 0, ..plain }),
+                Step::MakeOne { left, purl } => {
+                    out.push(Stitch { act: Act::Lift { left }, purl, parents: 0, ..plain });
+                }
                 Step::Slip { front } => out.push(Stitch { act: Act::Pass { front }, ..plain }),
                 Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
                 Step::Bobble => out.push(Stitch { act: Act::Bobble, ..plain }),
@@ -489,10 +497,15 @@ fn parse_step(token: &str) -> Option<(usize, Step)> {
         "sssk" | "sk2p" => together(3, false, Top::Right),
         "p3tog" => together(3, true, Top::Left),
         "cdd" | "s2kp" => together(3, false, Top::Middle),
-        "kfb" => Step::FrontBack,
+        "sssp" => together(3, true, Top::Right),
+        "cddp" => together(3, true, Top::Middle),
+        "kfb" => Step::FrontBack { purl: false },
+        "pfb" => Step::FrontBack { purl: true },
         "yo" => Step::YarnOver,
-        "m1l" | "m1" => Step::MakeOne { left: true },
-        "m1r" => Step::MakeOne { left: false },
+        "m1l" | "m1" => Step::MakeOne { left: true, purl: false },
+        "m1r" => Step::MakeOne { left: false, purl: false },
+        "m1lp" | "m1p" => Step::MakeOne { left: true, purl: true },
+        "m1rp" => Step::MakeOne { left: false, purl: true },
         "mb" | "bobble" => Step::Bobble,
         _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
     };

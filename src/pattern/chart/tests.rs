@@ -57,6 +57,10 @@ fn rows_of_one_line_share_their_steps() {
 #[test]
 fn plain_rows_may_be_cut_and_others_not() {
     assert_eq!(worked(&["k2 p2"], 7, 1)[0].iter().filter(|s| s.purl).count(), 3);
+    // Cut, and not left out.
+    let error = Chart::parse(&["k20 p4"]).unwrap().work(16, 2, 1000).unwrap_err();
+    assert_eq!(error.problem, "row 1 has 24 stitches, but finds 16");
+    assert!(error.hint.ends_with("cast on 24"), "{}", error.hint);
     let error = Chart::parse(&["k", "k3 k2tog"]).unwrap().work(9, 2, 1000).unwrap_err();
     assert_eq!((error.line, error.problem.as_str()), (Some(1), "row 2 repeats over 5 stitches, but finds 9"));
     assert!(error.hint.ends_with("takes: cast on 5 or 10"), "{}", error.hint);

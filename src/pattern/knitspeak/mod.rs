@@ -1,18 +1,23 @@
 //! Written knitting instructions (KnitSpeak) as rows of a chart.
 //!
-//! `Row 1 (RS): k2, *p2, k2; rep from * to end.` is what patterns in books and on Stitch-Maps say. Rows on the wrong side
-//! are worked from the other end and show the other face of each stitch; rounds are worked on the right side. Repeats to
-//! the end depend on the stitches on the needle, so rows are counted from the cast-on on, and each becomes a row of a
-//! chart over the whole width. A row that turns leaves the rest of the stitches for later, and the next one begins there.
+//! `Row 1 (RS): k2, *p2, k2; rep from * to end.` is what patterns in books and on Stitch-Maps say, with the abbreviations of
+//! the Craft Yarn Council. Rows on the wrong side are worked from the other end and show the other face of each stitch; rounds
+//! are worked on the right side. Repeats to the end depend on the stitches on the needle, so rows are counted from the cast-on
+//! on, and each becomes a row of a chart over the whole width. A row that turns leaves the rest of the stitches for later, and
+//! the next one begins there.
 
+mod lines;
 mod rows;
+mod step;
 #[cfg(test)]
 mod tests;
 mod words;
 
 use std::fmt;
 
-use rows::written_rows;
+use rows::{Again, Until, written};
+
+use super::chart::{Act, Chart};
 
 /// Why instructions could not be followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,31 +55,188 @@ const MOST_ROUNDS: u32 = 1_000_000;
 /// How deep repeats may lie in one another.
 const MOST_NESTED: usize = 16;
 
-const KNOWN: &str = "k, p, ktbl, ptbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, m1l, m1r, sl1, \
-                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f and 2/1 LC are known; write repeats as *...; rep from * to end, \
-                     [...] 3 times";
+const KNOWN: &str = "k, p, tbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, pfb, m1l, m1r, m1p, sl1, \
+                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f, 2/1 LC and LT are known; write repeats as *...; \
+                     rep from * to end, [...] 3 times";
+
+/// Instructions that have been read: which rows they are of, but not over how many stitches.
+#[derive(Clone, Debug)]
+pub struct Instructions {
+    rows: Vec<Written>,
+    again: Option<Again>,
+    cast_on: Option<u32>,
+    ends: bool,
+}
+
+/// Rows of a chart, as instructions make them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Worked {
+    /// From the cast-on edge up, each from left to right as seen from the right side.
+    pub rows: Vec<String>,
+    /// Whether the piece ends with them: they are shaped, or told to be repeated so often, or bound off. Else they may be repeated.
+    pub whole: bool,
+}
 
 /// The rows of a chart, from the cast-on edge up, each from left to right as seen from the right side.
 ///
 /// # Errors
 /// A word that is none, a row that does not fit the stitches it finds, rows that are missing or come twice.
 pub fn chart_rows(text: &str, cast_on: u32) -> Result<Vec<String>> {
-    let rows = written_rows(text)?;
-    let mut found = cast_on;
-    // Stitches that the row before has left when it turned.
-    let mut behind = 0;
-    rows.iter()
-        .enumerate()
-        .map(|(i, row)| {
-            let (worked, ahead) = row.body.work(found, behind, row.line, i + 1)?;
-            behind = ahead;
-            found = worked.iter().map(|s| s.makes * s.count).sum();
-            if found == 0 || found > MOST_STITCHES {
-                return error(row.line, format!("row {} makes {found} stitches", i + 1), "1 to 20000 fit on a needle");
+    Ok(Instructions::read(text)?.work(cast_on, 0)?.rows)
+}
+
+impl Instructions {
+    /// Reads instructions.
+    ///
+    /// # Errors
+    /// A word that is none, rows that are missing or come twice.
+    pub fn read(text: &str) -> Result<Self> {
+        written(text)
+    }
+
+    /// How many stitches they say to cast on, if they do.
+    pub fn cast_on(&self) -> Option<u32> {
+        self.cast_on
+    }
+
+    /// Works them over so many stitches. What they tell to repeat without an end, and does not repeat from the first row on
+    /// with as many stitches, is repeated for at least `least` rows.
+    ///
+    /// # Errors
+    /// A row that does not fit the stitches it finds, or does not make as many as it says.
+    pub fn work(&self, cast_on: u32, least: usize) -> Result<Worked> {
+        let reads = |row: &Written| row.body.reads_the_row_below();
+        let mut needle = Needle {
+            found: cast_on,
+            behind: 0,
+            faces: self.rows.iter().any(reads).then(Vec::new),
+            rows: Vec::with_capacity(self.rows.len()),
+        };
+        for row in &self.rows {
+            needle.work(row)?;
+        }
+        let shaped = needle.found != cast_on;
+        let Some(Again { rows, until, line }) = &self.again else {
+            return Ok(Worked { rows: needle.rows, whole: self.ends || shaped });
+        };
+        let copy = |needle: &Needle, k: usize| {
+            let row = &self.rows[rows[k % rows.len()]];
+            // Rows go on by turns, whichever they repeat.
+            let side = if needle.rows.len().is_multiple_of(2) { self.rows[0].side } else { self.second_side() };
+            Written { line: *line, side, count: None, ..row.clone() }
+        };
+        match until {
+            Until::Left(left) => {
+                let mut at_last = u32::MAX;
+                for k in 0.. {
+                    if needle.found == *left {
+                        break;
+                    }
+                    if k % rows.len() == 0 && (needle.found == at_last || needle.rows.len() > MOST_ROWS)
+                        || needle.found < *left
+                    {
+                        let problem = format!(
+                            "{left} stitches never remain: {} do after row {}",
+                            needle.found,
+                            needle.rows.len()
+                        );
+                        return error(
+                            *line,
+                            problem,
+                            "another number of `stitches` fits, or rows that make fewer than they find",
+                        );
+                    }
+                    if k % rows.len() == 0 {
+                        at_last = needle.found;
+                    }
+                    needle.work(&copy(&needle, k))?;
+                }
+                Ok(Worked { rows: needle.rows, whole: true })
             }
-            row.side.seen_from_right(worked, row.line)
-        })
-        .collect()
+            Until::Open => {
+                let all = rows.iter().copied().eq(0..self.rows.len());
+                if all && !shaped && needle.behind == 0 {
+                    // Over an odd number of rows the other side comes next.
+                    if self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side() {
+                        (0..rows.len()).try_for_each(|k| needle.work(&copy(&needle, k)))?;
+                    }
+                    return Ok(Worked { rows: needle.rows, whole: self.ends });
+                }
+                for k in 0.. {
+                    if needle.rows.len() >= least.min(MOST_ROWS) {
+                        break;
+                    }
+                    needle.work(&copy(&needle, k))?;
+                }
+                Ok(Worked { rows: needle.rows, whole: true })
+            }
+        }
+    }
+
+    /// The side of the rows after the first one and every other one from there on.
+    fn second_side(&self) -> Side {
+        match self.rows.get(1) {
+            Some(row) => row.side,
+            None if self.rows[0].round => self.rows[0].side,
+            None => self.rows[0].side.other(),
+        }
+    }
+}
+
+/// The stitches on the needle, and the rows below them.
+struct Needle {
+    found: u32,
+    /// Those that the row before has left when it turned.
+    behind: u32,
+    /// Which of them show a purl stitch on the right side, from the left, if anyone asks.
+    faces: Option<Vec<bool>>,
+    rows: Vec<String>,
+}
+
+impl Needle {
+    fn work(&mut self, row: &Written) -> Result<()> {
+        let number = self.rows.len() + 1;
+        let mut place = Place {
+            line: row.line,
+            row: number,
+            side: row.side,
+            found: self.found,
+            left: self.found - self.behind,
+            rounds: MOST_ROUNDS,
+            faces: self.faces.as_deref().unwrap_or_default(),
+            steps: Vec::new(),
+        };
+        row.body.work(self.behind, &mut place)?;
+        let (worked, ahead) = (place.steps, place.left);
+        let made = worked.iter().map(|s| s.makes.saturating_mul(s.count)).fold(0, u32::saturating_add);
+        if made == 0 || made > MOST_STITCHES {
+            return error(row.line, format!("row {number} makes {made} stitches"), "1 to 20000 fit on a needle");
+        }
+        if let Some(count) = row.count.filter(|count| *count != made) {
+            let problem = format!("row {number} makes {made} stitches, and says that it has {count}");
+            return error(row.line, problem, "another number of `stitches` fits, or the row is another one");
+        }
+        let text = row.side.seen_from_right(worked, row.line, number)?;
+        if let Some(faces) = &mut self.faces {
+            *faces = shown(&text, faces, self.found);
+        }
+        (self.found, self.behind) = (made, ahead);
+        self.rows.push(text);
+        Ok(())
+    }
+}
+
+/// Which stitches of a row show a purl stitch on the right side, where those below show such `faces`.
+fn shown(row: &str, faces: &[bool], found: u32) -> Vec<bool> {
+    let worked = Chart::parse(&[row]).and_then(|chart| chart.work(found, 1, u64::MAX)).unwrap_or_default();
+    let face = |s: &super::chart::Stitch| match s.act {
+        Act::Draw => s.purl,
+        Act::Pass { .. } | Act::Tuck | Act::Unworked | Act::Double => {
+            faces.get(s.first_parent as usize).copied().unwrap_or_default()
+        }
+        Act::Over | Act::Lift { .. } | Act::Bobble => s.purl,
+    };
+    worked.into_iter().flatten().map(|s| face(&s)).collect()
 }
 
 /// Which side faces the knitter.
@@ -89,6 +251,10 @@ enum Side {
 struct Written {
     line: usize,
     side: Side,
+    /// Whether it goes round.
+    round: bool,
+    /// How many stitches it says that it has in the end.
+    count: Option<u32>,
     body: Sequence,
 }
 
@@ -101,11 +267,22 @@ struct Steps {
     count: u32,
 }
 
+/// Stitches that are told by how they look from the right side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Look {
+    Knit,
+    Purl,
+    /// As those below.
+    Below,
+}
+
 #[derive(Clone, Debug)]
 enum Item {
     Steps(Steps),
     /// A step until so many stitches are left.
     Until(Steps, u32),
+    /// Stitches that look so, until so many are left.
+    Look(Look, u32),
     /// A sequence so many times.
     Times(Sequence, u32),
     /// A sequence until so many stitches are left.
@@ -117,101 +294,158 @@ enum Item {
 #[derive(Clone, Debug, Default)]
 struct Sequence(Vec<Item>);
 
-impl Sequence {
-    /// The steps of a row that finds so many stitches and begins where `behind` of them were left; and how many it leaves itself.
-    fn work(&self, found: u32, behind: u32, line: usize, row: usize) -> Result<(Vec<Steps>, u32)> {
-        let unworked = |count| Steps { name: "-".to_owned(), takes: 1, makes: 1, count };
-        let mut out: Vec<Steps> = Vec::new();
-        push(&mut out, unworked(behind));
-        let (mut left, mut rounds) = (found - behind, MOST_ROUNDS);
-        self.follow(&mut left, &mut out, &mut rounds, line, row)?;
-        if left > 0 && !matches!(self.0.last(), Some(Item::Turn)) {
-            let problem = format!("row {row} leaves {left} of {} stitches unworked", found - behind);
-            return error(line, problem, "rep from * to end, `turn` for a short row, or another number of `stitches`");
+/// How far a row has come.
+struct Place<'a> {
+    line: usize,
+    row: usize,
+    side: Side,
+    /// Stitches that it has found, and those that are left.
+    found: u32,
+    left: u32,
+    /// Rounds of repeats that are left: repeats of what takes no stitch would never end.
+    rounds: u32,
+    faces: &'a [bool],
+    steps: Vec<Steps>,
+}
+
+impl Place<'_> {
+    fn wrong<T>(&self, problem: &str, hint: impl Into<String>) -> Result<T> {
+        error(self.line, format!("row {} {problem}", self.row), hint)
+    }
+
+    fn push(&mut self, steps: Steps) {
+        match self.steps.last_mut() {
+            Some(last) if last.name == steps.name => last.count = last.count.saturating_add(steps.count),
+            _ if steps.count > 0 => self.steps.push(steps),
+            _ => {}
         }
-        push(&mut out, unworked(left));
-        Ok((out, left))
+    }
+
+    /// Knits the next stitches, or purls them.
+    fn look(&mut self, look: Look, count: u32) -> Result<()> {
+        if look == Look::Below && self.faces.is_empty() {
+            return self
+                .wrong("is the first one, and no stitches are there to look at", "say which are knitted: k2, p2");
+        }
+        for _ in 0..count {
+            let at = (self.found - self.left) as usize;
+            let purl = match (look, self.side) {
+                (Look::Below, Side::Right) => self.faces.iter().rev().nth(at).copied().unwrap_or_default(),
+                (Look::Below, Side::Wrong) => self.faces.get(at).copied().unwrap_or_default(),
+                (look, _) => look == Look::Purl,
+            };
+            let name = if purl == (self.side == Side::Right) { "p" } else { "k" };
+            self.push(Steps { name: name.to_owned(), takes: 1, makes: 1, count: 1 });
+            self.left -= 1;
+        }
+        Ok(())
+    }
+}
+
+impl Sequence {
+    /// Whether what is worked depends on how the stitches below look.
+    fn reads_the_row_below(&self) -> bool {
+        self.0.iter().any(|item| match item {
+            Item::Look(look, _) => *look == Look::Below,
+            Item::Times(sequence, _) | Item::Repeat(sequence, _) => sequence.reads_the_row_below(),
+            Item::Steps(_) | Item::Until(..) | Item::Turn => false,
+        })
+    }
+
+    /// Works a row that begins where `behind` stitches were left.
+    fn work(&self, behind: u32, place: &mut Place<'_>) -> Result<()> {
+        let unworked = |count| Steps { name: "-".to_owned(), takes: 1, makes: 1, count };
+        place.push(unworked(behind));
+        self.follow(place)?;
+        let left = place.left;
+        if left > 0 && !matches!(self.0.last(), Some(Item::Turn)) {
+            let problem = format!("leaves {left} of {} stitches unworked", place.found - behind);
+            return place.wrong(&problem, "rep from * to end, `turn` for a short row, or another number of `stitches`");
+        }
+        place.push(unworked(left));
+        Ok(())
     }
 
     fn takes(&self) -> u32 {
         let of = |item: &Item| match item {
             Item::Steps(steps) => steps.takes.saturating_mul(steps.count),
             Item::Times(sequence, times) => sequence.takes().saturating_mul(*times),
-            Item::Until(..) | Item::Repeat(..) | Item::Turn => 0,
+            Item::Until(..) | Item::Look(..) | Item::Repeat(..) | Item::Turn => 0,
         };
         self.0.iter().map(of).fold(0, u32::saturating_add)
     }
 
-    /// `rounds` are those that are left: repeats of what takes no stitch would never end.
-    fn follow(&self, left: &mut u32, out: &mut Vec<Steps>, rounds: &mut u32, line: usize, row: usize) -> Result<()> {
-        let Some(fewer) = rounds.checked_sub(1) else {
-            return error(line, format!("row {row} repeats more than {MOST_ROUNDS} times"), "fewer repeats");
+    fn follow(&self, place: &mut Place<'_>) -> Result<()> {
+        let Some(fewer) = place.rounds.checked_sub(1) else {
+            return place.wrong(&format!("repeats more than {MOST_ROUNDS} times"), "fewer repeats");
         };
-        *rounds = fewer;
+        place.rounds = fewer;
         for item in &self.0 {
             match item {
                 Item::Steps(steps) => {
                     let takes = steps.takes.saturating_mul(steps.count);
-                    if takes > *left {
-                        let problem = format!("row {row} needs {takes} stitches for {}, {left} are left", steps.name);
-                        return error(line, problem, "another number of `stitches` fits");
+                    if takes > place.left {
+                        let problem = format!("needs {takes} stitches for {}, {} are left", steps.name, place.left);
+                        return place.wrong(&problem, "another number of `stitches` fits");
                     }
-                    *left -= takes;
-                    push(out, steps.clone());
+                    place.left -= takes;
+                    place.push(steps.clone());
                 }
                 Item::Until(steps, last) => {
-                    let room = left.saturating_sub(*last);
+                    let room = place.left.saturating_sub(*last);
                     if steps.takes == 0 || !room.is_multiple_of(steps.takes) {
-                        return error(line, format!("row {row}: {} does not fit {room} stitches", steps.name), KNOWN);
+                        return place.wrong(&format!("has {room} stitches, which {} does not fit", steps.name), KNOWN);
                     }
-                    push(out, Steps { count: room / steps.takes, ..steps.clone() });
-                    *left -= room;
+                    place.push(Steps { count: room / steps.takes, ..steps.clone() });
+                    place.left -= room;
                 }
+                Item::Look(look, last) => place.look(*look, place.left.saturating_sub(*last))?,
                 Item::Turn => {}
                 Item::Times(sequence, times) => {
                     for _ in 0..*times {
-                        sequence.follow(left, out, rounds, line, row)?;
+                        sequence.follow(place)?;
                     }
                 }
                 Item::Repeat(sequence, last) => {
                     let takes = sequence.takes();
-                    let room = left.saturating_sub(*last);
+                    let room = place.left.saturating_sub(*last);
                     if takes == 0 || room == 0 || !room.is_multiple_of(takes) {
                         let rest = room.checked_rem(takes).unwrap_or(0);
-                        let problem = format!("row {row} repeats over {takes} stitches, but has {room} for it");
-                        return error(line, problem, format!("{rest} fewer `stitches`, or {} more, fit", takes - rest));
+                        let problem = format!("repeats over {takes} stitches, but has {room} for it");
+                        return place
+                            .wrong(&problem, format!("{rest} fewer `stitches`, or {} more, fit", takes - rest));
                     }
                     for _ in 0..room / takes {
-                        sequence.follow(left, out, rounds, line, row)?;
+                        sequence.follow(place)?;
                     }
                 }
             }
-            if out.len() > MOST_STITCHES as usize {
-                return error(line, format!("row {row} has more than {MOST_STITCHES} steps"), "fewer repeats");
+            if place.steps.len() > MOST_STITCHES as usize {
+                return place.wrong(&format!("has more than {MOST_STITCHES} steps"), "fewer repeats");
             }
         }
         Ok(())
     }
 }
 
-fn push(out: &mut Vec<Steps>, steps: Steps) {
-    match out.last_mut() {
-        Some(last) if last.name == steps.name => last.count = last.count.saturating_add(steps.count),
-        _ if steps.count > 0 => out.push(steps),
-        _ => {}
-    }
-}
-
 impl Side {
+    fn other(self) -> Self {
+        match self {
+            Self::Right => Self::Wrong,
+            Self::Wrong => Self::Right,
+        }
+    }
+
     /// The steps of a worked row as a row of a chart.
-    fn seen_from_right(self, mut worked: Vec<Steps>, line: usize) -> Result<String> {
+    fn seen_from_right(self, mut worked: Vec<Steps>, line: usize, row: usize) -> Result<String> {
         match self {
             // Rows on the right side run from right to left.
             Self::Right => worked.reverse(),
             Self::Wrong => {
                 for steps in &mut worked {
                     let Some(name) = other_face(&steps.name) else {
-                        let problem = format!("{} on the wrong side has no stitch that shows it", steps.name);
+                        let problem =
+                            format!("row {row}: {} on the wrong side has no stitch that shows it", steps.name);
                         return error(line, problem, "work it on a right-side row");
                     };
                     steps.name = name.to_owned();
@@ -229,12 +463,18 @@ impl Side {
 
 /// What a step on the wrong side looks like from the right side.
 fn other_face(name: &str) -> Option<&'static str> {
-    const FACES: [(&str, &str); 11] = [
+    const FACES: [(&str, &str); 16] = [
         ("k", "p"),
         ("ktbl", "ptbl"),
         ("k2tog", "p2tog"),
         ("ssk", "ssp"),
         ("k3tog", "p3tog"),
+        ("sssk", "sssp"),
+        ("cdd", "cddp"),
+        ("kfb", "pfb"),
+        // Which of two crossed legs is on top is the same from both sides.
+        ("m1l", "m1lp"),
+        ("m1r", "m1rp"),
         ("yo", "yo"),
         // The yarn in front of the knitter is behind the cloth.
         ("sl", "slwyif"),
@@ -254,11 +494,7 @@ fn other_face(name: &str) -> Option<&'static str> {
     })
 }
 
-fn starts_with(text: &str, words: &str) -> bool {
-    text.get(..words.len()).is_some_and(|start| start.eq_ignore_ascii_case(words))
-}
-
 /// A piece of the text for a message.
 fn short(text: &str) -> String {
-    text.chars().take(30).collect::<String>().escape_debug().to_string()
+    text.trim().chars().take(30).collect::<String>().escape_debug().to_string()
 }

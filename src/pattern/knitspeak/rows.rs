@@ -1,139 +1,240 @@
-//! Which row a line is about, and in which order rows come.
+//! Rows in their order, with those that are repeated.
 
 use std::collections::BTreeMap;
 
-use super::{KNOWN, KnitSpeakError, MOST_ROWS, Result, Side, Written, error, short, starts_with, words::parse_body};
+use super::{
+    Instructions, KNOWN, KnitSpeakError, MOST_ROWS, Result, Side, Written, error,
+    lines::{self, Copies, Head, Line, Often, Which},
+    words::parse_body,
+};
 
-/// All rows of the text in order.
-pub(super) fn written_rows(text: &str) -> Result<Vec<Written>> {
-    let mut rows: BTreeMap<usize, Written> = BTreeMap::new();
-    // Rows that are told to be like all others of a side, by parity.
-    let mut fill: Vec<(usize, Written)> = Vec::new();
-    let mut first_side = Side::Right;
-    let mut round = false;
-    for (line, written) in text.lines().enumerate() {
-        let written = written.trim().trim_end_matches('.');
-        if written.is_empty() || written.starts_with(['#', ';']) || starts_with(written, "cast on") {
+/// Rows that go on after the last one, by their places.
+#[derive(Clone, Debug)]
+pub(super) struct Again {
+    pub(super) rows: Vec<usize>,
+    pub(super) until: Until,
+    pub(super) line: usize,
+}
+
+/// How long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Until {
+    /// Until so many stitches are left.
+    Left(u32),
+    /// As long as the piece grows.
+    Open,
+}
+
+/// What has been read so far.
+struct Reading {
+    rows: BTreeMap<usize, Written>,
+    /// Rows that are told to be like all others of a side, and how far they are apart.
+    fill: Vec<(usize, usize, Written)>,
+    first_side: Side,
+    round: bool,
+    again: Option<Again>,
+    cast_on: Option<u32>,
+    ends: bool,
+}
+
+/// Reads all of the text.
+pub(super) fn written(text: &str) -> Result<Instructions> {
+    let mut reading = Reading {
+        rows: BTreeMap::new(),
+        fill: Vec::new(),
+        first_side: Side::Right,
+        round: false,
+        again: None,
+        cast_on: None,
+        ends: false,
+    };
+    // A row may go on in the next lines.
+    let mut row: Option<(usize, Head, String)> = None;
+    for (line, whole) in text.lines().enumerate() {
+        let whole = whole.trim();
+        if whole.starts_with(['#', ';']) {
             continue;
         }
-        let Some((head, body)) = written.split_once(':') else {
-            return error(line, format!("expected \"Row 1: ...\", found \"{}\"", short(written)), KNOWN);
-        };
-        let head = Head::read(head, line)?;
-        round |= head.round;
-        if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
-            first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+        for sentence in lines::sentences(whole) {
+            let sentence = sentence.trim();
+            if sentence.trim_matches('.').is_empty() {
+                continue;
+            }
+            match lines::read(sentence, line)? {
+                Line::More(more) => match &mut row {
+                    Some((_, _, body)) if !more.contains(':') => {
+                        body.push(' ');
+                        body.push_str(&more);
+                    }
+                    _ => return lines::no_row(sentence, line),
+                },
+                other => {
+                    if let Some((line, head, body)) = row.take() {
+                        reading.row(line, head, &body)?;
+                    }
+                    match other {
+                        Line::Row(head, body) => row = Some((line, head, body)),
+                        Line::Again(copies) => reading.again(line, &copies)?,
+                        Line::CastOn(count) => reading.cast_on = reading.cast_on.or(Some(count)),
+                        Line::BindOff => reading.ends = true,
+                        Line::Nothing | Line::More(_) => {}
+                    }
+                }
+            }
         }
-        if let Some(copied) = copied_rows(body, line)? {
-            let pick = |k: usize| rows.get(&copied[k % copied.len()]).cloned();
+    }
+    if let Some((line, head, body)) = row.take() {
+        reading.row(line, head, &body)?;
+    }
+    reading.finish()
+}
+
+impl Reading {
+    fn last(&self) -> usize {
+        self.rows.keys().next_back().copied().unwrap_or(0)
+    }
+
+    fn row(&mut self, line: usize, mut head: Head, body: &str) -> Result<()> {
+        if head.next > 0 {
+            self.fill_up(0);
+            head.rows = (self.last() + 1..=self.last() + head.next).collect();
+        }
+        if let Some(Again { .. }) = &self.again {
+            let problem = "rows come after rows that are repeated without an end";
+            return error(line, problem, "say how often those are repeated: Rep rows 1-4 3 times");
+        }
+        self.round |= head.round;
+        if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
+            self.first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+        }
+        if let Some(copied) = lines::copied(body, line)? {
+            self.fill_up(0);
+            let pick = |k: usize| self.rows.get(&copied[k % copied.len()]).cloned();
             let copies: Vec<Option<Written>> = (0..head.rows.len()).map(pick).collect();
             for (&row, copy) in head.rows.iter().zip(copies) {
                 let Some(copy) = copy else {
                     return error(line, format!("row {row} repeats a row that is not written before it"), KNOWN);
                 };
-                insert(&mut rows, row, Written { line, ..copy })?;
+                self.insert(row, Written { line, count: None, ..copy })?;
             }
-            continue;
+            return Ok(());
         }
-        let body = parse_body(body, line)?;
-        for &row in &head.rows {
-            insert(&mut rows, row, Written { line, side: Side::Right, body: body.clone() })?;
+        let number = head.rows.first().copied().unwrap_or_default();
+        let (body, count) = lines::counted(body);
+        let body = parse_body(body, line, number)?;
+        let row = Written { line, side: Side::Right, round: false, count, body };
+        if head.rows.is_empty() {
+            // Rows of a side, of whichever numbers.
+            let first = match (head.odd, head.side) {
+                (Some(odd), _) => odd,
+                (None, side) => side == Some(self.first_side),
+            };
+            self.fill.push((if first { 1 } else { 2 }, head.all.unwrap_or(2), Written { count: None, ..row }));
+            return Ok(());
         }
-        if let (true, Some(&row)) = (head.and_all_like_it, head.rows.first()) {
-            fill.push((row, Written { line, side: Side::Right, body }));
+        for &number in &head.rows {
+            self.insert(number, row.clone())?;
+        }
+        if let (Some(apart), Some(&first)) = (head.all, head.rows.first()) {
+            self.fill.push((first, apart, Written { count: None, ..row }));
+        }
+        Ok(())
+    }
+
+    fn insert(&mut self, number: usize, row: Written) -> Result<()> {
+        if number == 0 || number > MOST_ROWS {
+            return error(row.line, format!("row {number} is not one of 1 to {MOST_ROWS}"), KNOWN);
+        }
+        let line = row.line;
+        match self.rows.insert(number, row) {
+            None => Ok(()),
+            Some(_) => error(line, format!("row {number} is written twice"), KNOWN),
         }
     }
-    let last = rows.keys().next_back().copied().unwrap_or(0);
-    for (start, written) in fill {
+
+    /// Writes out rows that are like others, up to the last one and so many more.
+    fn fill_up(&mut self, more: usize) {
+        let last = self.last();
+        for (start, apart, written) in &self.fill {
+            for row in (*start..=last + more).step_by(*apart) {
+                self.rows.entry(row).or_insert_with(|| written.clone());
+            }
+        }
+    }
+
+    /// Repeats rows after the last one.
+    fn again(&mut self, line: usize, copies: &Copies) -> Result<()> {
+        if self.again.is_some() {
+            // "These 4 rows form the pattern. Cont in patt until ..."
+            if copies.often == Often::Open {
+                return Ok(());
+            }
+            self.again = None;
+        }
+        // So that the last row of the repeat has its partner.
+        let named = if let Which::Rows(rows) = &copies.which { rows.iter().copied().max().unwrap_or(0) } else { 0 };
+        let more = named.min(MOST_ROWS).saturating_sub(self.last());
+        self.fill_up(more.max(self.last() % 2));
+        let last = self.last();
+        let rows: Vec<usize> = match &copies.which {
+            Which::Rows(rows) => rows.clone(),
+            Which::Last(count) => (last + 1 - (*count).min(last + 1)..=last).collect(),
+            Which::From(first) => (*first..=last).collect(),
+            Which::All => (1..=last).collect(),
+        };
+        if let Some(missing) = rows.iter().find(|row| !self.rows.contains_key(row)) {
+            let problem = format!("row {missing} is repeated and is not written before");
+            return error(
+                line,
+                problem,
+                if last > 0 { format!("rows 1 to {last} are there") } else { KNOWN.to_owned() },
+            );
+        }
+        if rows.is_empty() {
+            return error(line, "no row is there to repeat", KNOWN);
+        }
+        let count = match copies.often {
+            Often::More(times) => (times as usize).saturating_mul(rows.len()),
+            // They were worked once where they are written.
+            Often::InAll(times) => (times.saturating_sub(1) as usize).saturating_mul(rows.len()),
+            Often::Rows(count) => count,
+            Often::Left(_) | Often::Open => {
+                let until = if let Often::Left(left) = copies.often { Until::Left(left) } else { Until::Open };
+                self.again = Some(Again { rows: rows.iter().map(|row| row - 1).collect(), until, line });
+                return Ok(());
+            }
+        };
+        if count > MOST_ROWS {
+            return error(line, format!("{count} rows more are too many"), format!("at most {MOST_ROWS} are knitted"));
+        }
+        let copies: Vec<Written> = (0..count).map(|k| self.rows[&rows[k % rows.len()]].clone()).collect();
+        for (k, copy) in copies.into_iter().enumerate() {
+            self.insert(last + 1 + k, Written { line, count: None, ..copy })?;
+        }
+        self.ends = true;
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Instructions> {
         // One more, so that the last row of the repeat has its partner.
-        for row in (start..=last + 1).step_by(2) {
-            rows.entry(row).or_insert_with(|| written.clone());
+        if self.again.is_none() {
+            self.fill_up(usize::from(self.last() % 2 == 1));
         }
-    }
-    let last = rows.keys().next_back().copied().unwrap_or(0);
-    if last == 0 {
-        return Err(KnitSpeakError { line: None, problem: "no row is written".into(), hint: KNOWN.into() });
-    }
-    let mut out = Vec::with_capacity(last);
-    for number in 1..=last {
-        let Some(mut row) = rows.remove(&number) else {
-            let problem = format!("row {number} is missing");
-            return Err(KnitSpeakError { line: None, problem, hint: format!("rows 1 to {last} are expected") });
-        };
-        let odd = number % 2 == 1;
-        row.side = if round || odd == (first_side == Side::Right) { Side::Right } else { Side::Wrong };
-        out.push(row);
-    }
-    Ok(out)
-}
-
-fn insert(rows: &mut BTreeMap<usize, Written>, number: usize, row: Written) -> Result<()> {
-    if number == 0 || number > MOST_ROWS {
-        return error(row.line, format!("row {number} is not one of 1 to {MOST_ROWS}"), KNOWN);
-    }
-    let line = row.line;
-    match rows.insert(number, row) {
-        None => Ok(()),
-        Some(_) => error(line, format!("row {number} is written twice"), KNOWN),
-    }
-}
-
-/// What stands before the colon.
-struct Head {
-    rows: Vec<usize>,
-    side: Option<Side>,
-    round: bool,
-    /// "Row 2 and all WS rows"
-    and_all_like_it: bool,
-}
-
-impl Head {
-    fn read(text: &str, line: usize) -> Result<Self> {
-        let lower = text.to_lowercase();
-        let says = |side: &str| [")", ","].iter().any(|end| lower.contains(&format!("({side}{end}")));
-        let side = match (says("rs"), says("ws")) {
-            (true, false) => Some(Side::Right),
-            (false, true) => Some(Side::Wrong),
-            _ => None,
-        };
-        let round = starts_with(&lower, "rnd") || starts_with(&lower, "round");
-        let and_all_like_it = ["all ws", "all rs", "all even", "all odd", "every alt", "all foll", "all other"]
-            .iter()
-            .any(|words| lower.contains(words));
-        let known = round || starts_with(&lower, "row");
-        // Sides and counts of stitches stand in brackets.
-        let mut deep = 0_i32;
-        let outside = |c: &char| {
-            let was = deep;
-            deep += i32::from(*c == '(') - i32::from(*c == ')');
-            was == 0 && *c != '('
-        };
-        let plain: String = lower.chars().filter(outside).collect();
-        let numbers = plain.split("all").next().unwrap_or_default();
-        let mut rows = Vec::new();
-        let digits = |t: &str| t.chars().filter(char::is_ascii_digit).collect::<String>().parse::<usize>().ok();
-        for part in numbers.split([',', '&']).flat_map(|p| p.split(" and ")) {
-            let ends: Vec<usize> = part.split(['-', '\u{2013}']).filter_map(digits).collect();
-            match ends[..] {
-                [] => {}
-                [row] => rows.push(row),
-                [first, last] if first <= last && last - first < MOST_ROWS => rows.extend(first..=last),
-                _ => return error(line, format!("\"{}\" is no range of rows", short(part.trim())), "as in Rows 1-4:"),
-            }
+        let last = self.last();
+        if last == 0 {
+            return Err(KnitSpeakError { line: None, problem: "no row is written".into(), hint: KNOWN.into() });
         }
-        if !known || rows.is_empty() {
-            return error(line, format!("expected \"Row 1:\" or \"Rnd 1:\", found \"{}:\"", short(text)), KNOWN);
+        let mut rows = Vec::with_capacity(last);
+        for number in 1..=last {
+            let Some(mut row) = self.rows.remove(&number) else {
+                let problem = format!("row {number} is missing");
+                return Err(KnitSpeakError { line: None, problem, hint: format!("rows 1 to {last} are expected") });
+            };
+            let odd = number % 2 == 1;
+            row.side = if self.round || odd == (self.first_side == Side::Right) { Side::Right } else { Side::Wrong };
+            row.round = self.round;
+            rows.push(row);
         }
-        Ok(Self { rows, side, round, and_all_like_it })
+        Ok(Instructions { rows, again: self.again, cast_on: self.cast_on, ends: self.ends })
     }
-}
-
-/// The rows that "Repeat rows 1 and 2" names.
-fn copied_rows(body: &str, line: usize) -> Result<Option<Vec<usize>>> {
-    let lower = body.trim().to_lowercase();
-    let rest = ["repeat row", "rep row", "work as row", "as row", "repeat rnd", "repeat round", "rep rnd"]
-        .iter()
-        .find_map(|start| lower.strip_prefix(start));
-    let Some(rest) = rest else { return Ok(None) };
-    Head::read(&format!("row {}", rest.trim_start_matches('s')), line).map(|head| Some(head.rows))
 }

@@ -34,11 +34,11 @@ fn lace_keeps_its_count() {
 
 #[test]
 fn charts_know_every_stitch_that_is_understood() {
-    let all = "Row 1: k1, p1, k1 tbl, p1 tbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, m1l, m1r, sl1, \
+    let all = "Row 1: k1, p1, k1 tbl, p1 tbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, p3tog, cdd, kfb, pfb, m1l, m1r, m1p, sl1, \
                sl1 wyif, tuck, miss, mb, c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC\nRow 2: k to last 2 sts, p2, yo";
-    let rows = rows(all, 50);
+    let rows = rows(all, 51);
     let chart = crate::pattern::chart::Chart::parse(&rows).unwrap();
-    assert_eq!(chart.work(50, 2, 1 << 20).unwrap().len(), 2);
+    assert_eq!(chart.work(51, 2, 1 << 20).unwrap().len(), 2);
 }
 
 #[test]
@@ -86,4 +86,142 @@ fn short_rows_turn_and_the_next_row_begins_there() {
     assert!(wrong("Row 1: *k2, turn; rep from * to end").problem.contains("comes after the turn"));
     assert!(wrong("Row 1: k5, turn\nRow 2: p6").problem.contains("needs 6"));
     assert!(wrong("Row 1: k5\nRow 2: p8").hint.contains("`turn`"));
+}
+
+#[test]
+fn heads_are_what_patterns_write() {
+    let rib = ["k2 p2 k2 p2 k2"; 2];
+    for text in [
+        "1st row (RS): k2, *p2, k2; rep from * to end.\n2nd row: p2, *k2, p2; rep from * to end.",
+        "1st row: (RS). K2. *P2. K2. Rep from * to end of row.\n2nd row: P2. *K2. P2. Rep from * to end of row.",
+        "R1: k2, *p2, k2; rep from * to end\nR2: p2, *k2, p2; rep from * to end",
+        "Row 1 [RS] - K2, *p2, k2; rep from * across.\nRow 2 \u{2013} P2, *k2, p2, rep from * across.",
+        "Row 1. K 2, * P 2, K 2. Repeat from * across row.\nRow 2. P 2, *K 2, P 2* across row.",
+        "First row (right side) K2, [p2, k2] to end.\nSecond row P2, [k2, p2] to end. (10 sts)",
+        "Row 1: k2, *p2, k2*, rep from * to * across. Row 2: p2, {k2, p2} 2 times.",
+        "RS rows: k2, *p2, k2;\n  rep from * to end.\nRow 2 and all WS rows: k the knits and p the purls.\nRow 3: k2, [p2, k2] x2",
+    ] {
+        match Instructions::read(text).and_then(|read| read.work(10, 0)) {
+            Ok(found) => assert_eq!(found.rows[..2], rib, "{text}"),
+            Err(wrong) => panic!("{text}: {wrong}"),
+        }
+    }
+    assert_eq!(rows("Rounds 1\u{2013}2: *k1, p1*; rep from * around", 4), ["p k p k"; 2]);
+    assert_eq!(
+        rows("Row 1 and 2: k\nNext row: p\nNext 2 rows: k1, p1\nKnit 1 row", 2),
+        ["k2", "p2", "p2", "p k", "p k", "p2"]
+    );
+    assert_eq!(rows("Row 1 (WS): purl\nAll RS rows: knit\nAll WS rows: k1, p1", 2), ["k2", "k2"]);
+    let dictionary = "Row 1: K 4, * P 1, K 7. Repeat from * across row. End P 1, K 4.";
+    assert_eq!(rows(dictionary, 25), ["k4 p k7 p k7 p k4"]);
+    let nth = "7th row: k\n1st to 5th rows: p\n6th row: As 5th row";
+    assert_eq!(rows(nth, 1), ["p", "k", "p", "k", "p", "k", "k"]);
+    assert_eq!(rows("1st row: k\n2nd row: p1\n3rd to 6th rows: As 1st and 2nd rows 2 times more.", 1), ["k"; 6]);
+    assert_eq!(
+        rows("Row 1: k1, p1\nRow 2: p1, k1\nRow 4: k2\nRow 3 and every following 3rd row: p2", 2),
+        ["p k", "k p", "p2", "p2"]
+    );
+}
+
+#[test]
+fn stitches_are_written_in_many_ways() {
+    for (text, takes, row) in [
+        ("(k1, p1) x 6", 12, "p k p k p k p k p k p k"),
+        ("(k1, p1) \u{d7}2", 4, "p k p k"),
+        ("[k1, p1] six times", 12, "p k p k p k p k p k p k"),
+        ("k2p2", 4, "p2 k2"),
+        ("K 2, p 2", 4, "p2 k2"),
+        ("knit 2, purl 2", 4, "p2 k2"),
+        ("k2tog tbl, k2tog-tbl, k 2 tog, knit 2 together, p2 tog tbl", 10, "ssp k2tog k2tog ssk ssk"),
+        ("k3 tog, sl 2 tog kwise, k1, p2sso", 6, "cdd k3tog"),
+        ("slip 1 knitwise, k 1, psso; s1, k2tog, psso", 5, "sssk ssk"),
+        ("pm, k1, yarn over, sl m, k2tog twice, yo twice", 5, "yo yo k2tog k2tog yo k"),
+        ("sl1p wyif, sl 2 with yarn in back, slip 1 purlwise with yarn in front", 4, "slwyif sl sl slwyif"),
+        ("LT, RT, C4L, 2/2RC, make 1, m1p", 12, "m1lp m1l 2/2rc c4f 1/1rc 1/1lc"),
+        ("k until 3 sts remain, p to end", 5, "p3 k2"),
+        ("K to 1 st before end, p1 tbl", 3, "ptbl k2"),
+        ("k all sts", 3, "k3"),
+        ("P.", 3, "p3"),
+        ("*k1, p1; rep from * twice more, k1 - 7 sts", 7, "k p k p k p k"),
+        ("pfb, kfb into", 0, ""),
+    ] {
+        let found = chart_rows(&format!("Row 1: {text}"), takes.max(1));
+        match row {
+            "" => assert!(found.unwrap_err().problem.contains("\"into\""), "{text}"),
+            row => assert_eq!(found.map_err(|e| e.to_string()), Ok(vec![row.to_owned()]), "{text}"),
+        }
+    }
+    assert_eq!(rows("Row 1: work in St st\nRow 2: st st\nRow 3: rev st st to last 1 st, k1", 3), ["k3", "k3", "k p2"]);
+    assert_eq!(
+        rows(
+            "Row 1: k1, p2, yo, k1\nRow 2: knit the knit sts and purl the purl sts\nRow 3: k2, k the k sts and p the p sts as they appear to last st, k1",
+            4
+        ),
+        ["k yo p2 k", "k2 p2 k", "k2 p k2"]
+    );
+    // On the wrong side increases show their purl faces.
+    assert_eq!(
+        rows("Row 1: k\nRow 2: p1, m1p, pfb, m1, p to end", 4),
+        ["k4", "k m1l pfb_"].map(|r| r.replace("pfb_", "kfb m1lp k2"))
+    );
+}
+
+#[test]
+fn rows_are_repeated_as_they_are_told() {
+    let work = |text: &str, stitches, least| Instructions::read(text).unwrap().work(stitches, least).unwrap();
+    let two = "Row 1: k1, p1\nRow 2: k2\n";
+    for (more, rows, whole) in [
+        ("Rep rows 1-2.", 2, false),
+        ("Repeat Rows 1 and 2 for pattern.", 2, false),
+        ("These 2 rows form the pattern. Cont in patt until work measures 10 cm.", 2, false),
+        ("Repeat rows 1-2 until piece measures 25 cm [10 in]\nBind off.", 2, true),
+        ("Rep last 2 rows twice more", 6, true),
+        ("Rep rows 1-2, 3 times more. Bind off all sts.", 8, true),
+        ("Work rows 1-2 3 times", 6, true),
+        ("Repeat from row 1 for 5 more rows", 7, true),
+        ("Rows 3-4: rep rows 1-2\nRepeat rows 3 and 4", 20, true),
+        ("Rep row 2", 20, true),
+    ] {
+        let found = work(&format!("{two}{more}"), 2, 20);
+        assert_eq!((found.rows.len(), found.whole), (rows, whole), "{more}");
+        assert!(found.rows[2..].chunks(2).all(|w| more == "Rep row 2" || w[0] == "p k"), "{more}: {:?}", found.rows);
+    }
+    // A pattern of one row comes from the other side in the next one.
+    assert_eq!(work("Row 1: *k1, p1; rep from * to last st, k1. Rep row 1.", 3, 20).rows, ["k p k", "p k p"]);
+    assert_eq!(work("Rnd 1: *k1, p1; rep from *\nRep rnd 1", 2, 20).rows, ["p k"]);
+    let shawl = "Cast on 9 sts.\nRow 1 (RS): k1, k2tog, k to last 3 sts, ssk, k1. (7 sts)\nRow 2: purl\nRep rows 1-2 until 5 sts remain.";
+    assert_eq!(Instructions::read(shawl).unwrap().cast_on(), Some(9));
+    assert_eq!(
+        work(shawl, 9, 20),
+        Worked { rows: ["k ssk k3 k2tog k", "k7", "k ssk k k2tog k"].map(String::from).to_vec(), whole: true }
+    );
+    let shaped = "Row 1: kfb, k to end\nRow 2: purl";
+    assert_eq!(work(shaped, 4, 20), Worked { rows: vec!["k3 kfb".into(), "k5".into()], whole: true });
+    assert_eq!(work(&format!("{shaped}\nrepeat rows 1-2"), 4, 7).rows.len(), 7);
+}
+
+#[test]
+fn what_is_not_knitted_is_told_with_its_row_and_word() {
+    for (text, problem, hint) in [
+        ("Row 1: k1\nRow 2: bind off 3 sts, k to end", "row 2: \"bind\"", "by a line of its own"),
+        ("Row 1: BO 3, k1", "row 1: \"bo\"", "k2tog"),
+        ("Row 1: cast off 3 sts", "row 1: \"cast\"", "k2tog"),
+        ("Row 1: inc 1, k1", "row 1: \"inc\"", "kfb"),
+        ("Row 1: k to m, k1", "row 1: markers", "say how many"),
+        ("Row 1: k1b", "row 1: \"k1b\"", "k1 tbl"),
+        ("Row 1: work in patt", "row 1: \"work\"", "k the knits"),
+        ("Row 1: k 5 tog", "row 1: \"k5tog\"", "are known"),
+        ("Row 1: k1\nRow 2: k1 (3 sts)", "row 2 makes 1 stitches, and says that it has 3", "fits"),
+        ("Set-up row: k1\nRow 1: k1", "expected \"Row 1: ...\"", "Repeat rows 2-5"),
+        ("Row 1: k the knits and p the purls", "row 1 is the first one", "say which"),
+        ("Row 1: k1\nRep rows 1-4", "row 2 is repeated", "rows 1 to 1"),
+        ("Row 1: k1\nRep row 1\nRow 2: p1", "rows come after", "3 times"),
+        ("Row 1: k1\nRep row 1 until 5 sts remain", "5 stitches never remain", "another number"),
+        ("Row 1: k1\nRep row 1 until 10 cm, inc 1 st at end", "\"inc\" in rows", "write rows"),
+        ("Rows 4-1: k1", "no range", "Rows 1-4"),
+        ("Row 99999999999: k1", "no row", "Row 1:"),
+    ] {
+        let wrong = Instructions::read(text).and_then(|read| read.work(1, 20)).unwrap_err();
+        assert!(wrong.problem.contains(problem) && wrong.hint.contains(hint), "{text}: {wrong}");
+    }
 }

@@ -1,47 +1,106 @@
 //! The words of a row: steps, repeats and brackets.
 
 use super::{
-    super::chart::WIDEST_CABLE, Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps, error, short,
+    Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps, error,
+    lines::number,
+    short,
+    step::{self, Phrase},
 };
 
 /// Words, brackets and signs of a row.
 fn tokens(text: &str) -> Vec<String> {
-    let spaced: String = text
-        .to_lowercase()
-        .chars()
-        .map(|c| match c {
-            '*' | '[' | ']' | '(' | ')' | ',' | ';' => format!(" {c} "),
-            '.' => " ".to_owned(),
-            c => c.to_string(),
-        })
-        .collect();
-    spaced.split_whitespace().map(str::to_owned).collect()
+    let mut spaced = String::with_capacity(2 * text.len());
+    for c in text.to_lowercase().chars() {
+        match c {
+            '*' | '[' | ']' | '(' | ')' | '{' | '}' | ',' | ';' | ':' => spaced.extend([' ', c, ' ']),
+            '.' => spaced.push_str(" , "),
+            '\u{d7}' => spaced.push('x'),
+            c => spaced.push(c),
+        }
+    }
+    let mut out = Vec::new();
+    for word in spaced.split_whitespace() {
+        // "k2tog-tbl", "p-wise"; a dash by itself parts.
+        match word.replace(['-', '\u{2013}', '\u{2014}'], "") {
+            joined if joined.is_empty() => out.push(",".to_owned()),
+            joined => run_together(joined, &mut out),
+        }
+    }
+    out
 }
 
-pub(super) fn parse_body(text: &str, line: usize) -> Result<Sequence> {
-    let tokens = tokens(text);
-    let mut parser = Parser { tokens: &tokens, at: 0, line };
-    let sequence = parser.sequence(0)?;
-    match parser.peek(0) {
-        None if sequence.0.is_empty() => error(line, "a row without stitches", KNOWN),
-        None => Ok(sequence),
-        Some(token) => error(line, format!("\"{}\" closes nothing", short(token)), KNOWN),
+/// "k2p2" is two words.
+fn run_together(word: String, out: &mut Vec<String>) {
+    let mut parts: Vec<&str> = Vec::new();
+    let mut from = 0;
+    let bytes = word.as_bytes();
+    for at in 1..bytes.len() {
+        if bytes[at - 1].is_ascii_digit() && matches!(bytes[at], b'k' | b'p') {
+            parts.push(&word[from..at]);
+            from = at;
+        }
+    }
+    parts.push(&word[from..]);
+    let plain =
+        |part: &&str| part.starts_with(['k', 'p']) && part.len() > 1 && part[1..].bytes().all(|b| b.is_ascii_digit());
+    if parts.len() > 1 && parts.iter().all(plain) {
+        out.extend(parts.into_iter().map(str::to_owned));
+    } else {
+        out.push(word);
     }
 }
 
-struct Parser<'a> {
+/// The steps of a row of a number, from 1.
+pub(super) fn parse_body(text: &str, line: usize, row: usize) -> Result<Sequence> {
+    let tokens = tokens(text);
+    let mut parser = Parser { tokens: &tokens, at: 0, line, row };
+    let mut sequence = parser.sequence(0)?;
+    if let Some(token) = parser.peek(0) {
+        return parser.wrong(&format!("\"{}\" closes nothing", short(token)), KNOWN);
+    }
+    // "Row 2: P."
+    if let [Item::Steps(steps)] = &sequence.0[..]
+        && matches!(tokens.iter().map(String::as_str).find(|t| *t != ","), Some("k" | "p"))
+        && tokens.iter().filter(|t| *t != ",").count() == 1
+    {
+        sequence = Sequence(vec![Item::Until(steps.clone(), 0)]);
+    }
+    match sequence.0.is_empty() {
+        true => parser.wrong("has no stitches", KNOWN),
+        false => Ok(sequence),
+    }
+}
+
+pub(super) struct Parser<'a> {
     tokens: &'a [String],
     at: usize,
     line: usize,
+    row: usize,
+}
+
+/// Where a repeat begins, by the items before it.
+#[derive(Default)]
+struct Star {
+    from: Option<usize>,
+    /// Where the second star of a pair stands.
+    closed: Option<usize>,
 }
 
 impl Parser<'_> {
-    fn peek(&self, ahead: usize) -> Option<&str> {
+    pub(super) fn peek(&self, ahead: usize) -> Option<&str> {
         self.tokens.get(self.at + ahead).map(String::as_str)
     }
 
+    pub(super) fn wrong<T>(&self, problem: &str, hint: impl Into<String>) -> Result<T> {
+        error(self.line, format!("row {}: {problem}", self.row), hint)
+    }
+
+    pub(super) fn skip(&mut self, words: usize) {
+        self.at += words;
+    }
+
     /// Takes the next words if they are these.
-    fn take(&mut self, words: &[&str]) -> bool {
+    pub(super) fn take(&mut self, words: &[&str]) -> bool {
         let found = words.iter().enumerate().all(|(i, word)| self.peek(i) == Some(word));
         if found {
             self.at += words.len();
@@ -49,259 +108,308 @@ impl Parser<'_> {
         found
     }
 
+    pub(super) fn take_any(&mut self, all: &[&[&str]]) -> bool {
+        all.iter().any(|words| self.take(words))
+    }
+
+    pub(super) fn stitches(&mut self) -> bool {
+        self.take_any(&[&["sts"], &["st"], &["stitches"], &["stitch"]])
+    }
+
+    pub(super) fn number(&self, ahead: usize) -> Option<u32> {
+        self.peek(ahead).and_then(number)
+    }
+
     fn separators(&mut self) {
-        while matches!(self.peek(0), Some("," | ";" | "and" | "then")) {
+        while matches!(self.peek(0), Some("," | ";" | ":" | "and" | "then" | "&")) {
             self.at += 1;
         }
     }
 
     fn sequence(&mut self, depth: usize) -> Result<Sequence> {
         if depth > MOST_NESTED {
-            return error(self.line, format!("repeats lie more than {MOST_NESTED} deep"), KNOWN);
+            return self.wrong(&format!("repeats lie more than {MOST_NESTED} deep"), KNOWN);
         }
         let mut out = Sequence::default();
-        let (mut star, mut closed) = (None, false);
+        let mut star = Star::default();
+        // A repeat that goes on until what ends the row, and how many items are before that.
+        let mut ending: Option<(usize, usize)> = None;
         loop {
             self.separators();
             match self.peek(0) {
-                None | Some("]" | ")") => break,
+                None | Some("]" | ")" | "}") => break,
                 Some("*") => {
                     self.at += 1;
-                    // "*k1, p1* repeat to end": the second star ends what the first one begins.
-                    closed = star.is_some() && matches!(self.peek(0), Some("rep" | "repeat"));
-                    if !closed {
-                        star = Some(out.0.len());
+                    if star.from.is_some() && star.closed.is_none() {
+                        // "*k1, p1*, repeat to end": the second star ends what the first one begins.
+                        star.closed = Some(out.0.len());
+                        // "*k1, p1* to end"
+                        if let Some(item) = self.paired(&star, &out)? {
+                            out.0.truncate(star.from.unwrap_or_default());
+                            out.0.push(item);
+                            star = Star::default();
+                        }
+                    } else {
+                        star = Star { from: Some(out.0.len()), closed: None };
                     }
                 }
                 Some("rep" | "repeat") => {
                     self.at += 1;
-                    let Some(start) = star.take() else {
-                        return error(self.line, "a repeat without a * where it begins", KNOWN);
-                    };
-                    if !self.take(&["from", "*"]) && !closed {
-                        return error(self.line, "expected \"rep from *\"", KNOWN);
+                    let item = self.again(&mut star, &mut out)?;
+                    out.0.push(item);
+                    if self.is_ending() {
+                        ending = Some((out.0.len() - 1, out.0.len()));
                     }
-                    let body = Sequence(out.0.split_off(start));
-                    let _ = self.take(&["across"]) || self.take(&["around"]);
-                    let again = match self.until()? {
-                        Some(last) => Item::Repeat(body, last),
-                        // Once as written, and so many times more.
-                        None => match self.times()? {
-                            Some(times) => Item::Times(body, times + 1),
-                            None => Item::Repeat(body, 0),
-                        },
-                    };
-                    out.0.push(again);
                 }
-                Some(open @ ("[" | "(")) => {
-                    let close = if open == "[" { "]" } else { ")" };
+                Some(open @ ("[" | "(" | "{")) => {
+                    let close = match open {
+                        "[" => "]",
+                        "(" => ")",
+                        _ => "}",
+                    };
                     self.at += 1;
                     let body = self.sequence(depth + 1)?;
                     if !self.take(&[close]) {
-                        return error(self.line, format!("a bracket is not closed by {close}"), KNOWN);
+                        return self.wrong(&format!("a bracket is not closed by {close}"), KNOWN);
                     }
                     let item = match self.until()? {
                         Some(last) => Item::Repeat(body, last),
-                        None => Item::Times(body, self.times()?.unwrap_or(1)),
+                        None => match self.times()? {
+                            Some(times) => Item::Times(body, times),
+                            None => Item::Times(body, 1),
+                        },
                     };
                     out.0.push(item);
                 }
                 Some(_) => {
                     let item = self.step()?;
-                    out.0.push(item);
+                    out.0.extend(item);
                 }
             }
+        }
+        if let Some((repeat, from)) = ending {
+            let rest = Sequence(out.0.split_off(from));
+            if let Some(Item::Repeat(_, last)) = out.0.get_mut(repeat) {
+                *last = rest.takes();
+            }
+            out.0.extend(rest.0);
         }
         Ok(out)
     }
 
-    /// "to end", "to last 3 sts": how many stitches are left then.
-    fn until(&mut self) -> Result<Option<u32>> {
-        if self.take(&["across"]) || self.take(&["around"]) || self.take(&["all", "sts"]) {
+    /// What stands between two stars, where it is told how far or how often behind them.
+    fn paired(&mut self, star: &Star, out: &Sequence) -> Result<Option<Item>> {
+        let body = || Sequence(out.0[star.from.unwrap_or_default()..].to_vec());
+        if let Some(last) = self.until()? {
+            return Ok(Some(Item::Repeat(body(), last)));
+        }
+        Ok(self.times()?.map(|times| Item::Times(body(), times)))
+    }
+
+    /// "End P1, K4" behind a repeat.
+    fn is_ending(&mut self) -> bool {
+        let at = self.at;
+        self.separators();
+        if self.take_any(&[&["ending", "last", "rep"], &["end", "last", "rep"], &["ending"], &["end"]]) {
+            self.take(&["with"]);
+            return true;
+        }
+        self.at = at;
+        false
+    }
+
+    /// What "rep from * to end" repeats, behind its first word.
+    fn again(&mut self, star: &mut Star, out: &mut Sequence) -> Result<Item> {
+        let named = self.take_any(&[
+            &["from", "*", "to", "*"],
+            &["from", "*"],
+            &["between", "*", "and", "*"],
+            &["between", "*s"],
+            &["between", "*"],
+            &["*", "to", "*"],
+            &["*"],
+        ]);
+        // "between *s"
+        if named {
+            self.take(&["s"]);
+        }
+        let Star { from, closed } = std::mem::take(star);
+        let body = match (from, closed) {
+            (Some(from), Some(to)) if named || to == out.0.len() => Sequence(out.0[from..to].to_vec()),
+            (Some(from), _) if named => Sequence(out.0[from..].to_vec()),
+            (Some(_), _) => return self.wrong("expected \"rep from *\"", KNOWN),
+            (None, _) => match out.0.pop() {
+                // "[k1, p1] rep to end"
+                Some(Item::Times(body, 1)) if !named => {
+                    return Ok(Item::Repeat(body, self.until()?.unwrap_or(0)));
+                }
+                _ => return self.wrong("a repeat without a * where it begins", KNOWN),
+            },
+        };
+        // What stands between the second star and here was worked once, and is not repeated.
+        let from = from.unwrap_or_default();
+        let apart = closed.is_some_and(|to| to < out.0.len());
+        if !apart {
+            out.0.truncate(from);
+        }
+        self.take(&[","]);
+        Ok(match self.until()? {
+            Some(last) => Item::Repeat(body, last),
+            // Once as written, and so many times more.
+            None => match self.times()? {
+                Some(times) => Item::Times(body, times + u32::from(!apart)),
+                None => Item::Repeat(body, 0),
+            },
+        })
+    }
+
+    /// "to end", "to last 3 sts", "until 3 sts remain": how many stitches are left then.
+    pub(super) fn until(&mut self) -> Result<Option<u32>> {
+        let across = self.take_any(&[&["across", "row"], &["across"], &["around"]]).then_some(0);
+        Ok(self.until_said()?.or(across))
+    }
+
+    fn until_said(&mut self) -> Result<Option<u32>> {
+        if self.take_any(&[&["all", "sts"], &["all", "stitches"], &["every", "st"], &["each", "st"]]) {
+            self.take_any(&[&["across"], &["to", "end"]]);
             return Ok(Some(0));
         }
+        // "k2, p2 to end" is of the purls only.
         if !matches!(self.peek(0), Some("to" | "until")) {
             return Ok(None);
         }
         self.at += 1;
         self.take(&["the"]);
         if self.take(&["end"]) {
-            let _ = self.take(&["of", "row"]) || self.take(&["of", "rnd"]) || self.take(&["of", "round"]);
+            self.take(&["of"]);
+            self.take(&["the"]);
+            self.take_any(&[&["row"], &["rnd"], &["round"]]);
             return Ok(Some(0));
         }
         if self.take(&["last"]) {
-            let count = self.peek(0).and_then(|t| t.parse::<u32>().ok());
+            let count = self.number(0);
             self.at += usize::from(count.is_some());
-            let _ = self.take(&["sts"]) || self.take(&["st"]) || self.take(&["stitches"]) || self.take(&["stitch"]);
+            self.stitches();
             return Ok(Some(count.unwrap_or(1)));
         }
-        error(self.line, "expected \"to end\" or \"to last 3 sts\"", KNOWN)
+        if let Some(count) = self.number(0)
+            && matches!(self.peek(1), Some("st" | "sts" | "stitches" | "stitch"))
+        {
+            self.at += 2;
+            let left = self.take_any(&[
+                &["before", "the", "end"],
+                &["before", "end"],
+                &["from", "the", "end"],
+                &["from", "end"],
+                &["remain"],
+                &["remains"],
+                &["rem"],
+                &["are", "left"],
+                &["left"],
+            ]);
+            if left {
+                return Ok(Some(count));
+            }
+        }
+        if matches!(self.peek(0), Some("m" | "marker" | "pm" | "mkr")) {
+            return self.wrong("markers are not counted", "say how many stitches: k5, or k to last 5 sts");
+        }
+        self.wrong("expected \"to end\" or \"to last 3 sts\"", KNOWN)
     }
 
-    /// "3 times", "twice", "once more", "4 more times".
-    fn times(&mut self) -> Result<Option<u32>> {
-        let count = match self.peek(0) {
-            Some("once") => 1,
-            Some("twice") => 2,
-            Some("thrice") => 3,
-            Some(word) => {
-                let Ok(count) = word.trim_end_matches('x').parse::<u32>() else { return Ok(None) };
-                if !word.ends_with('x') && !matches!(self.peek(1), Some("times" | "time" | "more")) {
+    /// "3 times", "twice", "once more", "4 more times", "x 6".
+    pub(super) fn times(&mut self) -> Result<Option<u32>> {
+        let (count, words) = match (self.peek(0), self.peek(1)) {
+            (Some("once"), _) => (1, 1),
+            (Some("twice"), _) => (2, 1),
+            (Some("thrice"), _) => (3, 1),
+            (Some("x"), Some(_)) if self.number(1).is_some() => (self.number(1).unwrap_or(1), 2),
+            (Some(word), Some("x")) if number(word).is_some() => (number(word).unwrap_or(1), 2),
+            (Some(word), next) => {
+                // "six" is none of these.
+                let digits = if number(word).is_some() { word } else { word.trim_matches('x') };
+                let (Some(count), is_marked) = (number(digits), digits.len() < word.len()) else { return Ok(None) };
+                if !is_marked && !matches!(next, Some("times" | "time" | "more")) {
                     return Ok(None);
                 }
-                count
+                (count, 1)
             }
-            None => return Ok(None),
+            (None, _) => return Ok(None),
         };
         if count > MOST_STITCHES {
-            return error(self.line, format!("{count} times are too many"), KNOWN);
+            return self.wrong(&format!("{count} times are too many"), KNOWN);
         }
-        self.at += 1;
+        self.at += words;
         while matches!(self.peek(0), Some("times" | "time" | "more")) {
             self.at += 1;
         }
         Ok(Some(count))
     }
 
-    fn step(&mut self) -> Result<Item> {
+    fn step(&mut self) -> Result<Option<Item>> {
         if let Some(turn) = self.turn()? {
-            return Ok(turn);
+            return Ok(Some(turn));
         }
-        let word = self.peek(0).unwrap_or_default().to_owned();
-        self.at += 1;
-        let Some(mut steps) = step(&word) else {
-            return error(self.line, format!("\"{}\" is no stitch that is known here", short(&word)), KNOWN);
+        if let Some(look) = step::look(self) {
+            let last = self.until()?.unwrap_or(0);
+            return Ok(Some(Item::Look(look, last)));
+        }
+        let start = self.at;
+        let Some(phrase) = step::phrase(self)? else {
+            let word = self.tokens[start].clone();
+            return self.wrong(
+                &format!("\"{}\" is no stitch that is known here", short(&word)),
+                step::instead_of(&word).unwrap_or(KNOWN),
+            );
         };
-        if steps.name == "cable" {
-            return self.cable(&word);
-        }
-        if matches!(self.peek(0), Some("tbl")) && matches!(steps.name.as_str(), "k" | "p") {
-            self.at += 1;
-            steps.name.push_str("tbl");
-        }
-        if steps.name == "sl" {
-            // "sl 1, k2tog, psso" is one decrease.
-            let counted = self.take(&["1"]);
-            for (passed, name) in [("k1", "skp"), ("k2tog", "sk2p")] {
-                if self.take(&[",", passed, ",", "psso"]) || self.take(&[passed, "psso"]) {
-                    return Ok(Item::Steps(step(name).expect("a stitch that is known")));
-                }
-            }
-            if !counted
-                && let Some(count) =
-                    self.peek(0).and_then(|n| n.parse().ok()).filter(|n| (1..=MOST_STITCHES).contains(n))
-            {
-                self.at += 1;
-                steps.count = count;
-            }
-            let _ = self.take(&["st"]) || self.take(&["sts"]) || self.take(&["purlwise"]) || self.take(&["pwise"]);
-            if self.take(&["wyif"]) {
-                steps.name = "slwyif".into();
-            } else {
-                self.take(&["wyib"]);
-            }
-        }
-        Ok(match self.until()? {
+        let (steps, whole_row) = match phrase {
+            Phrase::Nothing => return Ok(None),
+            Phrase::Steps(steps) => (steps, false),
+            Phrase::Row(steps) => (steps, true),
+        };
+        Ok(Some(match self.until()? {
             Some(last) => Item::Until(Steps { count: 1, ..steps }, last),
             // "Row 2: Purl."
-            None if matches!(word.as_str(), "knit" | "purl") => Item::Until(steps, 0),
-            None => Item::Steps(steps),
-        })
+            None if whole_row => Item::Until(steps, 0),
+            None => match self.times()? {
+                Some(times) => {
+                    let count = steps.count.saturating_mul(times).min(MOST_STITCHES + 1);
+                    Item::Steps(Steps { count, ..steps })
+                }
+                None => Item::Steps(steps),
+            },
+        }))
     }
 
     /// "turn", "w&t", "wrap and turn", "turn, leaving rem sts unworked".
     fn turn(&mut self) -> Result<Option<Item>> {
-        const WORDS: [&[&str]; 8] = [
+        const WORDS: [&[&str]; 9] = [
             &["turn", "work"],
             &["turn"],
             &["w&t"],
+            &["w+t"],
             &["wt"],
             &["wrap", "and", "turn"],
             &["wrap", "&", "turn"],
             &["wrap", "next", "st", "and", "turn"],
             &["wrap", "next", "st", ",", "turn"],
         ];
-        if !WORDS.iter().any(|words| self.take(words)) {
+        if !self.take_any(&WORDS) {
             return Ok(None);
         }
         self.separators();
-        if self.take(&["leaving"]) || self.take(&["leave"]) {
-            let _ = self.take(&["rem"]) || self.take(&["remaining"]);
-            let _ = self.take(&["sts"]) || self.take(&["stitches"]);
+        if self.take_any(&[&["leaving"], &["leave"]]) {
+            self.take_any(&[&["rem"], &["remaining"]]);
+            self.stitches();
             self.take(&["unworked"]);
+            self.separators();
         }
         match self.peek(0) {
             None => Ok(Some(Item::Turn)),
-            Some(after) => error(
-                self.line,
-                format!("\"{}\" comes after the turn", short(after)),
+            Some(after) => self.wrong(
+                &format!("\"{}\" comes after the turn", short(after)),
                 "a row ends where it turns: go on with the next one, as in Row 2: p10",
             ),
         }
-    }
-
-    /// "2/1 LC", "2/2 rpc".
-    fn cable(&mut self, word: &str) -> Result<Item> {
-        let kind = self.peek(0).unwrap_or_default().to_owned();
-        self.at += 1;
-        let counts: Vec<u32> = word.split('/').filter_map(|n| n.parse().ok()).collect();
-        let &[front, back] = &counts[..] else { return error(self.line, format!("\"{word}\" is no cable"), KNOWN) };
-        if !matches!(kind.as_str(), "lc" | "rc" | "lpc" | "rpc")
-            || front == 0
-            || back == 0
-            || front.saturating_add(back) > WIDEST_CABLE.into()
-        {
-            return error(self.line, format!("\"{word} {}\" is no cable", short(&kind)), "as in 2/1 LC, 2/2 RPC");
-        }
-        let both = front + back;
-        Ok(Item::Steps(Steps { name: format!("{word}{kind}"), takes: both, makes: both, count: 1 }))
-    }
-}
-
-/// A step by its word: its name in charts, and what it takes and makes.
-fn step(word: &str) -> Option<Steps> {
-    let one = |name: &str, takes, makes| Some(Steps { name: name.into(), takes, makes, count: 1 });
-    match word {
-        "knit" => return one("k", 1, 1),
-        "purl" => return one("p", 1, 1),
-        "ktbl" | "k1tbl" | "k1-tbl" => return one("ktbl", 1, 1),
-        "ptbl" | "p1tbl" | "p1-tbl" => return one("ptbl", 1, 1),
-        "yo" | "yfwd" | "yon" | "yrn" => return one("yo", 0, 1),
-        "k2tog" => return one("k2tog", 2, 1),
-        "ssk" | "skp" | "skpo" => return one("ssk", 2, 1),
-        "p2tog" => return one("p2tog", 2, 1),
-        "ssp" => return one("ssp", 2, 1),
-        "k3tog" => return one("k3tog", 3, 1),
-        "sssk" | "sk2p" | "sk2po" => return one("sssk", 3, 1),
-        "p3tog" => return one("p3tog", 3, 1),
-        "cdd" | "s2kp" | "s2kp2" => return one("cdd", 3, 1),
-        "kfb" | "k1fb" => return one("kfb", 1, 2),
-        "m1" | "m1l" => return one("m1l", 0, 1),
-        "m1r" => return one("m1r", 0, 1),
-        "tuck" => return one("tuck", 1, 1),
-        "ds" => return one("ds", 1, 1),
-        "miss" => return one("miss", 1, 1),
-        "slwyif" => return one("slwyif", 1, 1),
-        "mb" | "bobble" => return one("mb", 1, 1),
-        _ => {}
-    }
-    if word.contains('/') {
-        return one("cable", 0, 0);
-    }
-    // c4f, c6b, t3f: so many stitches cross.
-    if let Some(rest) = word.strip_prefix(['c', 't'])
-        && let Some(count) = rest.strip_suffix(['f', 'b'])
-    {
-        let count = count.parse::<u32>().ok().filter(|n| (2..=WIDEST_CABLE.into()).contains(n))?;
-        return one(word, count, count);
-    }
-    let digits = word.find(|c: char| c.is_ascii_digit());
-    let (name, count) = match digits {
-        Some(i) => (&word[..i], word[i..].parse::<u32>().ok().filter(|n| (1..=MOST_STITCHES).contains(n))?),
-        None => (word, 1),
-    };
-    match name {
-        "k" | "p" | "sl" => Some(Steps { name: name.into(), takes: 1, makes: 1, count }),
-        _ => None,
     }
 }

@@ -9,7 +9,7 @@ use super::{
     knit_size::GivenSizes,
 };
 use crate::{
-    geometry::{curve::Curve, overlap::share_of_overlap},
+    geometry::{curve::Curve, overlap::sampled_overlap},
     input::{
         diagnostic::{Span, unknown_name},
         document::Value,
@@ -17,7 +17,7 @@ use crate::{
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
-        knitspeak,
+        knitspeak::{Instructions, KnitSpeakError},
     },
 };
 
@@ -46,6 +46,9 @@ enum ColorWork {
     Printed,
 }
 
+/// So many stitches change places without running into each other.
+const EASY_CABLE: u32 = 6;
+
 /// More yarns in a row than this are more than anyone strands.
 const MOST_STRANDED: usize = 4;
 
@@ -69,30 +72,21 @@ impl KnitPlan {
     /// The same with the counts that its sizes make; what cannot be knitted is told.
     pub(super) fn sized(mut self, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Self> {
         self.knit = self.sizes.apply(&self.knit, &self.yarn, context)?;
-        let Knit { chart, stitches, rows, .. } = &self.knit;
-        let widths = self.told(self.knit.widths(), context)?;
-        if let Some((row, takes)) = chart.cut_short(*stitches, &widths) {
-            let found = if row > 0 { widths[row - 1] } else { *stitches };
-            warnings.push(format!(
-                "{}: row {} has {takes} stitches, but only {found} are there: the rest of the row is left out",
-                self.name,
-                row + 1
-            ));
-        }
+        let Knit { chart, rows, .. } = &self.knit;
+        self.told(self.knit.widths(), context)?;
         if *rows < chart.rows() && !self.lines.is_empty() {
             warnings.push(format!("{}: {rows} rows are knitted of a chart of {}", self.name, chart.rows()));
         }
         Some(self)
     }
 
-    /// Tells if yarns run into each other, where a given size could make them.
+    /// Tells if yarns run into each other.
     pub(super) fn warn_of_overlap(&self, curves: &[(Curve, Vec<f64>)], warnings: &mut Vec<String>) {
         const MOST: f64 = 0.05;
+        /// Fewer places are not seen, where strands are as deep in each other as this.
+        const FEW: f64 = 0.002;
+        const DEEP: f64 = 0.5;
         const ENOUGH: usize = 400_000;
-        let given = self.knit.stitch_width.or(self.knit.row_height).or(self.knit.yarn_per_stitch).is_some();
-        if !given && !matches!(self.knit.form, Form::Revolution(_)) {
-            return;
-        }
         let half_width = self.yarn.half_width;
         let found = match curves {
             // The first rows of one large piece are as the others.
@@ -104,20 +98,34 @@ impl KnitPlan {
                     radii: None,
                     flattening: curve.flattening.as_ref().map(|axes| axes[..ENOUGH].to_vec()),
                 };
-                share_of_overlap(std::iter::once((&first, &radii[..ENOUGH], half_width)))
+                sampled_overlap(std::iter::once((&first, &radii[..ENOUGH], half_width)))
             }
-            _ => share_of_overlap(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
+            _ => sampled_overlap(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
         };
-        if let Some(found) = found.filter(|share| *share > MOST) {
-            let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
-            let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
-            warnings.push(format!(
-                "{}: {:.0} % of the yarn overlaps: too many stitches or rows for its size; this yarn knits to {own_across:.1} x \
-                 {own_up:.1} in 10 cm by itself",
-                self.name,
-                100.0 * found
-            ));
-        }
+        let Some(found) = found.filter(|o| o.share > MOST || (o.share > FEW && o.deepest > DEEP)) else { return };
+        let sized = self.knit.stitch_width.or(self.knit.row_height).or(self.knit.yarn_per_stitch).is_some();
+        let why = match self.knit.chart.widest_cable() {
+            Some(wide) if wide > EASY_CABLE => format!(
+                "{wide} stitches change places in a row, and more than {EASY_CABLE} press through each other; cables of up to \
+                 {EASY_CABLE} stitches cross freely"
+            ),
+            _ if sized || matches!(self.knit.form, Form::Revolution(_)) => {
+                let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
+                let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
+                format!(
+                    "too many stitches or rows for its size; this yarn knits to {own_across:.1} x {own_up:.1} in 10 cm by itself"
+                )
+            }
+            _ => "the stitches of the chart find no room beside each other; more plain rows between, or more yarn in a stitch by \
+                  `yarn_per_stitch`"
+                .to_owned(),
+        };
+        warnings.push(format!(
+            "{}: {:.1} % of the yarn overlaps, by up to {:.0} % of its diameter: {why}",
+            self.name,
+            100.0 * found.share,
+            100.0 * found.deepest
+        ));
     }
 
     /// The colours of the stitches, as `of_rows` says for rows of so many, and the yarns they are of; what is wrong with the
@@ -172,10 +180,27 @@ impl KnitPlan {
     }
 }
 
-/// `pattern`, `chart` or `instructions`: its name, the chart, and where its rows were written.
-pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Chart>, Vec<Span>) {
+/// What `pattern`, `chart` or `instructions` say.
+pub(super) struct Charted {
+    pub(super) name: String,
+    pub(super) chart: Option<Chart>,
+    /// Where the rows of the chart were written.
+    lines: Vec<Span>,
+    /// Stitches to cast on and rows to knit unless asked otherwise.
+    stitches: u32,
+    rows: u32,
+}
+
+impl Charted {
+    fn new(name: &str, chart: Option<Chart>) -> Self {
+        Self { name: name.to_owned(), chart, lines: Vec::new(), stitches: knit::COUNT, rows: knit::COUNT }
+    }
+}
+
+/// `pattern`, `chart` or `instructions`.
+pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> Charted {
     if let Some(text) = table.string("instructions") {
-        return ("knit".to_owned(), written(table, text, context), Vec::new());
+        return written(table, text, context);
     }
     if let Some(Value::Table(_)) = table.node("chart").map(|node| &node.value)
         && let Some(picture) = table.table("chart")
@@ -187,7 +212,7 @@ pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
                 Some("a chart is a pattern of its own: keep one"),
             );
         }
-        return ("knit".to_owned(), drawn(table, picture, context), Vec::new());
+        return Charted::new("knit", drawn(table, picture, context));
     }
     let chart_rows = table.strings("chart");
     if table.has("chart") && chart_rows.is_empty() {
@@ -223,7 +248,7 @@ pub(super) fn chart(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
             }
         }
     };
-    (name.to_owned(), chart, chart_rows.iter().map(|(_, span)| *span).collect())
+    Charted { lines: chart_rows.iter().map(|(_, span)| *span).collect(), ..Charted::new(name, chart) }
 }
 
 /// A chart that is a picture.
@@ -239,30 +264,32 @@ fn drawn(table: &Reader<'_>, picture: Reader<'_>, context: &Context<'_>) -> Opti
     }
 }
 
-/// Written instructions over so many `stitches`, as a chart.
-fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Option<Chart> {
+/// Written instructions over so many `stitches`, or as many as they cast on.
+fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
+    // Rows of a height are counted when its stitches are known: so many are enough.
+    const MANY: u32 = 2000;
     for other in ["pattern", "chart"].into_iter().filter(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
-    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
-    let rows = match knitspeak::chart_rows(text, stitches) {
-        Ok(rows) => rows,
-        Err(error) => {
-            let whole = table.span("instructions").unwrap_or(table.header());
-            let place = error.line.map_or(whole, |line| context.sources.line_of_text(whole, line));
-            let line =
-                error.line.filter(|_| place == whole).map_or(String::new(), |line| format!("line {}: ", line + 1));
-            context.error(place, format!("{line}{}", error.problem), Some(error.hint));
-            return None;
-        }
+    let told = |error: KnitSpeakError| {
+        let whole = table.span("instructions").unwrap_or(table.header());
+        let place = error.line.map_or(whole, |line| context.sources.line_of_text(whole, line));
+        let line = error.line.filter(|_| place == whole).map_or(String::new(), |line| format!("line {}: ", line + 1));
+        context.error(place, format!("{line}{}", error.problem), Some(error.hint));
     };
-    match Chart::parse(&rows) {
-        Ok(chart) => Some(chart),
-        Err(error) => {
-            table.error_at("instructions", error.problem, Some(&error.hint));
-            None
-        }
+    let mut charted = Charted::new("knit", None);
+    let Ok(read) = Instructions::read(text).map_err(told) else { return charted };
+    charted.stitches = read.cast_on().unwrap_or(charted.stitches);
+    let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
+    let least = if table.has("height") { MANY } else { charted.rows };
+    let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
+    let Ok(worked) = read.work(stitches, least).map_err(told) else { return charted };
+    if worked.whole {
+        charted.rows = worked.rows.len() as u32;
     }
+    charted.chart =
+        Chart::parse(&worked.rows).map_err(|e| table.error_at("instructions", e.problem, Some(&e.hint))).ok();
+    charted
 }
 
 /// Reads the keys of a knit.
@@ -283,10 +310,12 @@ pub(super) fn knit(
     if let (Some(Form::Flat | Form::Tube), true) = (&form, profile.is_some()) {
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
-    let (_, chart, lines) = &charted;
-    let rows = if lines_are_all(&form, lines) { chart.as_ref().map_or(knit::COUNT, Chart::rows) } else { knit::COUNT };
+    let rows = match &charted.chart {
+        Some(chart) if lines_are_all(&form, &charted.lines) => chart.rows(),
+        _ => charted.rows,
+    };
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    counted(table, yarns, charted, form, rows, sizes)
+    counted(table, yarns, Charted { rows, ..charted }, form, sizes)
 }
 
 /// Shaped pieces are knitted once, from the first row of the chart to the last.
@@ -303,8 +332,7 @@ pub(super) fn stockinette(
 ) -> Option<KnitPlan> {
     let form = Some(Form::Flat);
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    let charted = ("stockinette".to_owned(), Chart::named("stockinette"), Vec::new());
-    counted(table, yarns, charted, form, knit::COUNT, sizes)
+    counted(table, yarns, Charted::new("stockinette", Chart::named("stockinette")), form, sizes)
 }
 
 /// Over how many stitches a float goes before it is caught, if it is, and over how many rows a yarn is carried.
@@ -345,12 +373,11 @@ pub(super) fn too_many_strands(row: &str, yarns: usize, instead: &str) -> Option
 fn counted(
     table: &Reader<'_>,
     yarns: &Yarns<'_>,
-    (name, chart, lines): (String, Option<Chart>, Vec<Span>),
+    Charted { name, chart, lines, stitches, rows }: Charted,
     form: Option<Form>,
-    rows: u32,
     sizes: GivenSizes,
 ) -> Option<KnitPlan> {
-    let stitches = table.u64_or("stitches", knit::COUNT.into(), 1..=1_000_000) as u32;
+    let stitches = table.u64_or("stitches", stitches.into(), 1..=1_000_000) as u32;
     let rows = table.u64_or("rows", rows.into(), 1..=1_000_000) as u32;
     let in_range = |[least, most]: [f64; 2]| Range::between(least, most);
     let stitch_width = table.f64("stitch_width", in_range(knit::STITCH_WIDTHS));

@@ -236,7 +236,7 @@ fn cloth(table: Reader<'_>, context: &Context<'_>) -> Option<ClothPlan> {
             let yarn_per_stitch = table.f64("yarn_per_stitch", Range::between(shortest, longest));
             let flatten = pattern::flatten(&table);
             let stranding = pattern::work_of_tile(&table);
-            let (name, chart, _) = pattern::chart(&table, context);
+            let pattern::Charted { name, chart, .. } = pattern::chart(&table, context);
             chart.map(|chart| (name, Pattern::Knit { chart, yarn_per_stitch, flatten, stranding }))
         }
         Some(ClothKind::Weave) => {

@@ -1,0 +1,507 @@
+//! What a line is about: a row, rows that are repeated, or how the piece begins and ends.
+
+use super::{KNOWN, MOST_ROWS, Result, Side, error, short};
+
+/// A sentence of the text, from where it begins.
+#[derive(Clone, Debug)]
+pub(super) enum Line {
+    /// A row, or several that are alike, and how it is worked.
+    Row(Head, String),
+    /// Rows that are repeated.
+    Again(Copies),
+    /// So many stitches are cast on.
+    CastOn(u32),
+    /// It is bound off.
+    BindOff,
+    /// Nothing that is knitted.
+    Nothing,
+    /// It goes on with what stands before it.
+    More(String),
+}
+
+/// What stands before the colon.
+#[derive(Clone, Debug)]
+pub(super) struct Head {
+    pub(super) rows: Vec<usize>,
+    pub(super) side: Option<Side>,
+    pub(super) round: bool,
+    /// "Next row", "knit 3 rows": so many after those before it.
+    pub(super) next: usize,
+    /// "Row 2 and all WS rows": by how many rows they are apart.
+    pub(super) all: Option<usize>,
+    /// "All even rows": whether they are odd.
+    pub(super) odd: Option<bool>,
+}
+
+/// Which rows are repeated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Which {
+    Rows(Vec<usize>),
+    /// So many that were written last.
+    Last(usize),
+    From(usize),
+    All,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Often {
+    /// So many times more.
+    More(u32),
+    /// So many times in all.
+    InAll(u32),
+    /// For so many rows.
+    Rows(usize),
+    /// Until so many stitches are left.
+    Left(u32),
+    /// As long as the piece grows.
+    Open,
+}
+
+/// "Rep rows 1-4 three times more."
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Copies {
+    pub(super) which: Which,
+    pub(super) often: Often,
+}
+
+/// A number in digits or as a word; also as in "1st" or "first".
+pub(super) fn number(word: &str) -> Option<u32> {
+    const WORDS: [[&str; 2]; 12] = [
+        ["one", "first"],
+        ["two", "second"],
+        ["three", "third"],
+        ["four", "fourth"],
+        ["five", "fifth"],
+        ["six", "sixth"],
+        ["seven", "seventh"],
+        ["eight", "eighth"],
+        ["nine", "ninth"],
+        ["ten", "tenth"],
+        ["eleven", "eleventh"],
+        ["twelve", "twelfth"],
+    ];
+    if let Some(n) = WORDS.iter().position(|words| words.contains(&word)) {
+        return Some(n as u32 + 1);
+    }
+    let digits = word.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    matches!(&word[digits.len()..], "" | "st" | "nd" | "rd" | "th").then(|| digits.parse().ok()).flatten()
+}
+
+/// A piece of a head: a word in small letters, a sign, or what stands in brackets; and where it ends.
+struct Token {
+    text: String,
+    end: usize,
+}
+
+/// The words, signs and brackets at the beginning of a text.
+fn head_tokens(text: &str) -> Vec<Token> {
+    /// No head is longer.
+    const MOST: usize = 400;
+    let mut out: Vec<Token> = Vec::new();
+    let (mut word, mut close) = (String::new(), None);
+    let flush = |word: &mut String, end: usize, out: &mut Vec<Token>| {
+        if !word.is_empty() {
+            out.push(Token { text: std::mem::take(word), end });
+        }
+    };
+    for (i, c) in text.char_indices() {
+        if let Some(end) = close {
+            word.extend(c.to_lowercase());
+            if c == end {
+                close = None;
+                flush(&mut word, i + c.len_utf8(), &mut out);
+            }
+            continue;
+        }
+        if c.is_alphanumeric() {
+            // "R1", "Rnd2"
+            let splits = c.is_ascii_digit() && !word.is_empty() && !word.ends_with(|d: char| d.is_ascii_digit());
+            if splits && is_row(&word) {
+                flush(&mut word, i, &mut out);
+            }
+            word.extend(c.to_lowercase());
+            continue;
+        }
+        flush(&mut word, i, &mut out);
+        if out.len() > MOST {
+            break;
+        }
+        match c {
+            '(' | '[' => {
+                close = Some(if c == '(' { ')' } else { ']' });
+                word.push(c);
+            }
+            c if c.is_whitespace() => {}
+            c => out.push(Token { text: c.to_string(), end: i + c.len_utf8() }),
+        }
+    }
+    flush(&mut word, text.len(), &mut out);
+    out
+}
+
+fn is_row(word: &str) -> bool {
+    is_round(word) || matches!(word, "row" | "rows" | "r")
+}
+
+fn is_round(word: &str) -> bool {
+    matches!(word, "rnd" | "rnds" | "round" | "rounds")
+}
+
+/// The side that words name: both or none is none.
+fn side_of(text: &str) -> Option<Side> {
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    let says = |short: &str, long: &str| words.contains(&short) || words.windows(2).any(|w| w == [long, "side"]);
+    match (says("rs", "right"), says("ws", "wrong")) {
+        (true, false) => Some(Side::Right),
+        (false, true) => Some(Side::Wrong),
+        _ => None,
+    }
+}
+
+impl Head {
+    /// The head of a line and what stands behind it; `None` if it has none.
+    pub(super) fn split(text: &str, line: usize) -> Result<Option<(Self, &str)>> {
+        let mut head = Self { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None };
+        let (mut known, mut range, mut end, mut said) = (false, false, 0, String::new());
+        let tokens = head_tokens(text);
+        // A list goes on behind a comma, and "Row 1 2/1 LC" is none.
+        let mut goes_on = true;
+        for (i, Token { text: word, end: here }) in tokens.iter().enumerate() {
+            let next = tokens.get(i + 1).map_or("", |t| t.text.as_str());
+            let is_number = |word: &str| number(word).is_some() || word.starts_with(|c: char| c.is_ascii_digit());
+            match word.as_str() {
+                ":" | "." => {
+                    end = *here;
+                    break;
+                }
+                // "1st row - k2"
+                "-" | "\u{2013}" | "\u{2014}" => {
+                    end = *here;
+                    if !is_number(next) {
+                        break;
+                    }
+                    range = true;
+                }
+                "," | "&" | "and" | "plus" if is_number(next) || is_row(next) || is_all(next) => goes_on = true,
+                "to" | "through" | "thru" if is_number(next) && !head.rows.is_empty() => range = true,
+                word if is_row(word) => {
+                    known = true;
+                    head.round |= is_round(word);
+                    goes_on |= head.rows.is_empty();
+                }
+                word if word.starts_with(['(', '[']) && (side_of(word).is_some() || is_count(word)) => {}
+                word if is_all(word) => head.all = head.all.or(Some(1)),
+                "ws" | "rs" | "wrong" | "right" | "side" | "alternate" | "alt" | "even" | "odd" | "other"
+                | "numbered" => {
+                    if matches!(word.as_str(), "even" | "odd") {
+                        head.odd = Some(word == "odd");
+                    }
+                    head.all = head.all.map(|_| 2);
+                }
+                "next" => head.next = 1,
+                // "rows 1-2, 3 times more"
+                word if is_number(word) && matches!(next, "times" | "time" | "more" | "further") => break,
+                word if is_number(word) => {
+                    let Some(n) = number(word).map(|n| n as usize) else {
+                        if known && goes_on && head.all.is_none() {
+                            return error(line, format!("\"{}\" is no row", short(word)), "as in Row 1:");
+                        }
+                        break;
+                    };
+                    if head.next > 0 {
+                        head.next = n.min(MOST_ROWS);
+                    } else if let Some(apart) = &mut head.all {
+                        // "every 4th row"
+                        *apart = n.max(1);
+                    } else if std::mem::take(&mut range) {
+                        let first = head.rows.pop().unwrap_or(n);
+                        if first > n || n - first >= MOST_ROWS {
+                            let problem = format!("\"{first}-{n}\" is no range of rows");
+                            return error(line, problem, "as in Rows 1-4:");
+                        }
+                        head.rows.extend(first..=n);
+                    } else if goes_on {
+                        head.rows.push(n);
+                    } else {
+                        break;
+                    }
+                    goes_on = matches!(next, "-" | "\u{2013}" | "\u{2014}" | "to" | "through" | "thru");
+                }
+                _ => break,
+            }
+            end = *here;
+            said.push_str(word);
+            said.push(' ');
+        }
+        head.side = side_of(&said);
+        let plural = || ["rows", "rnds", "rounds"].iter().any(|rows| said.split(' ').any(|word| word == *rows));
+        if head.rows.is_empty() && head.next == 0 && (head.side.is_some() || head.odd.is_some()) && plural() {
+            head.all = Some(2);
+        }
+        if !known || (head.rows.is_empty() && head.next == 0 && head.all.is_none()) {
+            return Ok(None);
+        }
+        let mut body = text[end..].trim();
+        // "1st row: (RS). K2."
+        for (open, close) in [('(', ')'), ('[', ']')] {
+            if body.starts_with(open)
+                && let Some(at) = body.find(close)
+                && let Some(side) = side_of(&body[..at].to_lowercase())
+            {
+                head.side = Some(side);
+                body = body[at + 1..].trim();
+            }
+        }
+        Ok(Some((head, body.trim_start_matches([':', '.', '-', ' ']))))
+    }
+}
+
+fn is_all(word: &str) -> bool {
+    matches!(word, "all" | "every" | "each" | "foll" | "following")
+}
+
+/// Whether brackets hold a number of stitches.
+fn is_count(brackets: &str) -> bool {
+    let words = plain_words(brackets);
+    words.first().is_some_and(|w| w.parse::<u32>().is_ok())
+        && words.get(1).is_some_and(|w| matches!(w.as_str(), "st" | "sts" | "stitches"))
+}
+
+/// The words of a text in small letters, without the signs between them.
+pub(super) fn plain_words(text: &str) -> Vec<String> {
+    let lower = text.to_lowercase();
+    let is_sign = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '.' | '(' | ')' | '[' | ']' | ':' | '*');
+    lower.split(is_sign).filter(|w| !w.is_empty()).map(str::to_owned).collect()
+}
+
+/// Whether a word says to bind off; "off" follows some.
+pub(super) fn binds_off(words: &[&str]) -> bool {
+    matches!(words, ["bo" | "bindoff", ..] | ["bind" | "cast", "off", ..])
+}
+
+/// What a piece of text is about.
+pub(super) fn read(text: &str, line: usize) -> Result<Line> {
+    if let Some((head, body)) = Head::split(text, line)? {
+        let words = plain_words(body);
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        // "Row 17: bind off all sts in pattern"
+        if binds_off(&words) && !words.iter().any(|w| number(w).is_some() || matches!(*w, "next" | "first")) {
+            return Ok(Line::BindOff);
+        }
+        return Ok(Line::Row(head, body.to_owned()));
+    }
+    let words = plain_words(text);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    if let Some(copies) = Copies::read(&words, text, line)? {
+        return Ok(Line::Again(copies));
+    }
+    Ok(match words[..] {
+        // "Knit 3 rows."
+        [name @ ("k" | "knit" | "p" | "purl"), n, row] if number(n).is_some() && is_row(row) => {
+            let next = number(n).map_or(0, |n| n as usize).min(MOST_ROWS);
+            let head = Head { rows: Vec::new(), side: None, round: is_round(row), next, all: None, odd: None };
+            Line::Row(head, if name.starts_with('k') { "knit" } else { "purl" }.to_owned())
+        }
+        ["cast", "on", n, ..] | ["co", n, ..] if number(n).is_some() => Line::CastOn(number(n).unwrap_or_default()),
+        ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,
+        ["break" | "cut", "yarn" | "the", ..] | ["weave", "in", ..] | ["worked", "over", ..] => Line::Nothing,
+        ref words if binds_off(words) && !words.iter().any(|w| number(w).is_some()) => Line::BindOff,
+        _ => Line::More(text.to_owned()),
+    })
+}
+
+/// Where in a line another sentence begins that is about rows: "Row 1: Knit. Row 2: Purl."
+pub(super) fn sentences(text: &str) -> Vec<&str> {
+    let mut out = Vec::new();
+    let mut rest = text;
+    let mut from = 0;
+    while let Some(at) = rest[from..].find(['.', ')', ']']).map(|at| from + at + 1) {
+        from = at;
+        let next = rest[at..].trim_start();
+        let starts = !next.is_empty() && next.len() < rest[at..].len() && begins(next);
+        if starts && !rest[..at].trim().is_empty() {
+            // "Row 1. (RS) k2": a head has begun, and goes on.
+            out.push(&rest[..at]);
+            rest = next;
+            from = 0;
+        }
+    }
+    out.push(rest);
+    out
+}
+
+/// Whether a text begins with a row or a repeat of rows.
+fn begins(text: &str) -> bool {
+    // Heads are short.
+    let start: String = text.chars().take(200).collect();
+    !matches!(read(&start, 0), Ok(Line::More(_)))
+}
+
+impl Copies {
+    /// "Repeat rows 1 and 2", "rep the last 4 rows twice more", "these 4 rows form the pattern", "cont in patt until ...".
+    pub(super) fn read(words: &[&str], text: &str, line: usize) -> Result<Option<Self>> {
+        let (verb, rest) = match words {
+            [
+                verb @ ("rep" | "repeat" | "work" | "continue" | "cont"),
+                "in" | "as",
+                "patt" | "pattern" | "pat" | "set" | "established" | "this",
+                rest @ ..,
+            ] => (*verb, (Which::All, rest)),
+            ["cont" | "continue", "working" | "to" | "even", rest @ ..] => ("cont", (Which::All, rest)),
+            [verb @ ("rep" | "repeat" | "work" | "continue" | "cont"), rest @ ..] => {
+                let rest = match rest {
+                    ["with" | "for" | "as" | "to", rest @ ..] => rest,
+                    rest => rest,
+                };
+                match which(rest, text, line)? {
+                    Some(found) => (*verb, found),
+                    None => return Ok(None),
+                }
+            }
+            // "These 4 rows form the pattern."
+            [first, .., last] if matches!(*first, "these" | "this" | "the" | "last" | "rows" | "row") => {
+                let forms = words.iter().position(|w| matches!(*w, "form" | "forms" | "set" | "sets" | "make"));
+                let is_pattern = matches!(*last, "patt" | "pattern" | "pat" | "rib" | "ribbing");
+                match (forms, which(words, text, line)?) {
+                    (Some(forms), Some((found, _))) if is_pattern => ("form", (found, &words[forms..])),
+                    _ => return Ok(None),
+                }
+            }
+            _ => return Ok(None),
+        };
+        let (which, rest) = rest;
+        if let Some(word) = rest
+            .iter()
+            .find(|w| matches!(**w, "inc" | "dec" | "increase" | "decrease" | "increasing" | "decreasing" | "inc'g"))
+        {
+            let hint = "write rows that change their number of stitches out, as in Row 5: k1, k2tog, k to end";
+            return error(line, format!("\"{}\" in rows that are repeated is not followed", short(word)), hint);
+        }
+        let often = often(rest).unwrap_or(Often::Open);
+        let often = match (verb, often) {
+            ("work", Often::More(n)) if !rest.contains(&"more") => Often::InAll(n),
+            (_, often) => often,
+        };
+        Ok(Some(Self { which, often }))
+    }
+}
+
+/// Which rows words name, and the words behind them.
+fn which<'a, 'w>(words: &'a [&'w str], text: &str, line: usize) -> Result<Option<(Which, &'a [&'w str])>> {
+    let words = if let ["the", rest @ ..] = words { rest } else { words };
+    Ok(match words {
+        ["from", row, n, rest @ ..] if is_row(row) => number(n).map(|n| (Which::From(n as usize), rest)),
+        ["last" | "these" | "previous" | "above" | "prev", n, row, rest @ ..] if is_row(row) => {
+            number(n).map(|n| (Which::Last(n as usize), rest))
+        }
+        ["last" | "this" | "previous" | "above" | "prev", row, rest @ ..] if is_row(row) => {
+            Some((Which::Last(1), rest))
+        }
+        ["these", row, rest @ ..] if is_row(row) => Some((Which::All, rest)),
+        [row, ..]
+            if is_row(row)
+                || row.starts_with(|c: char| c.is_ascii_digit())
+                || is_row(row.trim_end_matches(|c: char| c.is_ascii_digit())) =>
+        {
+            // As a head has them, with its signs.
+            let lower = text.to_lowercase();
+            let begins = |at: &usize| !lower[..*at].ends_with(|c: char| c.is_alphanumeric());
+            let Some(at) = lower.match_indices(row).map(|(at, _)| at).find(begins) else { return Ok(None) };
+            let Some((head, body)) = Head::split(&lower[at..], line)? else { return Ok(None) };
+            let behind = plain_words(body).len();
+            (!head.rows.is_empty()).then(|| (Which::Rows(head.rows), &words[words.len().saturating_sub(behind)..]))
+        }
+        _ => None,
+    })
+}
+
+/// "twice more", "3 times", "until 5 sts remain", "for 20 rows".
+fn often(words: &[&str]) -> Option<Often> {
+    let times = |w: &str| match w {
+        "once" => Some(1),
+        "twice" => Some(2),
+        "thrice" => Some(3),
+        _ => None,
+    };
+    for (i, word) in words.iter().enumerate() {
+        if let Some(n) = times(word) {
+            return Some(Often::More(n));
+        }
+        let rest = &words[i + 1..];
+        let n = number(word).or_else(|| number(word.trim_matches('x')));
+        match (n, rest) {
+            (Some(n), ["times" | "time", ..] | ["more" | "further", "times" | "time", ..]) => {
+                return Some(Often::More(n));
+            }
+            (Some(n), ["rows" | "rnds" | "rounds", ..] | ["more" | "further", "rows" | "rnds" | "rounds", ..]) => {
+                return Some(Often::Rows(n as usize));
+            }
+            (Some(n), ["st" | "sts" | "stitch" | "stitches", left, ..])
+                if matches!(*left, "rem" | "remain" | "remains" | "left" | "remaining" | "are") =>
+            {
+                return Some(Often::Left(n));
+            }
+            (Some(n), []) if word.trim_matches('x').len() < word.len() => return Some(Often::More(n)),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The rows that "as row 1" or "repeat rows 1 and 2 twice" in the place of a row names.
+pub(super) fn copied(body: &str, line: usize) -> Result<Option<Vec<usize>>> {
+    let words = plain_words(body);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let rest = match &words[..] {
+        ["same" | "work" | "knit", "as", "for", rest @ ..]
+        | ["as", "for", rest @ ..]
+        | ["same" | "work", "as", rest @ ..] => rest,
+        ["as" | "repeat" | "rep" | "work", rest @ ..] => rest,
+        _ => return Ok(None),
+    };
+    match which(rest, body, line)? {
+        Some((Which::Rows(rows), _)) => Ok(Some(rows)),
+        Some(_) => error(line, format!("\"{}\" does not number its rows", short(body)), "as in Row 3: as row 1"),
+        None => Ok(None),
+    }
+}
+
+/// A count of stitches at the end of a row, and the row without it: "(24 sts)", "- 24 sts".
+pub(super) fn counted(body: &str) -> (&str, Option<u32>) {
+    let body = body.trim().trim_end_matches('.').trim_end();
+    let count = |text: &str| {
+        let words = plain_words(text);
+        match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+            [n, "st" | "sts" | "stitch" | "stitches"]
+            | [n, "st" | "sts" | "stitch" | "stitches", "rem" | "remain" | "remaining" | "left"] => n.parse().ok(),
+            _ => None,
+        }
+    };
+    let open = if body.ends_with(')') {
+        body.rfind('(')
+    } else if body.ends_with(']') {
+        body.rfind('[')
+    } else {
+        None
+    };
+    let dash = body.char_indices().rfind(|(_, c)| matches!(c, '-' | '\u{2013}' | '\u{2014}' | '.' | '='));
+    let dash = dash.map(|(at, c)| (at, at + c.len_utf8()));
+    let place = open.map(|at| (at, at)).or(dash);
+    if let Some((at, from)) = place
+        && let Some(count) = count(&body[from..])
+    {
+        return (body[..at].trim_end().trim_end_matches(['.', ',', ';']), Some(count));
+    }
+    (body, None)
+}
+
+/// What is told where no row begins.
+pub(super) fn no_row<T>(text: &str, line: usize) -> Result<T> {
+    let start = text.split(':').next().unwrap_or_default().to_lowercase();
+    let hint = if start.contains("set") && start.contains("up") || start.contains("foundation") {
+        "number such a row as Row 1, and repeat the rows behind it: Repeat rows 2-5"
+    } else {
+        KNOWN
+    };
+    error(line, format!("expected \"Row 1: ...\", found \"{}\"", short(text)), hint)
+}
