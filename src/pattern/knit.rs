@@ -199,7 +199,9 @@ impl Knit {
     pub(super) fn relaxed_rows(&self) -> Result<RelaxedRows, ChartError> {
         const SMALLEST: f64 = 9.0;
         let wide = self.repeat_for("that could be laid")?;
+        self.check_repeat_held()?;
         let cell = self.cell(wide, self.size(), self.points);
+        self.check_relaxed(&cell)?;
         let [across, up] = (SMALLEST / cell.period).ceil().max(DVec2::ONE).to_array();
         let row = |r: usize| -> Vec<(DVec3, [f32; 2])> {
             let visits = (cell.visits[r % cell.high as usize].len() - 1) * across as usize;

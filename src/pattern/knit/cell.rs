@@ -17,8 +17,8 @@ use crate::geometry::spline::catmull_rom;
 /// The pull across and along that blocks a piece, force by length: ribs, which fold together, and garter stitch, which draws
 /// up, open a little under it, plain knit hardly.
 const BLOCKING: DVec2 = DVec2::new(0.03, 0.015);
-/// The same for each share of the stitches that are tucked. These rods slide where wool holds: tucks would draw the yarn of
-/// the loops beside them into the width, and rows down, unless loops are pulled up.
+/// The same for each share of the stitches that are tucked or slipped. These rods slide where wool holds: they would draw the
+/// yarn of the loops beside them into the width, and rows down, unless loops are pulled up.
 const DRAWN_UP: DVec2 = DVec2::new(-0.06, 0.34);
 /// The same for each share of the stitches that are yarn-overs: openwork is stretched to show its holes.
 const OPENED: DVec2 = DVec2::new(0.8, 1.2);
@@ -89,11 +89,12 @@ impl Cell {
         let scale = yarn / 13.9;
         let start = DVec2::new(size[0].unwrap_or(4.4 * scale), size[1].unwrap_or(3.0 * scale * loops.room()));
         let period = start * DVec2::new(wide.into(), high.into());
-        let share = |act: Act| {
-            let count = rows.iter().flatten().filter(|s| s.act == act).count();
+        let share = |is: &dyn Fn(Act) -> bool| {
+            let count = rows.iter().flatten().filter(|s| is(s.act)).count();
             count as f64 / f64::from((wide * high).max(1))
         };
-        let pull = BLOCKING + DRAWN_UP * share(Act::Tuck) + OPENED * share(Act::Over);
+        let held = share(&|act| matches!(act, Act::Tuck | Act::Pass { .. }));
+        let pull = BLOCKING + DRAWN_UP * held + OPENED * share(&|act| act == Act::Over);
         let mut cell = Self {
             wide,
             high,
@@ -256,6 +257,15 @@ impl Cell {
     /// How far its plane is from that of the same cloth turned, where both touch.
     pub(super) fn touching(&self) -> f64 {
         0.5 * APART - self.rods.points.iter().map(|p| p.z).fold(f64::MAX, f64::min)
+    }
+
+    /// By how much its yarn is longer than it is at rest: 1 where nothing pulls.
+    pub(super) fn stretch(&self) -> f64 {
+        let length = |s: &Strand| {
+            let own = &self.rods.points[s.start..s.start + s.count];
+            length(own) + s.jump.map_or(0.0, |jump| (own[0] + jump).distance(own[s.count - 1]))
+        };
+        self.rods.strands.iter().map(length).sum::<f64>() / self.rods.rest.iter().sum::<f64>()
     }
 
     /// Width of a stitch and distance of rows.

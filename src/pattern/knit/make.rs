@@ -110,6 +110,9 @@ impl Knit {
         let ways = self.ways(&rows, mirrored);
         let profile = self.profile(diameter, &rows)?;
         let layout = Layout::new(self, &rows, profile.as_ref());
+        if let Some(cell) = layout.cell.as_ref().filter(|_| profile.is_none()) {
+            self.check_relaxed(cell)?;
+        }
         let mut loops = self.loops(&rows, &ways, mirrored);
         loops.apart = layout.apart();
         let surface = self.surface(&layout, profile, &loops, &rows);
@@ -142,12 +145,14 @@ impl Knit {
     fn patch(&self, yarn: &Thickness) -> Result<Knitted, ChartError> {
         let diameter = yarn.pressed();
         let wide = self.repeat_for("for a tile")?;
+        self.check_repeat_held()?;
         let high = self.chart.rows();
         if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
             let problem = format!("a tile of {} x {} of what repeats over {wide} x {high}", self.stitches, self.rows);
             return Err(ChartError::new(None, problem, "give multiples of these stitches and rows"));
         }
         let cell = self.cell(wide, self.size(), self.points);
+        self.check_relaxed(&cell)?;
         let [width, height] = cell.gauge();
         let size = DVec2::new(f64::from(self.stitches) * width, f64::from(self.rows) * height);
         let row = |r: usize| {

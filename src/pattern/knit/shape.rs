@@ -61,6 +61,15 @@ struct Foot {
     out: f64,
     /// 1 where the yarn is behind what it is drawn through, -1 in front, else 0.
     behind: f64,
+    /// Whether the yarn goes from one side of the cloth to the other there: a loop must be behind what it is drawn through
+    /// right beside it.
+    through: bool,
+}
+
+impl Foot {
+    fn new(at: f64, up: f64, out: f64) -> Self {
+        Self { at, up, out, behind: 0.0, through: false }
+    }
 }
 
 impl Loops {
@@ -108,7 +117,8 @@ impl Loops {
                 let stack = l.parents.len().saturating_sub(1) as f64;
                 let (below, out) = match l.sign {
                     // Behind the stitches that it lies between, or in front of purl ones.
-                    0.0 if l.is_lifted() => (reach, DEPTH * l.layer + if l.layer > 0.0 { 0.6 } else { 0.0 }),
+                    0.0 if l.is_lifted() && l.layer == self.child_sign(l) => (reach, (DEPTH + 0.6) * l.layer),
+                    0.0 if l.is_lifted() => (reach, DEPTH * l.layer),
                     0.0 => (0.0, 0.0),
                     // A bobble begins as any other loop.
                     sign if l.bobble => (reach, -sign * DEPTH),
@@ -119,17 +129,15 @@ impl Loops {
                     sign => (reach + 0.12 * stack, self.layer(l, 0.0) - sign * self.foot_depth(l)),
                 };
                 let behind = if l.is_lifted() { -l.layer } else { l.sign };
-                Foot { at: l.foot, up: self.up_at(course.row, l.foot) - below, out, behind }
+                Foot { behind, ..Foot::new(l.foot, self.up_at(course.row, l.foot) - below, out) }
             }
             Visit::Pass { at, front } => {
                 let out = if *front { FLOAT } else { -FLOAT };
-                Foot { at: *at, up: self.up_at(course.row, *at) - 0.5 * reach, out, behind: 0.0 }
+                Foot::new(*at, self.up_at(course.row, *at) - 0.5 * reach, out)
             }
             // Where it lies is told where it is laid.
-            Visit::Through { at } => Foot { at: *at, up: f64::from(self.rows), out: 0.0, behind: 0.0 },
-            Visit::Float { at } => {
-                Foot { at: *at, up: self.up(course.row) - 0.5 * reach + course.lift, out: -FLOAT, behind: 0.0 }
-            }
+            Visit::Through { at } => Foot::new(*at, f64::from(self.rows), 0.0),
+            Visit::Float { at } => Foot::new(*at, self.up(course.row) - 0.5 * reach + course.lift, -FLOAT),
         }
     }
 
@@ -141,6 +149,13 @@ impl Loops {
                 let step = self.step(course);
                 let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course, v)).collect();
                 let n = feet.len();
+                // Whether the yarn comes from a stitch that it passes on one side of the cloth and goes on to a loop on the other.
+                let through = |k: usize| {
+                    let (a, b) = (k, (k + 1) % n);
+                    let passes = |k: usize| matches!(course.visits[k].1, Visit::Pass { .. });
+                    let is_drawn = |k: usize| feet[k].behind != 0.0 && !passes(k);
+                    ((passes(a) && is_drawn(b)) || (is_drawn(a) && passes(b))) && feet[a].out * feet[b].out < 0.0
+                };
                 // The joint between a visit and the next, as the first one has it.
                 let joint = |k: usize| -> Option<Foot> {
                     let (a, next) = (feet[k], (k + 1) % n);
@@ -153,6 +168,7 @@ impl Loops {
                     let out = match (a.behind, b.behind) {
                         (1.0, 1.0) => a.out.min(b.out),
                         (-1.0, -1.0) => a.out.max(b.out),
+                        _ if through(k) => 0.0,
                         _ => 0.5 * (a.out + b.out),
                     };
                     let (up, out) = match course.hold(k) {
@@ -162,7 +178,7 @@ impl Loops {
                         Hold::Catches => (self.up(course.row) - 0.8, -3.0),
                         Hold::Crosses => (0.5 * (a.up + b.up) + course.lift, out),
                     };
-                    Some(Foot { at: 0.5 * (a.at + b.at + round), up, out, behind: 0.0 })
+                    Some(Foot { through: through(k), ..Foot::new(0.5 * (a.at + b.at + round), up, out) })
                 };
                 let joints: Vec<Option<Foot>> = (0..n).map(joint).collect();
                 (0..n)
@@ -216,7 +232,8 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
     let piece = |k: usize| {
         let t = k as f64 / STEPS as f64;
         let (end, share) = if t < 0.5 { (ends[0], 2.0 * t) } else { (ends[1], 2.0 - 2.0 * t) };
-        let share = smooth_step(share);
+        // It is on its side before it meets the legs of the stitch.
+        let share = smooth_step(if end.through { 3.0 * share } else { share });
         let place = Place {
             at: end.at + (foot.at - end.at) * if t < 0.5 { 2.0 * t } else { 2.0 - 2.0 * t },
             up: end.up + (foot.up - end.up) * share,

@@ -378,3 +378,51 @@ fn a_piece_that_is_not_blocked_rolls_to_its_sides() {
     let shaped = Chart::parse(&["k", "k2tog k"]).unwrap();
     assert!(told(Knit { chart: shaped, ..free }).contains("curls"));
 }
+
+#[test]
+fn linen_stitch_is_dense() {
+    let chart = Chart::parse(&["slwyif k", "k slwyif"]).unwrap();
+    for wide in [2, 4] {
+        let cell = Cell::relaxed(&chart, wide, YARN_PER_STITCH, POINTS, [None; 2]);
+        let [width, height] = cell.gauge();
+        // Narrower than stockinette, with half as many rows again.
+        let found = [width / STITCH_WIDTH, height / ROW_HEIGHT];
+        eprintln!("{wide}: {found:?} of stockinette");
+        assert!((0.65..0.95).contains(&found[0]) && (0.6..0.8).contains(&found[1]), "{wide}: {found:?}");
+        assert!(cell.stretch() < 1.1, "{wide}: {}", cell.stretch());
+    }
+}
+
+#[test]
+fn loops_are_not_held_for_ever() {
+    let wrong = |chart: &[&str], stitches: u32, yarn: Option<f64>| {
+        let chart = Chart::parse(chart).unwrap();
+        Knit { chart, yarn_per_stitch: yarn, ..knit("stockinette", stitches, 4) }.widths().map_err(|e| e.to_string())
+    };
+    for (chart, told) in [
+        (&["sl k"][..], "row 5: stitch 1 is slipped for 5 rows, and a loop of this yarn reaches over 4 at most"),
+        (&["k", "k tuck"], "ok"),
+        (&["k tuck"], "row 7: stitch 2 is held by slips and tucks for 7 rows"),
+        (&["4: k sl", "k"], "ok"),
+        (&["5: k sl", "k"], "by `yarn_per_stitch`"),
+        (&["6: k tuck", "k"], "ok"),
+        (&["slwyif k", "k slwyif"], "ok"),
+    ] {
+        match wrong(chart, 8, None) {
+            Ok(_) => assert_eq!(told, "ok", "{chart:?}"),
+            Err(error) => assert!(error.contains(told), "{chart:?}: {error}"),
+        }
+    }
+    // What the hint proposes fits.
+    assert!(wrong(&["5: k sl", "k"], 8, Some(1.18 * YARN_PER_STITCH)).is_ok());
+}
+
+#[test]
+fn what_does_not_hold_together_is_told() {
+    let chart = Chart::parse(&["c8f"]).unwrap();
+    let wrong = Knit { chart, ..knit("stockinette", 8, 4) }.strands(1.0).unwrap_err();
+    assert!(
+        wrong.problem.contains("do not hold each other") && wrong.hint.contains("at least 7 plain rows"),
+        "{wrong}"
+    );
+}

@@ -37,8 +37,8 @@ struct Form<'a> {
     spread: f64,
     /// At which share of its height the legs of a twisted one cross.
     crossing: f64,
-    /// How far an end goes over into the neighbour's, radians of the way.
-    reach: f64,
+    /// How far each end goes over into the neighbour's, radians of the way.
+    reach: [f64; 2],
 }
 
 /// A place on the way along a loop.
@@ -83,6 +83,8 @@ impl<'a> Form<'a> {
             true => 0.35,
             false => 0.5,
         };
+        let is_beside = |p: &Loop| p.is_lifted() && p.layer == own.sign;
+        let through_strand = own.parents.iter().any(|&p| is_beside(&loops.loops[p as usize]));
         let mut form = Self {
             loops,
             own,
@@ -98,8 +100,11 @@ impl<'a> Form<'a> {
             // Its head is as wide as what is drawn through it.
             spread: if own.children.is_empty() { spread } else { spread * mean(&|c: &Loop| c.wide) },
             crossing,
-            // A tuck stays on its side of the stitch that it is worked with.
-            reach: if over && own.rank > 0 { TAU / 14.0 } else { TAU / 6.0 },
+            // A tuck stays on its side of the stitch that it is worked with, and what is drawn through a lifted strand beside it.
+            reach: ends.map(|end| match (over && own.rank > 0) || end.through || through_strand {
+                true => TAU / 14.0,
+                false => TAU / 6.0,
+            }),
         };
         form.swap = loops.swap(own, form.head_up(head_at) - form.foot_up(head_at), head_at - foot.at);
         form.head_depth = form.swap.map_or(form.head_depth, |s| s.depth);
@@ -124,8 +129,11 @@ impl<'a> Form<'a> {
     fn along(&self, k: usize) -> Along {
         let t = TAU * k as f64 / STEPS as f64;
         let head = 0.5 - 0.5 * t.cos();
-        let (side, end) = if k <= STEPS / 2 { (-1.0, self.ends[0]) } else { (1.0, self.ends[1]) };
-        let (upper, inside) = (smooth_step((head - 0.3) / 0.4), smooth_step(t.min(TAU - t) / self.reach));
+        let (side, end, reach) = match k <= STEPS / 2 {
+            true => (-1.0, self.ends[0], self.reach[0]),
+            false => (1.0, self.ends[1], self.reach[1]),
+        };
+        let (upper, inside) = (smooth_step((head - 0.3) / 0.4), smooth_step(t.min(TAU - t) / reach));
         Along { t, head, upper, inside, side, end }
     }
 
@@ -243,7 +251,7 @@ impl Loops {
         Piece { places, grid, yarn: own.yarn }
     }
 
-    fn child_sign(&self, own: &Loop) -> f64 {
+    pub(super) fn child_sign(&self, own: &Loop) -> f64 {
         let sign = own.children.first().map_or(own.sign, |&c| self.loops[c as usize].sign);
         if sign == 0.0 { 1.0 } else { sign }
     }

@@ -172,6 +172,8 @@ fn stitches_and_decreases() {
         (&["k4", "k yo sssk yo"], 4),
         (&["k4", "k yo cdd yo"], 4),
         (&["p4", "p yo p3tog yo"], 4),
+        (&["p4", "p yo sssp yo"], 4),
+        (&["p4", "p yo cddp yo"], 4),
     ]);
 }
 
@@ -181,10 +183,20 @@ fn increases_slips_and_tucks() {
         (&["k3 kfb", "k3 k2tog"], 4),
         (&["k4", "k2 m1l k2tog"], 4),
         (&["k4", "k2 m1r k2tog"], 4),
+        (&["p3 pfb", "p3 p2tog"], 4),
+        (&["p4", "p2 m1lp p2tog"], 4),
+        (&["p4", "p2 m1rp p2tog"], 4),
+        (&["k4", "k2 m1rp k2tog"], 4),
+        (&["k5", "k2tog k2 m1lp k"], 5),
         (&["k5", "k3tog yo k m1l k"], 5),
         (&["k3 p3", "k2tog m1l k p2tog m1r p"], 6),
         (&["k sl", "k2"], 4),
         (&["k4", "k sl k slwyif"], 4),
+        // Linen stitch, and its back.
+        (&["slwyif k", "k slwyif"], 4),
+        (&["p sl", "sl p"], 4),
+        (&["k2 slwyif2", "slwyif2 k2"], 4),
+        (&["slwyif2 k", "k slwyif2", "k3"], 6),
         (&["k tuck", "tuck p"], 4),
     ]);
 }
