@@ -349,7 +349,7 @@ impl Chart {
             let Some(made) = fit.made_of(found) else {
                 let (does, hint) = match (fit.short, fit.plain) {
                     (true, _) => ("is written for", "a short row says what becomes of every stitch"),
-                    (false, true) => ("has", "a row may be cut where it is repeated, and is there once as a whole"),
+                    (false, true) => ("has", "each row must be there once as a whole"),
                     (false, false) => (
                         "repeats over",
                         "the number of stitches must be a multiple of what a row with shaping or cables takes",
