@@ -224,15 +224,12 @@ impl Leaving {
         let with_rim = |rings: &[Outgoing; RINGS]| {
             let rim = rings[RINGS - 1].towards(&rings[RINGS - 2], -0.5);
             let at = |ring: usize| *rings.get(ring).unwrap_or(&rim);
-            (0..=RINGS)
-                .into_iter()
-                .enumerate()
-                .map(|(i, _)| {
-                    let r = ((i as f64 + 0.5) / RINGS as f64).min(1.0).sqrt();
-                    let (ring, part) = between((1.0 - (1.0 - r) * thicker).max(0.0).powi(2) as f32);
-                    if thicker > 1.0 { at(ring).towards(&at(ring + 1), f64::from(part)) } else { at(i) }
-                })
-                .collect::<Vec<_>>()
+            let at_ring = |i: usize| {
+                let r = ((i as f64 + 0.5) / RINGS as f64).min(1.0).sqrt();
+                let (ring, part) = between((1.0 - (1.0 - r) * thicker).max(0.0).powi(2) as f32);
+                if thicker > 1.0 { at(ring).towards(&at(ring + 1), f64::from(part)) } else { at(i) }
+            };
+            (0..=RINGS).map(at_ring).collect::<Vec<_>>()
         };
         let Solved { onward, met, for_good, entering } = solved;
         let for_good = for_good.iter().map(|rings| rings.map(|share| Outgoing::new(share, [1.0; AZIMUTHS])));
