@@ -131,7 +131,13 @@ impl Lobe {
             if stream.next() < chance {
                 let (_, met) = node.others(view, direction, stream);
                 let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
-                let there = Meeting::new(view, &frame, (&node.spot.inside, direction, met), (goes, Light::Met), stream);
+                let there = Meeting::new(
+                    view,
+                    &frame,
+                    (&node.spot.inside, Vec3A::ZERO, direction, met),
+                    (goes, Light::Met),
+                    stream,
+                );
                 (left, drawn) = (there.energy, chance);
                 away = Some(there);
             }
@@ -219,13 +225,26 @@ impl Lobe {
         (arriving, spread)
     }
 
+    /// From a place to where other plies are counted of light that wandered about from there and leaves towards `w`. Where plies lie in each
+    /// other it has left some of theirs behind by then: halfway to where it leaves its own ([`Self::start`]).
+    fn come_by_then(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Vec3A {
+        const COME: f32 = 0.5;
+        if view.yarn.plies_overlap { COME * (self.start(view, spot, w) - spot.inside.point) } else { Vec3A::ZERO }
+    }
+
+    /// The optical depth of plies other than that of a place, for light that wandered about from there and leaves towards `w`; `other` is
+    /// told of each, and of the fibres on its way.
+    fn past_own(&self, view: &View<'_>, spot: &Spot, w: Vec3A, other: impl FnMut(FibersAhead)) -> Rgb {
+        spot.past_own(view, self.come_by_then(view, spot, w), w, other)
+    }
+
     /// What other plies let pass in a direction, and where light meets one of them, if it does.
     fn others(&self, view: &View<'_>, node: &Node, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
-        if !self.away {
+        if !self.away && !view.yarn.plies_overlap {
             return node.others(view, w, stream);
         }
         let mut among = Among::default();
-        let depth = self.spot.past_own(view, w, |fibers| among.offer(fibers, stream));
+        let depth = self.past_own(view, &self.spot, w, |fibers| among.offer(fibers, stream));
         ((-depth).exp(), among.met(view, stream))
     }
 
@@ -240,17 +259,23 @@ impl Lobe {
             return Some(again);
         }
         let met = met.unwrap_or(Met { ply: self.spot.ply, distance: 0.0 });
-        let first = Meeting::new(view, &self.frame, (&self.spot.inside, w, met), (rest, Light::Met), stream);
+        let first = Meeting::new(
+            view,
+            &self.frame,
+            (&self.spot.inside, self.come_by_then(view, &self.spot, w), w, met),
+            (rest, Light::Met),
+            stream,
+        );
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
         let mut among = Among::default();
-        let open = first.open(view, w, |fibers| among.offer(fibers, stream));
+        let open = (-self.past_own(view, &first.spot, w, |fibers| among.offer(fibers, stream))).exp();
         let (way, rest) = Taken::new(node, (self.start(view, &first.spot, w), w, value, pdf), open)?;
         again.ways.push(way);
         again.meetings.push(first);
         if rest.max_channel() > 0.0 {
             let met = among.met(view, stream).unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
-            let from = (&first.spot.inside, w, met);
+            let from = (&first.spot.inside, self.come_by_then(view, &first.spot, w), w, met);
             again.meetings.push(Meeting::new(view, &self.frame, from, (rest, Light::MetForGood), stream));
         }
         Some(again)
@@ -269,7 +294,11 @@ impl Lobe {
         mut visit: impl FnMut(&Spot, Rgb),
     ) {
         let (first, pdf) = self.value(view, w);
-        let open = if self.away { (-self.spot.past_own(view, w, |_| {})).exp() } else { open };
+        let open = if self.away || view.yarn.plies_overlap {
+            (-self.past_own(view, &self.spot, w, |_| {})).exp()
+        } else {
+            open
+        };
         let chance = at_node * self.chance;
         match &self.again {
             None => visit(&self.spot, first * mis_weight(light_pdf, chance * pdf)),
@@ -284,7 +313,7 @@ impl Lobe {
                         break;
                     };
                     if value.max_channel() > 0.0 {
-                        let open = meeting.open(view, w, |_| {});
+                        let open = (-self.past_own(view, &meeting.spot, w, |_| {})).exp();
                         visit(&meeting.spot, value * open * mis_weight(light_pdf, left * goes_on(open) * pdf));
                     }
                     left *= 1.0 - next.open;
@@ -365,17 +394,17 @@ impl Taken {
 }
 
 impl Meeting {
-    /// Where so much light from a place meets a ply.
+    /// Where so much light meets a ply that set out towards `w` at `shift` from a place.
     fn new(
         view: &View<'_>,
         frame: &LobeFrame,
-        (from, w, met): (&Inside, Vec3A, Met),
+        (from, shift, w, met): (&Inside, Vec3A, Vec3A, Met),
         (arrives, light): (Rgb, Light),
         stream: &mut Stream,
     ) -> Self {
         let shape = view.yarn.occluder().shape();
         let leaving = &view.yarn.plies[met.ply].leaving;
-        let inside = view.section.beyond(shape, from, Vec3A::ZERO, w, met.distance);
+        let inside = view.section.beyond(shape, from, shift, w, met.distance);
         let at = inside.in_ply(shape, met.ply);
         let (place, axes) = leaving.place(at, inside.short_axis_within());
         Self {
@@ -393,12 +422,6 @@ impl Meeting {
         let around = view.yarn.plies[self.spot.ply].leaving.towards(self.outwards, azimuth(frame, self.axes, w));
         let value = around * (DIFFUSE * frame.latitudes(w).1 * (0.5 * FRAC_1_PI));
         (self.energy * value, value.mean())
-    }
-
-    /// What other plies let pass of that; `other` is told of each, and of the fibres on its way.
-    #[inline]
-    fn open(&self, view: &View<'_>, w: Vec3A, other: impl FnMut(FibersAhead)) -> Rgb {
-        (-self.spot.past_own(view, w, other)).exp()
     }
 
     fn draw(&self, view: &View<'_>, frame: &LobeFrame, stream: &mut Stream) -> Vec3A {

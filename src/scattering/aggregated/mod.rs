@@ -185,15 +185,15 @@ impl Spot {
         v - v.dot(self.tangent) * self.tangent
     }
 
-    /// The optical depth of plies other than its own that lie ahead in the direction `w`, per channel; `other` is told of each, and of the
+    /// The optical depth of plies other than its own that lie ahead at `shift` from here in the direction `w`, per channel; `other` is told of each, and of the
     /// fibres on its way.
     #[inline]
-    fn past_own(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
+    fn past_own(&self, view: &View<'_>, shift: Vec3A, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
         let shape = view.yarn.occluder().shape();
         let across = Across::new(view, &self.inside, w);
         let free = 2.0 * view.section.thinness() * view.yarn.plies[self.ply].lead;
         let mut ahead = PliesAhead::new();
-        view.section.plies_ahead(shape, &self.inside, Vec3A::ZERO, w, |way| {
+        view.section.plies_ahead(shape, &self.inside, shift, w, |way| {
             if way.ply != self.ply || view.yarn.plies_overlap {
                 let _ = ahead.try_push(FibersAhead::new(view, &self.inside, across, &way, free));
             }
