@@ -326,6 +326,6 @@ mod tests {
         assert!(wrong("v nan 0 0\n").problem.contains("finite"));
         assert!(wrong("").problem.contains("no faces"));
         let many = GarmentMesh::parse(&format!("{QUAD}v 0 2 0\nvt 0 2\nf 1/1 2/2 3/3 4/4 5/5\n")).unwrap();
-        assert!(many.notes[0].starts_with("1 faces of more than four corners"), "{:?}", many.notes);
+        assert!(many.notes[0].starts_with("1 face of more than four corners"), "{:?}", many.notes);
     }
 }
