@@ -108,7 +108,7 @@ fn memory_is_told_before_it_is_taken() {
         &["render", scene, "--mode", "fiber", "--max-memory", "0.01", "--spp", "1", "-o", "big.exr"],
     );
     assert_eq!(run.status, Some(2), "{}", run.stderr);
-    assert!(run.stderr.contains("may take 0.01 GB") && run.stderr.contains("--max-memory"), "{}", run.stderr);
+    assert!(run.stderr.contains("may take 10.0 MB") && run.stderr.contains("--max-memory"), "{}", run.stderr);
     assert!(!directory.path().join("big.exr").exists());
 }
 
