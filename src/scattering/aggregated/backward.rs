@@ -282,7 +282,7 @@ impl Lobe {
     }
 
     /// The lobe's value towards `w`, weighted against direction sampling, by the places from which it leaves; `open` is what the other
-    /// plies let pass, `at_node` the chance that the path goes on from the node.
+    /// plies let pass from the node, `at_node` the chance that the path goes on from the node.
     #[inline]
     pub(super) fn evaluate(
         &self,
@@ -294,15 +294,15 @@ impl Lobe {
         mut visit: impl FnMut(&Spot, Rgb),
     ) {
         let (first, pdf) = self.value(view, w);
-        let open = if self.away || view.yarn.plies_overlap {
-            (-self.past_own(view, &self.spot, w, |_| {})).exp()
-        } else {
-            open
-        };
         let chance = at_node * self.chance;
         match &self.again {
             None => visit(&self.spot, first * mis_weight(light_pdf, chance * pdf)),
             Some(again) => {
+                let open = if self.away || view.yarn.plies_overlap {
+                    (-self.past_own(view, &self.spot, w, |_| {})).exp()
+                } else {
+                    open
+                };
                 let goes_on = |open: Rgb| node.chance_out(open, node.leaves_again);
                 visit(&self.spot, first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf));
                 let mut left = chance * (1.0 - again.ways[0].open);
