@@ -6,7 +6,7 @@ use wide::f32x8;
 
 use super::{
     AZIMUTHS, Bends, Medium, Outgoing, RINGS,
-    pressed::{CELLS, SECTORS, landing},
+    flight::{CELLS, Flight, SECTORS, landing},
 };
 
 /// Directions, one for each azimuth that is held, and places along each, that are looked at from every cell.
@@ -16,6 +16,11 @@ const PLACES: usize = 12;
 const FOLLOWED: usize = 12;
 /// Azimuths from the short axis to the long one, with both: for the others the section is mirrored.
 const SOLVED: usize = AZIMUTHS / 4 + 1;
+
+/// Of a direction.
+fn angle(k: usize) -> f64 {
+    TAU * k as f64 / DIRECTIONS as f64
+}
 
 /// For each cell and direction: what leaves without meeting anything, and where something is met next, and how likely.
 struct Flights {
@@ -28,7 +33,7 @@ impl Flights {
         let mut out = Self { escape: Vec::new(), next: Vec::new() };
         for cell in 0..CELLS {
             for k in 0..DIRECTIONS {
-                let flight = Flight::new(cell, k, axes, apart);
+                let flight = Flight::new(cell, angle(k), axes, apart);
                 let mut next = [(0, 0.0); 4 * PLACES];
                 for m in 0..PLACES {
                     let at = flight.at((m as f64 + 0.5) / PLACES as f64);
@@ -41,38 +46,6 @@ impl Flights {
             }
         }
         out
-    }
-}
-
-/// A way from the middle of a cell.
-struct Flight {
-    from: (f64, f64),
-    /// In the circle that the section becomes, for each mean free path.
-    step: (f64, f64),
-    /// To the rim, in mean free paths, of which the first `apart` are free.
-    length: f64,
-    apart: f64,
-    /// The chance to meet something.
-    met: f64,
-}
-
-impl Flight {
-    fn new(cell: usize, direction: usize, [short, long]: [f64; 2], apart: f64) -> Self {
-        let r2 = ((cell / SECTORS) as f64 + 0.5) / RINGS as f64;
-        let (sin, cos) = (TAU * (cell % SECTORS) as f64 / SECTORS as f64).sin_cos();
-        let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
-        let (sin, cos) = (TAU * direction as f64 / DIRECTIONS as f64).sin_cos();
-        let (dx, dy) = (cos / short, sin / long);
-        let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
-        let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
-        let met = -(-(length - apart).max(0.0)).exp_m1();
-        Self { from: (x, y), step: (dx, dy), length, apart, met }
-    }
-
-    /// Where light meets something of which the share `u` has done so before.
-    fn at(&self, u: f64) -> (f64, f64) {
-        let s = if self.met > 1e-9 { self.apart - (-u * self.met).ln_1p() } else { u * self.length };
-        (self.from.0 + s * self.step.0, self.from.1 + s * self.step.1)
     }
 }
 
@@ -158,7 +131,8 @@ pub(super) fn solve(
         .map(|i| {
             let (sector, ring) = (i / RINGS, i % RINGS);
             let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
-            let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, k, axes(medium.radius), medium.apart).met;
+            let straight =
+                |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes(medium.radius), medium.apart).met;
             let rest = std::array::from_fn(|k| all[k] - straight(k));
             [Outgoing::new(1.0, all), Outgoing::new(1.0, rest)]
         })

@@ -12,6 +12,7 @@ use glam::Vec2;
 use crate::math::{Rgb, frame::sin_cos, sampler::Stream};
 
 mod bent;
+mod flight;
 mod linear;
 mod pressed;
 mod round;

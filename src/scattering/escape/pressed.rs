@@ -2,12 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, linear};
+use super::{
+    AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent,
+    flight::{CELLS, Flight, SECTORS, landing},
+    linear,
+};
 
-/// Sectors of the whole, a multiple of 4, and those from the short axis to the long one, with both.
-pub(super) const SECTORS: usize = 12;
+/// Sectors from the short axis to the long one, with both.
 pub(super) const QUARTER: usize = SECTORS / 4 + 1;
-pub(super) const CELLS: usize = RINGS * SECTORS;
 /// Directions, twice the azimuths that are held, and places along each, that are looked at from every cell.
 const DIRECTIONS: usize = 2 * AZIMUTHS;
 const PLACES: usize = 12;
@@ -20,27 +22,19 @@ struct Row {
 }
 
 impl Row {
-    fn new(ring: usize, sector: usize, [short, long]: [f64; 2], apart: f64) -> Self {
+    fn new(ring: usize, sector: usize, axes: [f64; 2], apart: f64) -> Self {
         let mut out = Self { escape: [0.0; AZIMUTHS], next: vec![0.0; CELLS] };
-        let r2 = (ring as f64 + 0.5) / RINGS as f64;
-        let (sin, cos) = (TAU * sector as f64 / SECTORS as f64).sin_cos();
-        let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
         for k in 0..DIRECTIONS {
-            let (sin, cos) = (TAU * k as f64 / DIRECTIONS as f64).sin_cos();
-            let (dx, dy) = (cos / short, sin / long);
-            // To the rim, in mean free paths.
-            let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
-            let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
-            let met = -(-(length - apart).max(0.0)).exp_m1();
+            let angle = TAU * k as f64 / DIRECTIONS as f64;
+            let flight = Flight::new(ring * SECTORS + sector, angle, axes, apart);
             // Directions between two azimuths by halves.
             for azimuth in [k / 2, k.div_ceil(2) % AZIMUTHS] {
-                out.escape[azimuth] += 0.5 * (1.0 - met) / DIRECTIONS as f64;
+                out.escape[azimuth] += 0.5 * (1.0 - flight.met) / DIRECTIONS as f64;
             }
             for m in 0..PLACES {
                 let u = (m as f64 + 0.5) / PLACES as f64;
-                let s = if met > 1e-9 { apart - (-u * met).ln_1p() } else { u * length };
-                for (cell, weight) in landing((x + s * dx, y + s * dy)) {
-                    out.next[cell] += weight * met / (DIRECTIONS * PLACES) as f64;
+                for (cell, weight) in landing(flight.at(u)) {
+                    out.next[cell] += weight * flight.met / (DIRECTIONS * PLACES) as f64;
                 }
             }
         }
@@ -72,20 +66,6 @@ impl Row {
         let next = (0..CELLS).map(|cell| self.next[cell / SECTORS * SECTORS + image(cell % SECTORS, SECTORS)]);
         Self { escape: std::array::from_fn(|k| self.escape[image(k, AZIMUTHS)]), next: next.collect() }
     }
-}
-
-/// In which cells a point is, and how much in each: by a cubic between the sectors, or light would spread around.
-pub(super) fn landing((x, y): (f64, f64)) -> [(usize, f64); 4] {
-    let ring = (((x * x + y * y) * RINGS as f64) as usize).min(RINGS - 1);
-    let at = y.atan2(x) / TAU * SECTORS as f64 + SECTORS as f64;
-    let (sector, t) = (at as usize, at.fract());
-    let weights = [
-        -t * (t - 1.0) * (t - 2.0) / 6.0,
-        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-        -t * (t + 1.0) * (t - 2.0) / 2.0,
-        t * (t + 1.0) * (t - 1.0) / 6.0,
-    ];
-    std::array::from_fn(|k| (ring * SECTORS + (sector + SECTORS + k - 1) % SECTORS, weights[k]))
 }
 
 /// Of light that meets something in each cell: what leaves at last towards each azimuth.

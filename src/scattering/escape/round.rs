@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, linear, pressed::SECTORS};
+use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, flight::SECTORS, linear};
 
 /// Directions, and places along each, that are looked at from every ring.
 const DIRECTIONS: usize = 24;

@@ -1,0 +1,59 @@
+//! Straight ways between the cells of an ellipse: rings and sectors of the circle that it becomes when its axes are made equal.
+
+use std::f64::consts::TAU;
+
+use super::RINGS;
+
+/// Sectors of the whole, a multiple of 4.
+pub(super) const SECTORS: usize = 12;
+/// Ring by ring, sector by sector from the short axis on.
+pub(super) const CELLS: usize = RINGS * SECTORS;
+
+/// A way from the middle of a cell.
+pub(super) struct Flight {
+    /// In the circle that the section becomes.
+    from: (f64, f64),
+    /// There, for each mean free path.
+    step: (f64, f64),
+    /// To the rim, in mean free paths, of which the first `apart` are free.
+    length: f64,
+    apart: f64,
+    /// The chance to meet something.
+    pub(super) met: f64,
+}
+
+impl Flight {
+    /// At an angle (radians) from the short axis of a section whose half axes are so many mean free paths long, of which the first `apart` of
+    /// a way are free.
+    pub(super) fn new(cell: usize, angle: f64, [short, long]: [f64; 2], apart: f64) -> Self {
+        let r2 = ((cell / SECTORS) as f64 + 0.5) / RINGS as f64;
+        let (sin, cos) = (TAU * (cell % SECTORS) as f64 / SECTORS as f64).sin_cos();
+        let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
+        let (sin, cos) = angle.sin_cos();
+        let (dx, dy) = (cos / short, sin / long);
+        let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
+        let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
+        let met = -(-(length - apart).max(0.0)).exp_m1();
+        Self { from: (x, y), step: (dx, dy), length, apart, met }
+    }
+
+    /// Where light meets something, when the share `u` of what does has done so: evenly along the way where next to nothing is met.
+    pub(super) fn at(&self, u: f64) -> (f64, f64) {
+        let s = if self.met > 1e-9 { self.apart - (-u * self.met).ln_1p() } else { u * self.length };
+        (self.from.0 + s * self.step.0, self.from.1 + s * self.step.1)
+    }
+}
+
+/// In which cells a point is, and how much in each: by a cubic between the sectors, or light would spread around.
+pub(super) fn landing((x, y): (f64, f64)) -> [(usize, f64); 4] {
+    let ring = (((x * x + y * y) * RINGS as f64) as usize).min(RINGS - 1);
+    let at = y.atan2(x) / TAU * SECTORS as f64 + SECTORS as f64;
+    let (sector, t) = (at as usize, at.fract());
+    let weights = [
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -t * (t + 1.0) * (t - 2.0) / 2.0,
+        t * (t + 1.0) * (t - 1.0) / 6.0,
+    ];
+    std::array::from_fn(|k| (ring * SECTORS + (sector + SECTORS + k - 1) % SECTORS, weights[k]))
+}
