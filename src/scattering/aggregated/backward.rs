@@ -117,32 +117,7 @@ impl Lobe {
         let frame = LobeFrame::of_ply(view.yarn.occluder().shape(), view.section, &node.crossing, view.camera);
         // As the fibres have it that the light met.
         let frame = frame.with_latitude(node.axial * node.spot.inside.along(frame.z));
-        // Light in the direction drawn meets a fibre in its own ply, or gets out of that and meets one in another.
-        let Drawn { direction, value: NodeValue { clear, open, .. }, escape, .. } = node.drawn;
-        let out_of_own = (clear / open.max(Rgb::splat(1e-30))).min(Rgb::ONE);
-        let stays = node.leaves * (Rgb::ONE - out_of_own);
-        let goes = out_of_own * (Rgb::ONE - open);
-        let mut away = None;
-        let (mut left, mut drawn) = (stays, 1.0);
-        if goes.max_channel() > 0.0 {
-            let [at_home, elsewhere] = [stays, goes * node.leaves_again].map(|left| (node.weight * left).mean());
-            let chance = elsewhere / (at_home + elsewhere).max(1e-30);
-            drawn = 1.0 - chance;
-            if stream.next() < chance {
-                let (_, met) = node.others(view, direction, stream);
-                let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
-                let there = Meeting::new(
-                    view,
-                    &frame,
-                    (&node.spot.inside, Vec3A::ZERO, direction, met),
-                    (goes, Light::Met),
-                    stream,
-                );
-                (left, drawn) = (there.energy, chance);
-                away = Some(there);
-            }
-        }
-        let left = left * drawn.max(1e-30).recip();
+        let (away, left) = Meeting::away(view, &frame, node, stream);
         let energy = node.amplitude * optics.albedo * left;
         let weight = node.weight * left;
         let channels = if weight.mean() > 1e-30 { weight * weight.mean().recip() } else { Rgb::ONE };
@@ -153,7 +128,7 @@ impl Lobe {
                 (node.spot, axes_across(&frame, axes), optics.leaving.draw(Light::Onward, &place, stream))
             }
         };
-        let (u_start, chance) = (stream.next(), 1.0 - escape);
+        let (u_start, chance) = (stream.next(), 1.0 - node.drawn.escape);
         let away = away.is_some();
         let mut lobe = Self { spot, away, frame, axes, outwards, energy, channels, chance, u_start, again: None };
         if view.yarn.occluder().shape().plies.len() > 1 && lobe.chance > 0.0 {
@@ -394,6 +369,29 @@ impl Taken {
 }
 
 impl Meeting {
+    /// Where light from the node in its direction is stopped by another ply, if it is and not in its own: one or the other by chance. And of
+    /// that light what leaves the ply that stops it, over the chance.
+    fn away(view: &View<'_>, frame: &LobeFrame, node: &Node, stream: &mut Stream) -> (Option<Self>, Rgb) {
+        let Drawn { direction, value: NodeValue { clear, open, .. }, .. } = node.drawn;
+        let out_of_own = (clear / open.max(Rgb::splat(1e-30))).min(Rgb::ONE);
+        let stays = node.leaves * (Rgb::ONE - out_of_own);
+        let goes = out_of_own * (Rgb::ONE - open);
+        if goes.max_channel() <= 0.0 {
+            return (None, stays);
+        }
+        let [at_home, elsewhere] = [stays, goes * node.leaves_again].map(|left| (node.weight * left).mean());
+        let chance = elsewhere / (at_home + elsewhere).max(1e-30);
+        if stream.next() >= chance {
+            return (None, stays * (1.0 - chance).max(1e-30).recip());
+        }
+        let (_, met) = node.others(view, direction, stream);
+        let met = met.unwrap_or(Met { ply: node.spot.ply, distance: 0.0 });
+        let from = (&node.spot.inside, Vec3A::ZERO, direction, met);
+        let there = Self::new(view, frame, from, (goes, Light::Met), stream);
+        let left = there.energy * chance.max(1e-30).recip();
+        (Some(there), left)
+    }
+
     /// Where so much light meets a ply that set out towards `w` at `shift` from a place.
     fn new(
         view: &View<'_>,
