@@ -18,7 +18,6 @@ use super::{
         mis_weight,
     },
     Spot, View,
-    ahead::FibersAhead,
     single::{Among, Drawn, Met, Node, NodeValue},
 };
 use crate::{
@@ -200,57 +199,48 @@ impl Lobe {
         (arriving, spread)
     }
 
-    /// From a place to where other plies are counted of light that wandered about from there and leaves towards `w`. Where plies lie in each
-    /// other it has left some of theirs behind by then: halfway to where it leaves its own ([`Self::start`]).
-    fn come_by_then(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Vec3A {
+    /// From a place to where other plies are counted of light that wandered about from there and leaves from `start` ([`Self::start`]). Where
+    /// plies lie in each other it has left some of theirs behind by then: halfway to where it leaves its own.
+    fn come_by_then(view: &View<'_>, spot: &Spot, start: impl FnOnce() -> Vec3A) -> Vec3A {
         const COME: f32 = 0.5;
-        if view.yarn.plies_overlap { COME * (self.start(view, spot, w) - spot.inside.point) } else { Vec3A::ZERO }
+        if view.yarn.plies_overlap { COME * (start() - spot.inside.point) } else { Vec3A::ZERO }
     }
 
-    /// The optical depth of plies other than that of a place, for light that wandered about from there and leaves towards `w`; `other` is
-    /// told of each, and of the fibres on its way.
-    fn past_own(&self, view: &View<'_>, spot: &Spot, w: Vec3A, other: impl FnMut(FibersAhead)) -> Rgb {
-        spot.past_own(view, self.come_by_then(view, spot, w), w, other)
-    }
-
-    /// What other plies let pass in a direction, and where light meets one of them, if it does.
-    fn others(&self, view: &View<'_>, node: &Node, w: Vec3A, stream: &mut Stream) -> (Rgb, Option<Met>) {
-        if !self.away && !view.yarn.plies_overlap {
-            return node.others(view, w, stream);
-        }
-        let mut among = Among::default();
-        let depth = self.past_own(view, &self.spot, w, |fibers| among.offer(fibers, stream));
-        ((-depth).exp(), among.met(view, stream))
+    /// What plies other than that of a place let pass of light that wandered about from there and leaves towards `w`.
+    fn open(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Rgb {
+        let shift = Self::come_by_then(view, spot, || self.start(view, spot, w));
+        (-spot.past_own(view, shift, w, |_| {})).exp()
     }
 
     /// Follows a direction of light that leaves the ply, and one of what the next ply gives off.
     fn again(&self, view: &View<'_>, node: &Node, stream: &mut Stream) -> Option<Again> {
         let w = self.draw(view, stream);
         let (value, pdf) = self.value(view, w);
-        let (open, met) = self.others(view, node, w, stream);
-        let (way, rest) = Taken::new(node, (self.start(view, &self.spot, w), w, value, pdf), open)?;
+        let start = self.start(view, &self.spot, w);
+        let shift = Self::come_by_then(view, &self.spot, || start);
+        let (open, met) = match self.away || view.yarn.plies_overlap {
+            true => others_past(view, &self.spot, (shift, w), stream),
+            false => node.others(view, w, stream),
+        };
+        let (way, rest) = Taken::new(node, (start, w, value, pdf), open)?;
         let mut again = Again { ways: ArrayVec::from_iter([way]), meetings: ArrayVec::new() };
         if rest.max_channel() <= 0.0 {
             return Some(again);
         }
         let met = met.unwrap_or(Met { ply: self.spot.ply, distance: 0.0 });
-        let first = Meeting::new(
-            view,
-            &self.frame,
-            (&self.spot.inside, self.come_by_then(view, &self.spot, w), w, met),
-            (rest, Light::Met),
-            stream,
-        );
+        let from = (&self.spot.inside, shift, w, met);
+        let first = Meeting::new(view, &self.frame, from, (rest, Light::Met), stream);
         let w = first.draw(view, &self.frame, stream);
         let (value, pdf) = first.value(view, &self.frame, w);
-        let mut among = Among::default();
-        let open = (-self.past_own(view, &first.spot, w, |fibers| among.offer(fibers, stream))).exp();
-        let (way, rest) = Taken::new(node, (self.start(view, &first.spot, w), w, value, pdf), open)?;
+        let start = self.start(view, &first.spot, w);
+        let shift = Self::come_by_then(view, &first.spot, || start);
+        let (open, met) = others_past(view, &first.spot, (shift, w), stream);
+        let (way, rest) = Taken::new(node, (start, w, value, pdf), open)?;
         again.ways.push(way);
         again.meetings.push(first);
         if rest.max_channel() > 0.0 {
-            let met = among.met(view, stream).unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
-            let from = (&first.spot.inside, self.come_by_then(view, &first.spot, w), w, met);
+            let met = met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
+            let from = (&first.spot.inside, shift, w, met);
             again.meetings.push(Meeting::new(view, &self.frame, from, (rest, Light::MetForGood), stream));
         }
         Some(again)
@@ -273,11 +263,7 @@ impl Lobe {
         match &self.again {
             None => visit(&self.spot, first * mis_weight(light_pdf, chance * pdf)),
             Some(again) => {
-                let open = if self.away || view.yarn.plies_overlap {
-                    (-self.past_own(view, &self.spot, w, |_| {})).exp()
-                } else {
-                    open
-                };
+                let open = if self.away || view.yarn.plies_overlap { self.open(view, &self.spot, w) } else { open };
                 let goes_on = |open: Rgb| node.chance_out(open, node.leaves_again);
                 visit(&self.spot, first * open * mis_weight(light_pdf, chance * goes_on(open) * pdf));
                 let mut left = chance * (1.0 - again.ways[0].open);
@@ -288,7 +274,7 @@ impl Lobe {
                         break;
                     };
                     if value.max_channel() > 0.0 {
-                        let open = (-self.past_own(view, &meeting.spot, w, |_| {})).exp();
+                        let open = self.open(view, &meeting.spot, w);
                         visit(&meeting.spot, value * open * mis_weight(light_pdf, left * goes_on(open) * pdf));
                     }
                     left *= 1.0 - next.open;
@@ -431,6 +417,14 @@ impl Meeting {
         let around = view.yarn.plies[self.spot.ply].leaving.azimuth(self.outwards, Rgb::mean, stream);
         direction(frame, sample_sine_diffuse(u), around, self.axes)
     }
+}
+
+/// What plies other than that of a place let pass on a way, by its shift from there and its direction, and where light meets one of them, if
+/// it does: as [`Node::others`] has it of the node's.
+fn others_past(view: &View<'_>, spot: &Spot, (shift, w): (Vec3A, Vec3A), stream: &mut Stream) -> (Rgb, Option<Met>) {
+    let mut among = Among::default();
+    let depth = spot.past_own(view, shift, w, |fibers| among.offer(fibers, stream));
+    ((-depth).exp(), among.met(view, stream))
 }
 
 /// The side of a ply's outline that faces a direction, in the axes of [`Inside::in_ply`], and how much of the light leaves there from each part
