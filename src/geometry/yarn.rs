@@ -119,6 +119,17 @@ pub struct YarnShape {
     pub symmetry: f64,
 }
 
+impl PlyShape {
+    /// A point of the unwound yarn's section from the ply's axis, in the circle of [`Self::radius`] that the ply's section becomes when its axes
+    /// are made equal.
+    #[inline]
+    pub(super) fn in_circle(&self, at: Vec2) -> Vec2 {
+        let from = at - self.distance * self.direction;
+        let (along, across) = (from.dot(self.direction), self.direction.perp_dot(from));
+        self.stretch.x * along * self.direction + self.stretch.y * across * self.direction.perp()
+    }
+}
+
 impl YarnShape {
     /// From the plies and the angle (radians) that a ply makes with the yarn's axis at its centre's distance.
     ///
@@ -171,11 +182,7 @@ impl YarnShape {
     pub fn plies_overlap(&self) -> bool {
         const RINGS: u16 = 32;
         const SECTORS: u16 = 64;
-        let inside = |of: &PlyShape, at: Vec2| {
-            let from = at - of.distance * of.direction;
-            let circle = of.stretch * Vec2::new(from.dot(of.direction), from.dot(of.direction.perp()));
-            circle.length_squared() < of.radius * of.radius
-        };
+        let inside = |of: &PlyShape, at: Vec2| of.in_circle(at).length_squared() < of.radius * of.radius;
         let covered = |(ply, own): (usize, &PlyShape)| {
             let within = (0..RINGS * SECTORS).filter(|place| {
                 let radius = own.radius * ((f32::from(place / SECTORS) + 0.5) / f32::from(RINGS)).sqrt();

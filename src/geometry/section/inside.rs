@@ -51,10 +51,7 @@ impl Inside {
     #[inline]
     pub fn in_ply(&self, shape: &YarnShape, ply: usize) -> Vec2 {
         let ply = &shape.plies[ply];
-        let from = self.at - ply.distance * ply.direction;
-        let (along, across) = (from.dot(ply.direction), ply.direction.perp_dot(from));
-        let circle = ply.stretch.x * along * ply.direction + ply.stretch.y * across * ply.direction.perp();
-        circle / ply.core_radius
+        ply.in_circle(self.at) / ply.core_radius
     }
 
     /// The point of a ply's axis abreast of this one, in the section's frame.
