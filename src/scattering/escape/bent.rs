@@ -6,7 +6,7 @@ use wide::f32x8;
 
 use super::{
     AZIMUTHS, Bends, Medium, Outgoing, RINGS,
-    flight::{CELLS, Flight, SECTORS, landing},
+    flight::{CELLS, Flight, QUARTER, SECTORS, landing},
 };
 
 /// Directions, one for each azimuth that is held, and places along each, that are looked at from every cell.
@@ -68,15 +68,17 @@ fn turns(sigma: f64, share: f64) -> [f32; DIRECTIONS] {
     parts.map(|part| (part / all) as f32)
 }
 
-/// Where to light leaves of each cell between the short axis and the long one, by `sectors` of them and by rings, but for a factor: of
-/// light that meets something in the cell, and of light that goes on from there and is not counted as going straight out.
+/// Where to light leaves of each cell between the short axis and the long one, by [`QUARTER`] sectors and by rings: over what would go there if it
+/// left evenly.
+pub(super) struct Bent {
+    /// Of light that meets something in the cell.
+    pub(super) met: Vec<[f64; AZIMUTHS]>,
+    /// Of light that goes on from there and is not counted as going straight out.
+    pub(super) onward: Vec<[f64; AZIMUTHS]>,
+}
+
 /// `without` is what leaves of each cell towards an azimuth where no direction is known, of light that meets something there.
-pub(super) fn solve(
-    medium: &Medium,
-    bends: &Bends,
-    stretch: f64,
-    without: impl Fn(usize, usize) -> f64,
-) -> Vec<[Outgoing; 2]> {
+pub(super) fn solve(medium: &Medium, bends: &Bends, stretch: f64, without: impl Fn(usize, usize) -> f64) -> Bent {
     let axes = |radius: f64| [radius / stretch.sqrt(), radius * stretch.sqrt()];
     let flights = Flights::new(axes(bends.radius), bends.apart);
     let turns = turns(bends.sigma, bends.share).map(|chance| f32x8::splat(bends.chain as f32 * chance));
@@ -126,15 +128,13 @@ pub(super) fn solve(
         let (k, sector) = if k >= SOLVED { (AZIMUTHS / 2 - k, half + SECTORS - sector) } else { (k, sector) };
         f64::from(mean[ring * SECTORS + sector % SECTORS][k])
     };
-    let quarter = SECTORS / 4 + 1;
-    (0..quarter * RINGS)
-        .map(|i| {
-            let (sector, ring) = (i / RINGS, i % RINGS);
-            let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
-            let straight =
-                |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes(medium.radius), medium.apart).met;
-            let rest = std::array::from_fn(|k| all[k] - straight(k));
-            [Outgoing::new(1.0, all), Outgoing::new(1.0, rest)]
-        })
-        .collect()
+    let of_cell = |i: usize| {
+        let (sector, ring) = (i / RINGS, i % RINGS);
+        let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
+        let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes(medium.radius), medium.apart).met;
+        let rest = std::array::from_fn(|k| all[k] - straight(k));
+        (Outgoing::new(1.0, all).azimuths, Outgoing::new(1.0, rest).azimuths)
+    };
+    let (met, onward) = (0..QUARTER * RINGS).map(of_cell).unzip();
+    Bent { met, onward }
 }

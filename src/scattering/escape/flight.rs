@@ -6,6 +6,8 @@ use super::RINGS;
 
 /// Sectors of the whole, a multiple of 4.
 pub(super) const SECTORS: usize = 12;
+/// Those from the short axis to the long one, with both.
+pub(super) const QUARTER: usize = SECTORS / 4 + 1;
 /// Ring by ring, sector by sector from the short axis on.
 pub(super) const CELLS: usize = RINGS * SECTORS;
 

@@ -131,10 +131,10 @@ struct Solved {
     entering: f64,
 }
 
-/// Light of cells leaves towards azimuths that were found with directions: those of light that meets something there, or goes on.
-fn turn(cells: &mut [[Outgoing; RINGS]], bent: &[[Outgoing; 2]], which: usize) {
-    for (cell, of) in cells.iter_mut().flatten().zip(bent) {
-        cell.azimuths = of[which].azimuths;
+/// Light of cells leaves towards azimuths that were found with directions.
+fn turn(cells: &mut [[Outgoing; RINGS]], azimuths: &[[f64; AZIMUTHS]]) {
+    for (cell, azimuths) in cells.iter_mut().flatten().zip(azimuths) {
+        cell.azimuths = *azimuths;
     }
 }
 
@@ -207,7 +207,7 @@ impl Leaving {
         let shares = (0..held).map(|i| rgb(&|of| of.held[i].share));
         let azimuths = |i: usize| std::array::from_fn(|k| rgb(&|of| of.held[i].azimuths[k]));
         Self {
-            sectors: if stretch > NEARLY_ROUND { pressed::QUARTER } else { 1 },
+            sectors: if stretch > NEARLY_ROUND { flight::QUARTER } else { 1 },
             cells,
             shares: shares.chain((0..held - cells).map(|i| rgb(&|of| of.for_good[i]))).collect(),
             azimuths: (0..held).map(azimuths).collect(),

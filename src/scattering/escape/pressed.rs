@@ -4,12 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{
     AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent,
-    flight::{CELLS, Flight, SECTORS, landing},
+    flight::{CELLS, Flight, QUARTER, SECTORS, landing},
     linear,
 };
 
-/// Sectors from the short axis to the long one, with both.
-pub(super) const QUARTER: usize = SECTORS / 4 + 1;
 /// Directions, twice the azimuths that are held, and places along each, that are looked at from every cell.
 const DIRECTIONS: usize = 2 * AZIMUTHS;
 const PLACES: usize = 12;
@@ -112,7 +110,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
     let mut onward = cells(&|own| mean(&near[own].next, &out, own));
     let bent = medium.bends.map(|bends| bent::solve(medium, &bends, stretch, |cell, k| out[cell * AZIMUTHS + k]));
     if let Some(bent) = &bent {
-        super::turn(&mut onward, bent, 1);
+        super::turn(&mut onward, &bent.onward);
     }
     let mut solved = Solved { onward, met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
     if !medium.alone {
@@ -123,7 +121,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         };
         solved.met = cells(&|cell| of(&past, cell));
         if let Some(bent) = &bent {
-            super::turn(&mut solved.met, bent, 0);
+            super::turn(&mut solved.met, &bent.met);
         }
         solved.for_good = cells(&|cell| of(&for_good, cell)).iter().map(|rings| rings.map(|out| out.share)).collect();
         let enters: Vec<f64> = rows.iter().map(|row| row.escape.iter().sum()).collect();

@@ -114,8 +114,8 @@ pub(super) fn solve(medium: &Medium) -> Solved {
         }))
     });
     let mut onward = vec![onward];
-    let alike: [Outgoing; RINGS] = std::array::from_fn(|i| outgoing(std::array::from_fn(|m| leaving[m][i])));
     let bent = medium.bends.map(|bends| {
+        let alike: [Outgoing; RINGS] = std::array::from_fn(|i| outgoing(std::array::from_fn(|m| leaving[m][i])));
         bent::solve(medium, &bends, 1.0, |cell, k| {
             let turned = k + AZIMUTHS - cell % SECTORS * (AZIMUTHS / SECTORS);
             let of = &alike[cell / SECTORS];
@@ -123,14 +123,14 @@ pub(super) fn solve(medium: &Medium) -> Solved {
         })
     });
     if let Some(bent) = &bent {
-        super::turn(&mut onward, bent, 1);
+        super::turn(&mut onward, &bent.onward);
     }
     let mut solved = Solved { onward, met: Vec::new(), for_good: Vec::new(), entering: 0.0 };
     if !medium.alone {
         let past = open.leaving(medium.albedo);
         solved.met.push(std::array::from_fn(|i| outgoing(std::array::from_fn(|m| past[m][i]))));
         if let Some(bent) = &bent {
-            super::turn(&mut solved.met, bent, 0);
+            super::turn(&mut solved.met, &bent.met);
         }
         let for_good = open.closed(medium.taken_back).leaving(medium.albedo)[0];
         solved.for_good.push(for_good);
