@@ -38,6 +38,7 @@ use crate::{
     },
     image::output,
     input::{diagnostic::hinted, document::Value},
+    math::words::counted,
     plan,
     render::OutOfMemory,
     scene::{
@@ -391,11 +392,11 @@ fn folds_in_words(scene: &Scene, fabric: &Fabric, folds: &Folds, yarns: usize) -
     let Folds { worst, places, .. } = folds;
     let at = folds.at + scene.middle;
     format!(
-        "{}: {} of {yarns} yarns bend so tightly at {places} place{} that they fold into themselves and their plies break; the \
+        "{}: {} of {yarns} yarns bend so tightly at {} that they fold into themselves and their plies break; the \
          worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
         fabric.origin,
         folds.yarns,
-        if *places == 1 { "" } else { "s" },
+        counted(*places, "place"),
         worst.yarn,
         worst.segment,
         fabric.panel_of(worst.yarn).map_or(String::new(), |name| format!(" of panel `{name}`")),
