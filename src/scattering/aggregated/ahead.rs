@@ -3,12 +3,9 @@
 use arrayvec::ArrayVec;
 use glam::Vec3A;
 
-use super::View;
+use super::{Spot, View};
 use crate::{
-    geometry::{
-        density::ChordFibers,
-        section::{Inside, PlyAhead},
-    },
+    geometry::{density::ChordFibers, section::PlyAhead},
     math::{Rgb, sampler::Stream},
 };
 
@@ -63,22 +60,6 @@ pub(super) const STRETCHES: usize = 16;
 /// The plies on a way out, in no order.
 pub(super) type PliesAhead = ArrayVec<FibersAhead, STRETCHES>;
 
-/// How fibres look across a way: in units of those of the round yarn, for [`FibersAhead::new`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Across {
-    w: Vec3A,
-    thin: f32,
-    wide: f32,
-}
-
-impl Across {
-    /// For a way from a place in the direction `w` of the section's frame.
-    #[inline]
-    pub(super) fn new(view: &View<'_>, from: &Inside, w: Vec3A) -> Self {
-        Self { w, thin: view.section.thinness(), wide: from.wide(w) }
-    }
-}
-
 /// The fibres of a ply on a way out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FibersAhead {
@@ -94,18 +75,34 @@ pub(super) struct FibersAhead {
     pub(super) expected: f32,
 }
 
-impl FibersAhead {
-    /// Of a ply that lies ahead of a place, from the distance `free` on: the middles of other fibres are no nearer.
-    #[inline]
-    pub(super) fn new(view: &View<'_>, from: &Inside, across: Across, ahead: &PlyAhead<'_>, free: f32) -> Self {
-        let Across { w, thin, wide } = across;
-        let shape = view.yarn.occluder().shape();
-        let &PlyAhead { ply, foot, offset, length, .. } = ahead;
+/// The fibres of the plies on a way out from `shift` beside a place, in the direction `w` of the section's frame: of the place's own ply from
+/// the distance `own` on, if they are asked for, and of others from `free` on.
+///
+/// A vertex asks a dozen times, from as many places of its code: one copy of this for all of them stays in the processor's cache.
+#[inline(never)]
+pub(super) fn plies_ahead(
+    view: &View<'_>,
+    spot: &Spot,
+    (shift, w): (Vec3A, Vec3A),
+    own: Option<f32>,
+    free: f32,
+) -> PliesAhead {
+    let from = &spot.inside;
+    let (thin, wide) = (view.section.thinness(), from.wide(w));
+    let shape = view.yarn.occluder().shape();
+    let mut plies = PliesAhead::new();
+    view.section.plies_ahead(shape, from, shift, w, |ahead| {
+        let Some(free) = (if ahead.ply == spot.ply { own } else { Some(free) }) else { return };
+        let PlyAhead { ply, foot, offset, length, .. } = ahead;
         let chord = shape.plies[ply].chord(offset, length, thin, wide);
         let tilt = ahead.tilt(shape, view.section, from, w, &chord);
-        Self { ply, offset, foot, tilt, chord, expected: tilt * chord.ahead(free - foot) }
-    }
+        let fibers = FibersAhead { ply, offset, foot, tilt, chord, expected: tilt * chord.ahead(free - foot) };
+        let _ = plies.try_push(fibers);
+    });
+    plies
+}
 
+impl FibersAhead {
     /// Where plies lie in each other: the share of the fibres that light meets which passes nearly all, of those that it meets in this ply
     /// alone. Others begin within a fibre of another ply on the way, which it has met already.
     #[inline]

@@ -12,7 +12,7 @@ use super::{
         medium::TtWidth,
     },
     Spot, Turned, View,
-    ahead::{Across, FibersAhead, STRETCHES, Stretch, nearest},
+    ahead::{FibersAhead, STRETCHES, Stretch, nearest, plies_ahead},
 };
 use crate::{
     geometry::{
@@ -358,20 +358,18 @@ impl Fiber {
     fn follow_way(&self, view: &View<'_>, way: &Way<'_>, mut visit: impl FnMut(PlyOnWay)) -> f32 {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
-        let across = Across::new(view, &spot.inside, way.w);
         let mut all = 1.0;
-        view.section.plies_ahead(shape, &spot.inside, way.shift, way.w, |ahead| {
-            let gaps = yarn.plies[ahead.ply].gaps;
-            let own = ahead.ply == spot.ply;
-            let fibers = FibersAhead::new(view, &spot.inside, across, &ahead, if own { 0.0 } else { way.free });
+        for fibers in plies_ahead(view, spot, (way.shift, way.w), Some(0.0), way.free) {
+            let gaps = yarn.plies[fibers.ply].gaps;
+            let own = fibers.ply == spot.ply;
             let through = if own {
-                (-gaps.rate * way.after.met(fibers.expected, shape.plies[ahead.ply].by_rim(ahead.offset))).exp()
+                (-gaps.rate * way.after.met(fibers.expected, shape.plies[fibers.ply].by_rim(fibers.offset))).exp()
             } else {
                 gaps.unscattered(fibers.expected)
             };
             all *= through;
             visit(PlyOnWay { fibers, gaps, own, through });
-        });
+        }
         all
     }
 

@@ -38,7 +38,7 @@ use crate::{
         sampler::{OneOf, Stream},
     },
 };
-use ahead::{Across, FibersAhead, PliesAhead};
+use ahead::{FibersAhead, plies_ahead};
 use backward::{Backward, Lobe};
 use forward::Forward;
 use single::LateNode;
@@ -189,15 +189,8 @@ impl Spot {
     /// fibres on its way.
     #[inline]
     fn past_own(&self, view: &View<'_>, shift: Vec3A, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
-        let shape = view.yarn.occluder().shape();
-        let across = Across::new(view, &self.inside, w);
         let free = 2.0 * view.section.thinness() * view.yarn.plies[self.ply].lead;
-        let mut ahead = PliesAhead::new();
-        view.section.plies_ahead(shape, &self.inside, shift, w, |way| {
-            if way.ply != self.ply || view.yarn.plies_overlap {
-                let _ = ahead.try_push(FibersAhead::new(view, &self.inside, across, &way, free));
-            }
-        });
+        let ahead = plies_ahead(view, self, (shift, w), view.yarn.plies_overlap.then_some(free), free);
         let mut depth = Rgb::ZERO;
         for fibers in ahead.iter().filter(|of| of.ply != self.ply && of.expected > 0.0) {
             depth += fibers.depth(view, &ahead);

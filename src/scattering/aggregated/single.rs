@@ -16,7 +16,7 @@ use super::{
         medium::PlyOptics,
     },
     Spot, Turned, View,
-    ahead::{Across, FibersAhead, PliesAhead},
+    ahead::{FibersAhead, plies_ahead},
     forward::ChainEnd,
 };
 use crate::{
@@ -262,7 +262,6 @@ impl Node {
         let later = self.before > 0.0;
         let width = 2.0 * view.section.thinness() * beside * shape.plies[spot.ply].fiber_radius;
         let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
-        let across = Across::new(view, &spot.inside, w);
         let short = spot.inside.along_short_axis(w);
         let direct = (strip(turn), optics.after.turned(later, turn, short));
         let cosine = optics.tt.cosine;
@@ -271,11 +270,7 @@ impl Node {
             let [turn, squared] = [turn * cosine, 0.5 + (turn * turn - 0.5) * cosine.powi(4)];
             (strip(-squared.sqrt()), optics.after.turned(later, turn, short))
         });
-        let mut ahead = PliesAhead::new();
-        view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
-            let free = if way.ply == spot.ply { 0.0 } else { free };
-            let _ = ahead.try_push(FibersAhead::new(view, &spot.inside, across, &way, free));
-        });
+        let ahead = plies_ahead(view, spot, (shift, w), Some(0.0), free);
         let mut out = WayOut::default();
         for fibers in &ahead {
             if fibers.ply == spot.ply {
