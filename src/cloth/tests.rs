@@ -154,11 +154,19 @@ fn come_in_through_ends(source: &str) {
 
 #[test]
 fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
-    // Tubes of yarns that are pressed flat overlap where the yarns touch.
-    let text = "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
-         [yarn.a]\nradius = 0.5\nplies = 3\nply_twist = 15\nfibers = 30\ndensity = 0.2\nfiber = \"f\"\n\
-         [[fabric]]\nyarn = \"a\"\nsource = { type = \"weave\", warps = 6, wefts = 5, flatten = 1.8 }\n";
-    let scene = parse("a test", text, &LoadOptions::default()).unwrap();
+    // Tubes of yarns that are pressed flat overlap where the yarns touch. Those of the twill bend more sharply than a circle of their radius.
+    // There 1.6 % missed what is ahead where they were followed in long steps alone, and 1.06 % do.
+    start_within_a_tube("plies = 3\nply_twist = 15", "plain\", flatten = 1.8", 0.01);
+    start_within_a_tube("plies = 2\nply_twist = -14", "twill 2/1\"", 0.013);
+}
+
+fn start_within_a_tube(yarn: &str, draft: &str, most: f64) {
+    let text = format!(
+        "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
+         [yarn.a]\nradius = 0.5\n{yarn}\nfibers = 30\ndensity = 0.2\nfiber = \"f\"\n\
+         [[fabric]]\nyarn = \"a\"\nsource = {{ type = \"weave\", warps = 6, wefts = 5, draft = \"{draft} }}\n"
+    );
+    let scene = parse("a test", &text, &LoadOptions::default()).unwrap();
     let (low, high) = scene.bounds().unwrap();
     let (cloth, _) = Cloth::new(&scene, 1).unwrap();
     let world = cloth.world();
@@ -184,8 +192,8 @@ fn rays_that_start_within_a_tube_meet_the_plies_ahead() {
         missed += usize::from(ahead - whole > 0.3);
     }
     // The rest is mostly grazed by plies: a little less or more, by where the yarn was looked at from.
-    assert!(within > 1000 && same as f64 > 0.92 * within as f64, "{same} of {within}");
-    assert!((missed as f64) < 0.01 * within as f64, "{missed} of {within} miss what is ahead");
+    assert!(within > 1000 && same as f64 > 0.92 * within as f64, "{draft}: {same} of {within}");
+    assert!((missed as f64) < most * within as f64, "{draft}: {missed} of {within} miss what is ahead");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use crate::{
         ray::{Ray, YarnPlace},
         section::{Crossings, Section},
         walk::Walker,
+        yarn_frame::YarnFrame,
     },
 };
 
@@ -20,9 +21,12 @@ const NEAR_AN_END: f32 = 64.0;
 
 /// The longest chord of a tube times the slope at which a ray leaves it, in yarn radii: 2 if it is straight.
 const LONGEST_CHORD: f32 = 5.0;
-/// The longest step by which a ray is followed back through a tube, in yarn radii, and how many there are at the most.
+/// The longest step by which a ray is followed back through a tube, in yarn radii; the longest where that leads astray in a bend of more
+/// than so much of the curvature of a circle of the yarn's radius; and how many there are at the most.
 const STEP: f32 = 1.0;
-const MOST_STEPS: f32 = 16.0;
+const SHORT_STEP: f32 = 0.25;
+const SHARP: f32 = 0.4;
+const MOST_STEPS: f32 = 64.0;
 /// The square of how far from its axis a place still counts as within a tube while it is walked to, in yarn radii.
 const ABOUT_WITHIN: f32 = 1.2;
 /// A step along the yarn below which a place counts as abreast of a point, in yarn radii, and how many there are at the most.
@@ -76,24 +80,13 @@ impl<'a> Met<'a> {
         if leaving.t * slope > LONGEST_CHORD * radius || done(leaving.segment) {
             return None;
         }
-        // Back along the ray, which is within the tube all the way if it starts there.
-        let (mut walker, mut place) = Walker::new(strands, leaving.segment, leaving.u, ray.time);
-        let steps = (leaving.t / (STEP * radius)).ceil().clamp(1.0, MOST_STEPS);
-        let mut left = steps;
-        while left > 0.0 {
-            left -= 1.0;
-            let point = ray.origin + left / steps * leaving.t * ray.direction;
-            place = walker.walk_abreast(&place, point)?;
-            if place.beside(point).length_squared() > ABOUT_WITHIN * place.radius * place.radius {
-                return None;
-            }
-        }
-        for _ in 0..MOST_CORRECTIONS {
-            if (ray.origin - place.centre).dot(place.tangent).abs() < ABREAST * place.radius {
-                break;
-            }
-            place = walker.walk_abreast(&place, ray.origin)?;
-        }
+        let at = Walker::new(strands, leaving.segment, leaving.u, ray.time);
+        let back = |step: f32| walk_back(at, ray, leaving, step * radius);
+        let found = match back(STEP) {
+            Back::Lost => back(SHORT_STEP),
+            found => found,
+        };
+        let Back::Abreast(walker, place) = found else { return None };
         let outside = (ray.origin - place.centre).length_squared() >= place.radius * place.radius;
         if outside || done(walker.segment()) {
             return None;
@@ -102,6 +95,45 @@ impl<'a> Met<'a> {
         let tilted = yarns.occluders.own().shape().tilted;
         let section = Section::at_start((walker, place), ray.origin, ray.direction, tilted);
         Some(Self { hit, section: Section { looked_at: ray.looks, ..section } })
+    }
+}
+
+/// Where a ray starts along a yarn that it leaves.
+enum Back<'a> {
+    /// Abreast of this place.
+    Abreast(Walker<'a>, YarnFrame),
+    /// Outside of the tube, or beyond the yarn's end.
+    Outside,
+    /// Where the yarn bends sharply, steps of this length lead astray.
+    Lost,
+}
+
+/// Walks back from where a ray leaves a yarn, which is within the tube all the way if it starts there, to the place abreast of its start.
+fn walk_back<'a>((mut walker, mut place): (Walker<'a>, YarnFrame), ray: &Ray, leaving: &RawHit, step: f32) -> Back<'a> {
+    let mut sharpest = 0.0f32;
+    let steps = (leaving.t / step).ceil().clamp(1.0, MOST_STEPS);
+    let mut left = steps;
+    let mut corrections = 0;
+    loop {
+        let point = ray.origin + left / steps * leaving.t * ray.direction;
+        if left < steps {
+            let Some(next) = walker.walk_abreast(&place, point) else { return Back::Outside };
+            place = next;
+            sharpest = sharpest.max(place.curvature.length() * place.radius);
+        }
+        let astray = || if sharpest > SHARP { Back::Lost } else { Back::Outside };
+        if place.beside(point).length_squared() > ABOUT_WITHIN * place.radius * place.radius {
+            return astray();
+        }
+        if left > 0.0 {
+            left -= 1.0;
+        } else if (point - place.centre).dot(place.tangent).abs() < ABREAST * place.radius {
+            return Back::Abreast(walker, place);
+        } else if corrections == MOST_CORRECTIONS {
+            return astray();
+        } else {
+            corrections += 1;
+        }
     }
 }
 

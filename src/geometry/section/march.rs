@@ -31,6 +31,17 @@ pub(super) struct Reach {
     pub(super) bend: f32,
 }
 
+/// By how much a yarn may turn where it is taken for its circle of curvature, radians.
+const SHARP_REACH: f32 = 0.3;
+
+impl Reach {
+    /// How far along the yarn from a place with that bend it is taken for its circle of curvature: a sharp bend is over soon.
+    #[inline]
+    pub(super) fn near(&self, bend: Vec2) -> f32 {
+        self.near.min(SHARP_REACH / bend.length().max(1e-6))
+    }
+}
+
 /// A ray that looks: off by less than 0.02 yarn radii.
 pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
 /// A ray that gathers light.
@@ -41,6 +52,8 @@ pub(super) const LIGHT: Reach = Reach { near: 0.5, longest: 16.0, turn: 2.0 * MO
 const LEAST_STEP: f32 = 0.1;
 /// The shortest that a step is made by turns and bends, in yarn radii.
 const SHORTEST_STEP: f32 = 0.02;
+/// Of what a reach lets plies turn in a step, how much they may turn when the step is made; else it is halved.
+const MOST_TURNED: f32 = 0.8;
 /// What may be left of a way without another station, in yarn radii.
 pub(super) const LEAST_LEFT: f32 = 1e-3;
 /// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
@@ -138,7 +151,7 @@ impl Section<'_> {
                     // How far it turns, and how much faster at the end than at the start.
                     let turned = (next.station.travel - station.travel).abs();
                     let hastened = 2.0 * step * (next.station.advance - station.advance).abs();
-                    if rate * turned.max(hastened) <= 1.3 * reach.turn || step <= SHORTEST_STEP {
+                    if rate * turned.max(hastened) <= MOST_TURNED * reach.turn || step <= SHORTEST_STEP {
                         break;
                     }
                     step *= 0.5;
@@ -154,7 +167,7 @@ impl Section<'_> {
     /// The yarn about the place so far along it: the section itself, if that is near enough.
     #[inline]
     pub(super) fn neighbourhood(&self, rate: f32, travel: f32, reach: Reach) -> Neighbourhood {
-        if travel.abs() > reach.near
+        if travel.abs() > reach.near(self.bend)
             && let Some(far) = self.walk_to(travel, reach)
         {
             return far;
@@ -211,7 +224,7 @@ impl Section<'_> {
         reach: Reach,
     ) -> Step {
         let mut unbent = near.unbend(point, direction);
-        if unbent.travel.abs() > reach.near
+        if unbent.travel.abs() > reach.near(near.bend)
             && let Some(far) = self.walk_to(near.travel + unbent.travel, reach)
         {
             *near = far;
