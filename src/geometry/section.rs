@@ -321,6 +321,14 @@ impl<'a> Section<'a> {
         self.inside(shape, from.point + shift + depth * direction, travel)
     }
 
+    /// The point of this frame that is `at` in the section of the unwound yarn and `travel` along it.
+    pub(super) fn point_at(&self, shape: &YarnShape, at: Vec2, travel: f32) -> Vec3A {
+        let near = self.neighbourhood(self.turn(shape), travel, LIGHT);
+        let beyond = travel - near.travel;
+        let round = at.rotate(near.phase_at(beyond));
+        near.bent(near.pressed_at(beyond).map_or(round, |pressed| pressed.real(round)), beyond)
+    }
+
     /// A point of this frame, which is about `travel` along the yarn, in the unwound yarn.
     #[inline]
     pub fn inside(&self, shape: &YarnShape, point: Vec3A, travel: f32) -> Inside {
@@ -329,7 +337,7 @@ impl<'a> Section<'a> {
         let (phase, pressed) = (near.phase_at(beyond), near.pressed_at(beyond));
         // The frame turned with the bend: sin / k = `lean`, and (1 - cos) / k^2 = lean^2 / (1 + cos).
         let bend = near.bend;
-        let out = |v: Vec3A| near.place.map_or(v, |p| v.x * p.x + v.y * p.y + v.z * p.z);
+        let out = |v: Vec3A| near.place.map_or(v, |place| place.out(v));
         let turned = |v: Vec2| {
             let part = bend.dot(v);
             out((v - bend * (part * lean * lean / (1.0 + cos))).extend(-part * lean).into())

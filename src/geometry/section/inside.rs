@@ -4,8 +4,9 @@ use glam::{Vec2, Vec3A};
 
 use super::{
     Section,
-    march::{LEAST_LEFT, LIGHT},
+    march::{LEAST_LEFT, LIGHT, angle},
     neighbourhood::{Neighbourhood, Unbent},
+    unrotate,
 };
 use crate::geometry::{
     way::Station,
@@ -74,6 +75,22 @@ impl Inside {
     pub fn outline(&self, shape: &YarnShape, ply: usize, direction: Vec2) -> Vec3A {
         let off = shape.plies[ply].radius * direction;
         self.axis_of(shape, ply) + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
+    }
+
+    /// The same so far along the yarn from there, in yarn radii: on the outline's part that has the same place in the frame of
+    /// `section`, while the ply winds.
+    #[inline]
+    pub fn outline_along(
+        &self,
+        shape: &YarnShape,
+        section: &Section<'_>,
+        ply: usize,
+        direction: Vec2,
+        travel: f32,
+    ) -> Vec3A {
+        let of = &shape.plies[ply];
+        let direction = unrotate(direction, angle(self.turn * travel));
+        section.point_at(shape, of.distance * of.direction + of.radius * direction, self.travel + travel)
     }
 
     /// The short axis of the section there, as a unit vector of the unwound yarn; any where it is round.
@@ -152,7 +169,7 @@ impl Inside {
         let to = from.ahead(depth)?;
         let turning = self.turn.abs() + if self.pressed.is_some() { section.pressed_turn.abs() } else { 0.0 };
         let turned = turning * to.travel;
-        let is_near = section.walker.is_none() || to.travel.abs() <= LIGHT.near;
+        let is_near = section.walker.is_none() || to.travel.abs() <= LIGHT.near(self.bend);
         if !turned.is_finite() || turned.abs() > LIGHT.turn || depth <= LEAST_LEFT || !is_near {
             return None;
         }

@@ -6,7 +6,10 @@ use super::{
     march::{Reach, Step, angle},
     unrotate,
 };
-use crate::geometry::{walk::LEAST_STRAIGHTNESS, way::Station, yarn_frame::Pressed};
+use crate::{
+    geometry::{walk::LEAST_STRAIGHTNESS, way::Station, yarn_frame::Pressed},
+    math::frame::sin_cos,
+};
 
 /// By how much a bent yarn may bow a way between two stations, in yarn radii.
 const MOST_BOW: f32 = 0.2;
@@ -45,6 +48,12 @@ impl Placed {
     #[inline]
     pub(super) fn local(&self, v: Vec3A) -> Vec3A {
         self.scale * Vec3A::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// A vector of its axes in the section's frame.
+    #[inline]
+    pub(super) fn out(&self, v: Vec3A) -> Vec3A {
+        v.x * self.x + v.y * self.y + v.z * self.z
     }
 }
 
@@ -114,6 +123,21 @@ impl Neighbourhood {
             lean: z * inverse,
             cos: ahead * inverse,
         }
+    }
+
+    /// The point of the section's frame that is `at` in the yarn's section, so far along the yarn from this place: what [`Self::unbend`] has
+    /// back.
+    #[inline]
+    pub(super) fn bent(&self, at: Vec2, travel: f32) -> Vec3A {
+        let bend = self.bend;
+        let (sin, cos) = sin_cos(bend.length() * travel);
+        // sin / k and (1 - cos) / k^2, which are finite for a straight yarn.
+        let k = bend.length();
+        let (along, fall) =
+            if k * travel.abs() > 1e-2 { (sin / k, (1.0 - cos) / (k * k)) } else { (travel, 0.5 * travel * travel) };
+        let nearer = 1.0 - bend.dot(at);
+        let point = (at + bend * (nearer * fall)).extend(nearer * along).into();
+        self.place.map_or(point, |place| place.origin + place.out(point) / place.scale)
     }
 
     /// (cos, sin) of the plies' phase so far along from this place.

@@ -677,3 +677,25 @@ fn light_that_goes_straight_on_meets_the_fibers_that_the_camera_has_not_met() {
 /// By how much the light's count may be off on the mean, and in each place: it knows the fibres' tilt in the middle of its way only.
 const MEAN_OFF: f32 = 0.03;
 const EACH_OFF: f32 = 0.12;
+
+#[test]
+fn points_of_the_unwound_yarn_are_found_where_they_lie() {
+    let mut stream = Stream::new(9);
+    let shape = touching_yarn(3, 40, 0.4, 20.0, 0.0);
+    for i in 0..400 {
+        let mut u = || stream.next();
+        let place = YarnFrame {
+            curvature: if i % 4 == 0 { Vec3A::ZERO } else { Vec3A::new(0.9 * u(), 0.4 * u() - 0.2, 0.0) },
+            flattening: if i % 3 == 0 { ROUND } else { Vec2::new(0.3 * u(), 0.3 * u()) },
+            flattening_turn: 0.2 * u(),
+            turn: Some(0.5 * u()),
+            ..place()
+        };
+        let section = section_of(&place, 0.8 * u() - 0.4, TAU as f32 * u(), u() - 0.5);
+        let at = 0.9 * u().sqrt() * angle(TAU as f32 * u());
+        let travel = 0.6 * u() - 0.3;
+        let inside = section.inside(&shape, section.point_at(&shape, at, travel), travel);
+        assert!((inside.at - at).length() < 1e-3, "{} {at}: {place:?}", inside.at);
+        assert!((inside.travel - travel).abs() < 1e-3, "{} {travel}: {place:?}", inside.travel);
+    }
+}

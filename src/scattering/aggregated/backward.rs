@@ -31,6 +31,9 @@ const OUTLINE: [[f32; 8]; 2] = [
     [-0.980_785, -0.831_470, -0.555_570, -0.195_090, 0.195_090, 0.555_570, 0.831_470, 0.980_785],
 ];
 
+/// How far along the yarn light that wanders about leaves at the most, in yarn radii.
+const FARTHEST: f32 = 4.0;
+
 /// Multiply scattered light of a vertex, made when first asked for: a path that goes on from the node may never do.
 #[derive(Clone, Debug)]
 pub(super) struct Backward {
@@ -151,7 +154,8 @@ impl Lobe {
 
     /// Where light that has wandered about in the ply of a place leaves it towards `w`, in the section's frame: on the part of its outline
     /// that faces there, by e^(-k d) / (d^2 + l^2) of the distance d from the place. That is Poisson's kernel, by which light that spreads
-    /// from a point reaches a circle, with a mean way l and with what is lost on the way.
+    /// from a point reaches a circle, with a mean way l and with what is lost on the way. Meanwhile it gets on along the ply, in about the
+    /// latitude in which it leaves ([`PlyOptics::along`]).
     pub(super) fn start(&self, view: &View<'_>, spot: &Spot, w: Vec3A) -> Vec3A {
         let shape = view.yarn.occluder().shape();
         let (facing, shares) = outline(view, spot, w);
@@ -165,7 +169,12 @@ impl Lobe {
             left -= share;
         }
         let angle = PI * (drawn / OUTLINE[0].len() as f32 - 0.5);
-        spot.inside.outline(shape, spot.ply, Vec2::from_angle(angle).rotate(facing))
+        let direction = Vec2::from_angle(angle).rotate(facing);
+        let across = (spot.inside.outline(shape, spot.ply, direction) - spot.inside.point).length();
+        let along = spot.inside.along(w);
+        let slope = along / (1.0 - along * along).max(1e-6).sqrt();
+        let travel = view.yarn.plies[spot.ply].along * across * slope;
+        spot.inside.outline_along(shape, view.section, spot.ply, direction, travel.clamp(-FARTHEST, FARTHEST))
     }
 
     /// The frame with the latitude that light had which leaves towards the azimuth of `w`, as the fibres have it that it leaves from; and by how
