@@ -88,8 +88,9 @@ fn knits_of_one_and_three_plies() {
 fn weaves_of_one_to_four_plies() {
     let source = "{ type = \"file\", path = \"weave.txt\" }";
     let mut wrong = Vec::new();
+    // With fewer samples the noise of the pixels that are covered comes near the bound; 3000 have .9997 to 1.0006, +- .0006 to .0008.
     for (plies, density) in [(1, 0.5), (2, 0.3), (3, 0.5), (4, 0.3)] {
-        wrong.extend(white("weave", source, plies, density, 256, ""));
+        wrong.extend(white("weave", source, plies, density, 640, ""));
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
