@@ -189,6 +189,7 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
         edges: args.edges.map_or(weave::Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
         draft,
+        shuttles: file.as_ref().map(|f| weave::shuttles(&f.colors[1])).unwrap_or_default(),
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
     };

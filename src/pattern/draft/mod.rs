@@ -81,10 +81,9 @@ impl Draft {
         Self::from_fn(count[0], count[1], |weft, warp| self.warp_over(first[1] + weft, first[0] + warp))
     }
 
-    /// The side of a cloth: every warp changes sides after so many picks, neighbours against each other. `first` picks of
-    /// the first shed are gone.
-    pub(super) fn selvedge(picks: usize, first: usize, inverted: bool) -> Self {
-        Self::from_fn(2, 2 * picks, |weft, warp| ((weft + first) / picks + warp).is_multiple_of(2) != inverted)
+    /// Cloth whose warps all change sides after so many picks, neighbours against each other: plain, or a rib.
+    pub(super) fn rib(picks: usize) -> Self {
+        Self::from_fn(2, 2 * picks, |weft, warp| (weft / picks + warp).is_multiple_of(2))
     }
 
     /// What a loom weaves: the shaft of each warp from the left, the shafts that each treadle raises, and the treadle of

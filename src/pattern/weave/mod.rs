@@ -9,6 +9,7 @@ mod intrusion;
 mod minimize;
 mod pile;
 mod selvedge;
+mod shuttle;
 mod unit_cell;
 
 #[cfg(test)]
@@ -56,6 +57,9 @@ pub struct Weave {
     pub pile_height: f64,
     /// How warps differ, and wefts, one value for each of the draft's repeat.
     pub threads: [Threads; 2],
+    /// The yarn of each weft, by a number, in turns from the bottom; all are of one where this is empty. Those of one yarn, one
+    /// thickness and one layer are one strand where the cloth has selvedges.
+    pub shuttles: Vec<u32>,
     /// Whether it is of whole repeats, so that it goes on at one border as it begins at the other.
     pub tile: bool,
 }
@@ -136,6 +140,12 @@ pub fn pile_height(draft: &Draft, half_room: f64) -> f64 {
     2.0 * rooms * half_room
 }
 
+/// A number for each yarn of the weft, by what tells one from another: [`Weave::shuttles`].
+pub fn shuttles<T: PartialEq>(yarns: &[T]) -> Vec<u32> {
+    let first = |yarn: &T| yarns.iter().position(|other| other == yarn).unwrap_or(0) as u32;
+    yarns.iter().map(first).collect()
+}
+
 /// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
 /// have no room.
 const MOST_OVERLAP: f64 = 0.03;
@@ -192,6 +202,7 @@ impl Weave {
             pile_height: pile_height(&draft, radius),
             draft,
             threads: <[Threads; 2]>::default(),
+            shuttles: Vec::new(),
             tile: false,
         }
     }
@@ -381,8 +392,8 @@ impl Cloth<'_> {
         strands
     }
 
-    /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top, which
-    /// selvedges make one.
+    /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top. Selvedges
+    /// make one strand of the wefts of a shuttle, with the number of the first.
     pub fn strands(&self) -> Vec<PatternStrand> {
         let Measures { thickness, size, .. } = self.measures();
         let cut = self.weave.draft.cut_wefts();

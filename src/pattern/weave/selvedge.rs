@@ -1,23 +1,28 @@
-//! Selvedges: the weft turns around the outermost warp, over it on one way and under it on the other, so that one yarn runs
-//! through all wefts.
+//! Selvedges: each yarn of the weft turns around the outermost warp, over it on one way and under it on the other, and so
+//! runs from its first pick to its last. `shuttle` tells the way of each.
 //!
-//! Only a plain weave holds each turn by itself. In other cloth the outermost warp floats free of the harness, as weavers let
-//! it: each pick goes over it at one side and under it at the other. It is relaxed together with the warps beside it, so
-//! that these give way. Cloth that stands up or twines is woven plain over some more warps at its sides instead.
+//! Where the draft itself does not hold each turn, the outermost warp floats free of the harness, as weavers let it: each
+//! pick goes over it as it enters and under it as it leaves, or the other way round. It is relaxed together with the warps
+//! beside it, so that these give way. Cloth that stands up or twines is woven plain over some more warps at its sides
+//! instead. Each layer of a cloth has selvedges of its own.
 
-use std::f64::consts::PI;
+use std::{
+    collections::HashMap,
+    f64::consts::{FRAC_PI_2, PI},
+};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{
     Cloth, Draft, PatternStrand, StrandKind, Threads, Weave,
     edges::{Point, from_points, points},
+    shuttle::{Shuttles, Turn},
     unit_cell::{CellOptions, Node, UnitCell},
 };
 use crate::math::special::{hermite, smooth_step};
 
-/// Points of a turn of the weft.
-const TURN: usize = 12;
+/// Distance of the points of a turn, in radii of the weft.
+const STEP: f64 = 0.45;
 /// Warps of a selvedge that is woven plain.
 const PLAIN: u32 = 3;
 /// Warps of the cloth that give way to one that floats.
@@ -34,106 +39,264 @@ const OUTSIDE: f64 = 0.25;
 const BESIDE: f64 = 1.02;
 /// How far the weft's ends stand out, of that.
 const STUB: f64 = 0.6;
+/// Points of such an end.
+const STUB_POINTS: usize = 3;
 
-/// Joins all wefts into one. Where the draft itself does not hold each turn, the outermost warp floats. Cloth that twines or stands
-/// up, and cloth of few warps, is woven plain over [`PLAIN`] warps instead, or as a rib of two picks where picks are too
-/// close for that; these are as close as the picks let them be, and as many of the cloth's own are left out as stood there.
+/// Lets each weft yarn turn at the sides. Where the draft itself does not hold each turn, the outermost warp floats. Cloth that
+/// twines or stands up, and cloth of few warps, is woven plain over [`PLAIN`] warps instead, or as a rib of two picks where
+/// picks are too close for that; these are as close as the picks let them be, and as many of the cloth's own are left out as
+/// stood there.
 pub(super) fn selvedges(cloth: &Cloth<'_>, strands: Vec<PatternStrand>, hem: u32) -> Vec<PatternStrand> {
     let (mut warps, wefts): (Vec<_>, Vec<_>) = strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-    let plan = (!holds_its_turns(cloth)).then(|| Plan::of(cloth));
-    let weave = plan.as_ref().map(|plan| plan.weave(cloth, hem));
+    let mut picks = Picks::new(cloth, wefts.len(), hem, cloth.weave.draft.layers() as u32);
+    let plan = (!picks.are_held(cloth)).then(|| Plan::of(cloth, &picks));
+    if plan.as_ref().is_some_and(|plan| plan.reach == 0) {
+        picks = Picks::new(cloth, wefts.len(), hem, 1);
+    }
+    let weave = plan.as_ref().map(|plan| plan.weave(cloth, &picks));
     let sides = plan.zip(weave.as_ref()).map(|(plan, weave)| Sides::new(cloth, plan, weave, hem));
+    let row = |pick: u32| {
+        let body = points(&wefts[pick as usize]);
+        let without = [false, true].map(|right| picks.outside_of(cloth, right, picks.layer(pick)));
+        match &sides {
+            Some(sides) => sides.weft(pick, &body, without),
+            None => from_crossing_to_crossing(&body, without, cloth.cell.nodes).to_vec(),
+        }
+    };
+    let mut rows: Vec<Vec<Point>> = (0..wefts.len() as u32).map(row).collect();
+    let edges = [false, true].map(|right| {
+        let edge = |layer: u32| {
+            let from_outside = picks.outside_of(cloth, right, layer);
+            let way = match &sides {
+                Some(sides) => sides.outer_warp(right, from_outside),
+                None => {
+                    let index = if right { cloth.count[0] - 1 - from_outside } else { from_outside };
+                    warps.iter().find(|w| w.index == index).map(points).unwrap_or_default()
+                }
+            };
+            let end = |row: &Vec<Point>| row[if right { row.len() - 1 } else { 0 }].0.y;
+            let own = rows.iter().zip(0..).filter(|(_, pick)| picks.layer(*pick) == layer);
+            let picks = own.map(|(row, _)| end(row)).collect();
+            Edge { out: if right { 1.0 } else { -1.0 }, way, picks, radius: cloth.weave.half_rooms[1] }
+        };
+        (0..picks.layers).map(edge).collect::<Vec<Edge>>()
+    });
     if let Some(sides) = &sides {
         warps = sides.warps(warps);
     }
-    let row = |i: usize| match &sides {
-        Some(sides) => sides.weft(i as u32, &points(&wefts[i])),
-        None => from_crossing_to_crossing(&points(&wefts[i]), 0, cloth.cell.nodes).to_vec(),
-    };
-    let outermost = outermost(&warps);
-    let radius = cloth.weave.half_rooms[1];
-    // The weft, from the bottom left on.
-    let mut way: Vec<Point> = Vec::new();
-    for i in 0..wefts.len() {
-        let mut row = row(i);
-        let right = i % 2 == 0;
-        if !right {
-            row.reverse();
+    for yarn in &picks.shuttles.yarns {
+        let mut way: Vec<Point> = Vec::new();
+        let mut turn: Option<Turn> = None;
+        for pass in yarn {
+            let mut row = std::mem::take(&mut rows[pass.pick as usize]);
+            if !pass.right {
+                row.reverse();
+            }
+            let edge = |right: bool| &edges[usize::from(right)][picks.layer(pass.pick) as usize];
+            match (way.last(), turn) {
+                (Some(&from), Some(turn)) => edge(!pass.right).turn(&mut way, from, row[0], turn),
+                _ => way.extend(edge(!pass.right).stub(row[1], row[0]).into_iter().rev()),
+            }
+            way.extend(row);
+            if pass.turn.is_none() {
+                way.extend(edge(pass.right).stub(way[way.len() - 2], way[way.len() - 1]));
+            }
+            turn = pass.turn;
         }
-        match way.last() {
-            Some(&from) => turn(&mut way, from, row[0], &outermost[usize::from(!right)], radius),
-            None => way.push(stub(row[0], &outermost[usize::from(!right)], radius)),
-        }
-        way.extend(row);
-        if i + 1 == wefts.len() {
-            way.push(stub(way[way.len() - 1], &outermost[usize::from(right)], radius));
-        }
+        warps.push(from_points(StrandKind::Weft, yarn[0].pick, &way, cloth.weave.sized()));
     }
-    warps.push(from_points(StrandKind::Weft, 0, &way, cloth.weave.sized()));
     warps
 }
 
-/// A weft without so many warps at both sides.
-fn from_crossing_to_crossing(way: &[Point], without: u32, nodes: usize) -> &[Point] {
-    let off = without as usize * nodes + nodes / 2;
-    &way[off..way.len() - off]
+/// A weft without so many warps at the left and at the right.
+fn from_crossing_to_crossing(way: &[Point], without: [u32; 2], nodes: usize) -> &[Point] {
+    let [left, right] = without.map(|warps| warps as usize * nodes + nodes / 2);
+    &way[left..way.len() - right]
 }
 
-/// The warps farthest to the left and to the right, and to which side each is.
-fn outermost(warps: &[PatternStrand]) -> [(f64, Vec<Point>); 2] {
-    // Pile yarns are cut into pieces.
-    let longest = warps.iter().map(|w| w.curve.points.len()).max().unwrap_or(0);
-    let place = |w: &&PatternStrand| w.curve.points.iter().map(|p| p.x).sum::<f64>() / w.curve.points.len() as f64;
-    [-1.0, 1.0].map(|out| {
-        let whole = warps.iter().filter(|w| 2 * w.curve.points.len() > longest);
-        let last = whole.max_by(|a, b| (out * place(a)).total_cmp(&(out * place(b))));
-        (out, last.map(points).unwrap_or_default())
-    })
+/// The picks of a cloth and the shuttles that make them.
+struct Picks {
+    shuttles: Shuttles,
+    hem: u32,
+    /// Layers that turn by themselves.
+    layers: u32,
 }
 
-/// How far out the middle of a weft that turns around a warp is at a height, from `x`.
-fn reach((out, warp): &(f64, Vec<Point>), x: f64, y: f64, radius: f64) -> f64 {
-    // Warps go up.
-    let above = warp.partition_point(|p| p.0.y < y);
-    let around = &warp[above.saturating_sub(1)..warp.len().min(above + 1)];
-    let nearest = around.iter().min_by(|a, b| (a.0.y - y).abs().total_cmp(&(b.0.y - y).abs()));
-    nearest.map_or(0.0, |p| p.0.x - x + out * BESIDE * (p.1.max(radius) + radius))
+impl Picks {
+    fn new(cloth: &Cloth<'_>, count: usize, hem: u32, layers: u32) -> Self {
+        let Weave { draft, shuttles, threads: [_, Threads { thickness, .. }], .. } = cloth.weave;
+        // Where a layer has no warp of its own, its wefts turn as the others do.
+        let layers = if layers > cloth.count[0] { 1 } else { layers };
+        let mut known = HashMap::new();
+        let yarn = |pick: usize| {
+            let number = pick as i64 - i64::from(hem);
+            let in_turns = |length: usize| number.rem_euclid(length.max(1) as i64) as usize;
+            let shuttle = shuttles.get(in_turns(shuttles.len()));
+            let thick = thickness.get(in_turns(thickness.len())).map(|t| t.to_bits());
+            let next = known.len() as u32;
+            *known.entry((shuttle, thick, in_turns(draft.layers()))).or_insert(next)
+        };
+        let yarns: Vec<u32> = (0..count).map(yarn).collect();
+        Self { shuttles: Shuttles::new(&yarns, layers), hem, layers }
+    }
+
+    /// The layer of the cloth in which a pick turns.
+    fn layer(&self, pick: u32) -> u32 {
+        (i64::from(pick) - i64::from(self.hem)).rem_euclid(i64::from(self.layers)) as u32
+    }
+
+    /// How many warps are outside of the one around which a layer turns.
+    fn outside_of(&self, cloth: &Cloth<'_>, right: bool, layer: u32) -> u32 {
+        if right { (cloth.count[0] - 1 - layer) % self.layers } else { layer }
+    }
+
+    /// Whether the draft itself holds each turn: its yarn is over the outermost warp on one way and under it on the other.
+    fn are_held(&self, cloth: &Cloth<'_>) -> bool {
+        let draft = &cloth.weave.draft;
+        let over = |pick: u32, warp: u32| {
+            let number = (i64::from(pick) - i64::from(self.hem)).rem_euclid(draft.wefts() as i64);
+            draft.warp_over(number as usize, warp as usize)
+        };
+        !draft.twines()
+            && draft.pile().is_none()
+            && [false, true].into_iter().all(|right| {
+                self.shuttles.turns(right).all(|[from, to]| {
+                    let outside = self.outside_of(cloth, right, self.layer(from));
+                    let warp = if right { cloth.count[0] - 1 - outside } else { outside };
+                    over(from, warp) != over(to, warp)
+                })
+            })
+    }
 }
 
-/// The end of the weft, beyond its last crossing.
-fn stub(last: Point, warp: &(f64, Vec<Point>), radius: f64) -> Point {
-    let out = STUB * reach(warp, last.0.x, last.0.y, radius);
-    (last.0 + DVec3::X * out, last.1, last.2, last.3)
+/// The outermost warp of a side, around which wefts of a radius turn.
+struct Edge {
+    /// To which side it is.
+    out: f64,
+    /// Upwards.
+    way: Vec<Point>,
+    /// Heights of the picks that turn around it.
+    picks: Vec<f64>,
+    radius: f64,
 }
 
-/// Around a warp from one pick to the next, without both: half an ellipse, along which the weft lies flat on the warp.
-fn turn(way: &mut Vec<Point>, from: Point, to: Point, warp: &(f64, Vec<Point>), radius: f64) {
-    let (middle, half) = (0.5 * (from.0 + to.0), 0.5 * (to.0 - from.0));
-    let out = reach(warp, middle.x, middle.y, radius);
-    way.extend((1..TURN).map(|k| {
-        let share = k as f64 / TURN as f64;
-        let (sin, cos) = (PI * share).sin_cos();
-        let p = middle - cos * half + out * sin * DVec3::X;
-        let (_, wide, axis, coordinates) = between(from, to, share);
-        let inwards = (half.length() * sin * DVec3::X - out * cos * half.normalize_or_zero()).normalize_or(DVec3::Z);
-        // An axis has no sign; at both ends it is that of the pick.
-        let pick = if 2 * k < TURN { from.2 } else { to.2 };
-        let inwards = inwards.as_vec3();
-        let flat = inwards * 1.0_f32.copysign(inwards.dot(pick)) * axis.length();
-        (p, wide, pick.lerp(flat, smooth_step(2.0 * share.min(1.0 - share)) as f32), coordinates)
-    }));
-}
+impl Edge {
+    /// The warp's middle at a height, and half its width.
+    fn at(&self, y: f64) -> (DVec3, f64) {
+        let Some(last) = self.way.len().checked_sub(2) else {
+            return self.way.first().map_or((DVec3::ZERO, 0.0), |p| (p.0, p.1));
+        };
+        let i = self.way.partition_point(|p| p.0.y < y).saturating_sub(1).min(last);
+        let (a, b) = (&self.way[i], &self.way[i + 1]);
+        let share = ((y - a.0.y) / (b.0.y - a.0.y)).clamp(0.0, 1.0);
+        (a.0.lerp(b.0, share), a.1 + share * (b.1 - a.1))
+    }
 
-/// Whether both outermost warps change sides after each pick, as those of a plain weave.
-fn holds_its_turns(cloth: &Cloth<'_>) -> bool {
-    let draft = &cloth.weave.draft;
-    let changes = |warp: usize| (0..draft.wefts()).all(|i| draft.warp_over(i, warp) != draft.warp_over(i + 1, warp));
-    draft.layers() == 1
-        && !draft.twines()
-        && draft.pile().is_none()
-        && draft.wefts() > 1
-        && changes(0)
-        && changes(cloth.count[0] as usize - 1)
+    /// How far the middle of a weft beside the warp is from its middle, at a height.
+    fn beside(&self, y: f64) -> f64 {
+        BESIDE * (self.at(y).1.max(self.radius) + self.radius)
+    }
+
+    /// Where the middle of a weft is in a lane, at a height, along x.
+    fn lane(&self, y: f64, lane: u32) -> f64 {
+        let others = f64::from(lane - 1) * 2.0 * BESIDE * self.radius;
+        self.at(y).0.x + self.out * (self.beside(y) + others)
+    }
+
+    /// The end of a weft, outwards from its last crossing, to which it comes from `before`.
+    fn stub(&self, before: Point, last: Point) -> [Point; STUB_POINTS] {
+        let length = STUB * (self.lane(last.0.y, 1) - last.0.x);
+        // It goes on as it comes, and ends level.
+        let slope = (last.0 - before.0) / (last.0.x - before.0.x).abs().max(1e-9);
+        let aside = slope.reject_from(DVec3::X).clamp_length_max(1.0) * length.abs();
+        std::array::from_fn(|k| {
+            let share = (k + 1) as f64 / STUB_POINTS as f64;
+            (last.0 + share * length * DVec3::X + share * (1.0 - 0.5 * share) * aside, last.1, last.2, last.3)
+        })
+    }
+
+    /// From one pick to the next of the same yarn, without both.
+    fn turn(&self, way: &mut Vec<Point>, from: Point, to: Point, turn: Turn) {
+        if turn.past == 0 { self.around(way, from, to, turn.lane) } else { self.carry(way, from, to, turn.lane) }
+    }
+
+    /// Around the warp, and around what is carried beside it: straight out and half a circle, or half an ellipse where picks
+    /// are farther from each other than it reaches out; the weft lies flat on the warp. A rounder turn breaks no plies.
+    fn around(&self, way: &mut Vec<Point>, from: Point, to: Point, lane: u32) {
+        let (middle, half) = (0.5 * (from.0 + to.0), 0.5 * (to.0 - from.0));
+        let reach = self.out * (self.lane(middle.y, lane) - middle.x);
+        let round = half.length().min(reach);
+        let (straight, arc) = (reach - round, FRAC_PI_2 * (half.length() + round));
+        let length = 2.0 * straight + arc;
+        let steps = (length / (STEP * self.radius)).round().max(4.0) as usize;
+        way.extend((1..steps).map(|k| {
+            let share = k as f64 / steps as f64;
+            let along = share * length;
+            let angle = (PI * (along - straight) / arc).clamp(0.0, PI);
+            let (sin, cos) = angle.sin_cos();
+            let out = straight.min(along).min(length - along) + round * sin;
+            let p = middle - cos * half + self.out * out * DVec3::X;
+            let (_, wide, axis, coordinates) = between(from, to, share);
+            let inwards = half.length() * sin * DVec3::X * -self.out + round * cos * half.normalize_or_zero();
+            let inwards = inwards.normalize_or(DVec3::Z).as_vec3();
+            // An axis has no sign; at both ends it is that of the pick.
+            let pick = if 2 * k < steps { from.2 } else { to.2 };
+            let flat = inwards * 1.0_f32.copysign(inwards.dot(pick)) * axis.length();
+            let turned = 2.0 * (angle / PI).min(1.0 - angle / PI);
+            (p, wide, pick.lerp(flat, smooth_step(turned) as f32), coordinates)
+        }));
+    }
+
+    /// Up beside the warp, past picks of others: over and under them as the warp is, so that those that turn meanwhile hold both.
+    fn carry(&self, way: &mut Vec<Point>, from: Point, to: Point, lane: u32) {
+        let (begin, rise) = (from.0.y, to.0.y - from.0.y);
+        // The first and the last pick that it passes.
+        let mut passed = self.picks.iter().copied().filter(|y| (begin..to.0.y).contains(y));
+        let [first, last] = [passed.clone().nth(1), passed.next_back()].map(|y| y.unwrap_or(begin + 0.5 * rise));
+        let below = |y: f64| self.at(y).0.z;
+        let height = |y: f64| {
+            if y < first {
+                from.0.z + smooth_step((y - begin) / (first - begin)) * (below(first) - from.0.z)
+            } else if y > last {
+                to.0.z + smooth_step((to.0.y - y) / (to.0.y - last)) * (below(last) - to.0.z)
+            } else {
+                below(y)
+            }
+        };
+        // Corners are quarters of ellipses.
+        let up = self.beside(begin).min(0.5 * rise);
+        let step = STEP * self.radius;
+        let flat = 0.5 * (from.2.length() + to.2.length());
+        let corner = |end: Point, sign: f64| {
+            let reach = self.out * (self.lane(end.0.y, lane) - end.0.x);
+            let round = reach.min(self.beside(end.0.y));
+            let straight = reach - round;
+            let steps = (FRAC_PI_2 * 0.5 * (round + up) / step).round().max(3.0) as u32;
+            let out = (0..(straight / step).round() as u32).map(|k| (f64::from(k) * step, 0.0));
+            let bend = (0..steps).map(|k| (straight, FRAC_PI_2 * f64::from(k) / f64::from(steps)));
+            let at = |(out, angle): (f64, f64)| {
+                let (sin, cos) = angle.sin_cos();
+                let y = end.0.y + sign * up * (1.0 - cos);
+                let x = end.0.x + self.out * out;
+                let x = x + sin * (self.lane(y, lane) - x);
+                let axis = end.2 * cos as f32 + Vec3::X * flat * sin as f32;
+                (DVec3::new(x, y, height(y)), end.1, axis, end.3)
+            };
+            // Without the end itself.
+            out.chain(bend).skip(1).map(at).collect::<Vec<Point>>()
+        };
+        let (first, mut last) = (corner(from, 1.0), corner(to, -1.0));
+        last.reverse();
+        let steps = ((rise - 2.0 * up) / step).ceil().max(1.0);
+        let beside = (0..=steps as usize).map(|k| {
+            let y = begin + up + (rise - 2.0 * up) * k as f64 / steps;
+            let (_, wide, _, coordinates) = between(from, to, (y - begin) / rise);
+            (DVec3::new(self.lane(y, lane), y, height(y)), wide, Vec3::X * flat, coordinates)
+        });
+        way.extend(first);
+        way.extend(beside);
+        way.extend(last);
+    }
 }
 
 /// A weave of the cloth's yarns with its picks.
@@ -161,25 +324,25 @@ struct Plan {
     reach: u32,
     /// Distance of warps.
     spacing: f64,
-    /// Picks in one shed of a selvedge.
-    picks: usize,
+    /// Whether two picks lie in one shed of a selvedge.
+    rib: bool,
 }
 
 impl Plan {
-    fn of(cloth: &Cloth<'_>) -> Self {
+    fn of(cloth: &Cloth<'_>, picks: &Picks) -> Self {
         // At least one warp is left between both.
         let most = (cloth.count[0] - 1) / 2;
-        let draft = &cloth.weave.draft;
-        if !draft.twines() && draft.pile().is_none() && cloth.count[0] >= 2 * (1 + GIVING + HOLDING) {
-            return Self { taken: 1, ends: 1, reach: GIVING + HOLDING, spacing: cloth.cell.spacing[0], picks: 1 };
+        let (draft, layers) = (&cloth.weave.draft, picks.layers);
+        if !draft.twines() && draft.pile().is_none() && cloth.count[0] >= 2 * (layers + GIVING + HOLDING) {
+            let spacing = cloth.cell.spacing[0];
+            return Self { taken: layers, ends: layers, reach: GIVING + HOLDING, spacing, rib: false };
         }
-        let close = cloth.cell.spacing[1] < RIB * (cloth.weave.half_rooms[0] + cloth.weave.half_rooms[1]);
-        let picks = 1 + usize::from(close);
-        let jammed = with_picks(cloth, Draft::selvedge(picks, 1, false), None);
+        let rib = cloth.cell.spacing[1] < RIB * (cloth.weave.half_rooms[0] + cloth.weave.half_rooms[1]);
+        let jammed = with_picks(cloth, Draft::rib(1 + usize::from(rib)), None);
         let spacing = SLACK * UnitCell::relax(&jammed.draft, &jammed.options()).spacing[0];
         // The cloth stays as wide.
         let taken = (f64::from(PLAIN) * spacing / cloth.cell.spacing[0]).round() as u32;
-        Self { taken: taken.min(most), ends: PLAIN, reach: 0, spacing, picks }
+        Self { taken: taken.min(most), ends: PLAIN, reach: 0, spacing, rib }
     }
 
     /// The column between both selvedges, where wefts turn: a thin warp makes room.
@@ -200,30 +363,44 @@ impl Plan {
         column.checked_sub(reach + 2 * ends + 1).map(|column| taken + column)
     }
 
-    /// The weave of both sides. `hem` picks come before the first.
-    fn weave(&self, cloth: &Cloth<'_>, hem: u32) -> Weave {
+    /// The weave of both sides.
+    fn weave(&self, cloth: &Cloth<'_>, picks: &Picks) -> Weave {
         let body = &cloth.weave.draft;
-        let high = lowest_common_multiple(body.wefts(), 2 * self.picks);
-        let [right, left] = [true, false].map(|right| {
-            // The weft turns right after even picks, left after odd ones; there the sheds of a rib must change.
-            let draft = |inverted| Draft::selvedge(self.picks, hem as usize + usize::from(right), inverted);
-            // Most yarns change sides where the cloth begins: floats end there.
-            let (own, beside) =
-                if right { (0, cloth.count[0] - 1 - self.taken) } else { (self.ends as usize - 1, self.taken) };
-            let changes = |draft: &Draft| {
-                (0..high).filter(|&i| draft.warp_over(i, own) != body.warp_over(i, beside as usize)).count()
+        let under = [false, true].map(|right| picks.shuttles.under(right, self.rib));
+        let high = period(&under, body.wefts());
+        // By its number in the cloth, of which the repeat is `high`.
+        let pick = |weft: usize| (weft + picks.hem as usize) % high;
+        let layer = |number: usize| number as u32 % picks.layers;
+        let sides = [false, true].map(|right| {
+            let under = &under[usize::from(right)];
+            // Of a warp of a selvedge, counted from the outside.
+            let own = move |weft: usize, from_outside: u32, inverted: bool| {
+                let outermost = under.get(pick(weft)).is_some_and(|under| *under != inverted);
+                if self.reach == 0 {
+                    return outermost != (from_outside % 2 == 1);
+                }
+                let warp = if right { cloth.count[0] - 1 - from_outside } else { from_outside } as usize;
+                if layer(warp) == layer(weft) { outermost } else { body.warp_over(weft, warp) }
             };
-            let [straight, inverted] = [false, true].map(draft);
-            if changes(&straight) < changes(&inverted) { inverted } else { straight }
+            // Most yarns change sides where the cloth begins: floats end there.
+            let last = self.ends - 1;
+            let next = self.taken - 1 + if self.reach == 0 { 1 } else { picks.layers };
+            let beside = if right { cloth.count[0] - 1 - next } else { next } as usize;
+            let changes =
+                |inverted: bool| (0..high).filter(|&i| own(i, last, inverted) != body.warp_over(i, beside)).count();
+            let inverted = changes(false) < changes(true);
+            move |weft: usize, from_outside: u32| own(weft, from_outside, inverted)
         });
-        let outside = self.outside() as usize;
-        let draft =
-            Draft::from_fn(self.columns() as usize, high, |weft, column| match self.body_warp(cloth, column as u32) {
+        let outside = self.outside();
+        let draft = Draft::from_fn(self.columns() as usize, high, |weft, column| {
+            let column = column as u32;
+            match self.body_warp(cloth, column) {
                 Some(warp) => body.warp_over(weft, warp as usize),
-                None if column < outside => right.warp_over(weft, column - self.reach as usize),
-                None if column == outside => !right.warp_over(weft, self.ends as usize - 1),
-                None => left.warp_over(weft, column - outside - 1),
-            });
+                None if column < outside => sides[1](weft, outside - 1 - column),
+                None if column == outside => !sides[1](weft, picks.outside_of(cloth, true, layer(weft))),
+                None => sides[0](weft, column - outside - 1),
+            }
+        });
         Weave { crimp: cloth.weave.crimp, ..with_picks(cloth, draft, Some(self.spacing)) }
     }
 
@@ -260,12 +437,10 @@ impl Plan {
     }
 }
 
-fn lowest_common_multiple(a: usize, b: usize) -> usize {
-    let (mut x, mut y) = (a, b);
-    while y != 0 {
-        (x, y) = (y, x % y);
-    }
-    a / x.max(1) * b
+/// The least number of picks, a multiple of the draft's, after which both sides go on as they began.
+fn period(under: &[Vec<bool>; 2], wefts: usize) -> usize {
+    let again = |period: usize| under.iter().all(|u| u.iter().zip(u.iter().skip(period)).all(|(a, b)| a == b));
+    (1..).map(|k| k * wefts).find(|&period| again(period)).unwrap_or(wefts)
 }
 
 /// Both sides, relaxed.
@@ -356,14 +531,21 @@ impl<'a> Sides<'a> {
         warps
     }
 
-    /// A weft from the outermost crossing at the left to that at the right; `body` is its way through the cloth.
-    fn weft(&self, index: u32, body: &[Point]) -> Vec<Point> {
+    /// The way of a warp of a selvedge, counted from the outside.
+    fn outer_warp(&self, right: bool, from_outside: u32) -> Vec<Point> {
+        self.moved(right, &self.cloth.strand(0, self.own(right, from_outside), self.hem))
+    }
+
+    /// A weft from its outermost crossing at the left to that at the right, beyond which there are so many warps; `body` is its
+    /// way through the cloth.
+    fn weft(&self, index: u32, body: &[Point], without: [u32; 2]) -> Vec<Point> {
         let Plan { taken, ends, reach, .. } = self.plan;
         let strand = self.cloth.strand(1, index, self.hem);
         let nodes = self.cloth.cell.nodes;
-        let middle = from_crossing_to_crossing(body, taken + GIVING.min(reach), nodes);
+        let middle = from_crossing_to_crossing(body, [taken + GIVING.min(reach); 2], nodes);
         let [left, right] = [false, true].map(|right| Side { way: self.moved(right, &strand), right, sides: self });
-        let [from, to] = [&left, &right].map(|side| side.x(side.sides.own(side.right, 0)));
+        let outermost = |side: &Side<'_>| side.x(side.sides.own(side.right, without[usize::from(side.right)]));
+        let [from, to] = [&left, &right].map(outermost);
         if reach > 0 {
             let mut way = left.part(from, middle[0].0.x);
             way.pop();

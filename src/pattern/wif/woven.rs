@@ -53,13 +53,10 @@ impl WovenWif {
     pub fn color_of(&self, strand: &PatternStrand) -> Option<[f32; 3]> {
         let side = usize::from(strand.kind == StrandKind::Weft);
         let colors = &self.colors[side];
-        let thread = |at: &[f32; 2]| colors.get((at[side].floor() as i64).rem_euclid(colors.len() as i64) as usize);
-        if colors.is_empty() || strand.coordinates.is_empty() {
-            return None;
-        }
-        let all: Vec<[f64; 3]> = strand.coordinates.iter().filter_map(thread).copied().collect();
-        let mean = |c: usize| all.iter().map(|v| srgb_to_linear(v[c] as f32)).sum::<f32>() / all.len() as f32;
-        Some([mean(0), mean(1), mean(2)])
+        let at = strand.coordinates.first().filter(|_| !colors.is_empty())?;
+        // A thread is of one colour all along.
+        let color = colors[(at[side].floor() as i64).rem_euclid(colors.len() as i64) as usize];
+        Some(color.map(|v| srgb_to_linear(v as f32)))
     }
 }
 

@@ -123,6 +123,11 @@ impl ColorPlan {
         }
     }
 
+    /// The yarns of the rows, which are the wefts of a weave, in turns, if they differ.
+    pub(super) fn rows(&self) -> &[String] {
+        if self.layout.motif.is_some() { &[] } else { &self.layout.rows }
+    }
+
     /// Whether all stitches are of the fabric's own yarn.
     pub(super) fn is_plain(&self) -> bool {
         let Layout { rows, columns, motif } = &self.layout;

@@ -1,6 +1,11 @@
 //! `source = { type = "weave" }`: woven cloth that the program makes.
 
-use super::{Context, Range, Reader, cloth::Yarns, color::FabricCoordinates, garment};
+use super::{
+    Context, Range, Reader,
+    cloth::Yarns,
+    color::{ColorPlan, FabricCoordinates},
+    garment,
+};
 use crate::{
     geometry::curve::Curve,
     input::{
@@ -11,7 +16,7 @@ use crate::{
     pattern::{
         PatternStrand, StrandKind,
         draft::{Draft, DraftError},
-        weave::{self, Edges, Extent, Impossible, Measures, Weave},
+        weave::{self, Edges, Extent, Impossible, Measures, Weave, shuttles},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Tufts, Yarn},
@@ -46,6 +51,14 @@ impl WeavePlan {
     /// Radii of warp and weft, mm.
     pub(super) fn radii(&self) -> [f64; 2] {
         self.weave.yarn_radii()
+    }
+
+    /// Gives each yarn of the weft its shuttle: those of the fabric's rows, or else of the draft's colours.
+    pub(super) fn take_shuttles(&mut self, color: &ColorPlan) {
+        self.weave.shuttles = match color.rows() {
+            [] if color.is_plain() => shuttles(&self.colors[1]),
+            rows => shuttles(rows),
+        };
     }
 
     /// Weaves it.
@@ -189,6 +202,7 @@ pub(super) fn weave(
         edges: if tile { Edges::Live } else { edges },
         pile_height: pile.unwrap_or(default_pile),
         threads,
+        shuttles: Vec::new(),
         tile,
     };
     if pile.is_some() && weave.draft.pile().is_none() {

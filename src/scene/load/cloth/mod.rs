@@ -159,7 +159,7 @@ pub(super) fn plan(
     let phases = table.numbers("phase", Range::FINITE).map(|p| p.into_iter().map(radians).collect());
     let transform = placement(&table, context);
     let mut color = color::plan(&table, context, library);
-    let source = match table.table("source") {
+    let mut source = match table.table("source") {
         Some(source_table) => {
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
             let fallback = if fiber.is_some() { defaults::FIBER_RADIUS } else { 0.5 };
@@ -179,8 +179,9 @@ pub(super) fn plan(
             None
         }
     };
-    if let Some(Source::Weave(plan)) = &source {
+    if let Some(Source::Weave(plan)) = &mut source {
         color.take_order(&table, &plan.order);
+        plan.take_shuttles(&color);
     }
     table.finish();
     let kind = fiber.map(KindName::Fiber).or(yarn.map(KindName::Yarn))?;

@@ -21,19 +21,22 @@ pub(in crate::scene::load) struct FabricCoordinates {
     pub(super) stitch: Option<[f32; 2]>,
     /// The yarn of each curve in the library, where each is of one colour; else empty.
     pub(super) own: Vec<usize>,
+    /// Whether each warp and each weft is a thread, of one yarn all along.
+    threads: bool,
 }
 
 impl FabricCoordinates {
     /// That of curves of which nothing is known: `columns` along each, and one row each.
     pub(in crate::scene::load) fn along(columns: f32, fabric: &Fabric) -> Self {
         let extent = [columns, fabric.curves.len() as f32];
-        Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new() }
+        Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new(), threads: false }
     }
 
     /// That of cloth that the program makes, and its curves.
     pub(in crate::scene::load) fn of(strands: Vec<PatternStrand>, extent: [u32; 2]) -> (Vec<Curve>, Self) {
         let extent = extent.map(|n| n as f32);
-        let mut grid = Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new() };
+        let mut grid =
+            Self { points: Vec::new(), kinds: Vec::new(), extent, stitch: None, own: Vec::new(), threads: true };
         let curves = strands.into_iter().map(PatternStrand::smooth).map(|strand| {
             grid.points.push(strand.coordinates);
             grid.kinds.push(strand.kind);
@@ -50,7 +53,7 @@ impl FabricCoordinates {
         extent: [f32; 2],
         stitch: [f32; 2],
     ) -> Self {
-        Self { points, kinds, extent, stitch: Some(stitch), own: Vec::new() }
+        Self { points, kinds, extent, stitch: Some(stitch), own: Vec::new(), threads: false }
     }
 
     /// The same of curves each of which is of one yarn of the library.
@@ -63,6 +66,12 @@ impl FabricCoordinates {
     pub(in crate::scene::load) fn join(&mut self, other: Self) {
         self.points.extend(other.points);
         self.kinds.extend(other.kinds);
+    }
+
+    /// Where a curve that is a thread begins, in the cloth.
+    pub(super) fn thread(&self, curve: usize) -> Option<[f32; 2]> {
+        let woven = matches!(self.kinds.get(curve), Some(StrandKind::Warp | StrandKind::Weft));
+        self.points.get(curve)?.first().copied().filter(|_| self.threads && woven)
     }
 
     fn at(&self, curve: usize, point: usize, count: usize) -> [f32; 2] {

@@ -101,6 +101,7 @@ impl Painter<'_> {
         let shine = self.shine(shade);
         let cells = self.cells.of(index, self.coordinates);
         let own = self.coordinates.own.get(index).copied();
+        let thread = self.coordinates.thread(index).filter(|_| self.cells.motif.is_none());
         let kind = self.coordinates.kinds.get(index).copied();
         let count = curve.points.len();
         let steps = steps(curve, radii);
@@ -108,8 +109,9 @@ impl Painter<'_> {
         let mut out = Numbered { places: Vec::with_capacity(places), ..Numbered::default() };
         for place in 0..places {
             let at = self.coordinates.between(index, place, steps, count);
-            let yarn = own.unwrap_or_else(|| cells.at(at[0], at[1]));
-            let dye = self.dyes.and_then(|d| d.at(index, kind, at));
+            let cell = thread.unwrap_or(at);
+            let yarn = own.unwrap_or_else(|| cells.at(cell[0], cell[1]));
+            let dye = self.dyes.and_then(|d| d.at(index, kind, cell));
             let key = match &self.print {
                 None => Key { yarn, shade, dye, levels: None },
                 Some(print) => {
