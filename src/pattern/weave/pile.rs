@@ -26,7 +26,10 @@ use super::{
     Cloth, PatternStrand, StrandKind,
     edges::{Point, from_points, points},
 };
-use crate::math::sampler::{hash2, unit};
+use crate::math::{
+    sampler::{hash2, unit},
+    special::hermite,
+};
 
 /// How far from the middle of a crossing that holds it a pile yarn stands up, in spacings.
 const RISE: f64 = 0.75;
@@ -79,6 +82,36 @@ impl Standing {
 
     fn is_free(&self, point: usize) -> bool {
         self.free.get(point).copied().unwrap_or(false)
+    }
+
+    /// Puts a point between each foot and what stands on it: those of the ground are much nearer to each other, and a spline through
+    /// both would swing out at the foot and fold there.
+    fn ease_feet(&mut self) {
+        const SHARE: f64 = 0.35;
+        let way = points(&self.strand);
+        let mut eased: Vec<(Point, bool)> = Vec::with_capacity(way.len() + 2 * way.len() / 8);
+        for (i, &here) in way.iter().enumerate() {
+            let [before, own] = [i.saturating_sub(1), i].map(|i| self.is_free(i));
+            // The ground before or after the foot, the foot, and two points of the loop.
+            let around = match (before, own) {
+                (false, true) if i > 1 && i + 1 < way.len() => Some([i - 2, i - 1, i, i + 1]),
+                (true, false) if i > 2 && i + 1 < way.len() => Some([i + 1, i, i - 1, i - 2]),
+                _ => None,
+            };
+            if let Some(around) = around {
+                let [ground, foot, first, second] = around.map(|i| way[i]);
+                let length = foot.0.distance(first.0);
+                let along = |a: Point, b: Point| (b.0 - a.0).normalize_or_zero() * length;
+                let at = hermite([foot.0, first.0], [along(ground, foot), along(foot, second)], SHARE);
+                let axis = foot.2.lerp(first.2, SHARE as f32);
+                eased.push(((at, foot.1 + SHARE * (first.1 - foot.1), axis, foot.3), true));
+            }
+            eased.push((here, own));
+        }
+        if eased.len() > way.len() {
+            let flat = self.strand.curve.radii.is_some();
+            *self = Self::of(&self.strand, &eased, flat);
+        }
     }
 
     /// The points by which the yarn finds room: all free ones and those beside them, few of the others.
@@ -138,6 +171,7 @@ pub(super) fn settle(mut yarns: Vec<Standing>, diameter: f64) -> Vec<PatternStra
     }
     arch::spread(&mut yarns, diameter);
     arch::bloom(&mut yarns, diameter);
+    yarns.iter_mut().filter(|yarn| yarn.tuft.is_none()).for_each(Standing::ease_feet);
     let tufts: Vec<(&PatternStrand, &Tuft)> =
         yarns.iter().filter_map(|yarn| Some((&yarn.strand, yarn.tuft.as_ref()?))).collect();
     let mut opened = tuft::open(&tufts).into_iter();
