@@ -98,6 +98,11 @@ fn what_cannot_be_made_is_refused() {
             &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
             "error: more than 2^27 control points",
         ),
+        // Before it is knitted, which would take minutes.
+        (
+            &["knit", "--stitches", "1000", "--rows", "1000", "-o", "a.bcc", "-o", "a.hair"],
+            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 24019200; ",
+        ),
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has 2 to 10000 points; as in "),
         (
             &["knit", "--form", "tube", "--stitches", "2", "-o", "a.bcc"],

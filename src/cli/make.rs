@@ -12,7 +12,7 @@ use super::{
     fibers::{self, FibersArgs},
     files::{Attempts, Files},
     garment::{self, GarmentArgs},
-    level::LevelArgs,
+    level::{LEVELS, LevelArgs},
     log, named, positive,
     working::Working,
 };
@@ -270,6 +270,27 @@ impl Output {
         refuse_unknown(&self.out)?;
         Files::default().writes("-o", &self.out).check(self.quiet)?;
         self.level.yarn()
+    }
+}
+
+impl Output {
+    /// Refuses files whose format has no room for a curve of so many points, before any work.
+    fn hold(&self, points: u64) -> Result<(), Failure> {
+        // Plies and fibres have points of their own.
+        if self.level.level != LEVELS[0] {
+            return Ok(());
+        }
+        let too_few = |path: &&PathBuf| curve_file::most_points(path).is_some_and(|most| points > most as u64);
+        let Some(path) = self.out.iter().find(too_few) else { return Ok(()) };
+        let most = curve_file::most_points(path).unwrap_or(0);
+        let extension = path.extension().unwrap_or_default().display();
+        Err(Failure::hinted(
+            format!(
+                "{}: a curve of a .{extension} file has at most {most} points, and one yarn of this piece at least {points}",
+                path.display()
+            ),
+            "a name that ends in .bcc, .usdc or .txt, fewer --points, or a smaller piece",
+        ))
     }
 }
 

@@ -35,7 +35,7 @@ pub use self::{
 };
 use super::{
     PatternStrand,
-    chart::{Chart, ChartError, Stitch},
+    chart::{Act, Chart, ChartError, Stitch},
     revolution::Revolution,
     tile::RelaxedRows,
 };
@@ -220,6 +220,24 @@ impl Knit {
     /// A chart that does not fit the stitches or the rows, or that makes too many control points.
     pub fn widths(&self) -> Result<Vec<u32>, ChartError> {
         Ok(self.worked()?.iter().map(|row| row.len() as u32).collect())
+    }
+
+    /// How many control points its longest yarn has at least, of a piece of one colour: those of the stitches that are drawn
+    /// through others, and of finished edges.
+    ///
+    /// # Errors
+    /// As [`Self::widths`].
+    pub fn least_points(&self) -> Result<u64, ChartError> {
+        let is_drawn = |s: &&Stitch| matches!(s.act, Act::Draw | Act::Lift { .. });
+        let rows = self.worked()?;
+        let drawn = rows.iter().map(|row| row.iter().filter(is_drawn).count() as u64);
+        // Of a stitch that is cast on, in percent of a row's: the bind-off, or what draws the last row together, comes to it.
+        const CAST_ON: u64 = 80;
+        let edges =
+            if self.is_finished() { u64::from(self.stitches) * u64::from(self.points) * CAST_ON / 100 } else { 0 };
+        // A tile has a yarn for each row.
+        let stitches: u64 = if self.edges == Edges::Tile { drawn.max().unwrap_or(0) } else { drawn.sum() };
+        Ok(stitches * u64::from(self.points) + edges)
     }
 
     fn is_finished(&self) -> bool {

@@ -212,6 +212,7 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     // Curve files know round yarns only.
     let thickness = Thickness { half_width: yarn.as_ref().map_or(1.0, Yarn::half_width), ..Thickness::round(radius) };
     let piece = args.piece(&thickness)?;
+    args.output.hold(piece.least_points().map_err(|e| wrong(&e))?)?;
     let task = format!("knitting {} x {}", counted(piece.stitches, "stitch"), counted(piece.rows, "row"));
     let working = Working::on(task, args.output.quiet);
     let Knitted { strands, gauge, .. } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;

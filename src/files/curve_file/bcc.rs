@@ -204,6 +204,9 @@ impl<'a> RawCurve<'a> {
     }
 }
 
+/// The most points of a curve: they are counted in four bytes with a sign.
+pub(super) const MOST_POINTS: usize = i32::MAX as usize;
+
 /// Writes curves as BCC with 4-byte floats.
 ///
 /// The format has no place for radii and the unit of length: they are left out. Where `up_axis` is absent, z is written.
@@ -219,7 +222,7 @@ pub fn write_bcc(set: &CurveSet, out: &mut impl Write) -> io::Result<()> {
         if curve.basis != basis {
             return Err(invalid("a BCC file has one basis for all curves"));
         }
-        if i32::try_from(curve.points.len()).is_err() {
+        if curve.points.len() > MOST_POINTS {
             return Err(invalid("a curve of a BCC file has at most 2147483647 points"));
         }
         if !curve.points.iter().all(|point| point.as_vec3().is_finite()) {

@@ -28,6 +28,9 @@ use crate::{
 /// The first bytes of every cyHair file.
 pub(super) const MAGIC: &[u8] = b"HAIR";
 
+/// The most points of a strand: its segments are counted in two bytes.
+pub(super) const MOST_POINTS: usize = u16::MAX as usize + 1;
+
 const HEADER_BYTES: usize = 128;
 const CUT_SHORT: &str = "is the file cut short?";
 const SEGMENTS: u32 = 1;
@@ -142,7 +145,7 @@ pub fn write_hair(set: &CurveSet, out: &mut impl Write) -> io::Result<()> {
     let mut points = 0_u64;
     for curve in &set.curves {
         let count = curve.points.len() + usize::from(curve.closed);
-        if !(2..=usize::from(u16::MAX) + 1).contains(&count) {
+        if !(2..=MOST_POINTS).contains(&count) {
             return Err(invalid("a strand of a .hair file has 2 to 65536 points"));
         }
         if curve.radii.as_ref().map(Vec::len) != has_radii.then_some(curve.points.len()) {

@@ -359,6 +359,16 @@ pub fn can_write(path: &Path) -> bool {
     written_as(path).is_some()
 }
 
+/// The most control points that a curve has in a file that [`write()`] makes by this name, where the format has a limit that a
+/// closed curve reaches one point earlier.
+pub(crate) fn most_points(path: &Path) -> Option<usize> {
+    match written_as(path)? {
+        Format::Bcc => Some(bcc::MOST_POINTS),
+        Format::Hair => Some(hair::MOST_POINTS),
+        Format::Obj | Format::Pyp | Format::Text | Format::Yarns => None,
+    }
+}
+
 /// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.yarns`, `.txt`,
 /// `.curves`, `.usda`, `.usdc`, `.usd`) to `out`.
 ///
