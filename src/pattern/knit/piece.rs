@@ -285,6 +285,8 @@ impl Laying<'_> {
     fn row(&self, c: usize, pieces: &[Piece]) -> Thread {
         // What is left of a side stitch's yarn: there it is pulled from one side only.
         const DRAWN_IN: f64 = 0.87;
+        // The same of yarn that is laid over the needle there: beyond it nothing spreads it.
+        const LAID_AT_SIDE: f64 = 0.5;
         let course = &self.loops.courses[c];
         let round = self.loops.border.turns;
         let finished = self.loops.border.finished;
@@ -302,7 +304,12 @@ impl Laying<'_> {
             let from = own.rest.len();
             self.lay(course, k, piece, edge, &mut own);
             let is_last = (k == 0 && ends[0]) || (k + 1 == count && ends[1]);
-            let drawn = if is_last { DRAWN_IN } else { 1.0 };
+            let is_laid = |visit: &Visit| matches!(visit, Visit::Loop(i) if self.loops.loops[*i as usize].sign == 0.0);
+            let drawn = match is_last {
+                true if course.row >= 0 && is_laid(&course.visits[k].1) => LAID_AT_SIDE,
+                true => DRAWN_IN,
+                false => 1.0,
+            };
             let taut = drawn * self.rim(course.row, count);
             own.rest[from..].iter_mut().for_each(|rest| *rest *= taut);
         }

@@ -130,3 +130,19 @@ fn openwork_in_the_round_keeps_its_yarns_apart() {
         assert!(found.share <= most, "{pattern}: {found:?}");
     }
 }
+
+#[test]
+fn mesh_keeps_its_sides() {
+    // Each row begins or ends with a yarn-over at the right side. Rows that lean would draw these out more and more.
+    let chart = Chart::parse(&["k2tog yo"]).unwrap();
+    let knit = Knit { chart, ..knit("stockinette", 12, 12) };
+    let made = knit.knitted(1.0).unwrap();
+    let [width, height] = made.gauge;
+    let right = |row: f64| {
+        let of_row = |p: &&DVec3| (p.y + 6.0 * height - row * height).abs() < height;
+        made.strands[0].curve.points.iter().filter(of_row).map(|p| p.x).fold(0.0, f64::max) - 6.0 * width
+    };
+    let beyond = [2.0, 6.0, 10.0].map(right);
+    eprintln!("{beyond:.1?}");
+    assert!(beyond.iter().all(|x| *x < 0.8 * width), "{beyond:?}");
+}

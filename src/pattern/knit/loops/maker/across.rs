@@ -34,11 +34,15 @@ impl Maker<'_> {
             self.rises = places.iter().enumerate().map(rise).collect();
             return;
         }
+        // Rows of one width stand over each other as their repeat does, whichever way its decreases lean.
+        let is_shaped = self.rows.windows(2).any(|w| w[0].len() != w[1].len());
+        if !is_shaped {
+            return;
+        }
         if self.border.round.is_none() {
             self.lie_over_each_other();
         }
-        let is_shaped = self.rows.windows(2).any(|w| w[0].len() != w[1].len());
-        if is_shaped && !self.border.stacked {
+        if !self.border.stacked {
             self.share_shaping();
         }
     }
