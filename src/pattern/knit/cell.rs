@@ -114,7 +114,7 @@ impl Cell {
             for ((piece, line), own) in course.iter().zip(&lines).zip(shares) {
                 visits.push(cell.rods.points.len());
                 // Points are near each other where a loop is laid long, for it must not cut its bends short.
-                let count = points_of(own.max(piece.yarn).max(length(line) / (CLOSE * yarn)), COARSE);
+                let count = points_of(own.max(piece.bends).max(length(line) / (CLOSE * yarn)), COARSE);
                 for (point, k, share) in spaced(line, count) {
                     cell.rods.points.push(point);
                     cell.rods.rest.push(own * yarn / count as f64);

@@ -35,6 +35,8 @@ pub(in super::super) struct Piece {
     pub(in super::super) grid: Vec<[f32; 2]>,
     /// Its yarn, in shares of a stitch's.
     pub(in super::super) yarn: f64,
+    /// How many points it needs for its bends, likewise: a strand that is lifted turns as often as a stitch of more yarn.
+    pub(in super::super) bends: f64,
 }
 
 /// How deep a loop dives, how far feet and heads reach beyond the line where they hold each other (rows 2.28 apart), and how
@@ -48,6 +50,8 @@ const LAYER: f64 = 0.85;
 const CLOSED_BY: f64 = 0.5;
 /// How wide the foot is of what closes a bobble.
 const CLOSING: f64 = 0.6;
+/// How far from a lifted strand, in shares of the way to the stitch beside it, the yarn goes over to the other side.
+const BESIDE_STRAND: f64 = 0.1;
 /// How far yarn lies off the cloth where it passes stitches.
 const FLOAT: f64 = 1.7;
 /// Places of a piece.
@@ -149,13 +153,18 @@ impl Loops {
                 let step = self.step(course);
                 let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course, v)).collect();
                 let n = feet.len();
-                // Whether the yarn comes from a stitch that it passes on one side of the cloth and goes on to a loop on the other.
-                let through = |k: usize| {
+                // Whether the yarn goes from one side of the cloth to the other between a visit and the next one.
+                let changes = |k: usize| feet[k].behind * feet[(k + 1) % n].behind < 0.0;
+                let is_lifted = |k: usize| self.made_by(&course.visits[k].1).is_some_and(Loop::is_lifted);
+                // Whether it comes so from a stitch that it passes, or goes on to one.
+                let from_pass = |k: usize| {
                     let (a, b) = (k, (k + 1) % n);
                     let passes = |k: usize| matches!(course.visits[k].1, Visit::Pass { .. });
                     let is_drawn = |k: usize| feet[k].behind != 0.0 && !passes(k);
                     ((passes(a) && is_drawn(b)) || (is_drawn(a) && passes(b))) && feet[a].out * feet[b].out < 0.0
                 };
+                let of_strand = |k: usize| self.made_by(&course.visits[k].1).is_some_and(|l| self.is_of_strand(l));
+                let through = |k: usize| from_pass(k) || (changes(k) && (of_strand(k) || of_strand((k + 1) % n)));
                 // The joint between a visit and the next, as the first one has it.
                 let joint = |k: usize| -> Option<Foot> {
                     let (a, next) = (feet[k], (k + 1) % n);
@@ -168,7 +177,7 @@ impl Loops {
                     let out = match (a.behind, b.behind) {
                         (1.0, 1.0) => a.out.min(b.out),
                         (-1.0, -1.0) => a.out.max(b.out),
-                        _ if through(k) => 0.0,
+                        _ if from_pass(k) => 0.0,
                         _ => 0.5 * (a.out + b.out),
                     };
                     let (up, out) = match course.hold(k) {
@@ -178,7 +187,14 @@ impl Loops {
                         Hold::Catches => (self.up(course.row) - 0.8, -3.0),
                         Hold::Crosses => (0.5 * (a.up + b.up) + course.lift, out),
                     };
-                    Some(Foot { through: through(k), ..Foot::new(0.5 * (a.at + b.at + round), up, out) })
+                    // A strand between stitches of both sides leaves the room to the one that is on the other side of it.
+                    let share = match (changes(k), is_lifted(k), is_lifted(next)) {
+                        (true, true, false) => BESIDE_STRAND,
+                        (true, false, true) => 1.0 - BESIDE_STRAND,
+                        _ => 0.5,
+                    };
+                    let at = a.at + share * (b.at + round - a.at);
+                    Some(Foot { through: through(k), ..Foot::new(at, up, out) })
                 };
                 let joints: Vec<Option<Foot>> = (0..n).map(joint).collect();
                 (0..n)
@@ -217,6 +233,16 @@ impl Loops {
             .collect()
     }
 
+    /// The loop that a visit makes, if it makes one.
+    fn made_by(&self, visit: &Visit) -> Option<&Loop> {
+        if let Visit::Loop(i) = visit { Some(&self.loops[*i as usize]) } else { None }
+    }
+
+    /// Whether a loop is drawn through the strand between two stitches.
+    fn is_of_strand(&self, own: &Loop) -> bool {
+        own.parents.iter().any(|&p| self.loops[p as usize].is_lifted())
+    }
+
     /// Whether a visit takes a place of its own in its row.
     fn is_stitch(&self, visit: &Visit) -> bool {
         match visit {
@@ -242,7 +268,7 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
         (place, [column as f32 + t as f32, row as f32 + 0.02])
     };
     let (places, grid) = (0..=STEPS).map(piece).unzip();
-    Piece { places, grid, yarn: PASSED }
+    Piece { places, grid, yarn: PASSED, bends: PASSED }
 }
 
 /// Yarn that passes a stitch, in shares of a stitch's: a little more than its width.

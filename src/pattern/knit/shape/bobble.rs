@@ -144,7 +144,7 @@ impl Loops {
             let course = k.checked_sub(before).and_then(|k| last.grid.get(k)).map_or(own.row as f32 + 0.3, |g| g[1]);
             [column as f32 + k as f32 / count, course]
         };
-        Piece { grid: (0..places.len()).map(grid).collect(), places, yarn: own.yarn }
+        Piece { grid: (0..places.len()).map(grid).collect(), places, yarn: own.yarn, bends: own.yarn }
     }
 }
 

@@ -12,6 +12,8 @@ use crate::{
 const CABLE: f64 = 2.6;
 /// Width of a strand that is lifted between two stitches.
 const NARROW: f64 = 0.9;
+/// Points of such a strand, in shares of a stitch's: it goes up, crosses itself and comes down again as one.
+const LIFTED_BENDS: f64 = 1.3;
 /// How wide a stitch is out of which a bobble grows.
 const HOLDS_BOBBLE: f64 = 1.35;
 
@@ -83,8 +85,7 @@ impl<'a> Form<'a> {
             true => 0.35,
             false => 0.5,
         };
-        let is_beside = |p: &Loop| p.is_lifted() && p.layer == own.sign;
-        let through_strand = own.parents.iter().any(|&p| is_beside(&loops.loops[p as usize]));
+        let through_strand = loops.is_of_strand(own);
         let mut form = Self {
             loops,
             own,
@@ -100,7 +101,7 @@ impl<'a> Form<'a> {
             // Its head is as wide as what is drawn through it.
             spread: if own.children.is_empty() { spread } else { spread * mean(&|c: &Loop| c.wide) },
             crossing,
-            // A tuck stays on its side of the stitch that it is worked with, and what is drawn through a lifted strand beside it.
+            // A tuck stays on its side of the stitch that it is worked with, and so does what is drawn through a lifted strand.
             reach: ends.map(|end| match (over && own.rank > 0) || end.through || through_strand {
                 true => TAU / 14.0,
                 false => TAU / 6.0,
@@ -248,7 +249,8 @@ impl Loops {
             (form.place(&along), grid)
         };
         let (places, grid) = (0..=STEPS).map(at).unzip();
-        Piece { places, grid, yarn: own.yarn }
+        let bends = if own.is_lifted() { LIFTED_BENDS } else { own.yarn };
+        Piece { places, grid, yarn: own.yarn, bends }
     }
 
     pub(super) fn child_sign(&self, own: &Loop) -> f64 {

@@ -56,7 +56,7 @@ impl Loops {
             (place, [column as f32 + share as f32, self.rows as f32 + 0.02])
         };
         let (places, grid) = (0..=STEPS).map(place).unzip();
-        Piece { places, grid, yarn: 0.0 }
+        Piece { places, grid, yarn: 0.0, bends: 0.0 }
     }
 
     /// A loop of a cable cast-on: drawn to the front between the two before it, across the last one and up. `ends_row` says
@@ -106,6 +106,6 @@ impl Loops {
             None => own.row as f32 + 0.02,
         };
         let grid = (0..places.len()).map(|k| [column as f32 + k as f32 / count, course(k)]).collect();
-        Piece { places, grid, yarn: own.yarn }
+        Piece { places, grid, yarn: own.yarn, bends: own.yarn }
     }
 }

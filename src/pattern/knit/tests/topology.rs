@@ -202,6 +202,22 @@ fn increases_slips_and_tucks() {
 }
 
 #[test]
+fn strands_lifted_between_knit_and_purl() {
+    all_drawn(&[
+        (&["k3 p3", "k2tog k m1l p3"], 6),
+        (&["k3 p3", "k2tog k m1r p3"], 6),
+        (&["k3 p3", "k2tog k m1lp p3"], 6),
+        (&["k3 p3", "k2tog k m1rp p3"], 6),
+        (&["p3 k3", "p2tog p m1l k3"], 6),
+        (&["p3 k3", "p2tog p m1rp k3"], 6),
+        (&["k3 p3", "k3 m1l p2tog p"], 6),
+        (&["k3 p3", "k3 m1r p2tog p"], 6),
+        (&["p3 k3", "p3 m1l k2tog k"], 6),
+        (&["p3 k3", "p3 m1rp k2tog k"], 6),
+    ]);
+}
+
+#[test]
 fn cables() {
     all_drawn(&[
         (&["k3", "k 1/1lc"], 3),
