@@ -23,7 +23,7 @@ const DRAWN_UP: DVec2 = DVec2::new(-0.06, 0.34);
 /// The same for each share of the stitches that are yarn-overs: openwork is stretched to show its holes.
 const OPENED: DVec2 = DVec2::new(0.8, 1.2);
 /// How firmly it is pressed flat meanwhile, force by length of yarn and distance: loops that are worked together would
-/// pile up in front of the cloth, where a wet one lets them slide beside each other.
+/// pile up in front of the cloth, and strands of cables stand on edge, where a wet one lets them slide beside each other.
 const PRESSED: f64 = 0.15;
 /// Points of a stitch while a cell finds its form; as many as are asked for after that.
 const COARSE: u32 = 12;
@@ -43,6 +43,8 @@ pub(super) struct Cell {
     pub(super) rods: Rods,
     /// Whether its wales lean, so that rows wave.
     pub(super) waves: bool,
+    /// How firmly it is pressed flat while it relaxes.
+    press: f64,
     /// Pull on it across and along while it relaxes.
     pull: DVec2,
     /// The first point of each visit of each course, and behind them the end of the course.
@@ -94,6 +96,7 @@ impl Cell {
             count as f64 / f64::from((wide * high).max(1))
         };
         let held = share(&|act| matches!(act, Act::Tuck | Act::Pass { .. }));
+        let crosses = rows.iter().flatten().any(|s| s.layer != 0);
         let pull = BLOCKING + DRAWN_UP * held + OPENED * share(&|act| act == Act::Over);
         let mut cell = Self {
             wide,
@@ -101,6 +104,7 @@ impl Cell {
             period,
             rods: Rods { period: Some(period), ..Rods::default() },
             waves: loops.has_waves(),
+            press: if loops.has_waves() || crosses { PRESSED } else { 0.0 },
             pull: pull.max(DVec2::ZERO),
             visits: Vec::new(),
             grid: Vec::new(),
@@ -134,8 +138,8 @@ impl Cell {
         let free = size.map(|s| s.is_none());
         // The many strands of a bobble begin close to each other.
         let (growing, thin) = if loops.has_bobbles() { (STEPS[0] / 3, 0.3) } else { (STEPS[0] / 5, 0.5) };
-        let press = if self.waves { PRESSED } else { 0.0 };
-        let run = Run { steps: STEPS[0], growing, thin, free, load: self.pull, press, firm: 1.0, calm: 0.01 };
+        let (load, press) = (self.pull, self.press);
+        let run = Run { steps: STEPS[0], growing, thin, free, load, press, firm: 1.0, calm: 0.01 };
         self.rods.relax(&run);
         self.refine(points);
         let run = Run { steps: STEPS[1], growing: 0, thin: 1.0, ..run };

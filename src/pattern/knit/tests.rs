@@ -36,6 +36,17 @@ fn measured(strands: &[PatternStrand]) -> Overlap {
     overlap(strands.iter().zip(&radii).map(|(s, r)| (&s.curve, r.as_slice()))).unwrap()
 }
 
+/// How far strands of diameter 1 fold into themselves at most, in radians.
+fn deepest_fold(strands: &[PatternStrand]) -> f64 {
+    let folds = strands.iter().flat_map(|s| {
+        s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
+            *fold = folded(*fold, w, 0.5);
+            Some(*fold)
+        })
+    });
+    folds.fold(0.0, f64::max)
+}
+
 #[test]
 fn every_pattern_keeps_its_yarns_apart() {
     for (pattern, _) in PATTERNS {
@@ -127,13 +138,7 @@ fn yarns_do_not_fold_into_themselves_where_a_brim_is_turned_up() {
     let form = Form::Revolution(profile.map(|(r, y)| DVec2::new(r, y)).into());
     let brim = Knit { rows: chart.rows(), chart, form, ..knit("stockinette", 48, 1) };
     let strands = brim.strands(1.0).unwrap();
-    let folds = strands.iter().flat_map(|s| {
-        s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            *fold = folded(*fold, w, 0.5);
-            Some(*fold)
-        })
-    });
-    let deepest = folds.fold(0.0, f64::max);
+    let deepest = deepest_fold(&strands);
     assert!(deepest < 0.5, "{deepest}");
 }
 

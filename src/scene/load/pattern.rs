@@ -47,7 +47,7 @@ enum ColorWork {
 }
 
 /// So many stitches change places without running into each other.
-const EASY_CABLE: u32 = 6;
+const EASY_CABLE: u32 = 10;
 
 /// More yarns in a row than this are more than anyone strands.
 const MOST_STRANDED: usize = 4;

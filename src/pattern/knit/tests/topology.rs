@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
+
 use super::{
     super::{
         loops::{Border, Loops, Visit},
@@ -11,7 +13,10 @@ use super::{
     },
     *,
 };
-use crate::pattern::rods::passing::passed;
+use crate::{
+    geometry::curve::{Basis, Curve},
+    pattern::rods::passing::passed,
+};
 
 /// How a way is linked with a ring: how often it passes the ring towards the front less towards the back. The ring is closed far
 /// below, the way far above, and crossings are counted as seen from the front (Gauss' linking number as a sum of signs where
@@ -132,8 +137,9 @@ fn links_of(cell: &Cell, loops: &Loops) -> Passes {
     found
 }
 
+/// The chart as it relaxes, which is drawn as it says.
 #[track_caller]
-fn drawn(name: &str, rows: &[&str], wide: u32) {
+fn drawn(name: &str, rows: &[&str], wide: u32) -> Cell {
     let chart = Chart::parse(rows).unwrap();
     let rows = chart.work(wide, chart.rows(), 10_000).unwrap();
     let loops = Loops::new(&rows, wide as usize, Border::cell(wide as usize));
@@ -145,13 +151,15 @@ fn drawn(name: &str, rows: &[&str], wide: u32) {
         eprintln!("{name}: {key:?} is {:?}, not {:?}", found.get(key), expected.get(key));
     }
     assert!(differ.is_empty(), "{name}: {} of {} differ", differ.len(), expected.len());
-    let relax = || drop(Cell::of_rows(&rows, YARN_PER_STITCH, POINTS, [None; 2]));
+    let mut relaxed = None;
+    let relax = || relaxed = Some(Cell::of_rows(&rows, YARN_PER_STITCH, POINTS, [None; 2]));
     assert_eq!(passed(relax), 0, "{name}: yarns passed through each other");
+    relaxed.unwrap()
 }
 
 /// Charts in which every stitch stands beside others, with stitches of their cell.
 fn all_drawn(charts: &[(&[&str], u32)]) {
-    charts.iter().for_each(|(rows, wide)| drawn(&rows.join(" / "), rows, *wide));
+    charts.iter().for_each(|(rows, wide)| drop(drawn(&rows.join(" / "), rows, *wide)));
 }
 
 #[test]
@@ -215,6 +223,41 @@ fn strands_lifted_between_knit_and_purl() {
         (&["p3 k3", "p3 m1l k2tog k"], 6),
         (&["p3 k3", "p3 m1rp k2tog k"], 6),
     ]);
+}
+
+/// Of a relaxed cell as yarns two periods wide and high: their overlap, and how far they fold.
+fn measured_cell(cell: &Cell) -> (Overlap, f64) {
+    let strand = |row: usize| {
+        let count = cell.visits[row % cell.high as usize].len() - 1;
+        let points: Vec<DVec3> = (0..2 * count).flat_map(|k| cell.visit(row, k)).map(|(p, _)| p).collect();
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening: None };
+        PatternStrand { coordinates: Vec::new(), kind: StrandKind::Course, index: row as u32, share: 1.0, curve }
+    };
+    let strands: Vec<_> = (0..2 * cell.high as usize).map(strand).collect();
+    (measured(&strands), deepest_fold(&strands))
+}
+
+#[test]
+fn wide_cables_lie_flat_over_each_other() {
+    let charts: [(&[&str], u32); 6] = [
+        (&["p k8 p", "p c8f p", "4: p k8 p"], 10),
+        (&["p k8 p", "p c8b p", "6: p k8 p"], 10),
+        (&["p k16 p", "p c8b c8f p", "6: p k16 p"], 18),
+        (&["p k12 p", "p c8f k4 p", "4: p k12 p", "p k4 c8b p", "3: p k12 p"], 14),
+        (&["p k10 p", "p c10f p", "6: p k10 p"], 12),
+        (&["p k12 p", "p c12b p", "8: p k12 p"], 14),
+    ];
+    // Side by side, for each takes seconds.
+    charts.par_iter().for_each(|(rows, wide)| {
+        let cell = drawn(&rows.join(" / "), rows, *wide);
+        let (overlap, fold) = measured_cell(&cell);
+        let z = || cell.rods.points.iter().map(|p| p.z);
+        let thick = 1.0 + z().fold(f64::MIN, f64::max) - z().fold(f64::MAX, f64::min);
+        eprintln!("{rows:?}: {overlap:?}, {fold:.2}, {thick:.1}");
+        assert!(overlap.share < 0.05 && overlap.deepest < 0.1 && fold == 0.0, "{rows:?}: {overlap:?} {fold}");
+        // Two cloths over each other are about six yarns thick; strands that stand on edge are ten.
+        assert!(thick < 9.0, "{rows:?}: {thick}");
+    });
 }
 
 #[test]
