@@ -101,7 +101,7 @@ fn what_cannot_be_made_is_refused() {
         // Before it is knitted, which would take minutes.
         (
             &["knit", "--stitches", "1000", "--rows", "1000", "-o", "a.bcc", "-o", "a.hair"],
-            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 24019200; ",
+            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 24019200\n",
         ),
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has 2 to 10000 points; as in "),
         (
