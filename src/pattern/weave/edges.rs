@@ -95,6 +95,12 @@ pub(super) fn from_points(kind: StrandKind, index: u32, points: &[Point], flat: 
     made
 }
 
+/// A point so far on the way from one to another.
+pub(super) fn between(a: Point, b: Point, share: f64) -> Point {
+    let coordinates = [0, 1].map(|k| a.3[k] + share as f32 * (b.3[k] - a.3[k]));
+    (a.0.lerp(b.0, share), a.1 + share * (b.1 - a.1), a.2.lerp(b.2, share as f32), coordinates)
+}
+
 /// Whether hems at both ends of cloth so high do not reach each other.
 pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
     2.0 * HEM[0] * FOLDED * thickness < height

@@ -10,6 +10,7 @@ mod minimize;
 mod pile;
 mod selvedge;
 mod shuttle;
+mod turn;
 mod unit_cell;
 
 #[cfg(test)]
