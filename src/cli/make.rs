@@ -271,18 +271,15 @@ impl Output {
         Files::default().writes("-o", &self.out).check(self.quiet)?;
         self.level.yarn()
     }
-}
 
-impl Output {
     /// Refuses files whose format has no room for a curve of so many points, before any work.
     fn hold(&self, points: u64) -> Result<(), Failure> {
         // Plies and fibres have points of their own.
         if self.level.level != LEVELS[0] {
             return Ok(());
         }
-        let too_few = |path: &&PathBuf| curve_file::most_points(path).is_some_and(|most| points > most as u64);
-        let Some(path) = self.out.iter().find(too_few) else { return Ok(()) };
-        let most = curve_file::most_points(path).unwrap_or(0);
+        let most = |path: &PathBuf| curve_file::most_points(path).filter(|most| points > *most as u64);
+        let Some((path, most)) = self.out.iter().find_map(|path| Some((path, most(path)?))) else { return Ok(()) };
         let extension = path.extension().unwrap_or_default().display();
         Err(Failure::hinted(
             format!(

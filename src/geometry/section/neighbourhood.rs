@@ -130,9 +130,9 @@ impl Neighbourhood {
     #[inline]
     pub(super) fn bent(&self, at: Vec2, travel: f32) -> Vec3A {
         let bend = self.bend;
-        let (sin, cos) = sin_cos(bend.length() * travel);
-        // sin / k and (1 - cos) / k^2, which are finite for a straight yarn.
         let k = bend.length();
+        let (sin, cos) = sin_cos(k * travel);
+        // sin / k and (1 - cos) / k^2, which are finite for a straight yarn.
         let (along, fall) =
             if k * travel.abs() > 1e-2 { (sin / k, (1.0 - cos) / (k * k)) } else { (travel, 0.5 * travel * travel) };
         let nearer = 1.0 - bend.dot(at);

@@ -96,6 +96,7 @@ impl Cell {
             count as f64 / f64::from((wide * high).max(1))
         };
         let held = share(&|act| matches!(act, Act::Tuck | Act::Pass { .. }));
+        let waves = loops.has_waves();
         let crosses = rows.iter().flatten().any(|s| s.layer != 0);
         let pull = BLOCKING + DRAWN_UP * held + OPENED * share(&|act| act == Act::Over);
         let mut cell = Self {
@@ -103,8 +104,8 @@ impl Cell {
             high,
             period,
             rods: Rods { period: Some(period), ..Rods::default() },
-            waves: loops.has_waves(),
-            press: if loops.has_waves() || crosses { PRESSED } else { 0.0 },
+            waves,
+            press: if waves || crosses { PRESSED } else { 0.0 },
             pull: pull.max(DVec2::ZERO),
             visits: Vec::new(),
             grid: Vec::new(),

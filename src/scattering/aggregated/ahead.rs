@@ -78,7 +78,7 @@ pub(super) struct FibersAhead {
 /// The fibres of the plies on a way out from `shift` beside a place, in the direction `w` of the section's frame: of the place's own ply from
 /// the distance `own` on, if they are asked for, and of others from `free` on.
 ///
-/// A vertex asks a dozen times, from as many places of its code: one copy of this for all of them stays in the processor's cache.
+/// A vertex asks a dozen times, from as many places of its code: one copy of this serves all of them, and is as fast as one in each.
 #[inline(never)]
 pub(super) fn plies_ahead(
     view: &View<'_>,
