@@ -117,7 +117,7 @@ impl PointGrid {
 
     /// What finds neighbours: quickest of points that follow each other in space.
     pub(crate) fn walk(&self) -> Walk<'_> {
-        Walk { grid: self, ahead: false, cell: None, runs: Vec::with_capacity(9) }
+        Walk { grid: self, ahead: false, known: std::array::from_fn(|_| Around::default()) }
     }
 
     /// What finds neighbours in a point's own cell and in one of each two opposite cells beside it, so that every pair of points
@@ -168,40 +168,54 @@ impl PointGrid {
     }
 }
 
-/// Finds the neighbours of points in a [`PointGrid`].
-pub(crate) struct Walk<'a> {
-    grid: &'a PointGrid,
-    ahead: bool,
-    /// The cell last asked for, and the entries around it.
+/// Cells that are remembered along x, y and z, as powers of two: a yarn that forms loops comes back to those that it left.
+const REMEMBERED: [u32; 3] = [2, 1, 1];
+
+/// A cell, and the entries around it as runs.
+#[derive(Default)]
+struct Around {
     cell: Option<Key>,
     runs: Vec<Range<u32>>,
 }
 
+/// Finds the neighbours of points in a [`PointGrid`].
+pub(crate) struct Walk<'a> {
+    grid: &'a PointGrid,
+    ahead: bool,
+    /// The cells last asked for, each in its place.
+    known: [Around; 1 << (REMEMBERED[0] + REMEMBERED[1] + REMEMBERED[2])],
+}
+
 impl<'a> Walk<'a> {
-    /// Finds the entries around a cell, unless they are those last asked for.
-    fn go_to(&mut self, cell: Key) {
-        if self.cell != Some(cell) {
-            self.grid.runs_around(cell, self.ahead, &mut self.runs);
-            self.cell = Some(cell);
+    /// The entries around a cell, found anew unless they are remembered.
+    fn go_to(&mut self, cell: Key) -> &[Range<u32>] {
+        let mut place = 0;
+        for (axis, bits) in REMEMBERED.into_iter().enumerate() {
+            place = place << bits | (cell >> (21 * axis)) as usize & ((1 << bits) - 1);
         }
+        let known = &mut self.known[place];
+        if known.cell != Some(cell) {
+            self.grid.runs_around(cell, self.ahead, &mut known.runs);
+            known.cell = Some(cell);
+        }
+        &known.runs
     }
 
     /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
     pub(crate) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
-        self.go_to(self.grid.cells[self.grid.cell_of[point] as usize].0);
-        let entries = &self.grid.entries;
-        self.runs.iter().flat_map(|run| &entries[run.start as usize..run.end as usize])
+        let grid = self.grid;
+        let runs = self.go_to(grid.cells[grid.cell_of[point] as usize].0);
+        runs.iter().flat_map(|run| &grid.entries[run.start as usize..run.end as usize])
     }
 
     /// Of the points around a place, those within a distance and some that are a little farther; in the same order. Of a grid
     /// without a period.
     pub(crate) fn within(&mut self, at: DVec3, distance: f64, mut found: impl FnMut(&'a Entry)) {
-        self.go_to(key_of(at, self.grid.size, self.grid.wrap));
-        let PointGrid { entries, places, origin, .. } = self.grid;
+        let PointGrid { entries, places, origin, size, wrap, .. } = self.grid;
         let from = (at - *origin).as_vec3();
         let most = f32x8::splat((distance as f32 + ROUNDED * (from.length() + distance as f32)).powi(2));
         let from = from.to_array().map(f32x8::splat);
-        for run in &self.runs {
+        for run in self.go_to(key_of(at, *size, *wrap)) {
             let (mut first, end) = (run.start as usize, run.end as usize);
             while first < end {
                 let mut square = f32x8::ZERO;

@@ -129,6 +129,7 @@ pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], 
         add_images(&mut segments, (*period, *shear), reach);
     }
     let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
+    let halves: Vec<f64> = segments.iter().map(|s| 0.5 * s.from.distance(s.to)).collect();
     let grid = PointGrid::new(&middles, reach, None);
     // Where a segment starts, by the half of it that follows and the half of the one before.
     let section = |(walk, ways): &mut (Walk<'_>, Vec<DVec3>), i: usize| {
@@ -141,8 +142,14 @@ pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], 
             (None, None) => own.from,
         };
         ways.clear();
+        let half = halves[i].max(own.from.distance(before));
         walk.within(own.from, reach, |entry| {
             let other = &segments[entry.index as usize];
+            // However they lie.
+            let most = 2.0 * far + half + halves[entry.index as usize];
+            if entry.at.distance_squared(own.from) > most * most {
+                return;
+            }
             if own.strand == other.strand && (own.along - other.along).abs() < ALONG * 2.0 * room {
                 return;
             }
