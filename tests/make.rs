@@ -1,6 +1,9 @@
 //! `make` and what `info` says of what it made.
 
-use yarnray::files::curve_file::{self, ReadOptions};
+use yarnray::{
+    files::curve_file::{self, ReadOptions},
+    geometry::curve::CurveSet,
+};
 
 use crate::support::{directory, listing, project, write, yarnray};
 
@@ -92,6 +95,42 @@ fn what_cannot_be_made_is_refused() {
         (
             &["knit", "-o", "a.xyz"][..],
             "error: a.xyz: expected a name that ends in .bcc, .hair, .obj, .yarns, .txt, .curves, .usda, .usdc or .usd\n",
+        ),
+        (
+            &["knit", "--motif", ".#", "--motif", "#", "--color", ".=#ffffff", "--color", "#=#000000", "-o", "a.bcc"],
+            "error: --motif #: every row of a motif has 2 signs, like the first\n  hint: ",
+        ),
+        (
+            &["knit", "--motif", "#", "--color", ".=#ffffff", "-o", "a.bcc"],
+            "error: --motif #: `#` stands for no yarn\n  hint: ",
+        ),
+        (
+            &["knit", "--motif", "#", "--color", "#c02a1f", "-o", "a.bcc"],
+            "error: --color #c02a1f: expected a sign and a colour\n",
+        ),
+        (
+            &["knit", "--motif", "@no.png", "--color", "#c02a1f", "-o", "a.bcc"],
+            "error: --motif: cannot read no.png: no such file\n",
+        ),
+        (
+            &["knit", "--motif", "#", "--color", "#=#c02a1f", "--color-work", "double-knit", "-o", "a.bcc"],
+            "error: double knitting takes two yarns, one for each layer, but found 1\n  hint: ",
+        ),
+        (
+            &[
+                "knit",
+                "--motif",
+                "#",
+                "--color",
+                "#=#c02a1f",
+                "--color-work",
+                "intarsia",
+                "--form",
+                "tube",
+                "-o",
+                "a.bcc",
+            ],
+            "error: intarsia is knitted flat\n  hint: --color-work stranded\n",
         ),
         (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
         (
@@ -355,6 +394,62 @@ fn written_instructions_are_knitted_from_the_command_line_and_from_a_file() {
     let rows = ["--chart", "p2 k2 p2 k2", "--chart", "p2 k2 p2 k2"];
     yarnray(d, &[&["make", "knit", "-o", "c.txt"], &rows[..], &size[..]].concat()).good();
     assert_eq!(read("a.txt"), read("c.txt"));
+}
+
+/// `make knit --motif` knits what a scene with that motif does: a yarn for each colour, dyed with it.
+#[test]
+fn commands_and_scenes_knit_the_same_colours() {
+    let folder = directory();
+    let d = folder.path();
+    let motif =
+        "motif = { rows = [\".#..\", \"###.\"], offset = [1, 0], yarns = { \".\" = \"wool\", \"#\" = \"grey_wool\" } }";
+    let source =
+        "type = \"knit\", stitches = 9, rows = 8, flatten = 1, color_work = \"WORK\", catch_floats = 2, carry_rows = 1";
+    for work in ["stranded", "intarsia", "double-knit"] {
+        let source = source.replace("WORK", work);
+        write(d, "s.toml", format!("[[fabric]]\nyarn = \"wool\"\n{motif}\nsource = {{ {source} }}\n"));
+        yarnray(d, &["make", "garment", "s.toml", "-o", "scene.yarns"]).good();
+        let piece = ["make", "knit", "--yarn", "wool", "--stitches", "9", "--rows", "8", "-o", "made.yarns"];
+        let signs = ["--motif", ".#..", "--motif", "###.", "--motif-offset", "1,0"];
+        let colors = ["--color", ".=#f0e8d8", "--color", "#=#c02a1f"];
+        let how = ["--color-work", work, "--catch-floats", "2", "--carry-rows", "1"];
+        yarnray(d, &[&piece[..], &signs, &colors, &how].concat()).good();
+        let [scene, made] = ["scene", "made"]
+            .map(|n| curve_file::read(&d.join(format!("{n}.yarns")), &ReadOptions::default()).unwrap());
+        let lengths = |set: &CurveSet| set.curves.iter().map(|c| c.polygon_length()).collect::<Vec<_>>();
+        let (wanted, found) = (lengths(&scene), lengths(&made));
+        assert_eq!(wanted.len(), found.len(), "{work}");
+        assert!(found.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 0.01 * b), "{work}: {found:?}, not {wanted:?}");
+        let reds = made.colors.iter().flatten().filter(|c| c[0] > 2.0 * c[1]).count();
+        assert!(reds > 0 && reds < made.colors.len(), "{work}: {reds} yarns of {} are red", made.colors.len());
+    }
+    // A picture is the same motif; a format without colours is told.
+    let mut encoder = png::Encoder::new(std::fs::File::create(d.join("m.png")).unwrap(), 4, 2);
+    encoder.set_color(png::ColorType::Rgb);
+    let pixels = [[0, 1, 0, 0], [1, 1, 1, 0]].concat();
+    let pixels: Vec<u8> = pixels.into_iter().flat_map(|p| if p == 1 { [190, 40, 30] } else { [250; 3] }).collect();
+    encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    let size = ["--stitches", "9", "--rows", "8"];
+    let from = |motif: &[&str], out: &str| {
+        let args = [&["make", "knit", "-o", out], &size[..], motif].concat();
+        (yarnray(d, &args).good().stderr, std::fs::read(d.join(out)).unwrap())
+    };
+    let signs = ["--motif", ".#..", "--motif", "###.", "--color", ".=#ffffff", "--color", "#=#c02a1f"];
+    let picture = ["--motif", "@m.png", "--color", "#ffffff", "--color", "#ff0000=#c02a1f"];
+    let ((said, signs), (_, picture)) = (from(&signs, "a.txt"), from(&picture, "b.txt"));
+    assert!(signs == picture);
+    assert!(said.contains("a.txt: its format holds no colours"), "{said}");
+}
+
+#[test]
+fn set_up_rows_and_a_cast_on_are_followed_from_the_command_line() {
+    let folder = directory();
+    let d = folder.path();
+    let text = "Cast on 8 sts.\nSet-up row (WS): p\nRow 1 (RS): *k2, p2; rep from * to end.\nRow 2: *k2, p2; rep from * to end.\nRep rows 1-2";
+    yarnray(d, &["make", "knit", "--instructions", text, "--rows", "5", "-o", "a.txt"]).good();
+    let rib = ["--chart", "k8", "--chart", "4: p2 k2 p2 k2", "--stitches", "8", "--rows", "5"];
+    yarnray(d, &[&["make", "knit", "-o", "b.txt"], &rib[..]].concat()).good();
+    assert_eq!(std::fs::read(d.join("a.txt")).unwrap(), std::fs::read(d.join("b.txt")).unwrap());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `yarnray make`: curve files of cloth that the program makes.
 
+mod colors;
 mod knit;
 
 use std::path::{Path, PathBuf};
@@ -38,6 +39,7 @@ const EXAMPLES: &str = "Examples:
   yarnray make knit --pattern rib2x2 --stitches 40 --rows 40 -o rib.hair
   yarnray make knit --chart '4: k' --chart 'k2 k2tog' --stitches 80 --rows 10 --form tube -o shaped.hair
   yarnray make knit --pattern seed --gauge 22,34 --width 80 --height 60 -o seed.hair
+  yarnray make knit --motif '#..' --motif '.#.' --color '.=#f0e8d8' --color '#=#c02a1f' -o colors.usdc
   yarnray make garment scenes/pullover.toml -o pullover.bcc
   yarnray make weave --draft 'twill 2/1' --warps 60 --wefts 60 --weft-radius 0.3 -o twill.txt
   yarnray make weave --draft 'satin 5' --width 30 --height 20 --radius 0.2 -o satin.txt
@@ -309,6 +311,10 @@ fn write(
     }
     if set.colors.iter().all(Option::is_none) {
         set.colors = Vec::new();
+    }
+    let plain = output.out.iter().find(|path| !curve_file::holds_colors(path));
+    if let Some(path) = plain.filter(|_| !set.colors.is_empty() && !output.quiet) {
+        log::say(&format!("{}: its format holds no colours; .usdc, .usda and .yarns do", path.display()));
     }
     let set = match yarn {
         Some(yarn) => output.level.apply(set, yarn)?,

@@ -304,6 +304,13 @@ struct SceneArgs {
     frame: bool,
 }
 
+/// Two numbers with a comma between them.
+fn two(text: &str) -> Option<[f64; 2]> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    numbers?.try_into().ok()
+}
+
 /// Reads a length or another number that must be above 0.
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "expected a number above 0".to_owned())

@@ -26,10 +26,10 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use self::cell::Cell;
-pub(crate) use self::colors::{Way, caught, in_use};
+pub(crate) use self::colors::{Way, caught, in_use, too_many_strands};
 pub(super) use self::pressed::{Alike, flatten_where_touching};
 pub use self::{
-    colors::{Colors, Work},
+    colors::{CARRY_ROWS, CATCH_FLOATS, Colors, Work},
     rims::{CastOn, Closing, Rims},
     size::{Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, YARNS_PER_STITCH, fits_stitch},
 };

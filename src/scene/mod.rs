@@ -14,6 +14,7 @@ pub(crate) mod force;
 pub(crate) mod identity;
 mod layers;
 pub mod load;
+pub(crate) mod motif;
 pub(crate) mod motion;
 pub mod view;
 

@@ -5,14 +5,15 @@ use std::path::Path;
 use clap::Args;
 use glam::DVec2;
 
-use super::{EXAMPLES, Output, RADIUS, write};
+use super::{EXAMPLES, Output, RADIUS, colors::ColorArgs, write};
 use crate::{
-    cli::{Failure, log, named, positive, working::Working},
+    cli::{Failure, log, named, positive, two, working::Working},
     math::words::counted,
     pattern::{
+        PatternStrand,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
-        knitspeak,
+        knitspeak::{Instructions, KnitSpeakError},
     },
     scene::{Yarn, load::read_text},
 };
@@ -39,6 +40,8 @@ pub(super) struct KnitArgs {
     rows: Option<u32>,
     #[command(flatten)]
     size: SizeArgs,
+    #[command(flatten)]
+    colors: ColorArgs,
     /// Flat, or round about the y axis.
     #[arg(long, default_value = "flat", value_parser = named(&FORMS))]
     form: Form,
@@ -94,12 +97,6 @@ struct SizeArgs {
 /// What is knitted without a profile.
 static FORMS: [(&str, Form); 2] = [("flat", Form::Flat), ("tube", Form::Tube)];
 
-fn two(text: &str) -> Option<[f64; 2]> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
-    numbers?.try_into().ok()
-}
-
 /// A number from one to another.
 fn within([least, most]: [f64; 2]) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| {
@@ -126,8 +123,16 @@ fn wrong(error: &dyn std::fmt::Display) -> Failure {
     Failure::Input(format!("error: {error}"))
 }
 
-/// The chart of written instructions over so many stitches, or of those in a file whose name stands behind `@`.
-fn written(text: &str, stitches: u32) -> Result<Chart, Failure> {
+/// A chart, and the stitches and rows that are knitted of it unless asked otherwise.
+struct Charted {
+    chart: Chart,
+    stitches: u32,
+    rows: u32,
+}
+
+/// The chart of written instructions, or of those in a file whose name stands behind `@`, over so many stitches or as many as
+/// they cast on; what they repeat without an end, for at least so many rows.
+fn written(text: &str, stitches: Option<u32>, least: u32) -> Result<Charted, Failure> {
     let (text, name) = match text.strip_prefix('@') {
         None => (text.to_owned(), "--instructions".to_owned()),
         Some(path) => {
@@ -135,30 +140,41 @@ fn written(text: &str, stitches: u32) -> Result<Chart, Failure> {
             (read, path.to_owned())
         }
     };
-    let rows = knitspeak::chart_rows(&text, stitches).map_err(|error| {
+    let told = |error: KnitSpeakError| {
         let line = error.line.map_or(String::new(), |line| format!("line {}: ", line + 1));
         Failure::hinted(format!("{name}: {line}{}", error.problem), error.hint)
-    })?;
-    Chart::parse(&rows).map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))
+    };
+    let read = Instructions::read(&text).map_err(told)?;
+    let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
+    let worked = read.work(stitches, least as usize).map_err(told)?;
+    let rows = if worked.whole { worked.rows.len() as u32 } else { knit::COUNT };
+    let parsed = Chart::parse(&worked.rows);
+    let chart = parsed.map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))?;
+    Ok(Charted { chart, stitches, rows })
 }
 
 impl KnitArgs {
     /// What is to be knitted, of yarn of a thickness.
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
-        let chart = if let Some(text) = &self.instructions {
-            written(text, self.stitches.unwrap_or(knit::COUNT))?
+        // Rows of a height are counted when its stitches are known: so many are enough.
+        const MANY: u32 = 2000;
+        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT };
+        let Charted { chart, stitches, rows } = if let Some(text) = &self.instructions {
+            let least = if self.size.height.is_some() { MANY } else { knit::COUNT };
+            written(text, self.stitches, self.rows.unwrap_or(least))?
         } else if self.chart.is_empty() {
-            Chart::named(self.pattern.as_deref().unwrap_or("stockinette")).ok_or_else(|| wrong(&"unknown pattern"))?
+            let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
+            by_itself(chart.ok_or_else(|| wrong(&"unknown pattern"))?)
         } else {
-            Chart::parse(&self.chart).map_err(|e| wrong(&e))?
+            by_itself(Chart::parse(&self.chart).map_err(|e| wrong(&e))?)
         };
         let form = self.form(yarn.radius)?;
         // Shaped pieces are knitted once, from the first row of the chart to the last.
         let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
-        let rows = if all { chart.rows() } else { knit::COUNT };
+        let rows = if all { chart.rows() } else { rows };
         let piece = Knit {
             chart,
-            stitches: self.stitches.unwrap_or(knit::COUNT),
+            stitches: self.stitches.unwrap_or(stitches),
             rows: self.rows.unwrap_or(rows),
             form,
             stitch_width: self.stitch_width,
@@ -211,15 +227,20 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     let radius = args.output.radius.or(yarn.as_ref().map(|y| y.radius)).unwrap_or(RADIUS);
     // Curve files know round yarns only.
     let thickness = Thickness { half_width: yarn.as_ref().map_or(1.0, Yarn::half_width), ..Thickness::round(radius) };
-    let piece = args.piece(&thickness)?;
+    let (piece, palette) = args.colors.dyed(args.piece(&thickness)?, |told| {
+        if !args.output.quiet {
+            log::say(told);
+        }
+    })?;
     args.output.hold(piece.least_points().map_err(|e| wrong(&e))?)?;
     let task = format!("knitting {} x {}", counted(piece.stitches, "stitch"), counted(piece.rows, "row"));
     let working = Working::on(task, args.output.quiet);
-    let Knitted { strands, gauge, .. } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
+    let Knitted { strands, gauge, colors } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
     drop(working);
     let length: f64 = strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
-    write(strands, &args.output, [radius; 2], yarn.as_ref(), |_| None)?;
+    let color = |strand: &PatternStrand| palette.of(*colors.get(strand.index as usize)?);
+    write(strands, &args.output, [radius; 2], yarn.as_ref(), color)?;
     if !args.output.quiet {
         let Knit { stitches, rows, form, .. } = &piece;
         let [width, height] = gauge;

@@ -369,6 +369,15 @@ pub(crate) fn most_points(path: &Path) -> Option<usize> {
     }
 }
 
+/// Whether a file that [`write()`] makes by this name holds the colours of curves.
+pub(crate) fn holds_colors(path: &Path) -> bool {
+    #[cfg(feature = "usd")]
+    if layer::can_write(path) {
+        return true;
+    }
+    written_as(path) == Some(Format::Yarns)
+}
+
 /// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.yarns`, `.txt`,
 /// `.curves`, `.usda`, `.usdc`, `.usd`) to `out`.
 ///

@@ -8,7 +8,10 @@
 
 use std::ops::Range;
 
-use super::loops::{Course, Loops, Visit};
+use super::{
+    Form,
+    loops::{Course, Loops, Visit},
+};
 
 /// How a row of several colours is knitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +22,53 @@ pub enum Work {
     Intarsia,
     /// Two layers of plain knit back to back, of two colours that are exchanged on the other side.
     DoubleKnit,
+}
+
+/// Stitches over which a yarn floats before it is caught, and rows that it is carried, unless asked otherwise.
+pub const CATCH_FLOATS: u32 = 7;
+/// Rows without a colour over which its yarn is carried, unless asked otherwise.
+pub const CARRY_ROWS: u32 = 6;
+
+/// More yarns in a row than this are more than anyone strands.
+const MOST_STRANDED: usize = 4;
+
+impl Work {
+    /// Those that have a yarn for each colour, by their names.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("stranded", Self::Stranded), ("intarsia", Self::Intarsia), ("double-knit", Self::DoubleKnit)];
+
+    /// Whether a piece of some form is knitted so.
+    ///
+    /// # Errors
+    /// What is wrong, and what to do.
+    pub(crate) fn suits(self, form: &Form) -> Result<(), [&'static str; 2]> {
+        if self == Self::Intarsia && *form != Form::Flat {
+            let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
+            return Err(["intarsia is knitted flat", hint]);
+        }
+        Ok(())
+    }
+
+    /// Whether a piece is knitted so of so many yarns.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub(crate) fn takes(self, yarns: usize) -> Result<(), String> {
+        if self == Self::DoubleKnit && yarns != 2 {
+            return Err(format!("double knitting takes two yarns, one for each layer, but found {yarns}"));
+        }
+        Ok(())
+    }
+}
+
+/// What is told of a row of so many yarns, if that is more than anyone strands: `instead` none floats.
+pub(crate) fn too_many_strands(row: &str, yarns: usize, instead: &str) -> Option<String> {
+    let told = || {
+        format!(
+            "{row} is knitted of {yarns} yarns, and each floats behind the stitches of the others; with {instead} none does"
+        )
+    };
+    (yarns > MOST_STRANDED).then(told)
 }
 
 /// The colours of a piece, and how they are worked.
@@ -114,6 +164,13 @@ impl Colors {
             below = here;
         }
         ways
+    }
+
+    /// What is told of its row of most yarns, if those are more than anyone strands.
+    pub(crate) fn too_many(&self, instead: &str) -> Option<String> {
+        let (most, row) = self.most_in_a_row();
+        let stranded = self.work == Work::Stranded;
+        too_many_strands(&format!("row {}", row + 1), most, instead).filter(|_| stranded)
     }
 
     /// The most yarns that any row has, and that row, from 0.

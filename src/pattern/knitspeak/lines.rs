@@ -31,6 +31,8 @@ pub(super) struct Head {
     pub(super) all: Option<usize>,
     /// "All even rows": whether they are odd.
     pub(super) odd: Option<bool>,
+    /// "Set-up row": whether it comes before the first one.
+    pub(super) set_up: bool,
 }
 
 /// Which rows are repeated.
@@ -161,7 +163,8 @@ fn side_of(text: &str) -> Option<Side> {
 impl Head {
     /// The head of a line and what stands behind it; `None` if it has none.
     pub(super) fn split(text: &str, line: usize) -> Result<Option<(Self, &str)>> {
-        let mut head = Self { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None };
+        let mut head =
+            Self { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None, set_up: false };
         let (mut known, mut range, mut end, mut said) = (false, false, 0, String::new());
         let tokens = head_tokens(text);
         // A list goes on behind a comma, and "Row 1 2/1 LC" is none.
@@ -279,8 +282,25 @@ pub(super) fn binds_off(words: &[&str]) -> bool {
     matches!(words, ["bo" | "bindoff", ..] | ["bind" | "cast", "off", ..])
 }
 
+/// A set-up row as it would be written if it were not one: "Next row (WS): p" of "Set-up row (WS): p", "Row 2: k" of
+/// "Foundation row 2: k".
+fn set_up(text: &str) -> Option<String> {
+    const NAMES: [&str; 6] = ["set-up", "set up", "setup", "foundation", "preparation", "preparatory"];
+    let is_named = |name: &&str| text.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name));
+    let rest = text[NAMES.iter().find(|name| is_named(name))?.len()..].trim_start();
+    let tokens = head_tokens(rest);
+    let [row, behind @ ..] = tokens.as_slice() else { return None };
+    let is_numbered = behind.first().is_some_and(|token| number(&token.text).is_some());
+    is_row(&row.text).then(|| if is_numbered { rest.to_owned() } else { format!("next {rest}") })
+}
+
 /// What a piece of text is about.
 pub(super) fn read(text: &str, line: usize) -> Result<Line> {
+    if let Some(row) = set_up(text) {
+        let split = Head::split(&row, line)?;
+        let Some((head, body)) = split.filter(|(_, body)| !body.is_empty()) else { return no_row(text, line) };
+        return Ok(Line::Row(Head { set_up: true, ..head }, body.to_owned()));
+    }
     if let Some((head, body)) = Head::split(text, line)? {
         let words = plain_words(body);
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -299,7 +319,8 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
         // "Knit 3 rows."
         [name @ ("k" | "knit" | "p" | "purl"), n, row] if number(n).is_some() && is_row(row) => {
             let next = number(n).map_or(0, |n| n as usize).min(MOST_ROWS);
-            let head = Head { rows: Vec::new(), side: None, round: is_round(row), next, all: None, odd: None };
+            let head =
+                Head { rows: Vec::new(), side: None, round: is_round(row), next, all: None, odd: None, set_up: false };
             Line::Row(head, if name.starts_with('k') { "knit" } else { "purl" }.to_owned())
         }
         ["cast", "on", n, ..] | ["co", n, ..] if number(n).is_some() => Line::CastOn(number(n).unwrap_or_default()),
@@ -497,11 +518,5 @@ pub(super) fn counted(body: &str) -> (&str, Option<u32>) {
 
 /// What is told where no row begins.
 pub(super) fn no_row<T>(text: &str, line: usize) -> Result<T> {
-    let start = text.split(':').next().unwrap_or_default().to_lowercase();
-    let hint = if start.contains("set") && start.contains("up") || start.contains("foundation") {
-        "number such a row as Row 1, and repeat the rows behind it: Repeat rows 2-5"
-    } else {
-        KNOWN
-    };
-    error(line, format!("expected \"Row 1: ...\", found \"{}\"", short(text)), hint)
+    error(line, format!("expected \"Row 1: ...\", found \"{}\"", short(text)), KNOWN)
 }

@@ -63,6 +63,8 @@ const KNOWN: &str = "k, p, tbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk
 #[derive(Clone, Debug)]
 pub struct Instructions {
     rows: Vec<Written>,
+    /// How many of them, from the first one, are knitted once only: set-up rows.
+    set_up: usize,
     again: Option<Again>,
     cast_on: Option<u32>,
     ends: bool,
@@ -112,11 +114,19 @@ impl Instructions {
             faces: self.rows.iter().any(reads).then(Vec::new),
             rows: Vec::with_capacity(self.rows.len()),
         };
-        for row in &self.rows {
-            needle.work(row)?;
-        }
+        let (set_up, pattern) = self.rows.split_at(self.set_up);
+        set_up.iter().try_for_each(|row| needle.work(row))?;
+        let begun = needle.found;
+        pattern.iter().try_for_each(|row| needle.work(row))?;
         let shaped = needle.found != cast_on;
-        let Some(Again { rows, until, line }) = &self.again else {
+        // What set-up rows are for is repeated, whether it is told or not.
+        let goes_on = !set_up.is_empty() && !pattern.is_empty() && !self.ends && needle.found == begun;
+        let implied = || Again {
+            rows: (self.set_up..self.rows.len()).collect(),
+            until: Until::Open,
+            line: self.rows[self.set_up].line,
+        };
+        let Some(Again { rows, until, line }) = &self.again.clone().or_else(|| goes_on.then(implied)) else {
             return Ok(Worked { rows: needle.rows, whole: self.ends || shaped });
         };
         let copy = |needle: &Needle, k: usize| {

@@ -28,9 +28,14 @@ pub(super) enum Until {
 /// What has been read so far.
 struct Reading {
     rows: BTreeMap<usize, Written>,
+    /// How many rows come before the one that is written as the first: set-up rows, and others without a number.
+    set_up: usize,
     /// Rows that are told to be like all others of a side, and how far they are apart.
     fill: Vec<(usize, usize, Written)>,
     first_side: Side,
+    /// Whether a row says which side it is on; else the first one is on the right side.
+    is_sided: bool,
+    is_numbered: bool,
     round: bool,
     again: Option<Again>,
     cast_on: Option<u32>,
@@ -41,8 +46,11 @@ struct Reading {
 pub(super) fn written(text: &str) -> Result<Instructions> {
     let mut reading = Reading {
         rows: BTreeMap::new(),
+        set_up: 0,
         fill: Vec::new(),
         first_side: Side::Right,
+        is_sided: false,
+        is_numbered: false,
         round: false,
         again: None,
         cast_on: None,
@@ -95,9 +103,25 @@ impl Reading {
     }
 
     fn row(&mut self, line: usize, mut head: Head, body: &str) -> Result<()> {
+        if head.set_up {
+            if self.is_numbered {
+                let problem = "a set-up row comes after the rows that it sets up";
+                return error(line, problem, "write it before Row 1, or give it the number that it has");
+            }
+        } else if !head.rows.is_empty() {
+            // "Knit 3 rows. Row 1: ..."
+            if !self.is_numbered && head.rows[0] == 1 {
+                self.set_up = self.last();
+            }
+            self.is_numbered = true;
+            head.rows.iter_mut().for_each(|row| *row = self.place(*row));
+        }
         if head.next > 0 {
             self.fill_up(0);
             head.rows = (self.last() + 1..=self.last() + head.next).collect();
+        }
+        if head.set_up {
+            self.set_up = self.set_up.max(head.rows.last().copied().unwrap_or_default());
         }
         if let Some(Again { .. }) = &self.again {
             let problem = "rows come after rows that are repeated without an end";
@@ -106,14 +130,16 @@ impl Reading {
         self.round |= head.round;
         if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
             self.first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+            self.is_sided = true;
         }
         if let Some(copied) = lines::copied(body, line)? {
             self.fill_up(0);
-            let pick = |k: usize| self.rows.get(&copied[k % copied.len()]).cloned();
+            let pick = |k: usize| self.rows.get(&self.place(copied[k % copied.len()])).cloned();
             let copies: Vec<Option<Written>> = (0..head.rows.len()).map(pick).collect();
             for (&row, copy) in head.rows.iter().zip(copies) {
                 let Some(copy) = copy else {
-                    return error(line, format!("row {row} repeats a row that is not written before it"), KNOWN);
+                    let row = self.name(row);
+                    return error(line, format!("{row} repeats a row that is not written before it"), KNOWN);
                 };
                 self.insert(row, Written { line, count: None, ..copy })?;
             }
@@ -126,7 +152,7 @@ impl Reading {
         if head.rows.is_empty() {
             // Rows of a side, of whichever numbers.
             let first = match (head.odd, head.side) {
-                (Some(odd), _) => odd,
+                (Some(odd), _) => odd == self.set_up.is_multiple_of(2),
                 (None, side) => side == Some(self.first_side),
             };
             self.fill.push((if first { 1 } else { 2 }, head.all.unwrap_or(2), Written { count: None, ..row }));
@@ -148,7 +174,20 @@ impl Reading {
         let line = row.line;
         match self.rows.insert(number, row) {
             None => Ok(()),
-            Some(_) => error(line, format!("row {number} is written twice"), KNOWN),
+            Some(_) => error(line, format!("{} is written twice", self.name(number)), KNOWN),
+        }
+    }
+
+    /// Where a row is that is written with such a number: 0 is none.
+    fn place(&self, row: usize) -> usize {
+        if row == 0 { 0 } else { row.saturating_add(self.set_up) }
+    }
+
+    /// What a row is called as it is written.
+    fn name(&self, row: usize) -> String {
+        match row.checked_sub(self.set_up) {
+            Some(number @ 1..) => format!("row {number}"),
+            _ => format!("set-up row {row}"),
         }
     }
 
@@ -172,23 +211,26 @@ impl Reading {
             self.again = None;
         }
         // So that the last row of the repeat has its partner.
-        let named = if let Which::Rows(rows) = &copies.which { rows.iter().copied().max().unwrap_or(0) } else { 0 };
+        let named = match &copies.which {
+            Which::Rows(rows) => self.place(rows.iter().copied().max().unwrap_or(0)),
+            _ => 0,
+        };
         let more = named.min(MOST_ROWS).saturating_sub(self.last());
         self.fill_up(more.max(self.last() % 2));
         let last = self.last();
         let rows: Vec<usize> = match &copies.which {
-            Which::Rows(rows) => rows.clone(),
+            Which::Rows(rows) => rows.iter().map(|row| self.place(*row)).collect(),
             Which::Last(count) => (last + 1 - (*count).min(last + 1)..=last).collect(),
-            Which::From(first) => (*first..=last).collect(),
-            Which::All => (1..=last).collect(),
+            Which::From(first) => (self.place(*first)..=last).collect(),
+            Which::All => (self.set_up + 1..=last).collect(),
         };
         if let Some(missing) = rows.iter().find(|row| !self.rows.contains_key(row)) {
-            let problem = format!("row {missing} is repeated and is not written before");
-            return error(
-                line,
-                problem,
-                if last > 0 { format!("rows 1 to {last} are there") } else { KNOWN.to_owned() },
-            );
+            let problem = format!("{} is repeated and is not written before", self.name(*missing));
+            let hint = match last.saturating_sub(self.set_up) {
+                0 => KNOWN.to_owned(),
+                last => format!("rows 1 to {last} are there"),
+            };
+            return error(line, problem, hint);
         }
         if rows.is_empty() {
             return error(line, "no row is there to repeat", KNOWN);
@@ -224,17 +266,27 @@ impl Reading {
         if last == 0 {
             return Err(KnitSpeakError { line: None, problem: "no row is written".into(), hint: KNOWN.into() });
         }
+        if !self.is_sided && !self.set_up.is_multiple_of(2) {
+            self.first_side = Side::Wrong;
+        }
         let mut rows = Vec::with_capacity(last);
         for number in 1..=last {
             let Some(mut row) = self.rows.remove(&number) else {
-                let problem = format!("row {number} is missing");
-                return Err(KnitSpeakError { line: None, problem, hint: format!("rows 1 to {last} are expected") });
+                let problem = format!("{} is missing", self.name(number));
+                let hint = format!("rows 1 to {} are expected", last.saturating_sub(self.set_up).max(1));
+                return Err(KnitSpeakError { line: None, problem, hint });
             };
             let odd = number % 2 == 1;
             row.side = if self.round || odd == (self.first_side == Side::Right) { Side::Right } else { Side::Wrong };
             row.round = self.round;
             rows.push(row);
         }
-        Ok(Instructions { rows, again: self.again, cast_on: self.cast_on, ends: self.ends })
+        Ok(Instructions {
+            set_up: self.set_up.min(rows.len()),
+            rows,
+            again: self.again,
+            cast_on: self.cast_on,
+            ends: self.ends,
+        })
     }
 }

@@ -90,7 +90,8 @@ pub(super) fn instead_of(word: &str) -> Option<&'static str> {
             "it is a stitch through the back loop to some, into the row below to others: k1 tbl, or `tuck` and k as in brioche"
         }
         "bind" | "bo" | "cast" | "co" => {
-            "stitches are bound off at the end of the piece only, by a line of its own: Bind off; shape before by decreases: k2tog, ssk"
+            "a piece is bound off at its end only, by a line of its own: Bind off; at a side, narrow it by decreases in the next rows, \
+             as in k1, ssk, k to last 3 sts, k2tog, k1, or leave stitches by `turn`; for a buttonhole, yo, k2tog"
         }
         "inc" | "increase" => "say which increase: kfb, m1l, m1r or yo",
         "dec" | "decrease" => "say which decrease: k2tog, ssk, p2tog or ssp",

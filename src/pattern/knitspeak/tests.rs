@@ -212,7 +212,12 @@ fn what_is_not_knitted_is_told_with_its_row_and_word() {
         ("Row 1: work in patt", "row 1: \"work\"", "k the knits"),
         ("Row 1: k 5 tog", "row 1: \"k5tog\"", "are known"),
         ("Row 1: k1\nRow 2: k1 (3 sts)", "row 2 makes 1 stitches, and says that it has 3", "fits"),
-        ("Set-up row: k1\nRow 1: k1", "expected \"Row 1: ...\"", "Repeat rows 2-5"),
+        ("Set-up row\nRow 1: k1", "expected \"Row 1: ...\"", "are known"),
+        ("Row 1: k1\nSet-up row: k1", "comes after", "before Row 1"),
+        ("Set-up row: k1\nRow 1: k1\nRow 1: k1", "row 1 is written twice", "are known"),
+        ("Set-up row 1: k1\nSet-up row 3: k1\nRow 1: k1", "set-up row 2 is missing", "expected"),
+        ("Set-up row: k1\nRow 1: k1\nRep rows 1-2", "row 2 is repeated", "rows 1 to 1"),
+        ("Row 1: k1\nRow 2: bind off 1 st", "row 2: \"bind\"", "for a buttonhole, yo, k2tog"),
         ("Row 1: k the knits and p the purls", "row 1 is the first one", "say which"),
         ("Row 1: k1\nRep rows 1-4", "row 2 is repeated", "rows 1 to 1"),
         ("Row 1: k1\nRep row 1\nRow 2: p1", "rows come after", "3 times"),
@@ -224,4 +229,31 @@ fn what_is_not_knitted_is_told_with_its_row_and_word() {
         let wrong = Instructions::read(text).and_then(|read| read.work(1, 20)).unwrap_err();
         assert!(wrong.problem.contains(problem) && wrong.hint.contains(hint), "{text}: {wrong}");
     }
+}
+
+#[test]
+fn set_up_rows_are_knitted_once() {
+    let work = |text: &str, least| Instructions::read(text).unwrap().work(4, least).unwrap();
+    // The rows behind are numbered from 1 and repeated by these numbers, or by themselves.
+    let pattern = "Row 1 (RS): k2, p2\nRow 2: k the knits and p the purls";
+    for text in [
+        format!("Set-up row (WS): k\n{pattern}\nRep rows 1-2"),
+        format!("Set up row: Knit.\n{pattern}\nRep rows 1 and 2 for pattern."),
+        format!("Foundation row (WS): k. {pattern}"),
+        format!("Knit 1 row.\n{pattern}\nThese 2 rows form the pattern."),
+    ] {
+        let made = work(&text, 5);
+        assert_eq!(made.rows, ["p4", "p2 k2", "p2 k2", "p2 k2", "p2 k2"], "{text}");
+        assert!(made.whole, "{text}");
+    }
+    // Without a word on sides, row 1 is on the right one.
+    assert_eq!(work("Set-up row: k\nRow 1: k2, p2\nRow 2: k2, p2", 3).rows, ["p4", "p2 k2", "p2 k2"]);
+    assert_eq!(
+        work("Set-up rows 1-2: k\nRow 1: p\nRow 2: p\nRep rows 1-2 once more. Bind off.", 20).rows,
+        ["k4", "p4", "p4", "k4", "p4", "k4"]
+    );
+    assert_eq!(work("Set-up rnd: p\nRnd 1: k\nRnd 2 and all even rnds: p\nRnd 3: k", 3).rows, ["p4", "k4", "p4", "k4"]);
+    // Their stitches count too.
+    assert_eq!(work("Set-up row: kfb, k3 (5 sts)\nRow 1: k5\nRow 2: p5", 4).rows, ["pfb p3", "k5", "k5", "k5"]);
+    assert_eq!(work("Set-up row: k", 20), Worked { rows: vec!["k4".into()], whole: false });
 }

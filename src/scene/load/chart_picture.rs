@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{Context, Reader, color::hex};
-use crate::{image, math::srgb::srgb_to_linear, pattern::chart::Chart};
+use super::{Context, Reader};
+use crate::{image, math::srgb::srgb_to_linear, pattern::chart::Chart, scene::motif::hex};
 
 /// A colour of the palette and what it stands for.
 struct Symbol {

@@ -9,14 +9,14 @@ mod motif;
 mod painter;
 mod variation;
 
-pub(super) use self::{coordinates::FabricCoordinates, motif::hex};
+pub(super) use self::coordinates::FabricCoordinates;
 use self::{
-    motif::{CellMap, Motif, motif},
+    motif::{NamedMotif, motif},
     painter::{LaidCells, Painter},
     variation::Variation,
 };
 use super::{
-    super::{CurveKind, Fabric, Yarn},
+    super::{CurveKind, Fabric, Yarn, motif::CellMap},
     Context, Range, Reader,
     dyes::Dyes,
     radians,
@@ -38,7 +38,7 @@ struct Layout {
     rows: Vec<String>,
     /// From the left; of a weave its warps.
     columns: Vec<String>,
-    motif: Option<Motif>,
+    motif: Option<NamedMotif>,
 }
 
 /// The colour work of a fabric as it is written.
@@ -144,23 +144,7 @@ impl ColorPlan {
     ) -> Option<StitchColors> {
         let widest = widths.iter().copied().max().unwrap_or(1);
         let cells = self.cells([widest as f32, widths.len() as f32], None, false, base, context, library)?;
-        let map = cells.of_rows();
-        let at = |(row, width): (usize, &u32)| -> Vec<usize> {
-            (0..*width).map(|column| map.at(column as f32 + 0.5, row as f32 + 0.5)).collect()
-        };
-        let yarns: Vec<Vec<usize>> = widths.iter().enumerate().map(at).collect();
-        // The yarn of most stitches is the first one.
-        let mut counts: Vec<(usize, usize)> = Vec::new();
-        for &yarn in yarns.iter().flatten() {
-            match counts.iter_mut().find(|c| c.1 == yarn) {
-                Some(count) => count.0 += 1,
-                None => counts.push((1, yarn)),
-            }
-        }
-        counts.sort_by_key(|&(count, yarn)| (std::cmp::Reverse(count), yarn));
-        let order: Vec<usize> = counts.into_iter().map(|c| c.1).collect();
-        let color = |yarn: &usize| order.iter().position(|y| y == yarn).unwrap_or(0) as u16;
-        Some((yarns.iter().map(|row| row.iter().map(color).collect()).collect(), order))
+        Some(cells.of_rows().colors(widths))
     }
 
     /// Which colour each stitch of a knit on a garment has, by columns and rows from a panel's corner, and the yarns in the
@@ -272,7 +256,7 @@ impl ColorPlan {
         let motif = match motif {
             None => None,
             Some(motif) => {
-                let yarns: Vec<usize> = motif.key.iter().map(|(_, name)| index_of(name)).collect();
+                let yarns: Vec<usize> = motif.names.iter().map(index_of).collect();
                 match motif.placed(extent, stitch, &yarns, base) {
                     Ok(cells) => Some(cells),
                     Err(problem) => {

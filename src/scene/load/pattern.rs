@@ -21,10 +21,6 @@ use crate::{
     },
 };
 
-/// Stitches over which a yarn floats before it is caught, and rows that it is carried, unless the knit says so.
-const CATCH_FLOATS: u64 = 7;
-const CARRY_ROWS: u64 = 6;
-
 /// A knit that is checked but for what only knitting tells.
 pub(super) struct KnitPlan {
     knit: Knit,
@@ -48,9 +44,6 @@ enum ColorWork {
 
 /// So many stitches change places without running into each other.
 const EASY_CABLE: u32 = 10;
-
-/// More yarns in a row than this are more than anyone strands.
-const MOST_STRANDED: usize = 4;
 
 impl KnitPlan {
     /// What it is, with its gauge as knitters give it, stitches and rows in 10 cm, its size and its yarn.
@@ -143,10 +136,7 @@ impl KnitPlan {
             return Some((None, yarns));
         }
         let colors = Colors { rows, work, catch, carry };
-        let (most, row) = colors.most_in_a_row();
-        if work == Work::Stranded {
-            warnings.extend(too_many_strands(&format!("row {}", row + 1), most, "intarsia"));
-        }
+        warnings.extend(colors.too_many("`color_work = \"intarsia\"`"));
         Some((Some(colors), yarns))
     }
 
@@ -156,9 +146,9 @@ impl KnitPlan {
         (colors, yarns): (Option<Colors>, Vec<usize>),
         context: &Context<'_>,
     ) -> Option<(Vec<Curve>, FabricCoordinates, String)> {
-        if matches!(self.work, ColorWork::Yarns { work: Work::DoubleKnit, .. }) && yarns.len() != 2 {
-            let problem =
-                format!("double knitting takes two yarns, one for each layer, but found {}", yarns.len().max(1));
+        if let ColorWork::Yarns { work, .. } = self.work
+            && let Err(problem) = work.takes(yarns.len().max(1))
+        {
             let hint = "a `motif` or `rows` of the fabric of two yarns; more of them are knitted with \"stranded\"";
             context.error(self.header, problem, Some(hint.to_owned()));
             return None;
@@ -343,8 +333,8 @@ pub(super) struct Stranding {
 }
 
 fn stranding(table: &Reader<'_>) -> Stranding {
-    let catch = table.u64_or("catch_floats", CATCH_FLOATS, 0..=1_000_000) as u32;
-    let carry = table.u64_or("carry_rows", CARRY_ROWS, 0..=1_000_000) as u32;
+    let catch = table.u64_or("catch_floats", knit::CATCH_FLOATS.into(), 0..=1_000_000) as u32;
+    let carry = table.u64_or("carry_rows", knit::CARRY_ROWS.into(), 0..=1_000_000) as u32;
     Stranding { catch: (catch > 0).then_some(catch), carry }
 }
 
@@ -358,16 +348,6 @@ pub(super) fn work_of_tile(table: &Reader<'_>) -> Option<Stranding> {
     let stranded = table.one_of_or("color_work", true, &[("stranded", true), ("printed", false)]);
     let stranding = stranding(table);
     stranded.then_some(stranding)
-}
-
-/// What is told of a row of so many yarns, if that is more than anyone strands.
-pub(super) fn too_many_strands(row: &str, yarns: usize, instead: &str) -> Option<String> {
-    let told = || {
-        format!(
-            "{row} is knitted of {yarns} yarns, and each floats behind the stitches of the others; with `color_work = \"{instead}\"` none does"
-        )
-    };
-    (yarns > MOST_STRANDED).then(told)
 }
 
 fn counted(
@@ -393,16 +373,13 @@ fn counted(
     let rims = rims(table, edges, form.as_ref());
     let flat = table.bool_or("flat", true);
     let points = table.u64_or("points", knit::POINTS.into(), 12..=200) as u32;
-    let works = [
-        ("stranded", Some(Work::Stranded)),
-        ("intarsia", Some(Work::Intarsia)),
-        ("double-knit", Some(Work::DoubleKnit)),
-        ("printed", None),
-    ];
+    let [stranded, intarsia, double] = Work::NAMES.map(|(name, work)| (name, Some(work)));
+    let works = [stranded, intarsia, double, ("printed", None)];
     let work = table.one_of_or("color_work", Some(Work::Stranded), &works);
-    if work == Some(Work::Intarsia) && form.as_ref().is_some_and(|f| *f != Form::Flat) {
-        let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
-        table.error_at("color_work", "intarsia is knitted flat", Some(hint));
+    if let (Some(work), Some(form)) = (work, &form)
+        && let Err([problem, hint]) = work.suits(form)
+    {
+        table.error_at("color_work", problem, Some(hint));
     }
     let Stranding { catch, carry } = stranding(table);
     // A tile is of one yarn for each row.

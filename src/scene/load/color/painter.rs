@@ -8,14 +8,13 @@ use rayon::prelude::*;
 use super::{
     super::{dyes::Dyes, tint::Print},
     coordinates::{FabricCoordinates, steps},
-    motif::CellMap,
     variation::{SHADES, Variation, shine},
 };
 use crate::{
     geometry::curve::Curve,
     math::sampler::{Stream, hash2},
     pattern::StrandKind,
-    scene::Yarn,
+    scene::{Yarn, motif::CellMap},
 };
 
 /// Levels of each channel of a tint, even in its square root; what lies between is dithered from point to point.

@@ -1,18 +1,20 @@
 use super::{
-    motif::Cells,
     variation::{SHADES, shine},
     *,
 };
-use crate::input::diagnostic::{SourceId, Sources};
+use crate::{
+    input::diagnostic::{SourceId, Sources},
+    scene::motif::{Cells, Motif, hex},
+};
 
 fn span() -> Span {
     let id: SourceId = Sources::new().add_file("s.toml", "");
     Span::whole(id)
 }
 
-fn motif(cells: Cells, key: [&str; 2], stretched: bool) -> Motif {
-    let key = key.map(|k| (k.to_owned(), String::new())).to_vec();
-    Motif { cells, key, stretched, offset: [0; 2], place: None, again: [true; 2], span: span() }
+fn motif(cells: Cells, signs: [&str; 2], stretched: bool) -> NamedMotif {
+    let motif = Motif { cells, signs: signs.map(str::to_owned).to_vec(), stretched, offset: [0; 2], again: [true; 2] };
+    NamedMotif { motif, names: vec![String::new(); 2], place: None, span: span() }
 }
 
 /// The cells of a map as they are seen, the top row first.
@@ -26,12 +28,12 @@ const LETTER: [&str; 5] = ["####", "#...", "###.", "#...", "#..."];
 #[test]
 fn a_motif_stands_upright_and_repeats() {
     let rows = LETTER.map(str::to_owned).to_vec();
-    let mut letter = motif(Cells::Text(rows), [".", "#"], false);
-    let map = letter.cells([8.0, 5.0], &[0, 1], 0).unwrap();
+    let mut letter = motif(Cells::Signs(rows), [".", "#"], false);
+    let map = letter.motif.cells([8.0, 5.0], &[0, 1], 0).unwrap();
     assert_eq!(drawn(&map, 4, 5), LETTER);
     assert_eq!(drawn(&map, 8, 1), ["#...#..."]);
-    letter.offset = [1, 0];
-    let map = letter.cells([8.0, 5.0], &[0, 1], 0).unwrap();
+    letter.motif.offset = [1, 0];
+    let map = letter.motif.cells([8.0, 5.0], &[0, 1], 0).unwrap();
     assert_eq!(drawn(&map, 4, 1), [".#.."]);
     // The same in millimetres, of stitches of 4 x 3.
     letter.place = Some([4.5, -0.5]);
@@ -57,15 +59,15 @@ fn an_image_stands_upright_and_is_averaged_where_it_is_finer_than_the_stitches()
         }
     }
     encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
-    let stretched = motif(Cells::Image(path.clone()), ["#ffffff", "#c02020"], true);
-    let map = stretched.cells([4.0, 5.0], &[0, 1], 0).unwrap();
+    let stretched = motif(Cells::Picture(path.clone()), ["#ffffff", "#c02020"], true);
+    let map = stretched.motif.cells([4.0, 5.0], &[0, 1], 0).unwrap();
     assert_eq!(drawn(&map, 4, 5), LETTER);
-    let pixels = motif(Cells::Image(path), ["#ffffff", "#c02020"], false);
-    let map = pixels.cells([4.0, 5.0], &[0, 1], 0).unwrap();
+    let pixels = motif(Cells::Picture(path), ["#ffffff", "#c02020"], false);
+    let map = pixels.motif.cells([4.0, 5.0], &[0, 1], 0).unwrap();
     assert_eq!(drawn(&map, 12, 15)[0], "#.##.##.##.#".replace('.', "#"));
     assert_eq!(drawn(&map, 12, 15)[1], "#.##.##.##.#");
-    let absent = motif(Cells::Image(folder.path().join("no.png")), ["#ffffff", "#000000"], true);
-    assert!(absent.cells([4.0, 5.0], &[0, 1], 0).is_err());
+    let absent = motif(Cells::Picture(folder.path().join("no.png")), ["#ffffff", "#000000"], true);
+    assert!(absent.motif.cells([4.0, 5.0], &[0, 1], 0).is_err());
 }
 
 #[test]

@@ -10,7 +10,6 @@ use super::{
         Context,
         cloth::Detail,
         color::{ColorPlan, FabricCoordinates},
-        pattern,
         poses::{Frames, Moment, Pose, between},
         sequence::check_moves,
         yarns::Library,
@@ -22,6 +21,7 @@ use crate::{
     garment::{Cloth, Garment, GarmentError, GarmentMesh, Laid, LaidYarn, Options, Stranded},
     geometry::{curve::Curve, mesh::Mesh},
     math::words::counted,
+    pattern::knit::too_many_strands,
     scene::{FabricMotion, GarmentFacts, Taken, Yarn},
 };
 
@@ -205,7 +205,7 @@ impl GarmentPlan {
             let stranded = Stranded { color, catch: work.catch, carry: work.carry };
             let most = garment.floats(i, &stranded).0.most;
             let row = format!("{}: a row", rule.origin(&self.path));
-            warnings.extend(pattern::too_many_strands(&row, most, "printed"));
+            warnings.extend(too_many_strands(&row, most, "`color_work = \"printed\"`"));
             all.push(Some(stranded));
             own.push(yarns);
         }
