@@ -255,5 +255,6 @@ fn set_up_rows_are_knitted_once() {
     assert_eq!(work("Set-up rnd: p\nRnd 1: k\nRnd 2 and all even rnds: p\nRnd 3: k", 3).rows, ["p4", "k4", "p4", "k4"]);
     // Their stitches count too.
     assert_eq!(work("Set-up row: kfb, k3 (5 sts)\nRow 1: k5\nRow 2: p5", 4).rows, ["pfb p3", "k5", "k5", "k5"]);
-    assert_eq!(work("Set-up row: k", 20), Worked { rows: vec!["k4".into()], whole: false });
+    // Row 1 would be on the right side.
+    assert_eq!(work("Set-up row: k", 20), Worked { rows: vec!["p4".into()], whole: false });
 }

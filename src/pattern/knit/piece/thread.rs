@@ -216,10 +216,7 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
     // How far a yarn may turn beyond what its radius allows, in radians; plies are seen to break at five times that.
     const FOLD: f64 = 0.1;
     const ROUNDS: usize = 8;
-    // Where no more than this share of them opens in a round, what is left stays as it is.
-    const GAIN: f64 = 0.1;
     let reach = per_stitch / 4;
-    let mut before = usize::MAX;
     for _ in 0..ROUNDS {
         let folds: Vec<Vec<usize>> = threads
             .iter()
@@ -231,11 +228,9 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
                 along.enumerate().filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
             })
             .collect();
-        let count: usize = folds.iter().map(Vec::len).sum();
-        if count == 0 || count as f64 > (1.0 - GAIN) * before as f64 {
+        if folds.iter().all(Vec::is_empty) {
             return;
         }
-        before = count;
         let states: Vec<Vec<State>> = threads.iter().map(|t| t.state.clone()).collect();
         for ((t, own), folds) in threads.iter_mut().zip(&states).zip(folds) {
             t.state.iter_mut().filter(|s| **s == State::Move).for_each(|s| *s = State::Rest);
