@@ -80,12 +80,15 @@ impl PlyShape {
             let [upper, lower, ..] = at.cubics();
             even -= 2.0 * self.crowding.max(-1.0 / 3.0) * (upper - lower);
         }
-        // The line meets a fibre whose centre lies up to a fibre's radius beside it: half of that on the mean.
-        let beside = ((offset.abs() - 0.5 * half_width).max(0.0) * inverse).min(1.0);
+        // The line meets fibres whose centres lie up to a fibre's radius beside it. Those of the mean fibre lie on a chord as long as the chords
+        // of the core there, each counted as often as it is long.
+        let [right, left, ..] = at.u.to_array();
+        let squares = (right - left) * (1.0 - (right * right + right * left + left * left) / 3.0);
+        let mean = 2.0 * squares / (upper - lower).max(1e-20);
         let along = (self.radius - self.fiber_radius / wide).max(0.0);
-        let half = ((1.0 - beside * beside).sqrt() * along).max(0.5 * self.fiber_radius);
+        let half = (mean * along).max(0.5 * self.fiber_radius);
         let half = half / length;
-        let zone = (2.0 * thin * self.fiber_radius).min(half);
+        let zone = (thin * self.fiber_radius).min(half);
         ChordFibers { even: (count * even).max(0.0), ring: (count * ring).max(0.0), half, zone }
     }
 }

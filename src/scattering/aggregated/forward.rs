@@ -75,7 +75,7 @@ pub(super) struct Fiber {
     /// The width of its TT.
     width: TtWidth,
     /// Where the light came from, across the fibre.
-    back: Vec3A,
+    pub(super) back: Vec3A,
 }
 
 /// A direction of F.
@@ -271,13 +271,13 @@ impl Forward {
 
     /// F towards `w`: what leaves from the place of each of the fibres.
     #[inline]
-    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(&Spot, Part)) {
+    pub(super) fn toward(&self, view: &View<'_>, w: Vec3A, mut visit: impl FnMut(&Fiber, Part)) {
         for (index, fiber) in self.fibers.iter().enumerate() {
             let lobe = fiber.lobe(w);
             if lobe.0 >= FORWARD_TAIL && fiber.passed != Rgb::ZERO {
                 let through =
                     if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w, index > 0), |_| {}) };
-                visit(&fiber.spot, self.part(view, fiber, lobe, through));
+                visit(fiber, self.part(view, fiber, lobe, through));
             }
         }
     }

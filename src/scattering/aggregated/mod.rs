@@ -179,6 +179,12 @@ impl Spot {
         }
     }
 
+    /// Where light that came from `back` leaves towards `w`: other yarns are met from there.
+    #[inline]
+    fn leaves_from(&self, view: &View<'_>, back: Vec3A, w: Vec3A) -> Vec3A {
+        self.inside.point + self.turned(view, back, w).shift
+    }
+
     /// The part of a vector across the fibre.
     #[inline]
     fn across(&self, v: Vec3A) -> Vec3A {
@@ -211,6 +217,14 @@ struct Turned {
     free: f32,
     /// How much of the section it passes for each unit across the fibre.
     beside: f32,
+}
+
+/// From where light leaves the yarn.
+enum Leaves<'a> {
+    /// From a fibre, to which it came from there.
+    At(Spot, Vec3A),
+    /// From elsewhere around its ply, in which it wandered about.
+    Around(Spot, &'a Lobe),
 }
 
 /// One place of scattering, for one camera direction: see the module's notes.
@@ -261,9 +275,9 @@ impl<'a> Vertex<'a> {
         let mut lobes = LobeValues::default();
         let mut start = OneOf::new(u_start);
         if let Some(forward) = &self.forward {
-            forward.toward(&self.view, w, |spot, part| {
+            forward.toward(&self.view, w, |fiber, part| {
                 let value = part.value * mis_weight(light_pdf, part.density());
-                start.offer(value.mean(), (*spot, None));
+                start.offer(value.mean(), Leaves::At(fiber.spot, fiber.back));
                 lobes.f += value;
             });
         }
@@ -274,16 +288,17 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            start.offer((lobes.r + lobes.tt + lobes.d).mean(), (node.spot, None));
+            start.offer((lobes.r + lobes.tt + lobes.d).mean(), Leaves::At(node.spot, node.back));
             let lobe = self.backward.of(&self.view, node);
             lobe.evaluate(&self.view, node, (w, light_pdf), value.open, at_node, |spot, value| {
-                start.offer(value.mean(), (*spot, Some(lobe)));
+                start.offer(value.mean(), Leaves::Around(*spot, lobe));
                 lobes.b += value;
             });
         }
-        // B leaves from elsewhere than its place.
-        let leaves_from =
-            |(spot, lobe): (Spot, Option<&Lobe>)| lobe.map_or(spot.inside.point, |b| b.start(&self.view, &spot, w));
+        let leaves_from = |leaves| match leaves {
+            Leaves::At(spot, back) => spot.leaves_from(&self.view, back, w),
+            Leaves::Around(spot, lobe) => lobe.start(&self.view, &spot, w),
+        };
         Direct { lobes, start: start.drawn.map(leaves_from) }
     }
 
@@ -301,10 +316,12 @@ impl<'a> Vertex<'a> {
             && u[0] < forward_chance
         {
             let drawn = &forward.drawn;
+            let direction = drawn.direction;
             // The last fibre that it met.
-            let start = forward.fibers.last().map_or(self.place(), |fiber| fiber.spot.inside.point);
+            let last = forward.fibers.last();
+            let start = last.map_or(self.place(), |last| last.spot.leaves_from(&self.view, last.back, direction));
             return Some(Continuation {
-                direction: drawn.direction,
+                direction,
                 weight: drawn.share / forward_chance,
                 pdf: drawn.pdf * forward_chance,
                 shares: LobeValues { f: Rgb::ONE, ..LobeValues::default() },
@@ -318,7 +335,7 @@ impl<'a> Vertex<'a> {
             let (sum, shares) = node.drawn.value.lobes();
             let pdf = node.drawn.value.pdf * at_node * node.drawn.escape;
             let direction = node.drawn.direction;
-            let start = node.spot.inside.point;
+            let start = node.spot.leaves_from(&self.view, node.back, direction);
             return (pdf > 0.0).then(|| Continuation { direction, weight: sum / pdf, pdf, shares, start });
         }
         let lobe = self.backward.of(&self.view, node);
@@ -338,5 +355,7 @@ impl<'a> Vertex<'a> {
 
 #[cfg(test)]
 mod azimuth_tests;
+#[cfg(test)]
+mod start_tests;
 #[cfg(test)]
 mod tests;

@@ -43,7 +43,7 @@ pub(super) struct Node {
     sin: f32,
     cos: f32,
     /// Where the light came from, across the fibre.
-    back: Vec3A,
+    pub(super) back: Vec3A,
     /// Fibres that have passed it on before the node.
     before: f32,
     /// Weight of an event here, before any albedo.

@@ -186,7 +186,7 @@ fn cases() -> impl Iterator<Item = (Case, Option<Pressed>)> {
     CASES.into_iter().flat_map(|case| PRESSED.map(|pressed| (case, pressed)))
 }
 
-fn build(case: Case, pressed: Option<Pressed>, m: &FiberMaterial) -> (AggregatedYarn, Section<'static>) {
+pub(super) fn build(case: Case, pressed: Option<Pressed>, m: &FiberMaterial) -> (AggregatedYarn, Section<'static>) {
     let (plies, fibers, density, ply_twist, fiber_twist, h, theta, phase) = case;
     let mut shape = crate::geometry::yarn::tests::touching_yarn(plies, fibers, density, ply_twist, fiber_twist);
     // Crowded as fibres that keep out of each other are.
@@ -408,31 +408,6 @@ fn light_finds_as_much_of_f_as_directions_do() {
 #[test]
 fn sample_densities_match_where_samples_fall() {
     PRESSED.into_iter().for_each(densities_match);
-}
-
-#[test]
-fn light_that_wandered_leaves_from_the_outline_where_that_faces_its_way() {
-    let (yarn, section) = build((1, 40, 0.2, 0.0, -0.33, 0.2, 0.5, 0.4), None, &material(SILK, [0.3, 0.25, 0.5]));
-    let mut crossings = Crossings::new();
-    section.crossings(yarn.occluder().shape(), &mut crossings);
-    let t0 = yarn.occluder().transparency(&crossings);
-    let w = Vec3A::new(-0.8, 0.6, 0.0);
-    let (mut sum, mut places) = (Vec3A::ZERO, Vec3A::ZERO);
-    for seed in 0..400 {
-        let mut stream = Stream::new(seed);
-        let u = std::array::from_fn(|_| stream.next());
-        let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
-        let Some(node) = vertex.node.get(&vertex.view) else { continue };
-        let start = vertex.backward.of(&vertex.view, node).start(&vertex.view, &node.spot, w);
-        let axis = node.spot.inside.axis_of(yarn.occluder().shape(), 0);
-        let out = start - axis;
-        assert!((out.truncate().length() - 1.0).abs() < 1e-4 && out.dot(w) > -1e-4, "{out}");
-        sum += out;
-        places += node.spot.inside.point - axis;
-    }
-    // The places lie to one side of the axis as seen from there, and so does what leaves.
-    let side = Vec3A::new(w.y, -w.x, 0.0);
-    assert!(places.dot(side) * sum.dot(side) > 0.0 && sum.dot(side).abs() > 40.0, "{places} {sum}");
 }
 
 fn densities_match(pressed: Option<Pressed>) {
