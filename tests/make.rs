@@ -142,6 +142,20 @@ fn what_cannot_be_made_is_refused() {
             &["knit", "--stitches", "1000", "--rows", "1000", "-o", "a.bcc", "-o", "a.hair"],
             "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 24019200\n",
         ),
+        // The same of a weave: of a warp of so many picks, and of a weft that turns at selvedges.
+        (
+            &["weave", "--wefts", "10000", "-o", "a.hair"],
+            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 80001\n",
+        ),
+        (
+            &["weave", "--warps", "132", "--wefts", "100", "--edges", "selvedge", "-o", "a.hair"],
+            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 96000\n",
+        ),
+        // Lengths are known as soon as a repeat is relaxed.
+        (
+            &["weave", "--height", "20000", "--weft-spacing", "2", "--quiet", "-o", "a.hair"],
+            "error: a.hair: a curve of a .hair file has at most 65536 points, and one yarn of this piece at least 80001\n",
+        ),
         (&["knit", "--profile", "1,2", "-o", "a.bcc"], "error: a profile has 2 to 10000 points; as in "),
         (
             &["knit", "--form", "tube", "--stitches", "2", "-o", "a.bcc"],

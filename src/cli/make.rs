@@ -200,9 +200,6 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
     }
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
     let task = format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]);
-    if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
-        log::say(&task);
-    }
     let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
     let most = weave::longest(half_rooms[0]);
     if piece.pile_height > most {
@@ -210,9 +207,14 @@ fn weave(args: &WeaveArgs) -> Result<(), Failure> {
             "error: --pile-height is at most {most}, five hundred times a warp's width"
         )));
     }
+    args.output.hold(piece.least_points())?;
+    if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
+        log::say(&task);
+    }
     let working = Working::on(task, args.output.quiet);
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     drop(working);
+    args.output.hold(cloth.least_points())?;
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {

@@ -16,6 +16,8 @@ mod unit_cell;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 
 pub use self::edges::{Edges, EdgesOf};
@@ -235,6 +237,34 @@ impl Weave {
         }
     }
 
+    /// Control points of its longest yarn, at least, as far as they are known before it is relaxed: lengths and whole repeats may
+    /// come to a single yarn.
+    pub fn least_points(&self) -> u64 {
+        let known = |extent: Extent| match extent {
+            Extent::Yarns(count) if !self.tile => count,
+            _ => 1,
+        };
+        self.points_of([known(self.warps), known(self.wefts)])
+    }
+
+    /// Control points of the longest yarn of so many warps and wefts, at least.
+    fn points_of(&self, count: [u32; 2]) -> u64 {
+        /// Warps beyond which a weft may turn.
+        const TURNING: u64 = 12;
+        let [warps, wefts] = count.map(u64::from);
+        let (points, longest) = (u64::from(self.points), warps.max(wefts));
+        if self.edges == Edges::Live || self.draft.cut_wefts() {
+            return longest * points + 1;
+        }
+        // Picks of one yarn, one thickness and one layer are one strand.
+        let kinds = |sorted: &mut dyn Iterator<Item = u64>| sorted.collect::<BTreeSet<u64>>().len().max(1) as u64;
+        let yarns = kinds(&mut self.shuttles.iter().map(|yarn| u64::from(*yarn)))
+            * kinds(&mut self.threads[1].thickness.iter().map(|thickness| thickness.to_bits()))
+            * self.draft.layers() as u64;
+        let turning = wefts.div_ceil(yarns) * warps.saturating_sub(TURNING);
+        turning.max(wefts) * points
+    }
+
     /// Whether its curves carry the widths and heights of their yarns.
     fn sized(&self) -> bool {
         self.flatten > 1.0 || self.threads.iter().any(|t| !t.thickness.is_empty())
@@ -370,6 +400,11 @@ impl Cloth<'_> {
         let yarn = (place - 0.5).floor();
         let (a, b) = (centre(yarn as i64), centre(yarn as i64 + 1));
         (a + (place - 0.5 - yarn) * (b - a)) * spacing - 0.5 * self.size(side)
+    }
+
+    /// Control points of its longest yarn, at least.
+    pub fn least_points(&self) -> u64 {
+        self.weave.points_of(self.count)
     }
 
     /// Numbers of warps and wefts.

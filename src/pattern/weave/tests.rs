@@ -254,6 +254,19 @@ fn selvedges_make_one_strand_of_each_shuttle() {
     }
 }
 
+#[test]
+fn no_more_points_are_promised_than_the_longest_yarn_has() {
+    for name in ["plain", "double cloth", "terry", "velvet", "corduroy"] {
+        for (edges, order) in [Edges::Live, Edges::Selvedge, Edges::Finished].into_iter().zip(ORDERS) {
+            let weave = Weave { edges, shuttles: order.to_vec(), warps: Extent::Yarns(24), ..weave(name) };
+            let cloth = weave.relax().unwrap();
+            let longest = cloth.strands().iter().map(|s| s.curve.points.len()).max().unwrap() as u64;
+            assert!((1..=longest).contains(&weave.least_points()), "{name}: {} {longest}", weave.least_points());
+            assert_eq!(cloth.least_points(), weave.least_points());
+        }
+    }
+}
+
 /// The warp that floats at a side is relaxed with those beside it, and wefts lie flat on it where they turn; those that are
 /// carried lie beside it.
 #[test]
