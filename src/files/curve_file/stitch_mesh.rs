@@ -32,88 +32,20 @@ struct Piece {
     joined: [Option<(usize, usize)>; 2],
 }
 
+/// Two edges that are one, each by its polygon and its place there.
+struct Joint {
+    edges: [[usize; 2]; 2],
+    /// Whether they run against each other.
+    turned: bool,
+    line: u64,
+}
+
 /// Reads a mesh.
 pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    let mut kinds: Vec<(String, Option<&Face>)> = Vec::new();
-    let mut corners: Vec<DVec3> = Vec::new();
-    let mut polygons: Vec<Polygon<'_>> = Vec::new();
-    let mut joints: Vec<([usize; 2], [usize; 2], bool, u64)> = Vec::new();
-    let mut points = 0;
-    for Line { number: line, content, .. } in lines(bytes) {
-        let wrong =
-            |expected: &str| CurveFileError::line(line, format!("expected {expected}, found {}", quoted(&content)));
-        let mut words = content.split_whitespace();
-        match words.next() {
-            Some("L") => {
-                let key = words.collect::<Vec<_>>().join(" ");
-                let face = library.get(&key);
-                kinds.push((key, face));
-            }
-            Some("v") => {
-                let mut p = [0.0; 3];
-                for (value, name) in p.iter_mut().zip(["x", "y", "z"]) {
-                    *value = number(words.next().unwrap_or(""), name, line)?;
-                }
-                corners.push(DVec3::from_array(p));
-            }
-            Some("f") => {
-                let index = |word: &str| {
-                    let place: usize = word.split('/').next()?.parse().ok()?;
-                    (1..=corners.len()).contains(&place).then(|| place as u32 - 1)
-                };
-                let own = words.map(index).collect::<Option<Vec<u32>>>();
-                let own = own.filter(|c| c.len() > 2).ok_or_else(|| wrong("three or more corners that there are"))?;
-                polygons.push(Polygon { corners: own, face: None, line });
-            }
-            Some("T") => {
-                let kind =
-                    words.next().and_then(|w| w.parse::<usize>().ok()).and_then(|k| kinds.get(k.checked_sub(1)?));
-                let (key, face) = kind.ok_or_else(|| wrong("the number of a line L above"))?;
-                let polygon = polygons.last_mut().ok_or_else(|| wrong("a face before its type"))?;
-                let face = face.ok_or_else(|| {
-                    let problem = format!("the face {} is not in the library", quoted(key));
-                    CurveFileError::line(line, problem).hint("`faces` names another library (.sf)")
-                })?;
-                if face.corners.len() != polygon.corners.len() {
-                    let (has, needs) = (polygon.corners.len(), face.corners.len());
-                    return Err(CurveFileError::line(line, format!("a face of {has} edges is of a type of {needs}")));
-                }
-                polygon.face = Some(face);
-                points += face.yarns.iter().map(|y| y.points.len() as u64 + 2).sum::<u64>();
-            }
-            Some("e") => {
-                let place = |word: Option<&str>| {
-                    let (polygon, edge) = word?.split_once('/')?;
-                    let (polygon, edge): (usize, i64) = (polygon.parse().ok()?, edge.parse().ok()?);
-                    let (polygon, at) =
-                        (polygon.checked_sub(1)?, usize::try_from(edge.unsigned_abs()).ok()?.checked_sub(1)?);
-                    (at < polygons.get(polygon)?.corners.len()).then_some(([polygon, at], edge < 0))
-                };
-                let ends = (place(words.next()), place(words.next()));
-                let (Some((a, turned)), Some((b, other))) = ends else {
-                    return Err(wrong("e face/edge face/-edge of faces above"));
-                };
-                joints.push((a, b, turned != other, line));
-            }
-            _ => {}
-        }
-        if 2 * points > options.max_points {
-            return Err(CurveFileError::too_many_points(FileLocation::Line(line), 2 * points, options));
-        }
-    }
-    let mut pieces = Vec::new();
-    // Where the pieces of each polygon begin.
-    let mut first = Vec::with_capacity(polygons.len() + 1);
-    for polygon in &polygons {
-        first.push(pieces.len());
-        let face =
-            polygon.face.ok_or_else(|| CurveFileError::line(polygon.line, "a face without a type (a line T)"))?;
-        let own: Vec<DVec3> = polygon.corners.iter().map(|&c| corners[c as usize]).collect();
-        pieces.extend(bent(face, &own));
-    }
-    first.push(pieces.len());
+    let mesh = Mesh::parse(bytes, library, options)?;
+    let (mut pieces, first) = mesh.pieces()?;
+    let loose = join(&mut pieces, &first, &mesh.joints)?;
     let mut set = CurveSet::default();
-    let loose = join(&mut pieces, &first, &joints)?;
     if loose > 0 {
         set.notes.push(format!("{} of edges that are one lie in one of both only", counted(loose, "yarn")));
     }
@@ -126,6 +58,128 @@ pub(super) fn parse(bytes: &[u8], library: &Library, options: &ReadOptions) -> R
         set.ids.push(Some(i as i64));
     }
     Ok(set)
+}
+
+/// A mesh as its lines say it.
+#[derive(Default)]
+struct Mesh<'a> {
+    /// The types of its faces: names, and what the library has by them.
+    kinds: Vec<(String, Option<&'a Face>)>,
+    corners: Vec<DVec3>,
+    polygons: Vec<Polygon<'a>>,
+    joints: Vec<Joint>,
+}
+
+impl<'a> Mesh<'a> {
+    fn parse(bytes: &[u8], library: &'a Library, options: &ReadOptions) -> Result<Self, CurveFileError> {
+        let mut mesh = Self::default();
+        let mut points = 0;
+        for line in lines(bytes) {
+            let mut words = line.content.split_whitespace();
+            match words.next() {
+                Some("L") => {
+                    let key = words.collect::<Vec<_>>().join(" ");
+                    let face = library.get(&key);
+                    mesh.kinds.push((key, face));
+                }
+                Some("v") => mesh.corners.push(corner(words, line.number)?),
+                Some("f") => mesh.add_polygon(words, &line)?,
+                Some("T") => {
+                    let face = mesh.choose_type(words, &line)?;
+                    points += face.yarns.iter().map(|y| y.points.len() as u64 + 2).sum::<u64>();
+                }
+                Some("e") => mesh.add_joint(words, &line)?,
+                _ => {}
+            }
+            if 2 * points > options.max_points {
+                return Err(CurveFileError::too_many_points(FileLocation::Line(line.number), 2 * points, options));
+            }
+        }
+        Ok(mesh)
+    }
+
+    /// A line f: corners by their numbers.
+    fn add_polygon<'w>(&mut self, words: impl Iterator<Item = &'w str>, line: &Line<'_>) -> Result<(), CurveFileError> {
+        let index = |word: &str| {
+            let place: usize = word.split('/').next()?.parse().ok()?;
+            (1..=self.corners.len()).contains(&place).then(|| place as u32 - 1)
+        };
+        let corners = words.map(index).collect::<Option<Vec<u32>>>();
+        let corners =
+            corners.filter(|c| c.len() > 2).ok_or_else(|| expected("three or more corners that there are", line))?;
+        self.polygons.push(Polygon { corners, face: None, line: line.number });
+        Ok(())
+    }
+
+    /// A line T: the type of the last polygon.
+    fn choose_type<'w>(
+        &mut self,
+        mut words: impl Iterator<Item = &'w str>,
+        line: &Line<'_>,
+    ) -> Result<&'a Face, CurveFileError> {
+        let number = words.next().and_then(|w| w.parse::<usize>().ok());
+        let kind = number.and_then(|k| self.kinds.get(k.checked_sub(1)?));
+        let (key, face) = kind.ok_or_else(|| expected("the number of a line L above", line))?;
+        let polygon = self.polygons.last_mut().ok_or_else(|| expected("a face before its type", line))?;
+        let face = face.ok_or_else(|| {
+            let problem = format!("the face {} is not in the library", quoted(key));
+            CurveFileError::line(line.number, problem).hint("`faces` names another library (.sf)")
+        })?;
+        if face.corners.len() != polygon.corners.len() {
+            let (has, needs) = (polygon.corners.len(), face.corners.len());
+            let problem = format!("a face of {has} edges is of a type of {needs}");
+            return Err(CurveFileError::line(line.number, problem));
+        }
+        polygon.face = Some(face);
+        Ok(face)
+    }
+
+    /// A line e: two edges as face and edge, with a minus where it is walked backwards.
+    fn add_joint<'w>(
+        &mut self,
+        mut words: impl Iterator<Item = &'w str>,
+        line: &Line<'_>,
+    ) -> Result<(), CurveFileError> {
+        let place = |word: Option<&str>| {
+            let (polygon, edge) = word?.split_once('/')?;
+            let (polygon, edge): (usize, i64) = (polygon.parse().ok()?, edge.parse().ok()?);
+            let (polygon, at) = (polygon.checked_sub(1)?, usize::try_from(edge.unsigned_abs()).ok()?.checked_sub(1)?);
+            (at < self.polygons.get(polygon)?.corners.len()).then_some(([polygon, at], edge < 0))
+        };
+        let (Some((a, turned)), Some((b, other))) = (place(words.next()), place(words.next())) else {
+            return Err(expected("e face/edge face/-edge of faces above", line));
+        };
+        self.joints.push(Joint { edges: [a, b], turned: turned != other, line: line.number });
+        Ok(())
+    }
+
+    /// The pieces of yarn of all polygons, and where those of each begin, with the end of the last.
+    fn pieces(&self) -> Result<(Vec<Piece>, Vec<usize>), CurveFileError> {
+        let mut pieces = Vec::new();
+        let mut first = Vec::with_capacity(self.polygons.len() + 1);
+        for polygon in &self.polygons {
+            first.push(pieces.len());
+            let face =
+                polygon.face.ok_or_else(|| CurveFileError::line(polygon.line, "a face without a type (a line T)"))?;
+            let own: Vec<DVec3> = polygon.corners.iter().map(|&c| self.corners[c as usize]).collect();
+            pieces.extend(bent(face, &own));
+        }
+        first.push(pieces.len());
+        Ok((pieces, first))
+    }
+}
+
+/// A line v: a corner's place.
+fn corner<'w>(mut words: impl Iterator<Item = &'w str>, line: u64) -> Result<DVec3, CurveFileError> {
+    let mut p = [0.0; 3];
+    for (value, name) in p.iter_mut().zip(["x", "y", "z"]) {
+        *value = number(words.next().unwrap_or(""), name, line)?;
+    }
+    Ok(DVec3::from_array(p))
+}
+
+fn expected(what: &str, line: &Line<'_>) -> CurveFileError {
+    CurveFileError::line(line.number, format!("expected {what}, found {}", quoted(&line.content)))
 }
 
 /// The yarns of a face in a polygon.
@@ -168,13 +222,9 @@ fn mean_value(corners: &[DVec2], at: DVec2) -> Vec<f64> {
 }
 
 /// Joins pieces across edges that are one, in their order along it; gives how many have no other.
-fn join(
-    pieces: &mut [Piece],
-    first: &[usize],
-    joints: &[([usize; 2], [usize; 2], bool, u64)],
-) -> Result<u64, CurveFileError> {
+fn join(pieces: &mut [Piece], first: &[usize], joints: &[Joint]) -> Result<u64, CurveFileError> {
     let mut loose = 0;
-    for &(a, b, turned, line) in joints {
+    for &Joint { edges: [a, b], turned, line } in joints {
         let along = |[polygon, edge]: [usize; 2], back: bool| {
             let own = (first[polygon]..first[polygon + 1]).flat_map(|piece| [(piece, 0), (piece, 1)]);
             let mut own: Vec<(usize, usize)> = own.filter(|&(p, end)| pieces[p].crossings[end].edge == edge).collect();
