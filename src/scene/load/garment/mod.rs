@@ -2,7 +2,7 @@
 
 mod make;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 
@@ -21,7 +21,7 @@ use crate::{
     pattern::{
         chart::Chart,
         draft::{Draft, Threads},
-        knit::{self, Edges, Form, Knit, STITCHES_PER_SQUARE, fits_stitch},
+        knit::{self, Edges, Form, Knit, Misfit, STITCHES_PER_SQUARE, Thickness, fits_stitch},
         tile::Tile,
         weave::{FLATTEN, Impossible, Weave},
     },
@@ -285,83 +285,94 @@ impl ClothPlan {
         context: &Context<'_>,
         warnings: &mut Vec<String>,
     ) -> Option<Tile> {
-        let d = 2.0 * radius;
-        let tell = |problem: String, hint: &str| {
-            context.error(self.span, problem, Some(hint.to_owned()));
-            None
-        };
-        match &self.pattern {
+        let made = match &self.pattern {
             Pattern::Knit { chart, yarn_per_stitch, flatten, .. } => {
                 let yarn = thickness(yarn, radius, *flatten);
-                let unit = yarn.pressed();
-                let length = yarn_per_stitch
-                    .map(|diameters| diameters * d / unit)
-                    .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / unit))
-                    .unwrap_or(knit::YARN_PER_STITCH);
-                if let Some(s) = stitch {
-                    if let Err(misfit) = fits_stitch(s.x / unit, s.y / unit, &yarn) {
-                        return tell(misfit.problem, &misfit.hint);
-                    }
-                    let diameters = length * unit / d;
-                    if diameters > LOOSEST {
-                        warnings.push(format!(
-                            "the yarn is thin for this gauge: a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, \
-                             {diameters:.1} diameters of {d:.3} mm; the cloth will be a net",
-                            s.x,
-                            s.y,
-                            length * unit
-                        ));
-                    }
-                }
-                let knit = Knit {
-                    chart: chart.clone(),
-                    stitches: 1,
-                    rows: 1,
-                    form: Form::Flat,
-                    stitch_width: stitch.map(|s| s.x / unit),
-                    row_height: stitch.map(|s| s.y / unit),
-                    yarn_per_stitch: Some(length.clamp(knit::YARNS_PER_STITCH[0], knit::YARNS_PER_STITCH[1])),
-                    edges: Edges::Live,
-                    rims: knit::Rims::default(),
-                    points: knit::POINTS,
-                    colors: None,
-                    flat: true,
-                };
-                match Tile::of_knit(&knit, &yarn) {
-                    Ok(tile) => Some(tile),
-                    Err(error) => tell(error.problem, &error.hint),
-                }
+                knit_tile(chart, &yarn, *yarn_per_stitch, stitch, warnings)
             }
             Pattern::Weave { draft, threads, crimp, flatten } => {
-                let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
                 let half_width = yarn.map_or(1.0, Yarn::half_width);
-                let own = Weave { half_width: [half_width; 2], ..Weave::of(draft.clone(), radius * half_width) };
+                let [warp_spacing, weft_spacing] = [stitch.map(|s| s.x), stitch.map(|s| s.y)];
                 let (crimp, flatten, threads) = (*crimp, *flatten, threads.clone());
-                let weave = Weave { warp_spacing, weft_spacing, crimp, flatten, threads, ..own };
-                match Tile::of_weave(&weave) {
-                    Ok(tile) => Some(tile),
-                    Err(Impossible::TooTight { warp, least }) => {
-                        let which = if warp { "warp" } else { "weft" };
-                        let problem = format!(
-                            "the yarn is too thick for this gauge: {which} threads of {d:.3} mm need {least:.4} mm each"
-                        );
-                        tell(problem, "thinner yarn, fewer threads, or another `crimp`")
-                    }
-                    Err(_) => tell("the draft is too large for a garment".to_owned(), "a smaller repeat"),
-                }
+                let own = Weave { half_width: [half_width; 2], ..Weave::of(draft.clone(), radius * half_width) };
+                weave_tile(&Weave { warp_spacing, weft_spacing, crimp, flatten, threads, ..own }, 2.0 * radius)
             }
-            Pattern::File(path) => match curve_file::read_tile(path) {
-                Err(error) => tell(error.to_string(), "a periodic curve file (.pyp)"),
-                Ok(tile) => Some(match stitch {
-                    None => tile,
-                    Some(s) => {
-                        let own = tile.stitch();
-                        let scale = (s.element_product() / own.element_product()).sqrt();
-                        let period = s * DVec2::new(f64::from(tile.counts[0]), f64::from(tile.counts[1]));
-                        tile.scaled(scale).pulled(period, 200)
-                    }
-                }),
-            },
+            Pattern::File(path) => file_tile(path, stitch),
+        };
+        made.map_err(|misfit| context.error(self.span, misfit.problem, Some(misfit.hint))).ok()
+    }
+}
+
+/// One repeat of a knit of yarn, which takes so many of its diameters a stitch, and of a stitch so large, mm.
+fn knit_tile(
+    chart: &Chart,
+    yarn: &Thickness,
+    yarn_per_stitch: Option<f64>,
+    stitch: Option<DVec2>,
+    warnings: &mut Vec<String>,
+) -> Result<Tile, Misfit> {
+    let (unit, d) = (yarn.pressed(), 2.0 * yarn.radius);
+    let length = yarn_per_stitch
+        .map(|diameters| diameters * d / unit)
+        .or(stitch.map(|s| (STITCHES_PER_SQUARE * s.element_product()).sqrt() / unit))
+        .unwrap_or(knit::YARN_PER_STITCH);
+    if let Some(s) = stitch {
+        fits_stitch(s.x / unit, s.y / unit, yarn)?;
+        let diameters = length * unit / d;
+        if diameters > LOOSEST {
+            warnings.push(format!(
+                "the yarn is thin for this gauge: a stitch of {:.3} x {:.3} mm takes about {:.2} mm of yarn, \
+                 {diameters:.1} diameters of {d:.3} mm; the cloth will be a net",
+                s.x,
+                s.y,
+                length * unit
+            ));
         }
     }
+    let knit = Knit {
+        chart: chart.clone(),
+        stitches: 1,
+        rows: 1,
+        form: Form::Flat,
+        stitch_width: stitch.map(|s| s.x / unit),
+        row_height: stitch.map(|s| s.y / unit),
+        yarn_per_stitch: Some(length.clamp(knit::YARNS_PER_STITCH[0], knit::YARNS_PER_STITCH[1])),
+        edges: Edges::Live,
+        rims: knit::Rims::default(),
+        points: knit::POINTS,
+        colors: None,
+        flat: true,
+    };
+    Tile::of_knit(&knit, yarn).map_err(|error| Misfit { key: None, problem: error.problem, hint: error.hint })
+}
+
+/// One repeat of a weave of yarn of a diameter, mm.
+fn weave_tile(weave: &Weave, diameter: f64) -> Result<Tile, Misfit> {
+    Tile::of_weave(weave).map_err(|error| match error {
+        Impossible::TooTight { warp, least } => {
+            let which = if warp { "warp" } else { "weft" };
+            let problem = format!(
+                "the yarn is too thick for this gauge: {which} threads of {diameter:.3} mm need {least:.4} mm each"
+            );
+            Misfit { key: None, problem, hint: "thinner yarn, fewer threads, or another `crimp`".to_owned() }
+        }
+        _ => Misfit {
+            key: None,
+            problem: "the draft is too large for a garment".to_owned(),
+            hint: "a smaller repeat".to_owned(),
+        },
+    })
+}
+
+/// The cell of a periodic curve file, relaxed to a stitch of a size, mm, where one is wanted.
+fn file_tile(path: &Path, stitch: Option<DVec2>) -> Result<Tile, Misfit> {
+    let tile = curve_file::read_tile(path).map_err(|error| Misfit {
+        key: None,
+        problem: error.to_string(),
+        hint: "a periodic curve file (.pyp)".to_owned(),
+    })?;
+    let Some(stitch) = stitch else { return Ok(tile) };
+    let scale = (stitch.element_product() / tile.stitch().element_product()).sqrt();
+    let period = stitch * DVec2::new(f64::from(tile.counts[0]), f64::from(tile.counts[1]));
+    Ok(tile.scaled(scale).pulled(period, 200))
 }
