@@ -294,6 +294,32 @@ fn rooms_use_what_the_table_says_and_nothing_else() {
     }
 }
 
+/// Rooms whose parts stand one above the other: none uses another that uses it, by whatever way.
+const ORDERED: [&str; 1] = ["garment"];
+
+#[test]
+fn parts_of_a_room_do_not_use_each_other_in_a_circle() {
+    for room in ORDERED {
+        let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for source in sources().iter().filter(|s| s.room() == room && s.module().len() > 1) {
+            let part = &source.module()[1];
+            let others =
+                source.paths().into_iter().filter(|path| path[0] == room && path.len() > 1 && path[1] != *part);
+            uses.entry(part.clone()).or_default().extend(others.map(|path| path[1].clone()));
+        }
+        assert!(uses.len() > 2, "`{room}` has no parts");
+        // What uses nothing that is left is taken away, until nothing is.
+        loop {
+            let left: BTreeSet<String> = uses.keys().cloned().collect();
+            uses.retain(|_, others| others.iter().any(|other| left.contains(other)));
+            if uses.len() == left.len() {
+                break;
+            }
+        }
+        assert!(uses.is_empty(), "in `{room}` these use each other in a circle: {uses:?}");
+    }
+}
+
 #[test]
 fn few_things_come_from_the_foreign_libraries() {
     let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();

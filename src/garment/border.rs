@@ -7,7 +7,7 @@ use rstar::{
 };
 
 use super::{
-    edges::SeamKind,
+    seam::SeamKind,
     surface::{Anchor, BorderEdge},
 };
 

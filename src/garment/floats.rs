@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::{
     lattice::Lattice,
-    lay::Run,
+    run::Run,
     strain::{Shape, Shapes, UNSTRAINED},
 };
 use crate::pattern::knit::{self, Colors, Work, caught, in_use};

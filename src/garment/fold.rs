@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::edges::SeamKind;
+use super::seam::SeamKind;
 
 /// Exponent of the superellipse that the right side follows round a bend; 2 is a circle.
 const FULL: f64 = 4.0;

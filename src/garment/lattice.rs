@@ -8,10 +8,8 @@ use rayon::prelude::*;
 
 use super::{
     border::{Border, Edge, NearSeam, closing, is_side},
-    edges::SeamKind,
-    fold::Folds,
-    sheet::Sheet,
-    surface::{Anchor, BorderEdge, Finder, Pose, Surface, bounds},
+    seam::SeamKind,
+    surface::{Anchor, BorderEdge, Finder, Surface, bounds},
 };
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
@@ -53,7 +51,8 @@ pub(super) struct Lattice {
     kept: Vec<bool>,
     /// The same of the whole panel, where only a part is laid.
     whole: Vec<bool>,
-    anchors: Vec<Anchor>,
+    /// Where each corner lies.
+    pub(super) anchors: Vec<Anchor>,
     /// Which corners are moved onto a free border.
     free: Vec<bool>,
     /// Number of stitches.
@@ -63,7 +62,7 @@ pub(super) struct Lattice {
     /// Columns and rows before those of the flat panel: they are turned in.
     pub(super) turned_in: [usize; 2],
     /// Corners near a seam that is turned in, in the order of their places.
-    near: Vec<(u32, NearSeam)>,
+    pub(super) near: Vec<(u32, NearSeam)>,
 }
 
 impl Lattice {
@@ -331,10 +330,5 @@ impl Lattice {
         self.free = free;
         self.near = placed.iter().enumerate().filter_map(|(i, p)| Some((i as u32, p.1?))).collect();
         self.anchors = placed.into_iter().map(|p| p.0).collect();
-    }
-
-    /// The corners in one frame; `folds` are those of each kind of seam.
-    pub(super) fn sheet<'a>(&'a self, surface: &Surface, pose: &Pose, folds: &'a Folds) -> Sheet<'a> {
-        Sheet::new(self, surface, pose, (&self.anchors, &self.near), folds)
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     floats::{FLOATING, Lanes, Strand, Stranded, Way, led},
-    lattice::Lattice,
+    run::{Run, chains},
     sheet::Sheet,
     strain::{Shape, Shapes, Strain, UNSTRAINED},
 };
@@ -62,28 +62,6 @@ pub(crate) struct Tension {
     pub spread: f64,
 }
 
-/// A run of stitches of a line, walked forwards or backwards.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Run {
-    pub(super) line: usize,
-    pub(super) first: usize,
-    pub(super) last: usize,
-    pub(super) backwards: bool,
-    /// It goes round and meets itself.
-    pub(super) ring: bool,
-}
-
-impl Run {
-    /// The corner at which it ends, in stitches.
-    fn end(&self) -> usize {
-        if self.backwards { self.first } else { self.last }
-    }
-
-    fn start(&self) -> usize {
-        if self.backwards { self.last } else { self.first }
-    }
-}
-
 /// Where on its way a yarn is.
 #[derive(Clone, Copy)]
 enum On {
@@ -93,14 +71,10 @@ enum On {
     Beside(usize),
 }
 
-/// A yarn goes on over so many stitches, then another begins: pieces of work for all threads.
-const LONGEST: usize = 6000;
 /// So much of a turn's way do cut threads go beyond their last stitch.
 pub(super) const CUT_END: f64 = 0.65;
 /// The end of a knit's yarn goes back so far behind where it came from, in diameters.
 const TAIL_DEEP: f32 = 1.1;
-/// A row's end and the next row's are joined if they are no further apart, in stitches.
-const FURTHEST: usize = 3;
 
 /// What a panel's yarns are, beside their shapes.
 #[derive(Clone, Copy)]
@@ -163,40 +137,6 @@ pub(super) fn lay(sheets: &[Sheet<'_>], shapes: &Shapes, laying: Laying<'_>) -> 
         ways.par_iter().map(one).collect()
     });
     frames.collect()
-}
-
-/// Runs of an axis, each joined to the nearest of the next line. Of a weave only wefts are, at selvedges: warps end, and so
-/// does what was cut to be sewn.
-fn chains(lattice: &Lattice, axis: usize, woven: bool) -> Vec<Vec<Run>> {
-    let turns = |run: &Run| !woven || (axis == 0 && lattice.is_free(run.end(), run.line + 1));
-    let mut done: Vec<Vec<Run>> = Vec::new();
-    let mut open: Vec<Vec<Run>> = Vec::new();
-    for line in 0..lattice.counts[1 - axis] {
-        let mut next: Vec<Vec<Run>> = Vec::new();
-        let mut waiting = std::mem::take(&mut open);
-        for [first, last] in lattice.runs(axis, line) {
-            let ring = axis == 0 && lattice.ring && last - first == lattice.counts[0];
-            if ring {
-                done.push(vec![Run { line, first, last, backwards: false, ring }]);
-                continue;
-            }
-            let mate = waiting.iter().position(|chain| {
-                let before = chain[chain.len() - 1];
-                let backwards = !before.backwards;
-                let start = if backwards { last } else { first };
-                let length: usize = chain.iter().map(|r| r.last - r.first).sum();
-                start.abs_diff(before.end()) <= FURTHEST && length < LONGEST && turns(&before)
-            });
-            let mut chain = mate.map_or_else(Vec::new, |i| waiting.remove(i));
-            let backwards = chain.last().is_some_and(|run| !run.backwards);
-            chain.push(Run { line, first, last, backwards, ring });
-            next.push(chain);
-        }
-        done.append(&mut waiting);
-        open = next;
-    }
-    done.append(&mut open);
-    done
 }
 
 struct Layer<'a> {

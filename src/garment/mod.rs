@@ -2,26 +2,32 @@
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
 //! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `lay`
-//! lays its yarns from row to row over the `sheet` of a frame, each colour with its `floats`, `sewing` says what is at the borders, of which `fold` turns
-//! in what is sewn and `edges` makes the yarns, and `body` keeps them outside of who wears them. All lengths are
-//! millimetres.
+//! lays its yarns from `run` to `run` over the `sheet` of a frame, each colour with its `floats`, `sewing` says what is at
+//! the borders by the kind of `seam`, of which `fold` turns in what is sewn and `edges` makes the yarns, and `body` keeps
+//! them outside of who wears them. `options` are what is asked for, `check` refuses what cannot be laid, `report` tells what
+//! is known before. No part uses another that uses it. All lengths are millimetres.
 
 mod body;
 mod border;
+mod check;
 mod edges;
 mod floats;
 mod fold;
 mod lattice;
 mod lay;
 pub(crate) mod mesh;
+mod options;
 mod panels;
+mod report;
+mod run;
+mod seam;
 mod sewing;
 mod sheet;
 mod strain;
 mod subdivide;
 mod surface;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use self::{
@@ -32,93 +38,20 @@ use self::{
     lay::{Laying, lay},
     panels::Panels,
     sewing::Sewing,
+    sheet::Sheet,
     strain::Shapes,
-    surface::{Surface, bounds},
+    surface::Surface,
 };
 pub(crate) use self::{
-    edges::SeamKind,
     floats::{Floats, Stranded},
     lay::{LaidYarn, Tension},
     mesh::{GarmentError, GarmentMesh},
-    panels::{LengthRatio, Panel},
+    options::{Cloth, Options},
+    panels::Panel,
+    report::Report,
+    seam::SeamKind,
 };
-use crate::{
-    files::stage::glob,
-    geometry::mesh::Mesh,
-    math::words::counted,
-    pattern::{StrandKind, tile::Tile},
-};
-
-/// More stitches than these are not laid.
-pub(crate) const MOST_STITCHES: f64 = 2e7;
-
-/// The cloth of some panels.
-#[derive(Clone, Debug)]
-pub(crate) struct Cloth {
-    /// Group or material of the panels, with `*` and `?`; `None` for all that no other cloth takes.
-    pub group: Option<String>,
-    /// What repeats, mm, at the gauge that it is to have.
-    pub tile: Tile,
-    /// Angle by which rows are turned against the panel's u axis, radians.
-    pub grain: f64,
-    /// Control points of a stitch.
-    pub points: usize,
-    /// How these panels are sewn, if not as all are; of two cloths that say it the later one counts.
-    pub seam: Option<SeamKind>,
-}
-
-/// What is laid on a garment.
-#[derive(Clone, Debug)]
-pub(crate) struct Options {
-    /// Millimetres per unit of the mesh.
-    pub unit_mm: f64,
-    /// Millimetres per unit of its texture coordinates; found from lengths if absent.
-    pub uv_mm: Option<f64>,
-    /// The first is for panels that no other one names; later ones win.
-    pub cloths: Vec<Cloth>,
-    /// How panels are sewn.
-    pub seam: SeamKind,
-    /// How loops vary.
-    pub tension: Option<Tension>,
-    /// Whether yarns know their stitches.
-    pub coordinates: bool,
-    /// Whether seams are pressed flat, as over a body.
-    pub pressed: bool,
-    /// Only stitches so near to a place of the first frame are laid, mm; all if absent.
-    pub near: Option<(DVec3, f64)>,
-}
-
-/// What is known of a garment before any yarn is laid.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Report {
-    /// Its panels.
-    pub panels: Vec<Panel>,
-    /// Stitches (or crossings) of each panel.
-    pub stitches: Vec<u64>,
-    /// Which cloth each panel has.
-    pub cloth: Vec<usize>,
-    /// Length of the yarns of each cloth, about, without what finishes edges; mm.
-    pub yarn_length: Vec<f64>,
-    /// About as many control points of each cloth.
-    pub control_points: Vec<u64>,
-    /// 3-D length over length as cut.
-    pub ratio: LengthRatio,
-    /// Share of the area that is stretched by more than a tenth along u or v.
-    pub stretched: f64,
-    /// Millimetres per unit of the texture coordinates.
-    pub uv_mm: f64,
-    /// What was repaired or found out, one line each.
-    pub notes: Vec<String>,
-    /// The box around the mesh, mm.
-    pub bounds: (DVec3, DVec3),
-}
-
-impl Report {
-    /// Stitches of all panels.
-    pub(crate) fn all_stitches(&self) -> u64 {
-        self.stitches.iter().sum()
-    }
-}
+use crate::{files::stage::glob, geometry::mesh::Mesh, math::words::counted, pattern::StrandKind};
 
 /// A garment divided into stitches, ready to be laid in any frame.
 pub(crate) struct Garment {
@@ -146,43 +79,13 @@ impl Garment {
         let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm)?;
         let cloth = choose(&panels.panels, &options.cloths)?;
         panels.turn(&cloth.iter().map(|&c| -options.cloths[c].grain).collect::<Vec<_>>());
-        let too_many: f64 = panels
-            .panels
-            .iter()
-            .zip(&cloth)
-            .map(|(p, &c)| p.area / options.cloths[c].tile.stitch().element_product())
-            .sum();
-        if too_many > MOST_STITCHES {
-            let stitch = options.cloths[0].tile.stitch();
-            let problem = format!(
-                "{too_many:.2e} stitches of {:.4} x {:.4} mm; at most {MOST_STITCHES:.0e} are laid",
-                stitch.x, stitch.y
-            );
-            return Err(GarmentError::new(problem, "a coarser gauge, or another `gauge_per` or `unit`"));
-        }
+        check::not_too_many(&panels.panels, &cloth, &options.cloths)?;
         let points = panels.points(mesh, options.unit_mm);
-        let ranges = panels.strains(&points, &cloth, options.cloths.len());
-        let shapes: Vec<Shapes> = options
-            .cloths
-            .iter()
-            .zip(ranges)
-            .map(|(c, range)| Shapes::new(&c.tile, c.points, range))
-            .collect::<Result<_, _>>()?;
+        let shapes = relaxed(&panels, &points, &cloth, &options.cloths)?;
         let widest = options.cloths.iter().map(|c| c.tile.stitch().x).fold(0.0, f64::max);
         let surface = Surface::new(&panels, &points, (1.5 * widest).max(2.5));
         let borders = surface.borders(panels.panels.len());
-        let boxes = borders.iter().zip(&cloth).map(|(border, &c)| {
-            let [low, high] = bounds(border);
-            ((high - low).max(DVec2::ZERO) / options.cloths[c].tile.stitch()).element_product()
-        });
-        if let Some((panel, places)) = boxes.enumerate().find(|(_, places)| *places > 4.0 * MOST_STITCHES) {
-            let panel = &panels.panels[panel];
-            let problem = format!(
-                "panel `{}` lies askew in the texture coordinates: the rows and wales of the box around it hold {places:.1e} stitches",
-                panel.group
-            );
-            return Err(GarmentError::at(panel.line, problem, "turn it upright, or its wales with `grain`, or cut it"));
-        }
+        check::upright(&panels.panels, &borders, &cloth, &options.cloths)?;
         let pose = surface.pose(&points);
         let wanted = |at: DVec3| options.near.is_none_or(|(middle, radius)| at.distance(middle) <= radius);
         let lays = |anchor| wanted(surface.at(&pose, anchor).0);
@@ -192,50 +95,13 @@ impl Garment {
             .enumerate()
             .map(|(panel, border)| Lattice::new(&surface, panel as u32, border, &sewing.division(panel), &lays))
             .collect();
-        if lattices.iter().all(|l| l.stitches == 0) {
-            if let Some((at, radius)) = options.near {
-                let problem = format!("no stitch lies within {radius:.3} mm of {at:.3} mm");
-                return Err(GarmentError::new(problem, "a place on the cloth in its first frame, or a larger radius"));
-            }
-            let stitch = options.cloths[0].tile.stitch();
-            let problem = format!("no panel has room for a stitch of {:.3} x {:.3} mm", stitch.x, stitch.y);
-            return Err(GarmentError::new(problem, "a finer gauge, another `unit`, or is the mesh cut short?"));
-        }
-        let mut notes = panels.notes.clone();
-        for (lattice, panel) in lattices.iter().zip(&panels.panels) {
-            if lattice.stitches == 0 && options.near.is_none() {
-                notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
-            }
-            if lattice.doubled * 100 > lattice.stitches as usize {
-                let problem = format!(
-                    "panel `{}` overlaps itself in the texture coordinates: {} of {} stitches have two places",
-                    panel.group, lattice.doubled, lattice.stitches
-                );
-                return Err(GarmentError::at(panel.line, problem, "lay the panel out flat, without overlaps"));
-            }
-        }
+        check::has_room(&lattices, &options)?;
+        check::flat(&lattices, &panels.panels)?;
         let mut edgings = sewing.edgings(&pose, &borders, &lattices);
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
-        let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-        let mut stitches_of = vec![0; shapes.len()];
-        lattices.iter().zip(&cloth).for_each(|(lattice, own)| stitches_of[*own] += lattice.stitches);
-        let report = Report {
-            stitches: lattices.iter().map(|l| l.stitches).collect(),
-            yarn_length: stitches_of.iter().zip(&shapes).map(|(n, shape)| *n as f64 * shape.length).collect(),
-            control_points: (stitches_of.iter().zip(&shapes).zip(&options.cloths))
-                .map(|((n, shape), cloth)| n * cloth.points as u64 * if shape.has_axis(1) { 2 } else { 1 })
-                .collect(),
-            cloth,
-            ratio: panels.ratio,
-            stretched: panels.stretched,
-            uv_mm: panels.uv_mm,
-            panels: panels.panels.clone(),
-            notes,
-            bounds: (low, high),
-        };
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
+        let report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &options);
         Ok(Self { panels, surface, lattices, shapes, sewing, edgings, clearances, options, report })
     }
 
@@ -318,7 +184,7 @@ impl Garment {
                 continue;
             }
             let sheets: Vec<_> =
-                poses.iter().map(|p| lattice.sheet(&self.surface, p, self.sewing.folds(cloth))).collect();
+                poses.iter().map(|p| Sheet::new(lattice, &self.surface, p, self.sewing.folds(cloth))).collect();
             let laying = Laying {
                 tension: self.options.tension,
                 stranded: stranded(cloth),
@@ -343,6 +209,12 @@ impl Garment {
         }
         Ok(laid)
     }
+}
+
+/// The tile of each cloth at the strains that occur on its panels.
+fn relaxed(panels: &Panels, points: &[DVec3], cloth: &[usize], cloths: &[Cloth]) -> Result<Vec<Shapes>, GarmentError> {
+    let ranges = panels.strains(points, cloth, cloths.len());
+    cloths.iter().zip(ranges).map(|(c, range)| Shapes::new(&c.tile, c.points, range)).collect()
 }
 
 /// How far cloth is kept from a body, mm.

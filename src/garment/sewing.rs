@@ -6,11 +6,12 @@ use glam::{DVec2, DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::{
-    Options,
-    edges::{Edging, Finish, SeamKind, Way, ways},
+    edges::{Edging, Finish, Way, ways},
     fold::{Fold, Folds},
     lattice::{Division, Lattice},
     lay::{CUT_END, turn},
+    options::{Cloth, Options},
+    seam::SeamKind,
     strain::Shapes,
     surface::{BorderEdge, Pose},
 };
@@ -91,7 +92,7 @@ fn turned_in(kind: SeamKind, fold: &Fold, stitch: DVec2, diameter: f64) -> DVec2
 
 impl Sewing {
     pub(super) fn new(options: &Options, shapes: &[Shapes], borders: &[Vec<BorderEdge>], cloth: &[usize]) -> Self {
-        let trim = |(cloth, shapes): (&super::Cloth, &Shapes)| {
+        let trim = |(cloth, shapes): (&Cloth, &Shapes)| {
             let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
             Trim::new(cloth.tile.stitch(), cloth.tile.counts, knitted, shapes, options.pressed)
         };

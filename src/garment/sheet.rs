@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::{
     border::NearSeam,
-    edges::SeamKind,
     fold::Folds,
     lattice::{Lattice, PAD},
+    seam::SeamKind,
     strain::{Strain, UNSTRAINED},
     surface::{Anchor, Pose, Surface, single},
 };
@@ -43,14 +43,8 @@ pub(super) struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    /// Of the corners' places and of those near seams.
-    pub(super) fn new(
-        lattice: &'a Lattice,
-        surface: &Surface,
-        pose: &Pose,
-        (anchors, near): (&[Anchor], &[(u32, NearSeam)]),
-        folds: &'a Folds,
-    ) -> Self {
+    /// The corners of a panel as they lie in a pose; `folds` are those of each kind of seam.
+    pub(super) fn new(lattice: &'a Lattice, surface: &Surface, pose: &Pose, folds: &'a Folds) -> Self {
         let place = |anchor: &Anchor| {
             if !anchor.is_some() {
                 return (Vec3::NAN, Vec3::Y);
@@ -58,10 +52,10 @@ impl<'a> Sheet<'a> {
             let (at, normal) = surface.at(pose, *anchor);
             (single(at), single(normal))
         };
-        let (points, normals) = anchors.par_iter().with_min_len(256).map(place).unzip();
-        let hems = if near.is_empty() { Vec::new() } else { vec![None; anchors.len()] };
+        let (points, normals) = lattice.anchors.par_iter().with_min_len(256).map(place).unzip();
+        let hems = if lattice.near.is_empty() { Vec::new() } else { vec![None; lattice.anchors.len()] };
         let mut sheet = Self { lattice, points, normals, hems, folds };
-        for (i, near) in near {
+        for (i, near) in &lattice.near {
             sheet.approach(*i as usize, near, pose);
         }
         for _ in 0..PAD {

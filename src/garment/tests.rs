@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::*;
 use crate::{
     geometry::overlap::{Overlap, overlap, overlap_of_plied},
-    pattern::{draft::Draft, weave::Weave},
+    pattern::{draft::Draft, tile::Tile, weave::Weave},
     testing::{pressed_stockinette, stockinette},
 };
 
