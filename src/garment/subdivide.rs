@@ -37,27 +37,41 @@ struct Edge {
 }
 
 impl Topology {
-    /// `corner` tells which border vertices stay.
+    /// Of triangles over so many vertices.
     pub(super) fn new(faces: Vec<[u32; 3]>, vertices: usize) -> Self {
-        let mut places: HashMap<[u32; 2], u32> = HashMap::with_capacity(faces.len() * 3 / 2);
-        let mut edges: Vec<Edge> = Vec::with_capacity(faces.len() * 3 / 2);
+        let mut known: HashMap<[u32; 2], u32> = HashMap::with_capacity(faces.len() * 3 / 2);
+        let mut key = |a: u32, b: u32| {
+            let next = known.len() as u32;
+            *known.entry([a.min(b), a.max(b)]).or_insert(next)
+        };
+        let keys: Vec<[u32; 3]> = faces.iter().map(|&[a, b, c]| [key(a, b), key(b, c), key(c, a)]).collect();
+        let count = known.len();
+        Self::with_keys(faces, vertices, &keys, count)
+    }
+
+    /// Of triangles and, for each of their sides, a number below `count` that is the same for both sides of an edge.
+    fn with_keys(faces: Vec<[u32; 3]>, vertices: usize, keys: &[[u32; 3]], count: usize) -> Self {
+        const UNSEEN: u32 = u32::MAX;
+        let mut places = vec![UNSEEN; count];
+        let mut edges: Vec<Edge> = Vec::with_capacity(count);
         let face_edges: Vec<[u32; 3]> = faces
             .iter()
-            .map(|f| {
+            .zip(keys)
+            .map(|(f, keys)| {
                 [0, 1, 2].map(|k| {
                     let (a, b, c) = (f[k], f[(k + 1) % 3], f[(k + 2) % 3]);
-                    let next = edges.len() as u32;
-                    let place = *places.entry([a.min(b), a.max(b)]).or_insert(next);
-                    if place == next {
+                    let place = &mut places[keys[k] as usize];
+                    if *place == UNSEEN {
+                        *place = edges.len() as u32;
                         edges.push(Edge { ends: [a, b], opposite: [c, c], faces: 1 });
                     } else {
-                        let edge = &mut edges[place as usize];
+                        let edge = &mut edges[*place as usize];
                         if edge.faces == 1 {
                             edge.opposite[1] = c;
                         }
                         edge.faces = edge.faces.saturating_add(1);
                     }
-                    place
+                    *place
                 })
             })
             .collect();
@@ -144,16 +158,24 @@ impl Topology {
     /// order of edges.
     pub(super) fn refined(&self) -> Self {
         let first = self.vertices as u32;
-        let faces = self
-            .faces
-            .iter()
-            .zip(&self.face_edges)
-            .flat_map(|(&[a, b, c], e)| {
-                let [ab, bc, ca] = e.map(|e| first + e);
-                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-            })
-            .collect();
-        let mut fine = Self::new(faces, self.vertices + self.edges.len());
+        let halves = 2 * self.edges.len() as u32;
+        let mut faces = Vec::with_capacity(4 * self.faces.len());
+        let mut keys = Vec::with_capacity(4 * self.faces.len());
+        for (i, (&[a, b, c], e)) in self.faces.iter().zip(&self.face_edges).enumerate() {
+            let [ab, bc, ca] = e.map(|e| first + e);
+            faces.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+            // Each edge becomes two, by the end that they keep, and each face has three of its own: nothing is looked up.
+            let half = |k: usize, end: u32| 2 * e[k] + u32::from(self.edges[e[k] as usize].ends[1] == end);
+            let [by_a, by_b, by_c] = [0, 1, 2].map(|k| halves + 3 * i as u32 + k);
+            keys.extend([
+                [half(0, a), by_a, half(2, a)],
+                [half(0, b), half(1, b), by_b],
+                [by_c, half(1, c), half(2, c)],
+                [by_b, by_c, by_a],
+            ]);
+        }
+        let count = halves as usize + 3 * self.faces.len();
+        let mut fine = Self::with_keys(faces, self.vertices + self.edges.len(), &keys, count);
         for v in 0..self.vertices {
             fine.corner[v] |= self.corner[v];
         }
@@ -220,6 +242,31 @@ mod tests {
             assert!(values[v].distance(*p) < 0.01, "{v}: {} {p}", values[v]);
         }
         assert_eq!(fine.faces.len(), 4 * coarse.faces.len());
+    }
+
+    /// Two triangles that share all three edges, as at the corner of a pillow, are closed, and stay so.
+    #[test]
+    fn faces_that_share_two_edges_keep_edges_of_their_own() {
+        let mut both = Topology::new(vec![[0, 1, 2], [0, 2, 1]], 3);
+        for _ in 0..3 {
+            let borders = |face: usize| (0..3).filter(|&k| both.is_border(face, k)).count();
+            assert_eq!((0..both.faces.len()).map(borders).sum::<usize>(), 0);
+            assert_eq!(2 * both.edges.len(), 3 * both.faces.len());
+            both = both.refined();
+        }
+    }
+
+    /// Edges are as they are found anew from the refined faces.
+    #[test]
+    fn refined_edges_are_those_of_the_faces() {
+        let grid = |i: u32, j: u32| i * 4 + j;
+        let cell = |i: u32, j: u32| {
+            [[grid(i, j), grid(i + 1, j), grid(i + 1, j + 1)], [grid(i, j), grid(i + 1, j + 1), grid(i, j + 1)]]
+        };
+        let faces: Vec<[u32; 3]> = (0..3).flat_map(|i| (0..3).flat_map(move |j| cell(i, j))).collect();
+        let fine = Topology::new(faces, 16).refined().refined();
+        let anew = Topology::new(fine.faces.clone(), fine.vertices);
+        assert_eq!((fine.face_edges, fine.around, fine.border), (anew.face_edges, anew.around, anew.border));
     }
 
     #[test]

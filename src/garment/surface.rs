@@ -105,20 +105,33 @@ impl Surface {
     pub(super) fn new(panels: &Panels, points: &[DVec3], finest: f64) -> Self {
         let area: f64 = panels.panels.iter().map(|p| p.area).sum();
         let mut edge = (2.0 * area / panels.cut.len() as f64).sqrt();
-        let mut cut = Topology::new(panels.cut.clone(), panels.uvs.len());
-        let flat: Vec<DVec3> = panels.uvs.iter().map(|uv| uv.extend(0.0)).collect();
-        cut.pin_corners(&flat, CORNER);
-        let mut uvs = cut.through(&flat);
-        let mut first = Topology::new(panels.sewn.clone(), points.len());
-        first.pin_corners(points, CORNER);
-        let mut sewn = vec![first];
-        while edge > finest && 4 * cut.faces.len() <= MOST_FACES && sewn.len() < 4 {
-            uvs = cut.refine(&uvs);
-            cut = cut.refined();
-            sewn.push(sewn[sewn.len() - 1].refined());
+        let mut refinements = 0;
+        while edge > finest && panels.cut.len() << (2 * (refinements + 1)) <= MOST_FACES && refinements < 3 {
+            refinements += 1;
             edge *= 0.5;
         }
-        let uvs = cut.limit(&uvs).into_iter().map(DVec3::truncate).collect();
+        let flat = || {
+            let flat: Vec<DVec3> = panels.uvs.iter().map(|uv| uv.extend(0.0)).collect();
+            let mut cut = Topology::new(panels.cut.clone(), panels.uvs.len());
+            cut.pin_corners(&flat, CORNER);
+            let mut uvs = cut.through(&flat);
+            for _ in 0..refinements {
+                uvs = cut.refine(&uvs);
+                cut = cut.refined();
+            }
+            let uvs: Vec<DVec2> = cut.limit(&uvs).into_iter().map(DVec3::truncate).collect();
+            (cut, uvs)
+        };
+        let sewn = || {
+            let mut first = Topology::new(panels.sewn.clone(), points.len());
+            first.pin_corners(points, CORNER);
+            let mut sewn = vec![first];
+            for i in 0..refinements {
+                sewn.push(sewn[i].refined());
+            }
+            sewn
+        };
+        let ((cut, uvs), sewn) = rayon::join(flat, sewn);
         Self { sewn, cut, uvs, of_face: panels.of_face.clone() }
     }
 

@@ -314,18 +314,13 @@ impl GarmentPlan {
                     panels.push((k, name.clone()));
                 }
             }
-            let mut kinds = Vec::with_capacity(yarns.len());
-            let mut places = Vec::with_capacity(yarns.len());
             let own: Vec<usize> =
                 if own.is_empty() { own } else { yarns.iter().map(|y| own[usize::from(y.color)]).collect() };
-            let curves = yarns
-                .into_iter()
-                .map(|mut yarn| {
-                    kinds.push(yarn.kind);
-                    places.push(std::mem::take(&mut yarn.coordinates));
-                    yarn.into_curve()
-                })
-                .collect();
+            let kinds = yarns.iter().map(|yarn| yarn.kind).collect();
+            let (places, curves) = yarns
+                .into_par_iter()
+                .map(|mut yarn| (std::mem::take(&mut yarn.coordinates), yarn.into_curve()))
+                .unzip();
             out.push(MadePanels {
                 origin: rule.origin(&self.path),
                 yarn: rule.yarn,
