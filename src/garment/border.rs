@@ -21,6 +21,18 @@ pub(super) struct Edge {
     pub(super) seam: SeamKind,
     /// Whether it is the first of two that are sewn together.
     pub(super) first: bool,
+    /// Whether its first row is picked up along the other's edge.
+    pub(super) picked_up: bool,
+}
+
+/// Where a corner of a stitch goes on the border.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Landing {
+    pub(super) at: DVec2,
+    /// Whether the border is sewn to nothing there.
+    pub(super) free: bool,
+    /// Whether the first row is picked up there.
+    pub(super) picked_up: bool,
 }
 
 /// A place of the panel near a seam that is turned in, or beyond it.
@@ -96,12 +108,14 @@ impl Border {
         found.into_iter().map(|i| &self.edges[i]).collect()
     }
 
-    /// The place on the border nearest to a point, moved by the margins of the edges around, and whether the border is
-    /// free there; the point itself if no border is within `reach`.
-    pub(super) fn onto(&self, from: DVec2, reach: f64) -> (DVec2, bool) {
+    /// The place on the border nearest to a point, moved by the margins of the edges around; the point itself if no border
+    /// is within `reach`.
+    pub(super) fn onto(&self, from: DVec2, reach: f64) -> Landing {
         let close = |e: &&Edge| on(&e.border, from).0.distance_squared(from) < (reach + e.margin.abs()).powi(2);
         let near: Vec<&Edge> = self.around(from, reach + self.widest).into_iter().filter(close).collect();
-        let Some(Edge { border, margin, .. }) = nearest(from, near.iter().copied()) else { return (from, false) };
+        let Some(Edge { border, margin, picked_up, .. }) = nearest(from, near.iter().copied()) else {
+            return Landing { at: from, free: false, picked_up: false };
+        };
         let mut at = on(border, from).0;
         if *margin < 0.0 {
             let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
@@ -119,7 +133,7 @@ impl Border {
                 }
             }
         }
-        (at, border.sewn_to.is_none())
+        Landing { at, free: border.sewn_to.is_none(), picked_up: *picked_up }
     }
 
     /// The place of the border nearest to a point.
@@ -154,6 +168,14 @@ impl Border {
             NearSeam { vertices: edge.border.vertices, share: share as f32, over, kind: edge.seam, first: edge.first };
         (distance < within).then_some(found)
     }
+}
+
+/// Whether the first row of a panel is picked up along an edge of another, `mate`, and not knitted into the heads of its last
+/// row: that edge slants or goes up its wales.
+pub(super) fn is_picked_up(edge: &BorderEdge, mate: &BorderEdge) -> bool {
+    // The cloth is to the left of its edges: first rows stand on edges that go right, last ones hang from such as go left.
+    let [own, other] = [edge, mate].map(|e| (e.ends[1] - e.ends[0]).normalize_or(DVec2::X));
+    own.x > own.y.abs() && !(other.x < 0.0 && other.y.abs() <= LEVEL)
 }
 
 /// Whether an edge goes rather up or down than across.

@@ -7,7 +7,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{
-    border::{Border, Edge, NearSeam, closing, is_side},
+    border::{Border, Edge, Landing, NearSeam, closing, is_side},
     seam::SeamKind,
     surface::{Anchor, BorderEdge, Finder, Surface, bounds},
 };
@@ -32,6 +32,8 @@ pub(super) struct Division<'a> {
     pub(super) sewn: [[DVec2; 2]; SeamKind::COUNT],
     /// The seam at each edge of the border.
     pub(super) seams: &'a [SeamKind],
+    /// Whether the first row is picked up, at each edge.
+    pub(super) picked_up: &'a [bool],
     /// Whether a panel that is sewn to itself goes round without a seam: knits do, of a weave no loom makes such a panel.
     pub(super) round: bool,
     /// Within this distance of a seam cloth is bent, mm.
@@ -55,6 +57,8 @@ pub(super) struct Lattice {
     pub(super) anchors: Vec<Anchor>,
     /// Which corners are moved onto a free border.
     free: Vec<bool>,
+    /// Which are moved onto an edge of another panel along which stitches are picked up; empty if none is.
+    picked_up: Vec<bool>,
     /// Number of stitches.
     pub(super) stitches: u64,
     /// Stitches whose middle lies in the panel more than once.
@@ -75,7 +79,7 @@ impl Lattice {
     ) -> Self {
         let finder = Finder::new(surface, panel);
         let around = closing(panel, border).filter(|_| division.round);
-        let edge = |(i, (border, seam)): (usize, (&BorderEdge, &SeamKind))| {
+        let edge = |(i, ((border, seam), picked_up)): (usize, ((&BorderEdge, &SeamKind), &bool))| {
             let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
             let sides = if border.sewn_to.is_none() { [division.free; 2] } else { division.sewn[*seam as usize] };
             // The cloth is to the left of its edges.
@@ -85,10 +89,11 @@ impl Lattice {
                 margin: d.y.abs() * x + d.x.abs() * y,
                 seam: *seam,
                 first: border.is_first(panel, i),
+                picked_up: *picked_up,
             }
         };
         // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
-        let all = border.iter().zip(division.seams).enumerate().map(edge);
+        let all = border.iter().zip(division.seams).zip(division.picked_up).enumerate().map(edge);
         let edges = Border::new(all.filter(|e| around.is_none() || !is_side(&e.border)).collect());
         let [mut low, mut high] = bounds(border);
         if border.is_empty() {
@@ -129,6 +134,7 @@ impl Lattice {
             whole: Vec::new(),
             anchors: Vec::new(),
             free: Vec::new(),
+            picked_up: Vec::new(),
             stitches: 0,
             doubled: 0,
             turned_in: ((flat_low - low) / stitch).round().max(DVec2::ZERO).as_usizevec2().to_array(),
@@ -253,6 +259,19 @@ impl Lattice {
         self.index(x as isize, y as isize).is_some_and(|i| self.free[i])
     }
 
+    /// How much of a stitch's foot, so far across it, is picked up along another panel's edge, from 0 to 1.
+    pub(super) fn picked_up(&self, x: usize, y: usize, across: f32) -> f32 {
+        if self.picked_up.is_empty() {
+            return 0.0;
+        }
+        let at = |x: usize| {
+            let picked_up = self.index(x as isize, y as isize).is_some_and(|i| self.picked_up[i]);
+            f32::from(u8::from(picked_up))
+        };
+        let [left, right] = [at(x), at(x + 1)];
+        left + (right - left) * across.clamp(0.0, 1.0)
+    }
+
     /// Finds where each corner of a stitch lies.
     fn place(&mut self, finder: &Finder<'_>, edges: &Border, low: DVec2, bent: f64) {
         let (w, h) = (self.width(), self.height());
@@ -265,7 +284,7 @@ impl Lattice {
         };
         let grid = |x: isize, y: isize| low + self.stitch * DVec2::new(x as f64, y as f64);
         // By how much corners at the border move: onto what is left of it.
-        let border: Vec<Option<(DVec2, bool)>> = (0..w * h)
+        let border: Vec<Option<(DVec2, Landing)>> = (0..w * h)
             .into_par_iter()
             .with_min_len(256)
             .map(|i| {
@@ -278,11 +297,12 @@ impl Lattice {
                     3 => INNER,
                     _ => 1.0,
                 };
-                let (to, free) = edges.onto(here, 2.5 * self.stitch.max_element());
-                Some((share * (to - here), free))
+                let landing = edges.onto(here, 2.5 * self.stitch.max_element());
+                Some((share * (landing.at - here), landing))
             })
             .collect();
-        let free: Vec<bool> = border.iter().map(|b| b.is_some_and(|b| b.1)).collect();
+        let free: Vec<bool> = border.iter().map(|b| b.is_some_and(|b| b.1.free)).collect();
+        let picked_up: Vec<bool> = border.iter().map(|b| b.is_some_and(|b| b.1.picked_up)).collect();
         let mut moved: Vec<Option<DVec2>> = border.into_iter().map(|b| b.map(|b| b.0)).collect();
         // Their neighbours inside follow by half, and those by half again.
         for _ in 0..2 {
@@ -328,6 +348,7 @@ impl Lattice {
             })
             .collect();
         self.free = free;
+        self.picked_up = if picked_up.contains(&true) { picked_up } else { Vec::new() };
         self.near = placed.iter().enumerate().filter_map(|(i, p)| Some((i as u32, p.1?))).collect();
         self.anchors = placed.into_iter().map(|p| p.0).collect();
     }

@@ -13,6 +13,7 @@ use crate::{
     geometry::curve::{Basis, Curve},
     math::{
         sampler::{Stream, hash2},
+        special::smooth_step,
         warp::normal,
     },
     pattern::{StrandKind, tile::Section},
@@ -75,6 +76,11 @@ enum On {
 pub(super) const CUT_END: f64 = 0.65;
 /// The end of a knit's yarn goes back so far behind where it came from, in diameters.
 const TAIL_DEEP: f32 = 1.1;
+/// Up to this height of its first row, in rows, a stitch that is picked up comes from the wrong side.
+const PICKED_UP: f32 = 0.6;
+/// Its feet go this share of the way to so far behind the middle of the deepest of the cloth's yarns, in diameters: not all of
+/// them, for in one layer a rib's feet would bend too tightly.
+const FOOT_BEHIND: (f32, f64) = (0.7, 0.4);
 
 /// What a panel's yarns are, beside their shapes.
 #[derive(Clone, Copy)]
@@ -301,6 +307,15 @@ impl<'a> Layer<'a> {
             let size = 1.0 + tension.spread as f32 * own;
             let middle = line as f32 + 0.5;
             p[1 - self.axis] = middle + (p[1 - self.axis] - middle) * size;
+        }
+        if self.axis == 0 {
+            // Feet are drawn through to the wrong side of the edge along which they are picked up.
+            let across = p.x - s as f32;
+            let foot = 1.0 - smooth_step(f64::from((p.y - line as f32) / PICKED_UP)) as f32;
+            let share = foot * self.sheet.lattice.picked_up(s, line, across);
+            let (most, deep) = FOOT_BEHIND;
+            let behind = (self.shapes.heights[0] - deep * self.shapes.diameter) as f32;
+            p.z += share * most * (behind - p.z).min(0.0);
         }
         p
     }

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::{
+    border::is_picked_up,
     edges::{Edging, Finish, Way, ways},
     fold::{Fold, Folds},
     lattice::{Division, Lattice},
@@ -49,6 +50,8 @@ pub(super) struct Sewing {
     cloth: Vec<usize>,
     /// The seam at each edge of each panel's border.
     seams: Vec<Vec<SeamKind>>,
+    /// Whether the first row is picked up, at each edge.
+    picked_up: Vec<Vec<bool>>,
 }
 
 impl Trim {
@@ -102,11 +105,17 @@ impl Sewing {
             options.cloths[last].seam.or(options.cloths[first].seam).unwrap_or(options.seam)
         };
         let of_panel = |(panel, border): (usize, &Vec<BorderEdge>)| border.iter().map(|e| kind(panel, e)).collect();
-        Self {
-            trims: options.cloths.iter().zip(shapes).map(trim).collect(),
-            cloth: cloth.to_vec(),
-            seams: borders.iter().enumerate().map(of_panel).collect(),
-        }
+        let trims: Vec<Trim> = options.cloths.iter().zip(shapes).map(trim).collect();
+        let picked_up = |panel: usize, edge: &BorderEdge| {
+            let Some((other, mate)) = edge.sewn_to else { return false };
+            let knitted = [panel, other as usize].iter().all(|&p| trims[cloth[p]].knitted);
+            let mate = &borders[other as usize][mate as usize];
+            knitted && kind(panel, edge) == SeamKind::None && is_picked_up(edge, mate)
+        };
+        let all = borders.iter().enumerate();
+        let picked_up = all.map(|(panel, border)| border.iter().map(|e| picked_up(panel, e)).collect()).collect();
+        let seams = borders.iter().enumerate().map(of_panel).collect();
+        Self { trims, cloth: cloth.to_vec(), seams, picked_up }
     }
 
     /// How a cloth is turned in.
@@ -158,6 +167,7 @@ impl Sewing {
             free: trim.free,
             sewn: trim.sewn,
             seams: &self.seams[panel],
+            picked_up: &self.picked_up[panel],
             round: trim.knitted,
             bent: begin + 2.0 * trim.stitch.max_element()
                 - trim.sewn.iter().map(|s| s[0].min_element()).fold(0.0, f64::min),

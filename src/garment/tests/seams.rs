@@ -283,6 +283,25 @@ fn columns_meet_at_mattress_seams() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// The feet of a band that is picked up along an edge are behind it; heads of a last row lie as they were knitted.
+#[test]
+fn stitches_are_picked_up_from_the_wrong_side() {
+    let tile = stockinette();
+    let feet = |lean: f64, turn: f64| {
+        let seam = Leaning { lean: lean.to_radians(), turn: turn.to_radians() };
+        let [_, band, _] = seam.sewn(&tile, SeamKind::None);
+        let at_seam = |p: &DVec3| seam.of(*p)[1] < 0.1 * tile.stitch().y;
+        let heights = along(&band).into_iter().filter(at_seam).map(|p| p.z / tile.diameter());
+        heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)))
+    };
+    for (lean, turn) in [(0.0, 90.0), (30.0, 120.0), (60.0, 150.0)] {
+        let (low, high) = feet(lean, turn);
+        assert!(low > -2.0 && high < -0.3, "{lean} {turn}: {low} to {high}");
+    }
+    let (_, high) = feet(0.0, -90.0);
+    assert!(high > 0.0, "{high}");
+}
+
 #[test]
 fn edges_that_are_knitted_on_leave_no_gap() {
     let mut wrong = Vec::new();
@@ -297,8 +316,9 @@ fn edges_that_are_knitted_on_leave_no_gap() {
         let cloth = run_into_each_other(&[first, second].concat()).share;
         let told = format!("{lean} {turn}: {furthest:.2}, {cloth:.3}");
         eprintln!("{told}");
-        // Measured: 0.27 to 1.29, and of bands 0.16 to 0.30, of others up to 0.45 of the yarn within 8 mm.
-        if furthest > 1.4 || cloth > if turn.abs() > 40.0 { 0.33 } else { 0.48 } {
+        // Measured: 0.15 to 1.29, and of bands 0.16 to 0.36, of others up to 0.43 of the yarn within 8 mm. Feet of bands lie among
+        // the turns of the other panel's rows, on the wrong side.
+        if furthest > 1.4 || cloth > if turn.abs() > 40.0 { 0.38 } else { 0.48 } {
             wrong.push(told);
         }
     }
