@@ -51,7 +51,6 @@ fn thick_plies_send_light_back_as_their_fibers_do() {
     ];
     let found = around(210, 0.5, &material(([0.0; 3], [0.0; 3], [0.02, 0.3, 0.9]), [0.15, 0.12, 0.35]));
     for (found, truth) in found.iter().zip(truth) {
-        eprintln!("{found:.4?} of all light, and of explicit fibres' {truth:.4?}");
         for (found, truth) in found.iter().zip(truth) {
             assert!((found / truth - 1.0).abs() < 0.16, "{found:.4} of all light, not {truth:.4}");
         }

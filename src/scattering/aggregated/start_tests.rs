@@ -79,7 +79,6 @@ fn light_leaves_as_high_as_fibers_are_met() {
             }
         }
         let (want, found) = (want / f64::from(lines), found / drawn);
-        eprintln!("{from} to {to}: {found:.4}, met at {want:.4}; fibres are {fiber:.4} thick");
         assert!((found - want).abs() < 0.2 * fiber, "{from} to {to}: {found} {want}");
     }
 }
