@@ -4,7 +4,9 @@ use glam::Vec3A;
 
 use super::fiber::FiberMaterial;
 use crate::geometry::{
+    fiber::{packing::measured, slopes::Twist},
     section::Section,
+    yarn::{YarnShape, tests::touching_yarn},
     yarn_frame::{ROUND, YarnFrame},
 };
 
@@ -24,6 +26,13 @@ pub(super) fn silk() -> FiberMaterial {
 
 pub(super) fn lossless() -> FiberMaterial {
     material(([0.2; 3], [0.5; 3], [0.3; 3]), [0.15, 0.12, 0.35])
+}
+
+/// A yarn of one untwisted ply whose fibres lie as this program packs them.
+pub(super) fn packed_ply(fibers: u32, density: f64) -> YarnShape {
+    let shape = touching_yarn(1, fibers, density, 0.0, 0.0);
+    let radius = f64::from(shape.plies[0].fiber_radius / shape.plies[0].core_radius);
+    shape.packed(&[measured(fibers, radius, Twist::NONE, 1.0)])
 }
 
 /// The section of a straight yarn along z, seen from latitude `theta` at azimuth 0.

@@ -3,18 +3,12 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::{
-    geometry::fiber::{packing::measured, slopes::Twist},
-    scattering::testing::{material, section},
-};
+use crate::scattering::testing::{material, packed_ply, section};
 
 /// What a straight, untwisted ply of fibres that only scatter evenly sends to each 30 degrees of azimuth, 0 towards the camera, of what it
 /// sends anywhere, by channels.
 fn around(fibers: u32, density: f64, m: &FiberMaterial) -> [[f64; 3]; 6] {
-    let shape = crate::geometry::yarn::tests::touching_yarn(1, fibers, density, 0.0, 0.0);
-    let radius = f64::from(shape.plies[0].fiber_radius / shape.plies[0].core_radius);
-    let shape = shape.packed(&[measured(fibers, radius, Twist::NONE, 1.0)]);
-    let yarn = AggregatedYarn::new(shape, &[m]);
+    let yarn = AggregatedYarn::new(packed_ply(fibers, density), &[m]);
     let (mut sums, mut all) = ([[0.0; 3]; 6], [0.0; 3]);
     let mut stream = Stream::new(4);
     for i in 0..60_000 {

@@ -2,15 +2,9 @@
 
 use super::{tests::build, *};
 use crate::{
-    geometry::{
-        fiber::{
-            packing::{hard_discs, measured},
-            slopes::Twist,
-        },
-        yarn::tests::touching_yarn,
-    },
+    geometry::fiber::{packing::hard_discs, slopes::Twist},
     math::sampler::Stream,
-    scattering::testing::{SILK, material, section},
+    scattering::testing::{SILK, material, packed_ply, section},
 };
 
 #[test]
@@ -46,8 +40,10 @@ fn light_leaves_as_high_as_fibers_are_met() {
     const DENSITY: f64 = 0.5;
     let fiber = (DENSITY / f64::from(FIBERS)).sqrt();
     let core = 1.0 - fiber;
-    let shape = touching_yarn(1, FIBERS, DENSITY, 0.0, 0.0).packed(&[measured(FIBERS, fiber / core, Twist::NONE, 1.0)]);
-    let yarn = AggregatedYarn::new(shape, &[&material(([0.0; 3], [0.0; 3], [0.5; 3]), [0.15, 0.12, 0.35])]);
+    let yarn = AggregatedYarn::new(
+        packed_ply(FIBERS, DENSITY),
+        &[&material(([0.0; 3], [0.0; 3], [0.5; 3]), [0.15, 0.12, 0.35])],
+    );
     let packings: Vec<_> =
         (0..100).map(|seed| hard_discs(FIBERS, fiber / core, Twist::NONE, &mut Stream::new(seed))).collect();
     // By three parts of the ply's width.
