@@ -2,9 +2,11 @@
 
 use std::{borrow::Cow, f64::consts::TAU};
 
+use rayon::prelude::*;
+
 use super::{
     estimate::{BuildError, DISTANCE_BYTES, Estimate, FLATTENING_BYTES, MATERIAL_INDEX_BYTES},
-    material::{self, Scatterers},
+    material::{self, Scatterers, Shared},
 };
 use crate::{
     geometry::{
@@ -78,7 +80,15 @@ impl<'a> Preparation<'a> {
     /// The curves for Embree, one entry for each geometry, with how they scatter.
     pub(super) fn pieces(self) -> Vec<Piece> {
         let (mode, model) = (self.scene.render.mode, self.scene.render.model);
-        let mut all: Vec<Piece> = self.fabrics.into_iter().flat_map(|prepared| prepared.pieces(mode, model)).collect();
+        let whole = self.fabrics.iter().filter(|_| mode == Mode::Yarn).filter_map(Prepared::whole_yarn);
+        let shared = Shared::new(whole, model);
+        let of_fabric = |prepared: Prepared<'_>| prepared.pieces(mode, model, &shared);
+        let mut all: Vec<Piece> = match mode {
+            // Nothing is left but to find how they scatter.
+            Mode::Yarn => self.fabrics.into_par_iter().flat_map_iter(of_fabric).collect(),
+            // One after the other, so that only one has all that its curves are made of beside them.
+            Mode::Ply | Mode::Fiber => self.fabrics.into_iter().flat_map(of_fabric).collect(),
+        };
         // A yarn too short to hold a hair leaves nothing for Embree.
         all.retain(|piece| piece.curves.count() > 0);
         all
@@ -178,7 +188,15 @@ impl<'a> Prepared<'a> {
         estimate
     }
 
-    fn pieces(self, mode: Mode, model: Model) -> Vec<Piece> {
+    /// Its yarns, if they are no single fibres, and long over short axis of their sections.
+    fn whole_yarn(&self) -> Option<(&'a Yarn, f64)> {
+        match &self.of {
+            Of::Yarns { yarn, strands, .. } => Some((yarn, stretch(strands.mean_flattening()))),
+            Of::Fibers { .. } => None,
+        }
+    }
+
+    fn pieces(self, mode: Mode, model: Model, shared: &Shared<'_>) -> Vec<Piece> {
         let (index, fabric) = (self.index, self.fabric);
         let (yarn, shape, strands) = match self.of {
             Of::Yarns { yarn, shape, strands } => (yarn, shape, strands),
@@ -197,11 +215,17 @@ impl<'a> Prepared<'a> {
             all.extend(slots.map(|ply| wound.flyaways(ply, flyaways)));
         }
         if mode == Mode::Yarn {
-            let scatterers = material::of_yarns(yarn, &fabric.variants, model, strands.mean_flattening().recip());
+            let scatterers = shared.of_yarns(yarn, &fabric.variants, stretch(strands.mean_flattening()));
             all.push(Piece::of_yarns(index, 0, strands, scatterers));
         }
         all
     }
+}
+
+/// Long over short axis of sections, by how flat they are on the mean: to a hundredth, so that panels of one cloth and frames of one film
+/// count as the same.
+fn stretch(mean_flattening: f64) -> f64 {
+    (mean_flattening.recip() * 100.0).round() / 100.0
 }
 
 impl Piece {
@@ -244,7 +268,7 @@ impl Wound<'_> {
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
         let scatterers =
-            material::of_plies(self.yarn, self.variants, model, ply, (alone, self.plies.mean_flattening().recip()));
+            material::of_plies(self.yarn, self.variants, model, ply, (alone, stretch(self.plies.mean_flattening())));
         Piece::of_yarns(self.index, ply, strands, scatterers)
     }
 

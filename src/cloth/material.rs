@@ -35,16 +35,43 @@ pub fn pressed_scatterer(yarn: &Yarn, model: Model, stretch: f64) -> YarnScatter
     of_shape(shape_for(yarn, model, stretch), &materials(yarn), model, stretch, &Solutions::default())
 }
 
-/// Whole yarns, pressed to axes of `stretch` : 1 on the mean. Variants whose plies are the same share one shape.
-pub(super) fn of_yarns(yarn: &Yarn, variants: &[Yarn], model: Model, stretch: f64) -> PerVariant<YarnScatterer> {
-    let own = |of: &Yarn| Arc::new(shape_for(of, model, stretch));
-    let shape = own(yarn);
-    let solutions = Solutions::default();
-    let scatterer = |of: &Yarn| {
-        let alike = of.plies == yarn.plies && of.placement == yarn.placement;
-        of_shape(if alike { Arc::clone(&shape) } else { own(of) }, &materials(of), model, stretch, &solutions)
-    };
-    PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
+/// What yarns share whose plies are alike, whatever their colour and their fabric.
+pub(super) struct Shared<'a> {
+    model: Model,
+    /// With the yarns that have them, pressed to axes of some number to 1.
+    shapes: Vec<(&'a Yarn, f64, Arc<YarnShape>)>,
+    solutions: Solutions,
+}
+
+impl<'a> Shared<'a> {
+    /// With the shapes of some yarns, pressed to axes of some number to 1.
+    pub(super) fn new(yarns: impl IntoIterator<Item = (&'a Yarn, f64)>, model: Model) -> Self {
+        let mut all: Vec<(&Yarn, f64)> = Vec::new();
+        for (yarn, stretch) in yarns {
+            if !all.iter().any(|of| is_shaped_as((yarn, stretch), *of)) {
+                all.push((yarn, stretch));
+            }
+        }
+        let shaped = |(yarn, stretch)| (yarn, stretch, Arc::new(shape_for(yarn, model, stretch)));
+        Self { model, shapes: all.into_par_iter().map(shaped).collect(), solutions: Solutions::default() }
+    }
+
+    fn shape(&self, yarn: &Yarn, stretch: f64) -> Arc<YarnShape> {
+        let alike = self.shapes.iter().find(|(of, pressed, _)| is_shaped_as((yarn, stretch), (of, *pressed)));
+        alike.map_or_else(|| Arc::new(shape_for(yarn, self.model, stretch)), |(_, _, shape)| Arc::clone(shape))
+    }
+
+    /// Whole yarns, pressed to axes of `stretch` : 1 on the mean.
+    pub(super) fn of_yarns(&self, yarn: &Yarn, variants: &[Yarn], stretch: f64) -> PerVariant<YarnScatterer> {
+        let scatterer =
+            |of: &Yarn| of_shape(self.shape(of, stretch), &materials(of), self.model, stretch, &self.solutions);
+        PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
+    }
+}
+
+fn is_shaped_as((yarn, stretch): (&Yarn, f64), (other, pressed): (&Yarn, f64)) -> bool {
+    let of = |yarn: &Yarn| (yarn.ply_twist, yarn.placement, yarn.known_packing, yarn.tilted);
+    stretch == pressed && yarn.plies == other.plies && of(yarn) == of(other)
 }
 
 /// One ply of a yarn that is pressed to axes of `stretch` : 1 as a yarn of its own, whose shape `alone` is given.

@@ -67,6 +67,34 @@ fn what_rays_pass_is_what_the_model_of_each_yarn_says() {
 }
 
 #[test]
+fn fabrics_of_yarns_that_differ_in_colour_only_share_one_shape() {
+    let shares = |more: &str| {
+        let fabric = |fiber: &str| {
+            format!("[[fabric]]\nyarn = \"{fiber}\"\nsource = {{ type = \"straight\", count = 1, length = 20 }}\n")
+        };
+        let yarn = |name: &str, more: &str| {
+            format!("[yarn.{name}]\nradius = 0.5\nplies = 2\nfibers = 40\nfiber_radius = 0.02\nfiber = \"{name}\"\n{more}")
+        };
+        let text = format!(
+            "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n[fiber.g]\nr = 0.1\ntt = 0.1\nd = 0.1\n{}{}{}{}",
+            yarn("f", ""),
+            yarn("g", more),
+            fabric("f"),
+            fabric("g"),
+        );
+        let scene = parse("a test", &text, &LoadOptions::default()).unwrap();
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        let CurveGeometry::Yarns(first) = &cloth.world().geometries()[0] else { panic!("yarns") };
+        let CurveGeometry::Yarns(second) = &cloth.world().geometries()[1] else { panic!("yarns") };
+        first.occluders.own().shares_shape(second.occluders.own())
+    };
+    assert!(shares(""));
+    for more in ["ply_twist = 20\n", "fiber_twist = 20\n", "[yarn.g.packing]\ntype = \"measured\"\n"] {
+        assert!(!shares(more), "{more}");
+    }
+}
+
+#[test]
 fn a_hit_is_joined_to_the_material_of_what_it_met() {
     for mode in ["yarn", "ply", "fiber"] {
         let scene = scene(mode, "");

@@ -17,19 +17,27 @@ const FOLLOWED: usize = 12;
 /// Azimuths from the short axis to the long one, with both: for the others the section is mirrored.
 const SOLVED: usize = AZIMUTHS / 4 + 1;
 
+/// The half axes of a section of the area of a circle, in the unit of its radius.
+fn axes(radius: f64, stretch: f64) -> [f64; 2] {
+    [radius / stretch.sqrt(), radius * stretch.sqrt()]
+}
+
 /// Of a direction.
 fn angle(k: usize) -> f64 {
     TAU * k as f64 / DIRECTIONS as f64
 }
 
 /// For each cell and direction: what leaves without meeting anything, and where something is met next, and how likely.
-struct Flights {
+#[derive(Debug)]
+pub(super) struct Flights {
     escape: Vec<f32>,
     next: Vec<[(u16, f32); 4 * PLACES]>,
 }
 
 impl Flights {
-    fn new(axes: [f64; 2], apart: f64) -> Self {
+    /// For fibres as [`Bends`] has them.
+    pub(super) fn new(radius: f64, apart: f64, stretch: f64) -> Self {
+        let axes = axes(radius, stretch);
         let mut out = Self { escape: Vec::new(), next: Vec::new() };
         for cell in 0..CELLS {
             for k in 0..DIRECTIONS {
@@ -78,9 +86,13 @@ pub(super) struct Bent {
 }
 
 /// `without` is what leaves of each cell towards an azimuth where no direction is known, of light that meets something there.
-pub(super) fn solve(medium: &Medium, bends: &Bends, stretch: f64, without: impl Fn(usize, usize) -> f64) -> Bent {
-    let axes = |radius: f64| [radius / stretch.sqrt(), radius * stretch.sqrt()];
-    let flights = Flights::new(axes(bends.radius), bends.apart);
+pub(super) fn solve(
+    medium: &Medium,
+    bends: &Bends,
+    stretch: f64,
+    flights: &Flights,
+    without: impl Fn(usize, usize) -> f64,
+) -> Bent {
     let turns = turns(bends.sigma, bends.share).map(|chance| f32x8::splat(bends.chain as f32 * chance));
     let even = f32x8::splat((bends.other / DIRECTIONS as f64) as f32);
     let lanes =
@@ -131,7 +143,8 @@ pub(super) fn solve(medium: &Medium, bends: &Bends, stretch: f64, without: impl 
     let of_cell = |i: usize| {
         let (sector, ring) = (i / RINGS, i % RINGS);
         let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
-        let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes(medium.radius), medium.apart).met;
+        let axes = axes(medium.radius, stretch);
+        let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes, medium.apart).met;
         let rest = std::array::from_fn(|k| all[k] - straight(k));
         (Outgoing::new(1.0, all).azimuths, Outgoing::new(1.0, rest).azimuths)
     };

@@ -4,10 +4,12 @@
 use std::{
     collections::HashMap,
     f32::consts::{FRAC_PI_2, TAU},
+    hash::Hash,
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use glam::Vec2;
+use rayon::prelude::*;
 
 use crate::math::{Rgb, frame::sin_cos, sampler::Stream};
 
@@ -16,6 +18,8 @@ mod flight;
 mod linear;
 mod pressed;
 mod round;
+
+use bent::Flights;
 
 /// Rings of equal area into which the section is cut.
 pub(crate) const RINGS: usize = 16;
@@ -146,12 +150,34 @@ struct OfChannel {
     entering: f64,
 }
 
+/// What one thread makes for all that ask for it. Who asks meanwhile waits, so that what is made must not itself ask the pool of threads.
+#[derive(Debug)]
+struct Made<K, V>(Mutex<HashMap<K, Pending<V>>>);
+
+type Pending<V> = Arc<OnceLock<Arc<V>>>;
+
+impl<K, V> Default for Made<K, V> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<K: Eq + Hash, V> Made<K, V> {
+    fn get(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let cell = Arc::clone(all.entry(key).or_default());
+        drop(all);
+        Arc::clone(cell.get_or_init(|| Arc::new(make())))
+    }
+}
+
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
-pub struct Solutions(Mutex<HashMap<Vec<u64>, Pending>>);
-
-/// What one thread solves and others wait for.
-type Pending = Arc<OnceLock<Arc<OfChannel>>>;
+pub struct Solutions {
+    channels: Made<Vec<u64>, OfChannel>,
+    /// They are the same for all colours.
+    flights: Made<[u64; 3], Flights>,
+}
 
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
@@ -163,11 +189,12 @@ impl Solutions {
             .into_iter()
             .chain(bent)
             .map(f64::to_bits);
-        let key = key.collect();
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let cell = Arc::clone(all.entry(key).or_default());
-        drop(all);
-        Arc::clone(cell.get_or_init(|| Arc::new(Leaving::of_channel(&medium, stretch))))
+        self.channels.get(key.collect(), || Leaving::of_channel(&medium, stretch, self))
+    }
+
+    fn flights(&self, bends: &Bends, stretch: f64) -> Arc<Flights> {
+        let Bends { radius, apart, .. } = *bends;
+        self.flights.get([radius, apart, stretch].map(f64::to_bits), || Flights::new(radius, apart, stretch))
     }
 }
 
@@ -200,7 +227,7 @@ pub(crate) enum Light {
 impl Leaving {
     /// For each channel, in a section of long over short axis `stretch`.
     pub(crate) fn new(channels: &[Medium; 3], stretch: f64, solutions: &Solutions) -> Self {
-        let tables = channels.map(|medium| solutions.of(&medium, stretch));
+        let tables: Vec<Arc<OfChannel>> = channels.par_iter().map(|medium| solutions.of(medium, stretch)).collect();
         let rgb = |value: &dyn Fn(&OfChannel) -> f64| Rgb::from([0, 1, 2].map(|c: usize| value(&tables[c])));
         let held = tables[0].held.len();
         let cells = if channels[0].alone { held } else { held / 2 };
@@ -215,13 +242,16 @@ impl Leaving {
         }
     }
 
-    fn of_channel(medium: &Medium, stretch: f64) -> OfChannel {
+    fn of_channel(medium: &Medium, stretch: f64, solutions: &Solutions) -> OfChannel {
         // Of thicker sections the outer part is as deep below the rim as in the one that is looked at.
         let thicker = (medium.radius / THICKEST).max(1.0);
         let bends = medium.bends.map(|bends| Bends { radius: bends.radius / thicker, ..bends });
         let looked_at = Medium { radius: medium.radius.min(THICKEST), bends, ..*medium };
-        let solved =
-            if stretch > NEARLY_ROUND { pressed::solve(&looked_at, stretch) } else { round::solve(&looked_at) };
+        let solved = if stretch > NEARLY_ROUND {
+            pressed::solve(&looked_at, stretch, solutions)
+        } else {
+            round::solve(&looked_at, solutions)
+        };
         let with_rim = |rings: &[Outgoing; RINGS]| {
             let rim = rings[RINGS - 1].towards(&rings[RINGS - 2], -0.5);
             let at = |ring: usize| *rings.get(ring).unwrap_or(&rim);

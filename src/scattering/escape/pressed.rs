@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent,
+    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, bent,
     flight::{CELLS, Flight, QUARTER, SECTORS, landing},
     linear,
 };
@@ -76,7 +76,7 @@ fn leaving(rows: &[Row], albedo: f64) -> Vec<f64> {
     out
 }
 
-pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
+pub(super) fn solve(medium: &Medium, stretch: f64, solutions: &Solutions) -> Solved {
     let axes = [medium.radius / stretch.sqrt(), medium.radius * stretch.sqrt()];
     // All four quarters from one of them.
     let rows: Vec<Row> = (0..RINGS)
@@ -108,7 +108,10 @@ pub(super) fn solve(medium: &Medium, stretch: f64) -> Solved {
         Outgoing::new(towards.iter().sum::<f64>(), towards)
     };
     let mut onward = cells(&|own| mean(&near[own].next, &out, own));
-    let bent = medium.bends.map(|bends| bent::solve(medium, &bends, stretch, |cell, k| out[cell * AZIMUTHS + k]));
+    let bent = medium.bends.map(|bends| {
+        let flights = solutions.flights(&bends, stretch);
+        bent::solve(medium, &bends, stretch, &flights, |cell, k| out[cell * AZIMUTHS + k])
+    });
     if let Some(bent) = &bent {
         super::turn(&mut onward, &bent.onward);
     }

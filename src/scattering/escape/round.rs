@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solved, bent, flight::SECTORS, linear};
+use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, bent, flight::SECTORS, linear};
 
 /// Directions, and places along each, that are looked at from every ring.
 const DIRECTIONS: usize = 24;
@@ -102,7 +102,7 @@ fn outgoing(waves: [f64; HARMONICS]) -> Outgoing {
     Outgoing::new(waves[0], std::array::from_fn(towards))
 }
 
-pub(super) fn solve(medium: &Medium) -> Solved {
+pub(super) fn solve(medium: &Medium, solutions: &Solutions) -> Solved {
     let open = Transport::new(medium);
     let transport = open.closed(medium.sent_back);
     let leaving = transport.leaving(medium.albedo);
@@ -116,7 +116,7 @@ pub(super) fn solve(medium: &Medium) -> Solved {
     let mut onward = vec![onward];
     let bent = medium.bends.map(|bends| {
         let alike: [Outgoing; RINGS] = std::array::from_fn(|i| outgoing(std::array::from_fn(|m| leaving[m][i])));
-        bent::solve(medium, &bends, 1.0, |cell, k| {
+        bent::solve(medium, &bends, 1.0, &solutions.flights(&bends, 1.0), |cell, k| {
             let turned = k + AZIMUTHS - cell % SECTORS * (AZIMUTHS / SECTORS);
             let of = &alike[cell / SECTORS];
             of.share * of.azimuths[turned % AZIMUTHS] / AZIMUTHS as f64

@@ -7,7 +7,11 @@ fn medium(radius: f64, albedo: f64, apart: f64) -> Medium {
 }
 
 fn solved(medium: &Medium, stretch: f64) -> Solved {
-    if stretch > 1.0 { pressed::solve(medium, stretch) } else { round::solve(medium) }
+    if stretch > 1.0 {
+        pressed::solve(medium, stretch, &Solutions::default())
+    } else {
+        round::solve(medium, &Solutions::default())
+    }
 }
 
 #[test]
@@ -43,7 +47,8 @@ fn nothing_is_lost_that_is_not_absorbed() {
 fn both_solutions_agree_where_the_section_is_nearly_round() {
     for (radius, albedo, apart) in [(2.0, 0.9, 0.0), (6.0, 0.9, 0.8), (6.0, 0.3, 0.4), (6.0, 1.0, 0.8)] {
         let medium = Medium { alone: false, taken_back: 0.2, ..medium(radius, albedo, apart) };
-        let (round, pressed) = (round::solve(&medium), pressed::solve(&medium, 1.0));
+        let solutions = Solutions::default();
+        let (round, pressed) = (round::solve(&medium, &solutions), pressed::solve(&medium, 1.0, &solutions));
         let (a, b) = (round.entering, pressed.entering);
         assert!((a - b).abs() < 0.01 && a > 0.0, "{a} {b}");
         let met = round.met[0].iter().zip(&pressed.met[0]);

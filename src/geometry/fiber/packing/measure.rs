@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2};
+use rayon::prelude::*;
 
 use super::{after::after, leaning_discs, lines::Lines};
 use crate::{
@@ -48,6 +49,7 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacki
     let radius = share / (1.0 - share);
     let slopes = twist.scaled(twist.room(packed, share)).in_core(share);
     let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
+        .into_par_iter()
         .map(|seed| leaning_discs(packed, radius, &slopes, &mut Stream::new(seed)))
         .collect();
     let pressed = Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0)));
