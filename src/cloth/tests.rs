@@ -73,7 +73,9 @@ fn fabrics_of_yarns_that_differ_in_colour_only_share_one_shape() {
             format!("[[fabric]]\nyarn = \"{fiber}\"\nsource = {{ type = \"straight\", count = 1, length = 20 }}\n")
         };
         let yarn = |name: &str, more: &str| {
-            format!("[yarn.{name}]\nradius = 0.5\nplies = 2\nfibers = 40\nfiber_radius = 0.02\nfiber = \"{name}\"\n{more}")
+            format!(
+                "[yarn.{name}]\nradius = 0.5\nplies = 2\nfibers = 40\nfiber_radius = 0.02\nfiber = \"{name}\"\n{more}"
+            )
         };
         let text = format!(
             "[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n[fiber.g]\nr = 0.1\ntt = 0.1\nd = 0.1\n{}{}{}{}",
