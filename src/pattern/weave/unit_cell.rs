@@ -34,6 +34,9 @@ const STEPS_BESIDE: usize = 150;
 /// Force on each yarn that packs the cloth, unless spacings are given.
 pub(super) const BEAT: f64 = 1.0;
 
+/// Share of that force while yarns find their places.
+const FIRST_BEAT: f64 = 0.1;
+
 /// What is woven.
 #[derive(Clone, Debug)]
 pub(super) struct CellOptions {
@@ -97,10 +100,11 @@ impl UnitCell {
         let begin = Self::first_spacing(draft, options).map(|s| s.map(|s| s / unit));
         let mut x = energy.start(begin);
         let rest = energy.rest;
-        // Round yarns first find their places, then all give way.
-        energy.rest = [0.0; 2];
+        // Round yarns first find their places, hardly packed, then all give way. Where a repeat leaves them a choice, as beside the
+        // turns of a herringbone, the full force would push each aside another way.
+        (energy.rest, energy.beat) = ([0.0; 2], FIRST_BEAT * options.beat);
         energy.minimize(&mut x, &[], 400);
-        energy.rest = rest;
+        (energy.rest, energy.beat) = (rest, options.beat);
         energy.minimize(&mut x, &[], MOST_STEPS);
         Self::of(&energy, &x, options)
     }
