@@ -18,8 +18,9 @@ const ROUND: f64 = 2000.0;
 const WALL: f64 = 200.0;
 /// Distance of wefts over that of warps, or the other way round, from which on one side hides the other.
 const DENSE: f64 = 1.99;
-/// Distance of such a side's yarns over that at which they lie side by side.
-const CLOSE: f64 = 0.9;
+/// Distance of such a side's yarns over that at which they lie side by side: floats lie upon each other where they dip, and
+/// hide what crosses them.
+const CLOSE: f64 = 0.75;
 /// A yarn's node in the vector of variables: `[aside, height, ln(width / round)]`.
 pub(super) const PER_NODE: usize = 3;
 
