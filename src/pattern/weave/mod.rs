@@ -137,9 +137,9 @@ pub fn fringe(half_room: f64) -> f64 {
 }
 
 /// How high pile stands unless asked otherwise, by half of the room that a warp takes: four times the room where it is
-/// cut, eight times as loops.
+/// cut, twelve times as loops, which bend over.
 pub fn pile_height(draft: &Draft, half_room: f64) -> f64 {
-    let rooms = if draft.pile().is_some_and(|pile| !pile.cut) { 8.0 } else { 4.0 };
+    let rooms = if draft.pile().is_some_and(|pile| !pile.cut) { 12.0 } else { 4.0 };
     2.0 * rooms * half_room
 }
 

@@ -41,9 +41,10 @@ const STEP: f64 = 1.1;
 const ROUNDS: usize = 80;
 /// How much lower tufts are at the sides of a wale, of their height.
 const ROUNDED: f64 = 0.55;
-/// How far tufts lean by chance, and loops at most, of their height.
+/// How far tufts lean by chance, of their height.
 const LEAN: f64 = 0.06;
-const LEAN_LOOP: f64 = 0.7;
+/// How far the tops of loops have bent over, at least and at most, radians: what lies hides more of the ground than what stands.
+const BENT: [f64; 2] = [0.3, 2.1];
 /// By how much the top of a loop is turned, at least and at most, in half turns.
 const TURN: [f64; 2] = [0.3, 1.2];
 
@@ -459,13 +460,14 @@ impl<'a> Raised<'a> {
     fn arch(&self, from: Point, to: Point, place: u32) -> Vec<Point> {
         let height = self.cloth.weave.pile_height;
         let random = |what: u32| self.random(place, what);
-        let lean = DVec2::from_angle(PI * random(0)) * (LEAN_LOOP * height * (0.5 + 0.5 * random(1)).sqrt());
+        let side = DVec2::from_angle(PI * random(0)).extend(0.0);
         let arch = Arch {
             feet: [from.0, to.0],
             up: self.direction(0.0, 0.0, 1.0),
             radius: self.radius(),
             height: height * (1.0 + 0.05 * random(2)),
-            lean: lean.extend(0.0),
+            side,
+            bend: BENT[0] + (BENT[1] - BENT[0]) * (0.5 + 0.5 * random(1)).sqrt(),
             turn: PI * (TURN[0] + (TURN[1] - TURN[0]) * (0.5 + 0.5 * random(3))),
         };
         let points = arch.points(STEP * self.radius());

@@ -29,6 +29,9 @@ const HOLDING: u32 = 2;
 const RIB: f64 = 1.42;
 /// Distance of a selvedge's warps over that at which they jam.
 const SLACK: f64 = 1.05;
+/// The same of such a selvedge from the cloth beside it, over that of its warps: wefts that go up and down as far as under
+/// the loops of terry would fold on their way from one weave into the other.
+const BESIDE: f64 = 1.4;
 /// Thickness of the warp that stands for the turns of wefts while a selvedge is relaxed.
 const OUTSIDE: f64 = 0.25;
 
@@ -361,13 +364,13 @@ impl<'a> Sides<'a> {
             let held = self.beside(right, GIVING);
             return body(held) - self.cloth.position(0, f64::from(held) + 0.5);
         }
-        // Beside the outermost warp that is left, as far as they are from each other.
+        // Beside the outermost warp that is left.
         let out = if right { 1.0 } else { -1.0 };
         let column = self.own(right, self.plan.ends - 1);
         let last = self.number(right, column) - out as i64;
         let thickness = &self.body.weave.threads[0].thickness;
         let thicker = thickness.get(last.rem_euclid(thickness.len().max(1) as i64) as usize).map_or(0.0, |t| t - 1.0);
-        let apart = self.plan.spacing + thicker.max(0.0) * self.body.weave.half_rooms[0];
+        let apart = BESIDE * self.plan.spacing + thicker.max(0.0) * self.body.weave.half_rooms[0];
         self.body.position(0, last as f64 + 0.5) + out * apart - self.place(column)
     }
 

@@ -113,6 +113,51 @@ fn closed_weaves_are_closed() {
     }
 }
 
+/// Share of a repeat on which a warp is on top, seen from above.
+fn warp_face(cell: &UnitCell) -> f64 {
+    const FINE: usize = 12;
+    let count = [0, 1].map(|side| cell.yarns[side].len());
+    let top = |side: usize, place: [f64; 2]| {
+        let own = (-1..=count[side] as i64).map(|index| {
+            let yarn = &cell.yarns[side][index.rem_euclid(count[side] as i64) as usize];
+            let node = &yarn[(place[1 - side] * cell.nodes as f64).round() as usize % yarn.len()];
+            let off = ((place[side] - index as f64) * cell.spacing[side] - node.aside) / node.axes[0];
+            if off.abs() < 1.0 { node.height + node.axes[1] * (1.0 - off * off).sqrt() } else { f64::MIN }
+        });
+        own.fold(f64::MIN, f64::max)
+    };
+    let places = (0..count[0] * FINE).flat_map(|x| (0..count[1] * FINE).map(move |y| [x, y]));
+    let warps = places.filter(|at| {
+        let place = at.map(|v| (v as f64 + 0.5) / FINE as f64);
+        top(0, place) > top(1, place)
+    });
+    warps.count() as f64 / (count[0] * count[1] * FINE * FINE) as f64
+}
+
+/// Floats of a satin close over the places where its ends dip and hide the picks. Measured: 0.93 and 0.97.
+#[test]
+fn floats_of_a_satin_hide_what_crosses_them() {
+    for (name, least) in [("satin 5", 0.9), ("satin 8/3", 0.95)] {
+        let face = warp_face(&weave(name).relax().unwrap().cell);
+        eprintln!("{name}: {face:.3}");
+        assert!(face > least, "{name}: {face}");
+    }
+}
+
+/// Beside the turns of a herringbone its warps keep straight ways. They went a third of a radius aside, each another way, while they
+/// were packed at once.
+#[test]
+fn a_herringbone_is_as_even_as_its_twill() {
+    for name in ["herringbone 2/2 8", "herringbone"] {
+        let cell = weave(name).relax().unwrap().cell;
+        for yarn in &cell.yarns[0] {
+            let mean = yarn.iter().map(|n| n.aside).sum::<f64>() / yarn.len() as f64;
+            let square = yarn.iter().map(|n| (n.aside - mean).powi(2)).sum::<f64>() / yarn.len() as f64;
+            assert!(square.sqrt() < 0.2, "{name}: {}", square.sqrt());
+        }
+    }
+}
+
 #[test]
 fn warps_of_a_basket_draw_together() {
     let weave = weave("basket 2");
@@ -310,6 +355,23 @@ fn wefts_turn_without_folding_into_themselves() {
     }
 }
 
+/// The wefts of terry, which go far up and down, come into its selvedge without a fold.
+#[test]
+fn wefts_come_from_pile_into_a_selvedge_without_folding() {
+    let (warps, wefts) = (Extent::Yarns(48), Extent::Yarns(24));
+    let weave = Weave { edges: Edges::Selvedge, warps, wefts, ..weave("terry") };
+    let made = weave.strands().unwrap();
+    for weft in made.iter().filter(|s| s.kind == StrandKind::Weft) {
+        let deepest = weft.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
+            *fold = folded(*fold, w, weave.half_rooms[1]);
+            Some(*fold)
+        });
+        let deepest = deepest.fold(0.0, f64::max);
+        eprintln!("{deepest:.2}");
+        assert!(deepest < 0.7, "{deepest}");
+    }
+}
+
 #[test]
 fn hems_hide_the_ends_of_warps() {
     let weave = Weave { edges: Edges::Finished, wefts: Extent::Yarns(20), ..weave("plain") };
@@ -393,7 +455,7 @@ fn pile_stands_as_high_as_it_is_asked_to() {
         let strands = cloth.strands();
         let top = |s: &PatternStrand| s.curve.points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
         let highest = strands.iter().map(top).fold(f64::MIN, f64::max);
-        assert_eq!(weave.pile_height, if cut { 8.0 } else { 16.0 }, "{name}: radii of its yarn");
+        assert_eq!(weave.pile_height, if cut { 8.0 } else { 24.0 }, "{name}: radii of its yarn");
         assert!((highest - weave.pile_height).abs() < 0.5 * ground + 2.0, "{name}: {highest}");
         // Tufts are held in the cloth and end above it; loops are one yarn.
         let standing: Vec<_> = strands.iter().filter(|s| s.kind == kind && top(s) > 5.0).collect();
@@ -462,14 +524,15 @@ fn threads_of_several_kinds_have_their_own_thickness_and_room() {
 /// Where yarns of one side lean aside together they have less room than their distance says.
 #[test]
 fn yarns_that_go_aside_keep_apart() {
-    // Measured: 0.042, 0.031 and 0.23 of the length.
-    for (name, most) in [("herringbone 2/2 8", 0.055), ("honeycomb", 0.045), ("leno", 0.25)] {
+    // Measured: 0.0, 0.026 and 0.23 of the length.
+    for (name, most) in [("herringbone 2/2 8", 0.01), ("honeycomb", 0.045), ("leno", 0.25)] {
         let weave = Weave { edges: Edges::Live, flatten: 1.5, ..weave(name) };
         let strands = weave.strands().unwrap();
         let radius = |s: &PatternStrand| s.curve.radii.clone().unwrap_or_else(|| vec![0.5; s.curve.points.len()]);
         let curves: Vec<(Curve, Vec<f64>)> =
             strands.into_iter().map(|s| (radius(&s), s)).map(|(r, s)| (s.curve, r)).collect();
         let found = overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap();
+        eprintln!("{name}: {found:?}");
         assert!(found.share < most && found.nearest > 0.85, "{name}: {found:?}");
     }
 }

@@ -43,9 +43,12 @@ pub(super) struct Arch {
     /// Unit vector away from the ground.
     pub(super) up: DVec3,
     pub(super) radius: f64,
+    /// Along its axis.
     pub(super) height: f64,
-    /// Where its top is beside its feet, at right angles to `up`.
-    pub(super) lean: DVec3,
+    /// Unit vector to the side it bends over to, at right angles to `up`.
+    pub(super) side: DVec3,
+    /// By how much it has bent over at its top, radians.
+    pub(super) bend: f64,
     /// By how much its top is turned about its axis, radians: by half a turn legs cross once.
     pub(super) turn: f64,
 }
@@ -94,15 +97,16 @@ impl Arch {
         };
         let v = high / self.height;
         let turned = self.turn * smooth_step((v - 0.5 * TOGETHER) / (CROSSED - 0.5 * TOGETHER));
-        // The axis bends over to the side it leans to.
-        let lean = self.lean.length() / self.height;
-        let bend = |v: f64| self.up * (high * (1.0 - 0.5 * lean * lean * v)) + self.lean * v.powf(1.5);
-        let axis = (bend(v + 1e-3) - bend(v) + self.up * (1e-3 * self.height)).normalize_or(self.up);
+        // The axis is an arc of a circle.
+        let bent = self.bend.max(1e-3);
+        let (bent_sin, bent_cos) = (bent * v).sin_cos();
+        let bend = (self.up * bent_sin + self.side * (1.0 - bent_cos)) * (self.height / bent);
+        let axis = self.up * bent_cos + self.side * bent_sin;
         let along = (b - a - (b - a).dot(axis) * axis).normalize_or(DVec3::X);
         let across = axis.cross(along);
         let (sin, cos) = turned.sin_cos();
         let rise = (b - a).dot(self.up) * self.up * (0.5 * side * (1.0 - v));
-        middle + rise + bend(v) + (cos * along + sin * across) * (side * aside)
+        middle + rise + bend + (cos * along + sin * across) * (side * aside)
     }
 }
 

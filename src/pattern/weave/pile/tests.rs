@@ -50,14 +50,14 @@ fn cover(weave: &Weave, strands: &[PatternStrand], height: f64) -> f64 {
     hidden.iter().filter(|hidden| **hidden).count() as f64 / hidden.len() as f64
 }
 
-/// Measured: 0.63 of the ground, 0.02 of the length.
+/// Measured: 0.83 of the ground, 0.006 of the length.
 #[test]
 fn loops_hide_most_of_the_ground_and_lie_beside_each_other() {
     let (weave, strands) = cloth("terry");
     let (hidden, found) = (cover(&weave, &strands, 3.0), overlap_of(&strands));
     eprintln!("{hidden:.3} hidden, {found:?}");
-    assert!(hidden > 0.55, "{hidden}");
-    assert!(found.share < 0.05, "{found:?}");
+    assert!(hidden > 0.78, "{hidden}");
+    assert!(found.share < 0.02, "{found:?}");
 }
 
 /// Loops are not sausages: nowhere much thicker than the yarn, and many times as high as thick.
