@@ -102,7 +102,9 @@ impl UnitCell {
         let rest = energy.rest;
         // Round yarns first find their places, hardly packed, then all give way. Where a repeat leaves them a choice, as beside the
         // turns of a herringbone, the full force would push each aside another way.
-        (energy.rest, energy.beat) = ([0.0; 2], FIRST_BEAT * options.beat);
+        // If one spacing is given, the other would grow far too wide meanwhile.
+        let packed = if options.spacing == [None; 2] { FIRST_BEAT } else { 1.0 };
+        (energy.rest, energy.beat) = ([0.0; 2], packed * options.beat);
         energy.minimize(&mut x, &[], 400);
         (energy.rest, energy.beat) = (rest, options.beat);
         energy.minimize(&mut x, &[], MOST_STEPS);
