@@ -1,11 +1,11 @@
 //! Yarns on garments: a mesh whose texture coordinates are its flat panels, and cloth that repeats, laid over them.
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
-//! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `lay`
-//! lays its yarns from `run` to `run` over the `sheet` of a frame, each colour with its `floats`, `sewing` says what is at
-//! the borders by the kind of `seam`, of which `fold` turns in what is sewn and `edges` makes the yarns, and `body` keeps
-//! them outside of who wears them. `options` are what is asked for, `check` refuses what cannot be laid, `report` tells what
-//! is known before. No part uses another that uses it. All lengths are millimetres.
+//! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `settle`
+//! lets out what a frame presses together, `lay` lays its yarns from `run` to `run` over the `sheet` of a frame, each colour
+//! with its `floats`, `sewing` says what is at the borders by the kind of `seam`, of which `fold` turns in what is sewn and
+//! `edges` makes the yarns, and `body` keeps them outside of who wears them. `options` are what is asked for, `check` refuses
+//! what cannot be laid, `report` tells what is known before. No part uses another that uses it. All lengths are millimetres.
 
 mod body;
 mod border;
@@ -21,6 +21,7 @@ mod panels;
 mod report;
 mod run;
 mod seam;
+mod settle;
 mod sewing;
 mod sheet;
 mod strain;
@@ -63,6 +64,8 @@ pub(crate) struct Garment {
     edgings: Vec<Edging>,
     /// How far the fine points of the surface are kept from a body, mm, if not all by the same.
     clearances: Vec<f32>,
+    /// The lengths of the surface's finest edges as the first frame is worn, mm.
+    worn: Vec<f64>,
     options: Options,
     report: Report,
 }
@@ -101,8 +104,9 @@ impl Garment {
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
+        let worn = surface.worn_lengths(&pose, panels.panels.len());
         let report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &options);
-        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, clearances, options, report })
+        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, clearances, worn, options, report })
     }
 
     /// What is known of it.
@@ -172,11 +176,16 @@ impl Garment {
         let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
         for (i, pose) in poses.iter_mut().enumerate() {
             let pushed = bodies.get(i).map_or(0, |body| pose.push_out(body, &of_point));
-            if pushed > 0 {
+            let let_out = self.surface.settle(pose, &self.worn, bodies.get(i), &of_point);
+            if pushed + let_out > 0 {
                 self.surface.turn_normals(pose);
             }
             if pushed > 0 && i == 0 {
                 notes.push(format!("{} of the cloth moved out of the body or off its skin", counted(pushed, "point")));
+            }
+            if let_out > 0 && i == 0 {
+                let edges = counted(let_out, "edge");
+                notes.push(format!("cloth let out where the mesh presses it together, at {edges} of its refinement"));
             }
         }
         for (lattice, &cloth) in self.lattices.iter().zip(&self.report.cloth) {

@@ -111,13 +111,30 @@ impl Topology {
         }
     }
 
-    fn around_of(&self, v: usize) -> &[u32] {
+    /// The neighbours of a vertex.
+    pub(super) fn around_of(&self, v: usize) -> &[u32] {
         &self.around[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 
     /// Edges with one face, or with more than two.
     pub(super) fn is_border(&self, face: usize, k: usize) -> bool {
         self.edges[self.face_edges[face][k] as usize].faces != 2
+    }
+
+    /// The two vertices of each edge.
+    pub(super) fn edge_ends(&self) -> impl IndexedParallelIterator<Item = [u32; 2]> {
+        self.edges.par_iter().map(|e| e.ends)
+    }
+
+    /// A length for each edge from that of each side of a face, which `of` tells: the mean of both where two meet.
+    pub(super) fn edge_lengths(&self, of: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut lengths = vec![0.0; self.edges.len()];
+        for (face, edges) in self.face_edges.iter().enumerate() {
+            for (k, &edge) in edges.iter().enumerate() {
+                lengths[edge as usize] += of(face, k) / f64::from(self.edges[edge as usize].faces);
+            }
+        }
+        lengths
     }
 
     /// Vertex v times `own` plus its ring times `ring` in all; on a border only along that, by `border`.

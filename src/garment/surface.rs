@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{
     body::Body,
     panels::Panels,
+    settle::settle,
     subdivide::{Topology, normals},
 };
 
@@ -145,6 +146,41 @@ impl Surface {
         let points = finest.limit(&values);
         let normals = normals(&finest.faces, &points);
         Pose { points, normals }
+    }
+
+    /// The flat lengths of the finest edges of the sewn mesh, mm, as far as a pose says that they are worn: where a quarter of
+    /// a panel's edges are shorter by a share, all of it is made so small and not pressed.
+    pub(super) fn worn_lengths(&self, pose: &Pose, panels: usize) -> Vec<f64> {
+        let finest = &self.sewn[self.sewn.len() - 1];
+        let flat = |face: usize, k: usize| {
+            let uvs = self.uvs_of(face as u32);
+            uvs[k].distance(uvs[(k + 1) % 3])
+        };
+        let share = |panel: usize| {
+            let ratio = |face: u32| {
+                let face = face as usize;
+                let at = finest.faces[face].map(|i| pose.points[i as usize]);
+                [0, 1, 2].map(|k| at[k].distance(at[(k + 1) % 3]) / flat(face, k))
+            };
+            let mut ratios: Vec<f64> = self.faces_of(panel as u32).flat_map(ratio).collect();
+            let quarter = ratios.len() / 4;
+            if ratios.is_empty() { 1.0 } else { ratios.select_nth_unstable_by(quarter, f64::total_cmp).1.min(1.0) }
+        };
+        let shares: Vec<f64> = (0..panels).into_par_iter().map(share).collect();
+        finest.edge_lengths(|face, k| flat(face, k) * shares[self.panel_of(face as u32) as usize])
+    }
+
+    /// Lets out what is pressed together in a pose, off a body if there is one; gives the number of edges. `worn` are the lengths
+    /// of [`Self::worn_lengths`].
+    pub(super) fn settle(
+        &self,
+        pose: &mut Pose,
+        worn: &[f64],
+        body: Option<&Body>,
+        clearance: &(impl Fn(usize) -> f64 + Sync),
+    ) -> usize {
+        let keep_off = |i: usize, at: DVec3| body.and_then(|b| b.push_out(at, clearance(i))).unwrap_or(at);
+        settle(&self.sewn[self.sewn.len() - 1], worn, &mut pose.points, &keep_off)
     }
 
     /// Turns the normals of a pose after its points.

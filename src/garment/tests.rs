@@ -293,6 +293,27 @@ fn a_body_keeps_yarns_out() {
     }
 }
 
+/// A place that a drape presses together is let out and said; a garment that is small everywhere is as it is.
+#[test]
+fn pressed_places_are_let_out_and_small_garments_stay_small() {
+    let lay = |x: &dyn Fn(f64) -> f64| {
+        let mut text = String::new();
+        sheet(&mut text, "square", 24, 10, 5.0, 0.0, &|u, v| DVec3::new(x(u), v, 0.0));
+        let mesh = GarmentMesh::parse(&text).unwrap();
+        let garment = Garment::new(&mesh, Options { uv_mm: Some(1.0), ..options(stockinette()) }).unwrap();
+        let mut notes = Vec::new();
+        let mut laid = garment.lay(&mesh, &[&mesh], &[], &[], &mut notes).unwrap();
+        let yarns: Vec<LaidYarn> = laid.remove(0).into_iter().flatten().collect();
+        let width = yarns.iter().flat_map(|y| &y.points).map(|p| p.x).fold(0.0, f64::max);
+        (notes.iter().any(|n| n.contains("let out")), width)
+    };
+    let (let_out, narrow) = lay(&|u| u - 0.6 * (u - 55.0).clamp(0.0, 10.0));
+    assert!(let_out && (narrow - 114.0).abs() < 5.0, "{narrow}");
+    let (let_out, small) = lay(&|u| 0.7 * u);
+    assert!(!let_out && (small - 84.0).abs() < 5.0, "{small}");
+    assert!(!lay(&|u| u).0);
+}
+
 #[test]
 fn groups_that_no_panel_has_are_told() {
     let cloths = vec![
