@@ -453,9 +453,13 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Text that is a number but for a point without a digit on one side, as TOML would have it: 0.1 for `.1`.
+/// Text that is a number, or an array of numbers, but for points without a digit on one side, as TOML would have it: 0.1 for `.1`.
 fn half_written(value: &Value) -> Option<String> {
     let Value::String(text) = value else { return None };
-    let number: f64 = text.parse().ok()?;
-    (text.trim_start_matches(['+', '-']).starts_with('.') || text.ends_with('.')).then(|| number_text(number))
+    let array = text.strip_prefix('[').and_then(|text| text.strip_suffix(']'));
+    let parts: Vec<&str> = array.unwrap_or(text).split(',').map(str::trim).collect();
+    let numbers: Vec<f64> = parts.iter().map(|part| part.parse()).collect::<Result<_, _>>().ok()?;
+    let is_half = |part: &&str| part.trim_start_matches(['+', '-']).starts_with('.') || part.ends_with('.');
+    let written = numbers.into_iter().map(number_text).collect::<Vec<_>>().join(", ");
+    parts.iter().any(is_half).then(|| if array.is_some() { format!("[{written}]") } else { written })
 }

@@ -275,6 +275,11 @@ fn options() {
          ^^ in TOML a point stands between digits: write 1\n"
     );
     assert_eq!(
+        check_with(scene, &["light.0.radiance=[.45, 1, 2.]"]),
+        "--set light.0.radiance=[.45, 1, 2.]: error: `radiance`: expected a number or an array of 3 numbers, found a \
+         string\n                       ^^^^^^^^^^^^ in TOML a point stands between digits: write [0.45, 1, 2]\n"
+    );
+    assert_eq!(
         check_with(scene, &["light.2.radiance=1", "light.x.radiance=1", "render.spp.x=1", "lamp.0.radiance=1"]),
         "--set light.2.radiance=1: error: `light` has 2 entries, with indices from 0 to 1\n            ^\n\
          --set light.x.radiance=1: error: `light` is an array: expected an index, found `x`\n            ^\n\
