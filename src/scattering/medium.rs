@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    escape::{self, Bends, Leaving, Medium, Solutions},
+    escape::{self, Bends, Leaving, Medium, Solutions, Spacing},
     fiber::FiberMaterial,
     kernel::{DIFFUSE, Latitudes, kappa_of_spread, kappa_of_variance, kernel, normalisation, spread},
 };
@@ -330,13 +330,8 @@ impl<'a> Channel<'a> {
         if self.lost() > 0.0 { 1.0 - ((1.0 - self.r - self.d - self.tt) / self.lost()).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Light that is scattered on starts at fibres, on no line that was drawn: its extinction is the mean medium's.
-    fn rate(&self) -> f64 {
-        extinction_rate(self.lost(), self.fibers.density)
-    }
-
     fn extinction(&self) -> f64 {
-        self.fibers.sigma * self.rate()
+        self.fibers.sigma * self.rho()
     }
 
     fn radius_optical(&self) -> f64 {
@@ -368,8 +363,7 @@ impl<'a> Channel<'a> {
         let taken_back = self.taken_back();
         Medium {
             radius: self.radius_optical(),
-            // The mean way to the next fibre is one, to the next that takes light out of its way 1 / lost.
-            apart: if self.lost() > 1e-9 { (self.rate() / self.lost() - 1.0).max(0.0) } else { 0.0 },
+            spacing: self.spacing(self.rho(), self.lost()),
             albedo: self.kept(),
             bends: (self.turned > 0.0).then(|| self.bends()),
             alone: self.fibers.neighbours == 0.0,
@@ -378,12 +372,20 @@ impl<'a> Channel<'a> {
         }
     }
 
+    /// Of fibres which take so much out of light, at a rate for each that is expected. The mean way to the next fibre is one, to the next that takes
+    /// light out of its way 1 / lost.
+    fn spacing(&self, rate: f64, lost: f64) -> Spacing {
+        let lead = FRAC_PI_4 * self.fibers.radius * self.fibers.sigma * rate;
+        let apart = if lost > 1e-9 { rate / lost - 1.0 } else { 0.0 };
+        Spacing { lead, apart: (apart - lead).max(0.0) }
+    }
+
     /// Light that ends at each fibre, and goes on from there.
     fn bends(&self) -> Bends {
-        let rate = extinction_rate(1.0, self.fibers.density);
+        let rate = extinction_rate(1.0, self.fibers.dead_zone);
         Bends {
             radius: self.fibers.sigma * rate * self.fibers.core,
-            apart: rate - 1.0,
+            spacing: self.spacing(rate, 1.0),
             chain: self.chain,
             other: self.r + self.d + self.tt_out,
             sigma: self.sigma,

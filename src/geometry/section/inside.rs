@@ -55,6 +55,14 @@ impl Inside {
         ply.in_circle(self.at) / ply.core_radius
     }
 
+    /// The same of a point that is a little off this one, by a vector of the section's frame.
+    #[inline]
+    pub fn beside_in_ply(&self, shape: &YarnShape, ply: usize, off: Vec3A) -> Vec2 {
+        let off = self.across(off);
+        let ply = &shape.plies[ply];
+        ply.in_circle(self.at + self.pressed.map_or(off, |pressed| pressed.round(off))) / ply.core_radius
+    }
+
     /// The point of a ply's axis abreast of this one, in the section's frame.
     #[inline]
     pub fn axis_of(&self, shape: &YarnShape, ply: usize) -> Vec3A {

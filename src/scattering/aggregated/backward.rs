@@ -126,7 +126,7 @@ impl Lobe {
         let (spot, axes, outwards) = match &away {
             Some(Meeting { spot, axes, outwards, .. }) => (*spot, *axes, *outwards),
             None => {
-                let (place, axes) = node.spot.place(view.yarn);
+                let (place, axes) = node.spot.place(view);
                 (node.spot, axes_across(&frame, axes), optics.leaving.draw(Light::Onward, &place, stream))
             }
         };
@@ -398,13 +398,13 @@ impl Meeting {
         let shape = view.yarn.occluder().shape();
         let leaving = &view.yarn.plies[met.ply].leaving;
         let inside = view.section.beyond(shape, from, shift, w, met.distance);
-        let at = inside.in_ply(shape, met.ply);
-        let (place, axes) = leaving.place(at, inside.short_axis_within());
+        let spot = Spot::new(view, met.ply, inside);
+        let (place, axes) = spot.place_towards(view, -spot.across(w).normalize_or_zero());
         Self {
-            axes: axes_across(frame, axes.map(|axis| inside.out_of(axis))),
+            axes: axes_across(frame, axes),
             outwards: leaving.draw(light, &place, stream),
             energy: arrives * leaving.share(light, &place),
-            spot: Spot::new(view, met.ply, inside),
+            spot,
         }
     }
 

@@ -145,11 +145,20 @@ impl Spot {
         Self { ply, inside, tangent: tangent.normalize() }
     }
 
-    /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count.
+    /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count. Of light that goes on from the
+    /// first fibre it is that one's middle: what goes back finds its way clear, and the rest is ahead of where it met the fibre.
     #[inline]
-    fn place(&self, yarn: &AggregatedYarn) -> (Place, [Vec3A; 2]) {
-        let at = self.inside.in_ply(yarn.occluder().shape(), self.ply);
-        let (place, axes) = yarn.plies[self.ply].leaving.place(at, self.inside.short_axis_within());
+    fn place(&self, view: &View<'_>) -> (Place, [Vec3A; 2]) {
+        self.place_towards(view, Vec3A::ZERO)
+    }
+
+    /// The same of light that came from `back`: where it met the fibre.
+    #[inline]
+    fn place_towards(&self, view: &View<'_>, back: Vec3A) -> (Place, [Vec3A; 2]) {
+        let optics = &view.yarn.plies[self.ply];
+        let met = view.section.thinness() * optics.lead * back;
+        let at = self.inside.beside_in_ply(view.yarn.occluder().shape(), self.ply, met);
+        let (place, axes) = optics.leaving.place(at, self.inside.short_axis_within());
         (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 

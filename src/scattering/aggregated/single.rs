@@ -154,7 +154,7 @@ impl Node {
         let optics = &view.yarn.plies[spot.ply];
         let sin = (axial * spot.inside.along(spot.tangent)).clamp(-1.0, 1.0);
         let weight = throughput * amplitude;
-        let leaves = optics.leaving.share(Light::Onward, &spot.place(view.yarn).0);
+        let leaves = optics.leaving.share(Light::Onward, &spot.place(view).0);
         let widening = Rgb::splat(SAMPLING_WIDENING);
         let (untouched, spread) = optics.touched(before, widening, None);
         let lobes =

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use wide::f32x8;
 
 use super::{
-    AZIMUTHS, Bends, Medium, Outgoing, RINGS,
+    AZIMUTHS, Bends, Medium, Outgoing, RINGS, Spacing,
     flight::{CELLS, Flight, QUARTER, SECTORS, landing},
 };
 
@@ -27,21 +27,37 @@ fn angle(k: usize) -> f64 {
     TAU * k as f64 / DIRECTIONS as f64
 }
 
-/// For each cell and direction: what leaves without meeting anything, and where something is met next, and how likely.
+/// Of light that fibres send on.
 #[derive(Debug)]
 pub(super) struct Flights {
+    /// All round.
+    even: Ways,
+    /// As TT of a chain, through the fibre, which keeps others off all that way.
+    chain: Ways,
+}
+
+/// For each cell and direction: what leaves without meeting anything, and where something is met next, and how likely.
+#[derive(Debug)]
+struct Ways {
     escape: Vec<f32>,
     next: Vec<[(u16, f32); 4 * PLACES]>,
 }
 
 impl Flights {
     /// For fibres as [`Bends`] has them.
-    pub(super) fn new(radius: f64, apart: f64, stretch: f64) -> Self {
+    pub(super) fn new(radius: f64, spacing: Spacing, stretch: f64) -> Self {
         let axes = axes(radius, stretch);
+        let Spacing { lead, apart } = spacing;
+        Self { even: Ways::new(axes, spacing), chain: Ways::new(axes, Spacing { lead, apart: apart + lead }) }
+    }
+}
+
+impl Ways {
+    fn new(axes: [f64; 2], spacing: Spacing) -> Self {
         let mut out = Self { escape: Vec::new(), next: Vec::new() };
         for cell in 0..CELLS {
             for k in 0..DIRECTIONS {
-                let flight = Flight::new(cell, angle(k), axes, apart);
+                let flight = Flight::new(cell, angle(k), axes, spacing);
                 let mut next = [(0, 0.0); 4 * PLACES];
                 for m in 0..PLACES {
                     let at = flight.at((m as f64 + 0.5) / PLACES as f64);
@@ -105,9 +121,9 @@ pub(super) fn solve(
         met.extend([start; DIRECTIONS]);
     }
     // Of light that goes on from there in one.
-    let onward = |met: &[f32x8]| -> Vec<f32x8> {
-        let flights = flights.escape.iter().zip(&flights.next).enumerate();
-        let of = flights.map(|(i, (escape, next))| {
+    let onward = |ways: &Ways, met: &[f32x8]| -> Vec<f32x8> {
+        let ways = ways.escape.iter().zip(&ways.next).enumerate();
+        let of = ways.map(|(i, (escape, next))| {
             let direction = i % DIRECTIONS;
             let out = lanes(&|k| if k == direction { f64::from(*escape) * AZIMUTHS as f64 } else { 0.0 });
             next.iter().fold(out, |sum, (cell, chance)| {
@@ -117,17 +133,18 @@ pub(super) fn solve(
         of.collect()
     };
     for _ in 0..FOLLOWED {
-        let onward = onward(&met);
-        for (met, onward) in met.chunks_exact_mut(DIRECTIONS).zip(onward.chunks_exact(DIRECTIONS)) {
-            let around = onward.iter().fold(f32x8::ZERO, |sum, of| sum + *of) * even;
+        let [around, on] = [&flights.even, &flights.chain].map(|ways| onward(ways, &met));
+        let of_cells = around.chunks_exact(DIRECTIONS).zip(on.chunks_exact(DIRECTIONS));
+        for (met, (around, on)) in met.chunks_exact_mut(DIRECTIONS).zip(of_cells) {
+            let around = around.iter().fold(f32x8::ZERO, |sum, of| sum + *of) * even;
             for (k, met) in met.iter_mut().enumerate() {
                 let of = turns.iter().enumerate();
-                *met = of.fold(around, |sum, (turn, chance)| sum + onward[(k + turn) % DIRECTIONS] * *chance);
+                *met = of.fold(around, |sum, (turn, chance)| sum + on[(k + turn) % DIRECTIONS] * *chance);
             }
         }
     }
     // Light goes on evenly around from where the tables begin.
-    let mean: Vec<[f32; 8]> = onward(&met)
+    let mean: Vec<[f32; 8]> = onward(&flights.even, &met)
         .chunks_exact(DIRECTIONS)
         .map(|onward| {
             (onward.iter().fold(f32x8::ZERO, |sum, of| sum + *of) / f32x8::splat(DIRECTIONS as f32)).to_array()
@@ -144,7 +161,7 @@ pub(super) fn solve(
         let (sector, ring) = (i / RINGS, i % RINGS);
         let all: [f64; AZIMUTHS] = std::array::from_fn(|k| towards(ring, sector, k));
         let axes = axes(medium.radius, stretch);
-        let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes, medium.apart).met;
+        let straight = |k| 1.0 - Flight::new(ring * SECTORS + sector, angle(k), axes, medium.spacing).met;
         let rest = std::array::from_fn(|k| all[k] - straight(k));
         (Outgoing::new(1.0, all).azimuths, Outgoing::new(1.0, rest).azimuths)
     };

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::RINGS;
+use super::{RINGS, Spacing};
 
 /// Sectors of the whole, a multiple of 4.
 pub(super) const SECTORS: usize = 12;
@@ -11,13 +11,37 @@ pub(super) const QUARTER: usize = SECTORS / 4 + 1;
 /// Ring by ring, sector by sector from the short axis on.
 pub(super) const CELLS: usize = RINGS * SECTORS;
 
+/// How many events are expected on a way of so many mean free paths after one: of fibres that keep `apart`, all the more of them are missing on
+/// it the longer it is, `apart` at last.
+pub(super) fn expected(length: f64, apart: f64) -> f64 {
+    if apart > 0.0 { length + apart * (-length / apart).exp_m1() } else { length }
+}
+
+/// The way on which so many are.
+pub(super) fn length_of(expected: f64, apart: f64) -> f64 {
+    if apart <= 0.0 {
+        return expected;
+    }
+    // x + e^-x - 1 = y, by Newton from above.
+    let y = expected / apart;
+    let mut x = y + (2.0 * y).sqrt().min(1.0);
+    for _ in 0..3 {
+        let free = -(-x).exp_m1();
+        if free < 1e-9 {
+            break;
+        }
+        x -= (x - free - y) / free;
+    }
+    apart * x
+}
+
 /// A way from the middle of a cell.
 pub(super) struct Flight {
     /// In the circle that the section becomes.
     from: (f64, f64),
     /// There, for each mean free path.
     step: (f64, f64),
-    /// To the rim, in mean free paths, of which the first `apart` are free.
+    /// Until nothing is left to be met, in mean free paths.
     length: f64,
     apart: f64,
     /// The chance to meet something.
@@ -25,23 +49,24 @@ pub(super) struct Flight {
 }
 
 impl Flight {
-    /// At an angle (radians) from the short axis of a section whose half axes are so many mean free paths long, of which the first `apart` of
-    /// a way are free.
-    pub(super) fn new(cell: usize, angle: f64, [short, long]: [f64; 2], apart: f64) -> Self {
+    /// At an angle (radians) from the short axis of a section whose half axes are so many mean free paths long.
+    pub(super) fn new(cell: usize, angle: f64, [short, long]: [f64; 2], spacing: Spacing) -> Self {
         let r2 = ((cell / SECTORS) as f64 + 0.5) / RINGS as f64;
         let (sin, cos) = (TAU * (cell % SECTORS) as f64 / SECTORS as f64).sin_cos();
         let (x, y) = (r2.sqrt() * cos, r2.sqrt() * sin);
         let (sin, cos) = angle.sin_cos();
         let (dx, dy) = (cos / short, sin / long);
         let (square, outward) = (dx * dx + dy * dy, x * dx + y * dy);
-        let length = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
-        let met = -(-(length - apart).max(0.0)).exp_m1();
+        let rim = ((outward * outward + square * (1.0 - r2)).sqrt() - outward) / square;
+        let Spacing { lead, apart } = spacing;
+        let length = (rim - lead).max(0.0);
+        let met = -(-expected(length, apart)).exp_m1();
         Self { from: (x, y), step: (dx, dy), length, apart, met }
     }
 
     /// Where light meets something, when the share `u` of what does has done so: evenly along the way where next to nothing is met.
     pub(super) fn at(&self, u: f64) -> (f64, f64) {
-        let s = if self.met > 1e-9 { self.apart - (-u * self.met).ln_1p() } else { u * self.length };
+        let s = if self.met > 1e-9 { length_of(-(-u * self.met).ln_1p(), self.apart) } else { u * self.length };
         (self.from.0 + s * self.step.0, self.from.1 + s * self.step.1)
     }
 }

@@ -44,8 +44,8 @@ pub(crate) fn past_itself(escape: f64, own: f64) -> f64 {
 pub(crate) struct Medium {
     /// The radius in mean free paths: of the circle of the section's area.
     pub(crate) radius: f64,
-    /// How far from each meeting no other is, in mean free paths beyond that.
-    pub(crate) apart: f64,
+    /// Of what is met.
+    pub(crate) spacing: Spacing,
     /// What a meeting keeps.
     pub(crate) albedo: f64,
     /// How TT bends light, if there is any: with it a meeting sends light all round only on the mean.
@@ -58,13 +58,32 @@ pub(crate) struct Medium {
     pub(crate) taken_back: f64,
 }
 
+/// How fibres keep others away. Places are those where light meets a fibre, on the side from where it came, and where it leaves again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Spacing {
+    /// From there to abreast of the fibre's middle, mean free paths: by so much ways out are shorter than to the rim, up to which middles lie.
+    pub(crate) lead: f64,
+    /// By how much fewer others are met after a fibre than at random, those in `lead` not counted, once the way is long.
+    pub(crate) apart: f64,
+}
+
+impl Spacing {
+    fn map(self, of: impl Fn(f64) -> f64) -> Self {
+        Self { lead: of(self.lead), apart: of(self.apart) }
+    }
+
+    fn bits(self) -> [u64; 2] {
+        [self.lead, self.apart].map(f64::to_bits)
+    }
+}
+
 /// The same section by each fibre that light meets, which passes it on as TT or sends it all round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bends {
-    /// The radius in mean free paths, and how far from each fibre no other is, beyond which these count.
+    /// The radius in mean free paths.
     pub(crate) radius: f64,
-    /// As above.
-    pub(crate) apart: f64,
+    /// Of fibres.
+    pub(crate) spacing: Spacing,
     /// What goes on as TT.
     pub(crate) chain: f64,
     /// What goes all round.
@@ -79,17 +98,17 @@ impl Medium {
     /// The next one of those that are told apart: colours that nobody does are solved once. What is not absorbed stays so.
     fn rounded(&self) -> Self {
         let near = |x: f64| if x > 0.0 { ((x.ln() * TOLD_APART).round() / TOLD_APART).exp() } else { 0.0 };
-        let Self { radius, apart, albedo, bends, alone, sent_back, taken_back } = *self;
-        let bends = bends.map(|Bends { radius, apart, chain, other, sigma, share }| {
+        let Self { radius, spacing, albedo, bends, alone, sent_back, taken_back } = *self;
+        let bends = bends.map(|Bends { radius, spacing, chain, other, sigma, share }| {
             let rest = 1.0 - near(1.0 - chain - other);
             let chain = near(chain).min(rest);
-            Bends { radius: near(radius), apart: near(apart), chain, other: rest - chain, sigma, share }
+            Bends { radius: near(radius), spacing: spacing.map(near), chain, other: rest - chain, sigma, share }
         });
         Self {
             bends,
             alone,
             radius: near(radius),
-            apart: near(apart),
+            spacing: spacing.map(near),
             albedo: 1.0 - near(1.0 - albedo).min(1.0),
             sent_back: near(sent_back).min(1.0),
             taken_back: near(taken_back).min(1.0),
@@ -171,30 +190,32 @@ impl<K: Eq + Hash, V> Made<K, V> {
     }
 }
 
+/// The bits of a [`Medium`] and a section's stretch.
+type ChannelKey = ([u64; 6], [u64; 2], Option<([u64; 5], [u64; 2])>);
+
 /// Transport that is solved already: plies of a yarn, its channels and its variants are often alike.
 #[derive(Debug, Default)]
 pub struct Solutions {
-    channels: Made<Vec<u64>, OfChannel>,
+    channels: Made<ChannelKey, OfChannel>,
     /// They are the same for all colours.
-    flights: Made<[u64; 3], Flights>,
+    flights: Made<([u64; 2], [u64; 2]), Flights>,
 }
 
 impl Solutions {
     fn of(&self, medium: &Medium, stretch: f64) -> Arc<OfChannel> {
         let medium = medium.rounded();
-        let Medium { radius, apart, albedo, bends, alone, sent_back, taken_back } = medium;
-        let bent = bends
-            .map_or([0.0; 5], |Bends { radius, apart, chain, other, sigma, .. }| [radius, apart, chain, other, sigma]);
-        let key = [radius, apart, albedo, f64::from(u8::from(alone)), sent_back, taken_back, stretch]
-            .into_iter()
-            .chain(bent)
-            .map(f64::to_bits);
-        self.channels.get(key.collect(), || Leaving::of_channel(&medium, stretch, self))
+        let Medium { radius, spacing, albedo, bends, alone, sent_back, taken_back } = medium;
+        let bent = bends.map(|Bends { radius, spacing, chain, other, sigma, share }| {
+            ([radius, chain, other, sigma, share].map(f64::to_bits), spacing.bits())
+        });
+        let own = [radius, albedo, f64::from(u8::from(alone)), sent_back, taken_back, stretch].map(f64::to_bits);
+        self.channels.get((own, spacing.bits(), bent), || Leaving::of_channel(&medium, stretch, self))
     }
 
     fn flights(&self, bends: &Bends, stretch: f64) -> Arc<Flights> {
-        let Bends { radius, apart, .. } = *bends;
-        self.flights.get([radius, apart, stretch].map(f64::to_bits), || Flights::new(radius, apart, stretch))
+        let Bends { radius, spacing, .. } = *bends;
+        let key = ([radius, stretch].map(f64::to_bits), spacing.bits());
+        self.flights.get(key, || Flights::new(radius, spacing, stretch))
     }
 }
 

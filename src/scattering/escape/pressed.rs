@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, bent,
+    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, Spacing, bent,
     flight::{CELLS, Flight, QUARTER, SECTORS, landing},
     linear,
 };
@@ -20,11 +20,11 @@ struct Row {
 }
 
 impl Row {
-    fn new(ring: usize, sector: usize, axes: [f64; 2], apart: f64) -> Self {
+    fn new(ring: usize, sector: usize, axes: [f64; 2], spacing: Spacing) -> Self {
         let mut out = Self { escape: [0.0; AZIMUTHS], next: vec![0.0; CELLS] };
         for k in 0..DIRECTIONS {
             let angle = TAU * k as f64 / DIRECTIONS as f64;
-            let flight = Flight::new(ring * SECTORS + sector, angle, axes, apart);
+            let flight = Flight::new(ring * SECTORS + sector, angle, axes, spacing);
             // Directions between two azimuths by halves.
             for azimuth in [k / 2, k.div_ceil(2) % AZIMUTHS] {
                 out.escape[azimuth] += 0.5 * (1.0 - flight.met) / DIRECTIONS as f64;
@@ -81,7 +81,7 @@ pub(super) fn solve(medium: &Medium, stretch: f64, solutions: &Solutions) -> Sol
     // All four quarters from one of them.
     let rows: Vec<Row> = (0..RINGS)
         .flat_map(|ring| {
-            let quarter: Vec<Row> = (0..QUARTER).map(|sector| Row::new(ring, sector, axes, medium.apart)).collect();
+            let quarter: Vec<Row> = (0..QUARTER).map(|sector| Row::new(ring, sector, axes, medium.spacing)).collect();
             let half = SECTORS / 2;
             (0..SECTORS).map(move |sector| {
                 let (upper, mirrored) = (sector.min(SECTORS - sector), sector > half);

@@ -2,7 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::{AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, bent, flight::SECTORS, linear};
+use super::{
+    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, Spacing, bent,
+    flight::{SECTORS, expected, length_of},
+    linear,
+};
 
 /// Directions, and places along each, that are looked at from every ring.
 const DIRECTIONS: usize = 24;
@@ -18,22 +22,22 @@ struct Transport {
 
 impl Transport {
     fn new(medium: &Medium) -> Self {
-        let radius = medium.radius;
+        let Medium { radius, spacing: Spacing { lead, apart }, .. } = *medium;
         let mut out = Self { escape: [[0.0; RINGS]; HARMONICS], next: [[[0.0; RINGS]; RINGS]; HARMONICS] };
         for i in 0..RINGS {
             let r2 = (i as f64 + 0.5) / RINGS as f64;
             let r = r2.sqrt();
             for k in 0..DIRECTIONS {
                 let (sin, cos) = (PI * (k as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
-                // To the rim, as shares of the radius.
-                let length = (1.0 - r2 * sin * sin).sqrt() - r * cos;
-                let met = -(-(radius * length - medium.apart).max(0.0)).exp_m1();
+                // Until nothing is left to be met, as shares of the radius.
+                let length = ((1.0 - r2 * sin * sin).sqrt() - r * cos - lead / radius).max(0.0);
+                let met = -(-expected(radius * length, apart)).exp_m1();
                 let escape = (1.0 - met) / DIRECTIONS as f64;
                 harmonics(cos).zip(&mut out.escape).for_each(|(wave, of)| of[i] += escape * wave);
                 for m in 0..PLACES {
                     let u = (m as f64 + 0.5) / PLACES as f64;
                     // Evenly spaced in what is met, also where next to nothing is.
-                    let s = if met > 1e-9 { (medium.apart - (-u * met).ln_1p()) / radius } else { u * length };
+                    let s = if met > 1e-9 { length_of(-(-u * met).ln_1p(), apart) / radius } else { u * length };
                     let (x, y) = (r + s * cos, s * sin);
                     let to2 = x * x + y * y;
                     let ring = ((to2 * RINGS as f64) as usize).min(RINGS - 1);

@@ -1,9 +1,19 @@
 use std::f64::consts::{PI, TAU};
 
+use glam::DVec2;
+
 use super::*;
+use crate::{
+    geometry::fiber::{packing::hard_discs, slopes::Twist},
+    scattering::{
+        medium::PlyOptics,
+        testing::{material, packed_ply},
+    },
+};
 
 fn medium(radius: f64, albedo: f64, apart: f64) -> Medium {
-    Medium { radius, apart, albedo, bends: None, alone: true, sent_back: 0.0, taken_back: 0.0 }
+    let spacing = Spacing { lead: 0.2, apart };
+    Medium { radius, spacing, albedo, bends: None, alone: true, sent_back: 0.0, taken_back: 0.0 }
 }
 
 fn solved(medium: &Medium, stretch: f64) -> Solved {
@@ -75,9 +85,12 @@ fn walked(medium: &Medium, stretch: f64, ring: usize, angle: f64) -> [f64; 4] {
         loop {
             let phi = TAU * next();
             let (dx, dy) = (phi.cos() / axes[0], phi.sin() / axes[1]);
-            let s = medium.apart - (1.0 - next()).ln();
+            let s = flight::length_of(-(1.0 - next()).ln(), medium.spacing.apart);
+            // What is met has its middle within the section.
+            let middle = s + medium.spacing.lead;
+            let (beyond_x, beyond_y) = (x + middle * dx, y + middle * dy);
             (x, y) = (x + s * dx, y + s * dy);
-            if x * x + y * y >= 1.0 {
+            if beyond_x * beyond_x + beyond_y * beyond_y >= 1.0 {
                 if !first {
                     out[(phi / (0.5 * PI) + 0.5) as usize % 4] += weight;
                 }
@@ -130,19 +143,24 @@ fn walked_by_fibers(bends: &Bends, stretch: f64, ring: usize, angle: f64) -> [f6
     for _ in 0..WALKS {
         let (mut x, mut y) = (r * angle.cos(), r * angle.sin());
         let mut phi = TAU * f64::from(stream.next());
-        let mut weight = 1.0;
+        let Spacing { lead, apart } = bends.spacing;
+        let (mut weight, mut kept_off) = (1.0, apart);
         loop {
-            let s = bends.apart - (1.0 - f64::from(stream.next())).ln();
-            (x, y) = (x + s * phi.cos() / axes[0], y + s * phi.sin() / axes[1]);
-            if x * x + y * y >= 1.0 {
+            let s = flight::length_of(-(1.0 - f64::from(stream.next())).ln(), kept_off);
+            let to = |s: f64| (x + s * phi.cos() / axes[0], y + s * phi.sin() / axes[1]);
+            let beyond = to(s + lead);
+            (x, y) = to(s);
+            if beyond.0 * beyond.0 + beyond.1 * beyond.1 >= 1.0 {
                 out[((phi / TAU * 12.0 + 0.5).rem_euclid(12.0)) as usize % 12] += weight / WALKS as f64;
                 break;
             }
             weight *= bends.chain + bends.other;
             if f64::from(stream.next()) * (bends.chain + bends.other) < bends.chain {
                 phi += bends.sigma * f64::from(crate::math::warp::normal(stream.next()));
+                kept_off = apart + lead;
             } else {
                 phi = TAU * f64::from(stream.next());
+                kept_off = apart;
             }
         }
     }
@@ -153,7 +171,8 @@ fn walked_by_fibers(bends: &Bends, stretch: f64, ring: usize, angle: f64) -> [f6
 #[test]
 fn light_that_tt_bends_leaves_towards_where_it_is_found_fiber_by_fiber() {
     for (stretch, chain, other) in [(1.0, 0.75, 0.2), (1.6, 0.75, 0.2), (1.6, 0.5, 0.1), (2.2, 0.6, 0.39)] {
-        let bends = Bends { radius: 6.0, apart: 0.6, chain, other, sigma: 0.45, share: 1.0 };
+        let bends =
+            Bends { radius: 6.0, spacing: Spacing { lead: 0.3, apart: 0.4 }, chain, other, sigma: 0.45, share: 1.0 };
         let lost = 1.0 - chain * 0.83;
         let bent = Medium {
             bends: Some(bends),
@@ -178,5 +197,75 @@ fn light_that_tt_bends_leaves_towards_where_it_is_found_fiber_by_fiber() {
                 }
             }
         }
+    }
+}
+
+/// The first disc that a ray from a place meets, but for one, and where.
+fn met(discs: &[DVec2], radius: f64, from: DVec2, w: DVec2, but: Option<usize>) -> Option<(usize, DVec2)> {
+    let enters = |(i, disc): (usize, &DVec2)| {
+        let way = *disc - from;
+        let (along, off) = (way.dot(w), way.perp_dot(w));
+        let is_met = Some(i) != but && along > 0.0 && off.abs() < radius;
+        is_met.then(|| (along - (radius * radius - off * off).sqrt(), i))
+    };
+    let first = discs.iter().enumerate().filter_map(enters).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((first.1, from + first.0 * w))
+}
+
+/// Parallel light is followed through packings of discs that scatter it evenly around, from where it meets them: of what two and more
+/// did, the tables have as much, and as much of it on each side.
+#[test]
+fn light_that_packings_scatter_on_leaves_as_the_tables_have_it() {
+    const WALKS: usize = 60_000;
+    const SIDES: usize = 4;
+    // Straight on, the two sides, and back, of which the first has little of dense plies.
+    for (fibers, density, most) in
+        [(60, 0.2, [0.03, 0.05, 0.03]), (60, 0.35, [0.08, 0.03, 0.03]), (143, 0.35, [0.06, 0.04, 0.02])]
+    {
+        let albedo = 0.9;
+        let shape = packed_ply(fibers, density);
+        let ply = &shape.plies[0];
+        let radius = f64::from(ply.fiber_radius / ply.core_radius);
+        let scattering = material(([albedo; 3], [0.0; 3], [0.0; 3]), [0.1, 0.1, 0.4]);
+        let leaving = PlyOptics::new(&scattering, ply, 1, 1.0, &Solutions::default()).leaving;
+        let packings: Vec<Vec<DVec2>> =
+            (0..32).map(|seed| hard_discs(fibers, radius, Twist::NONE, &mut Stream::new(seed))).collect();
+        let mut stream = Stream::new(7);
+        let (mut walked, mut told) = ([0.0; SIDES], [0.0; SIDES]);
+        for walk in 0..WALKS {
+            let discs = &packings[walk % packings.len()];
+            let beside = (2.0 * f64::from(stream.next()) - 1.0) * (1.0 + radius);
+            let (mut from, mut w, mut at, mut weight) = (DVec2::new(-3.0, beside), DVec2::X, None, 1.0);
+            let mut first = None;
+            while let Some((disc, place)) = met(discs, radius, from, w, at) {
+                if at.is_some() && first.is_none() {
+                    first = at.map(|disc: usize| (discs[disc], weight));
+                }
+                weight *= albedo;
+                (from, at) = (place, Some(disc));
+                w = DVec2::from_angle(TAU * f64::from(stream.next()));
+            }
+            let Some((middle, before)) = first else { continue };
+            let side = |angle: f64| ((angle / TAU * SIDES as f64 + 0.5).rem_euclid(SIDES as f64)) as usize % SIDES;
+            walked[side(w.y.atan2(w.x))] += weight;
+            let (place, axes) = leaving.place(middle.as_vec2(), Vec2::X);
+            let share = before * f64::from(leaving.share(Light::Onward, &place).mean());
+            let outwards = leaving.draw(Light::Onward, &place, &mut stream);
+            for k in 0..AZIMUTHS {
+                let angle = TAU * (k as f64 + 0.5) / AZIMUTHS as f64;
+                let towards = DVec2::from_angle(angle).as_vec2();
+                let towards = leaving.towards(outwards, Vec2::new(towards.dot(axes[0]), towards.dot(axes[1])));
+                told[side(angle)] += share * f64::from(towards.mean()) / AZIMUTHS as f64;
+            }
+        }
+        let of = |all: &[f64; SIDES]| [all[0], all[1] + all[3], all[2]];
+        for ((side, most), (told, walked)) in
+            ["on", "aside", "back"].iter().zip(most).zip(of(&told).into_iter().zip(of(&walked)))
+        {
+            let ratio = told / walked;
+            assert!((ratio - 1.0).abs() < most, "{fibers} fibres, {density}, {side}: {ratio:.3}");
+        }
+        let ratio = told.iter().sum::<f64>() / walked.iter().sum::<f64>();
+        assert!((ratio - 1.0).abs() < 0.02, "{fibers} fibres, {density}: {ratio:.3}");
     }
 }
