@@ -19,7 +19,7 @@ use crate::{
         yarn::{PlyParameters, YarnShape},
     },
     scattering::{fiber::FiberBcsdf, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, Mode, Model, Sample, Scene, Tufts, Yarn},
+    scene::{CurveKind, Fabric, Mode, Sample, Scene, Tufts, Yarn},
     trace::{CurveGeometry, FiberGeometry, PerVariant, YarnGeometry},
 };
 
@@ -82,7 +82,7 @@ impl<'a> Preparation<'a> {
         let (mode, model) = (self.scene.render.mode, self.scene.render.model);
         let whole = self.fabrics.iter().filter(|_| mode == Mode::Yarn).filter_map(Prepared::whole_yarn);
         let shared = Shared::new(whole, model);
-        let of_fabric = |prepared: Prepared<'_>| prepared.pieces(mode, model, &shared);
+        let of_fabric = |prepared: Prepared<'_>| prepared.pieces(mode, &shared);
         let mut all: Vec<Piece> = match mode {
             // Nothing is left but to find how they scatter.
             Mode::Yarn => self.fabrics.into_par_iter().flat_map_iter(of_fabric).collect(),
@@ -196,7 +196,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    fn pieces(self, mode: Mode, model: Model, shared: &Shared<'_>) -> Vec<Piece> {
+    fn pieces(self, mode: Mode, shared: &Shared<'_>) -> Vec<Piece> {
         let (index, fabric) = (self.index, self.fabric);
         let (yarn, shape, strands) = match self.of {
             Of::Yarns { yarn, shape, strands } => (yarn, shape, strands),
@@ -208,7 +208,7 @@ impl<'a> Prepared<'a> {
         let slots = 0..yarn.plies.len();
         let mut all: Vec<Piece> = match mode {
             Mode::Yarn => Vec::new(),
-            Mode::Ply => slots.clone().map(|ply| wound.ply(ply, model)).collect(),
+            Mode::Ply => slots.clone().map(|ply| wound.ply(ply, shared)).collect(),
             Mode::Fiber => slots.clone().map(|ply| wound.fibers(ply)).collect(),
         };
         if let Some(flyaways) = &yarn.flyaways {
@@ -263,12 +263,12 @@ struct Wound<'a> {
 
 impl Wound<'_> {
     /// One ply of all yarns, each as a yarn of its own.
-    fn ply(&self, ply: usize, model: Model) -> Piece {
+    fn ply(&self, ply: usize, shared: &Shared<'_>) -> Piece {
         let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply, self.shows_fibers);
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
-        let scatterers =
-            material::of_plies(self.yarn, self.variants, model, ply, (alone, stretch(self.plies.mean_flattening())));
+        let alone = (alone, stretch(self.plies.mean_flattening()));
+        let scatterers = shared.of_plies(self.yarn, self.variants, ply, alone);
         Piece::of_yarns(self.index, ply, strands, scatterers)
     }
 

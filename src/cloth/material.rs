@@ -67,28 +67,28 @@ impl<'a> Shared<'a> {
             |of: &Yarn| of_shape(self.shape(of, stretch), &materials(of), self.model, stretch, &self.solutions);
         PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
     }
+
+    /// One ply of a yarn that is pressed to axes of `stretch` : 1 as a yarn of its own, whose shape `alone` is given.
+    pub(super) fn of_plies(
+        &self,
+        yarn: &Yarn,
+        variants: &[Yarn],
+        ply: usize,
+        (alone, stretch): (YarnShape, f64),
+    ) -> PerVariant<YarnScatterer> {
+        let shape = Arc::new(match self.model {
+            Model::Aggregated => alone.packed(&yarn.packings(stretch)[ply..=ply]),
+            _ => alone,
+        });
+        let scatterer =
+            |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], self.model, stretch, &self.solutions);
+        PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
+    }
 }
 
 fn is_shaped_as((yarn, stretch): (&Yarn, f64), (other, pressed): (&Yarn, f64)) -> bool {
     let of = |yarn: &Yarn| (yarn.ply_twist, yarn.placement, yarn.known_packing, yarn.tilted);
     stretch == pressed && yarn.plies == other.plies && of(yarn) == of(other)
-}
-
-/// One ply of a yarn that is pressed to axes of `stretch` : 1 as a yarn of its own, whose shape `alone` is given.
-pub(super) fn of_plies(
-    yarn: &Yarn,
-    variants: &[Yarn],
-    model: Model,
-    ply: usize,
-    (alone, stretch): (YarnShape, f64),
-) -> PerVariant<YarnScatterer> {
-    let shape = Arc::new(match model {
-        Model::Aggregated => alone.packed(&yarn.packings(stretch)[ply..=ply]),
-        _ => alone,
-    });
-    let solutions = Solutions::default();
-    let scatterer = |of: &Yarn| of_shape(Arc::clone(&shape), &[&of.fibers[ply].1], model, stretch, &solutions);
-    PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
 }
 
 /// The fibres of one ply of a yarn.

@@ -128,6 +128,12 @@ impl PlyShape {
         let (along, across) = (from.dot(self.direction), self.direction.perp_dot(from));
         self.stretch.x * along * self.direction + self.stretch.y * across * self.direction.perp()
     }
+
+    /// The same in radii of the circle within which the centres of its fibres lie.
+    #[inline]
+    pub(super) fn in_core(&self, at: Vec2) -> Vec2 {
+        self.in_circle(at) / self.core_radius
+    }
 }
 
 impl YarnShape {

@@ -224,7 +224,7 @@ impl PlyOptics {
             spread_expected_tt: expected_spread(material.beta_tt) as f32,
             tt: TtWidth::new(material),
             after: ply.after.unwrap_or(AfterFiber::free(fibers.gaps.dead_zone)),
-            lead: (FRAC_PI_4 * fibers.radius) as f32,
+            lead: fibers.lead() as f32,
             mean_way,
             fading: rgb(&|c| c.fading()).mean(),
             along: ALONG[0] + kept * (ALONG[1] - ALONG[0]),
@@ -260,6 +260,11 @@ impl Fibers {
             gaps: PlyGaps::new(dead_zone as f32),
             neighbours: ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0),
         }
+    }
+
+    /// From where light meets a fibre to abreast of its middle, on the mean, yarn radii.
+    fn lead(&self) -> f64 {
+        FRAC_PI_4 * self.radius
     }
 }
 
@@ -375,7 +380,7 @@ impl<'a> Channel<'a> {
     /// Of fibres which take so much out of light, at a rate for each that is expected. The mean way to the next fibre is one, to the next that takes
     /// light out of its way 1 / lost.
     fn spacing(&self, rate: f64, lost: f64) -> Spacing {
-        let lead = FRAC_PI_4 * self.fibers.radius * self.fibers.sigma * rate;
+        let lead = self.fibers.lead() * self.fibers.sigma * rate;
         let apart = if lost > 1e-9 { rate / lost - 1.0 } else { 0.0 };
         Spacing { lead, apart: (apart - lead).max(0.0) }
     }

@@ -51,16 +51,14 @@ impl Inside {
     /// pressed flat, in the round section. Axes are those of the unwound yarn.
     #[inline]
     pub fn in_ply(&self, shape: &YarnShape, ply: usize) -> Vec2 {
-        let ply = &shape.plies[ply];
-        ply.in_circle(self.at) / ply.core_radius
+        shape.plies[ply].in_core(self.at)
     }
 
     /// The same of a point that is a little off this one, by a vector of the section's frame.
     #[inline]
     pub fn beside_in_ply(&self, shape: &YarnShape, ply: usize, off: Vec3A) -> Vec2 {
         let off = self.across(off);
-        let ply = &shape.plies[ply];
-        ply.in_circle(self.at + self.pressed.map_or(off, |pressed| pressed.round(off))) / ply.core_radius
+        shape.plies[ply].in_core(self.at + self.pressed.map_or(off, |pressed| pressed.round(off)))
     }
 
     /// The point of a ply's axis abreast of this one, in the section's frame.

@@ -399,7 +399,7 @@ impl Meeting {
         let leaving = &view.yarn.plies[met.ply].leaving;
         let inside = view.section.beyond(shape, from, shift, w, met.distance);
         let spot = Spot::new(view, met.ply, inside);
-        let (place, axes) = spot.place_towards(view, -spot.across(w).normalize_or_zero());
+        let (place, axes) = spot.place_met(view, -spot.across(w).normalize_or_zero());
         Self {
             axes: axes_across(frame, axes),
             outwards: leaving.draw(light, &place, stream),

@@ -21,7 +21,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3A;
+use glam::{Vec2, Vec3A};
 
 pub use super::escape::Solutions;
 use super::{
@@ -149,16 +149,20 @@ impl Spot {
     /// first fibre it is that one's middle: what goes back finds its way clear, and the rest is ahead of where it met the fibre.
     #[inline]
     fn place(&self, view: &View<'_>) -> (Place, [Vec3A; 2]) {
-        self.place_towards(view, Vec3A::ZERO)
+        self.placed(view, self.inside.in_ply(view.yarn.occluder().shape(), self.ply))
     }
 
     /// The same of light that came from `back`: where it met the fibre.
     #[inline]
-    fn place_towards(&self, view: &View<'_>, back: Vec3A) -> (Place, [Vec3A; 2]) {
-        let optics = &view.yarn.plies[self.ply];
-        let met = view.section.thinness() * optics.lead * back;
-        let at = self.inside.beside_in_ply(view.yarn.occluder().shape(), self.ply, met);
-        let (place, axes) = optics.leaving.place(at, self.inside.short_axis_within());
+    fn place_met(&self, view: &View<'_>, back: Vec3A) -> (Place, [Vec3A; 2]) {
+        let met = view.section.thinness() * view.yarn.plies[self.ply].lead * back;
+        self.placed(view, self.inside.beside_in_ply(view.yarn.occluder().shape(), self.ply, met))
+    }
+
+    /// The same of a point of the ply.
+    #[inline]
+    fn placed(&self, view: &View<'_>, at: Vec2) -> (Place, [Vec3A; 2]) {
+        let (place, axes) = view.yarn.plies[self.ply].leaving.place(at, self.inside.short_axis_within());
         (place, axes.map(|axis| self.inside.out_of(axis)))
     }
 

@@ -13,7 +13,7 @@ pub(super) const CELLS: usize = RINGS * SECTORS;
 
 /// How many events are expected on a way of so many mean free paths after one: of fibres that keep `apart`, all the more of them are missing on
 /// it the longer it is, `apart` at last.
-pub(super) fn expected(length: f64, apart: f64) -> f64 {
+fn expected(length: f64, apart: f64) -> f64 {
     if apart > 0.0 { length + apart * (-length / apart).exp_m1() } else { length }
 }
 
@@ -64,7 +64,7 @@ impl Flight {
         Self { from: (x, y), step: (dx, dy), length, apart, met }
     }
 
-    /// Where light meets something, when the share `u` of what does has done so: evenly along the way where next to nothing is met.
+    /// In the circle, where light meets something, when the share `u` of what does has done so: evenly along the way where next to nothing is met.
     pub(super) fn at(&self, u: f64) -> (f64, f64) {
         let s = if self.met > 1e-9 { length_of(-(-u * self.met).ln_1p(), self.apart) } else { u * self.length };
         (self.from.0 + s * self.step.0, self.from.1 + s * self.step.1)

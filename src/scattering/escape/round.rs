@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::{
-    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, Spacing, bent,
-    flight::{SECTORS, expected, length_of},
+    AZIMUTHS, Medium, Outgoing, RINGS, Solutions, Solved, bent,
+    flight::{Flight, SECTORS},
     linear,
 };
 
@@ -22,26 +22,18 @@ struct Transport {
 
 impl Transport {
     fn new(medium: &Medium) -> Self {
-        let Medium { radius, spacing: Spacing { lead, apart }, .. } = *medium;
         let mut out = Self { escape: [[0.0; RINGS]; HARMONICS], next: [[[0.0; RINGS]; RINGS]; HARMONICS] };
         for i in 0..RINGS {
-            let r2 = (i as f64 + 0.5) / RINGS as f64;
-            let r = r2.sqrt();
             for k in 0..DIRECTIONS {
-                let (sin, cos) = (PI * (k as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
-                // Until nothing is left to be met, as shares of the radius.
-                let length = ((1.0 - r2 * sin * sin).sqrt() - r * cos - lead / radius).max(0.0);
-                let met = -(-expected(radius * length, apart)).exp_m1();
-                let escape = (1.0 - met) / DIRECTIONS as f64;
-                harmonics(cos).zip(&mut out.escape).for_each(|(wave, of)| of[i] += escape * wave);
+                let angle = PI * (k as f64 + 0.5) / DIRECTIONS as f64;
+                let flight = Flight::new(i * SECTORS, angle, [medium.radius; 2], medium.spacing);
+                let escape = (1.0 - flight.met) / DIRECTIONS as f64;
+                harmonics(angle.cos()).zip(&mut out.escape).for_each(|(wave, of)| of[i] += escape * wave);
                 for m in 0..PLACES {
-                    let u = (m as f64 + 0.5) / PLACES as f64;
-                    // Evenly spaced in what is met, also where next to nothing is.
-                    let s = if met > 1e-9 { length_of(-(-u * met).ln_1p(), apart) / radius } else { u * length };
-                    let (x, y) = (r + s * cos, s * sin);
+                    let (x, y) = flight.at((m as f64 + 0.5) / PLACES as f64);
                     let to2 = x * x + y * y;
                     let ring = ((to2 * RINGS as f64) as usize).min(RINGS - 1);
-                    let met = met / (DIRECTIONS * PLACES) as f64;
+                    let met = flight.met / (DIRECTIONS * PLACES) as f64;
                     let turned = x / to2.sqrt().max(1e-12);
                     harmonics(turned).zip(&mut out.next).for_each(|(wave, of)| of[i][ring] += met * wave);
                 }
