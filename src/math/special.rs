@@ -61,6 +61,18 @@ pub(crate) fn front_share_of_wrapped_normal(sigma: f64) -> f64 {
         .sum()
 }
 
+/// What a wrapped normal distribution of standard deviation `sigma` (radians) has over its least density, which is that opposite to its
+/// centre, as a share of the whole: what is not the same all round. 1 for sigma -> 0, 0 for sigma -> infinity.
+pub(crate) fn uneven_share_of_wrapped_normal(sigma: f64) -> f64 {
+    if sigma > 1.5 {
+        // The alternating sum of its harmonics; the images below cancel there.
+        let harmonic = |k: i32| f64::from(k % 2 * 2 - 1) * (-0.5 * (f64::from(k) * sigma).powi(2)).exp();
+        return 2.0 * (1..=6).map(harmonic).sum::<f64>();
+    }
+    let image = |k: i32| (-0.5 * (PI * f64::from(2 * k + 1) / sigma.max(1e-300)).powi(2)).exp();
+    1.0 - 2.0 * (2.0 * PI).sqrt() / sigma.max(1e-300) * (0..3).map(image).sum::<f64>()
+}
+
 /// Density (1/radian) at distance `d` radians from the centre of a normal distribution wrapped round the circle.
 #[inline]
 pub(crate) fn wrapped_normal(d: f32, sigma: f32) -> f32 {
@@ -141,6 +153,9 @@ mod tests {
             assert!((total * step - 1.0).abs() < 2e-5, "sigma {sigma}: mass {}", total * step);
             let want = front_share_of_wrapped_normal(sigma);
             assert!((front * step - want).abs() < 3e-5, "sigma {sigma}: front {} not {want}", front * step);
+            let least = 2.0 * PI * f64::from(wrapped_normal(std::f32::consts::PI, sigma as f32));
+            let uneven = uneven_share_of_wrapped_normal(sigma);
+            assert!((uneven + least - 1.0).abs() < 2e-6, "sigma {sigma}: uneven {uneven}, least {least}");
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::math::{
     Rgb,
     frame::sin_cos,
     sampler::Stream,
-    special::{front_share_of_wrapped_normal, wrapped_normal},
+    special::{uneven_share_of_wrapped_normal, wrapped_normal},
     warp::normal,
 };
 
@@ -39,9 +39,9 @@ pub struct FiberMaterial {
 }
 
 impl FiberMaterial {
-    /// The share of TT that goes on forward as a chain: 2 q - 1 with q the share within a quarter turn of forward.
+    /// The share of TT that goes on forward as a chain: what its azimuths have over the least of them, which the rest has all round.
     pub fn chain_share(&self) -> f64 {
-        2.0 * front_share_of_wrapped_normal(self.beta_n) - 1.0
+        uneven_share_of_wrapped_normal(self.beta_n)
     }
 
     /// The mean cosine of the angle by which that share turns, across the fibre.

@@ -4,7 +4,7 @@ use super::{Case, Checks, Group::Scattering, Scale, digits};
 use crate::{
     math::{
         Rgb,
-        special::{bessel_i1_scaled, front_share_of_wrapped_normal, wrapped_normal},
+        special::{bessel_i1_scaled, front_share_of_wrapped_normal, uneven_share_of_wrapped_normal, wrapped_normal},
     },
     scattering::{
         closed_forms::{
@@ -167,6 +167,12 @@ fn branches(_: Scale, checks: &mut Checks) {
         front_share_of_wrapped_normal(4.0),
         front_share_of_wrapped_normal(4.0 + e),
         1e-8,
+    );
+    both(
+        "uneven share of a wrapped normal",
+        uneven_share_of_wrapped_normal(1.5),
+        uneven_share_of_wrapped_normal(1.5 + e),
+        1e-7,
     );
     both("scaled Bessel function", bessel_i1_scaled(20.0 - e), bessel_i1_scaled(20.0), 1e-9);
     let one = |x: f32| f64::from(Rgb::splat(x).one_minus_exp_neg().to_array()[0]);

@@ -14,7 +14,7 @@ use crate::{
         yarn::{PlyParameters, touching_plies},
         yarn_frame::Pressed,
     },
-    math::special::{GAUSS_LEGENDRE_4, wrapped_normal},
+    math::special::{GAUSS_LEGENDRE_4, front_share_of_wrapped_normal, wrapped_normal},
     scattering::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, spread},
         lobe::LobeFrame,
@@ -225,8 +225,9 @@ fn values_agree_with_the_reference_vectors() {
             .collect();
         let shape = YarnShape::new(&parameters, 0.0, true);
         let mut yarn = AggregatedYarn::new(shape.clone(), &vec![&m; count as usize]);
-        // Chains run straight, and what leaves them is even.
-        let (chain, out) = (m.chain_share(), 1.0 - m.chain_share());
+        // Chains run straight, and what leaves them is even: as much as lies behind, twice.
+        let chain = 2.0 * front_share_of_wrapped_normal(m.beta_n) - 1.0;
+        let out = 1.0 - chain;
         let straight = FiberMaterial {
             tt: m.tt.map(|tt| tt * chain),
             d: std::array::from_fn(|c| m.d[c] + m.tt[c] * out),
@@ -236,6 +237,14 @@ fn values_agree_with_the_reference_vectors() {
         let straight = AggregatedYarn::new(shape, &vec![&straight; count as usize]);
         for (ply, straight) in yarn.plies.iter_mut().zip(straight.plies) {
             (ply.rho, ply.leaves_yarn, ply.slope) = (straight.rho, straight.leaves_yarn, 0.0);
+            let single = |part: &dyn Fn(usize) -> f64| {
+                Rgb::from([0, 1, 2].map(|c: usize| part(c) / (1.0 - m.tt[c] * chain).max(1e-12)))
+            };
+            (ply.chain, ply.chain_share) = (Rgb::from(m.tt.map(|tt| tt * chain)), chain as f32);
+            ply.single_r = single(&|c| m.r[c]);
+            ply.single_d = single(&|c| m.d[c]);
+            ply.single_tt = single(&|c| m.tt[c] * out);
+            ply.albedo = ply.single_r + ply.single_d + ply.single_tt;
             // Chains widen R by their mean, and what was only ever reflected is as wide as two reflections.
             (ply.sharp, ply.events) = (false, ply.chain);
             let [touched, untouched] = straight.mirrored.map(|lobe| lobe.share);
