@@ -24,6 +24,8 @@ mod calibrated {
     pub(super) const STRAIGHT: f64 = 1.6;
     /// How fast, with the mean way in core radii, the last fibres that B leaves from draw nearer to the axis than the outline; on walks.
     pub(super) const LAST_PLACE: f32 = -4.6;
+    /// By how much more than one event does light turns that fibres send all round about themselves; on walks.
+    pub(super) const SWIRL: f32 = 1.35;
     /// How much of the neighbours' view counts already when light leaves its own ply; the rest is followed by direction.
     pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.25;
 }
@@ -134,6 +136,8 @@ pub(crate) struct PlyOptics {
     pub leaves_yarn: Rgb,
     /// How much the fibres at the wall of the core lean against the ply's axis: the tangent of that angle. 0 where no light keeps its latitude.
     pub slope: f32,
+    /// Of [`Self::swirl`].
+    turns: f32,
     /// What leaves this ply at last of light that meets another fibre after one at a place in it, and what leaves the yarn at last
     /// of light that meets a fibre of this ply on its way from another one.
     pub leaving: Arc<Leaving>,
@@ -178,8 +182,8 @@ fn expected_spread(beta: f64) -> f64 {
 pub(crate) const LEAST_RATE: f64 = 1e-6;
 
 /// [`PlyOptics::along`] of light that keeps no latitude from event to event, and of light that keeps it. Walks in a circle that keep it exactly
-/// have 1.45 to 2, by albedos up to .9; lobes widen it meanwhile. By pictures of cloth seen in development (docs/model.md, section 7).
-const ALONG: [f32; 2] = [0.4, 1.1];
+/// have 1.45 to 2, by albedos up to .9. The first is by pictures of cloth seen in development (docs/model.md, section 7).
+const ALONG: [f32; 2] = [0.4, 1.6];
 
 impl PlyOptics {
     /// For a ply among `plies` of a yarn whose section is pressed to axes of `stretch` : 1, with transport that is solved already.
@@ -202,6 +206,7 @@ impl PlyOptics {
         let kept = mirrored.iter().map(|lobe| lobe.share.mean()).sum::<f32>().clamp(0.0, 1.0);
         let mean_way = rgb(&|c| c.met_along_radius()).mean().recip().min(10.0);
         let slope = ply.fiber_rate * ply.core_radius * (0.75 + 0.25 * (calibrated::LAST_PLACE * mean_way).exp()).sqrt();
+        let slope = if mirrored.iter().any(|lobe| !lobe.share.is_zero()) { slope } else { 0.0 };
         Self {
             gaps: fibers.gaps,
             chain_share: material.chain_share() as f32,
@@ -214,7 +219,8 @@ impl PlyOptics {
             albedo: rgb(&|c| c.albedo()),
             leaves_yarn: rgb(&|c| c.closure(c.escape_yarn())),
             leaving: Arc::new(Leaving::new(&channels.each_ref().map(Channel::medium), stretch, solutions)),
-            slope: if mirrored.iter().any(|lobe| !lobe.share.is_zero()) { slope } else { 0.0 },
+            slope,
+            turns: calibrated::SWIRL * kept * slope / (1.0 + slope * slope),
             mirrored,
             sharp,
             events: rgb(&|c| c.events()),
@@ -239,7 +245,7 @@ struct Fibers {
     core: f64,
     /// Area fraction of the fibres in the ply.
     density: f64,
-    /// What fibres a line meets per length, where the ply is even.
+    /// What fibres a line across the ply meets per length, where the ply is even.
     sigma: f64,
     dead_zone: f64,
     gaps: PlyGaps,
@@ -479,6 +485,17 @@ impl PlyOptics {
             latitude += lobe.share * (kernel(lobe.kappa(spread), at) - Rgb::splat(DIFFUSE));
         }
         latitude
+    }
+
+    /// By how much light turns about the ply's axis before it leaves, radians, which has the part `axial` along the fibres, for each unit of
+    /// their own part along the axis.
+    ///
+    /// A fibre sends it all round about itself, and so more of it to the side to which the fibre leans against the ply, if the light goes up the
+    /// fibre. All fibres lean round the axis to one side, and the light keeps its part along all of them.
+    #[inline]
+    pub(crate) fn swirl(&self, axial: f32) -> f32 {
+        let about = axial * axial / (1.0 + self.slope * self.slope);
+        self.turns * (axial / (1.0 - about).max(0.01).sqrt()).clamp(-1.0, 1.0)
     }
 
     /// Of light that `before` fibres passed on before its node, and so many expected ones may after it: the share that none does, if R tells it

@@ -127,7 +127,9 @@ impl Lobe {
             Some(Meeting { spot, axes, outwards, .. }) => (*spot, *axes, *outwards),
             None => {
                 let (place, axes) = node.spot.place(view);
-                (node.spot, axes_across(&frame, axes), optics.leaving.draw(Light::Onward, &place, stream))
+                let swirl = Vec2::from_angle(optics.swirl(-node.axial));
+                let axes = axes_across(&frame, axes).map(|axis| swirl.rotate(axis));
+                (node.spot, axes, optics.leaving.draw(Light::Onward, &place, stream))
             }
         };
         let (u_start, chance) = (stream.next(), 1.0 - node.drawn.escape);
