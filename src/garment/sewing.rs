@@ -65,7 +65,7 @@ impl Trim {
             let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
             free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
         }
-        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, pressed));
+        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, knitted, pressed));
         // Edges that only meet: as far as yarns reach, and half a yarn.
         let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
         let meets = match knitted {

@@ -174,8 +174,8 @@ fn slanting_seams_meet_as_straight_ones_do() {
     let mut wrong = Vec::new();
     // Edges that only meet are straight: where they slant rows end in steps.
     for kind in [SeamKind::Mattress, SeamKind::Overlock] {
-        // Measured: up to 0.16 and 0.02 of the yarn within 8 mm overlaps; straight 0.09 and 0.02.
-        for (tile, name, most) in [(stockinette(), "knit", 0.2), (woven(), "woven", 0.04)] {
+        // Measured: up to 0.19 and 0.03 of the yarn within 8 mm overlaps; straight 0.09 and 0.03. Knits are drawn together by a fifth.
+        for (tile, name, nearest, most) in [(stockinette(), "knit", 0.75, 0.22), (woven(), "woven", 0.95, 0.04)] {
             for (lean, turn) in [(0.0, 0.0), (15.0, 0.0), (30.0, 0.0), (45.0, 0.0), (20.0, 35.0)] {
                 let seam = Leaning { lean: f64::to_radians(lean), turn: f64::to_radians(turn) };
                 let [first, second, threads] = seam.sewn(&tile, kind);
@@ -185,7 +185,7 @@ fn slanting_seams_meet_as_straight_ones_do() {
                 let sewn = run_into_each_other(&[first, second, threads].concat()).share;
                 let told = format!("{kind:?} {name} {lean} {turn}: {least:.2} to {furthest:.2}, {cloth:.3}, {sewn:.3}");
                 eprintln!("{told}");
-                if least < 0.95 || furthest > 2.0 || cloth > most {
+                if least < nearest || furthest > 2.0 || cloth > most {
                     wrong.push(told);
                 }
             }
@@ -274,8 +274,8 @@ fn columns_meet_at_mattress_seams() {
             let deeper = |by: f64| 0.1 * heights.iter().filter(|h| **h < cloth - by).count() as f64;
             let told = format!("{lean} {turn} pressed {pressed}: {:.1} and {:.1}", deeper(1.0), deeper(1.5));
             eprintln!("{told}");
-            // Measured: 1.3 to 1.7 and 0.8 to 1.1; round bends left 1.7 to 2.3 and 1.2 to 1.5.
-            if deeper(1.0) > 1.9 || deeper(1.5) > 1.2 {
+            // Measured: 1.0 to 1.5 and 0.5 to 0.7; round bends left 1.7 to 2.3 and 1.2 to 1.5.
+            if deeper(1.0) > 1.6 || deeper(1.5) > 0.8 {
                 wrong.push(told);
             }
         }
