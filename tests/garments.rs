@@ -2,6 +2,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
+use glam::{DMat3, DVec3};
 use yarnray::{
     cloth::Cloth,
     scene::{
@@ -11,7 +12,7 @@ use yarnray::{
     trace::CurveGeometry,
 };
 
-use crate::support::{directory, write, yarnray};
+use crate::support::{directory, shared, write, yarnray};
 
 type Point = [f64; 3];
 
@@ -142,6 +143,65 @@ fn stitches_go_with_the_cloth_and_plies_keep_their_places() {
     };
     assert!(slid(&b, false) < 1e-3 && slid(&c, false) < 1e-3, "{} {}", slid(&b, false), slid(&c, false));
     assert!(slid(&b, true) < 0.2 && slid(&c, true) < 1e-3, "{} {}", slid(&b, true), slid(&c, true));
+}
+
+/// A mesh file of centimetres in millimetres: its points, and its faces cut into triangles.
+fn triangles(path: &Path) -> (Vec<DVec3>, Vec<[usize; 3]>) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    for line in text.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.split_first() {
+            Some((&"v", at)) => {
+                points.push(10.0 * DVec3::from_slice(&at.iter().map(|w| w.parse().unwrap()).collect::<Vec<f64>>()))
+            }
+            Some((&"f", corners)) => {
+                let corner = |w: &&str| w.split('/').next().unwrap().parse::<usize>().unwrap() - 1;
+                let all: Vec<usize> = corners.iter().map(corner).collect();
+                faces.extend((2..all.len()).map(|k| [all[0], all[k - 1], all[k]]));
+            }
+            _ => {}
+        }
+    }
+    (points, faces)
+}
+
+/// The middle of a triangle, and two of its edges and its normal as axes.
+fn frame_of(points: &[DVec3], face: &[usize; 3]) -> (DVec3, DMat3) {
+    let [a, b, c] = face.map(|i| points[i]);
+    ((a + b + c) / 3.0, DMat3::from_cols(b - a, c - a, (b - a).cross(c - a).normalize()))
+}
+
+/// Frames of a simulated pullover in which its arms rise fastest: yarns are laid in each frame for itself, out of the body and
+/// let out where they are pressed, and go on with the cloth all the same.
+#[test]
+fn stitches_of_a_worn_pullover_do_not_jump() {
+    let Some(folder) = shared("data/garments/pullover_anim") else { return };
+    let file = |name: &str| folder.join(format!("{name}.####.obj")).to_str().unwrap().replace('\\', "/");
+    let source = format!("path = \"{}\", body = \"{}\"", file("pullover"), file("mannequin"));
+    let own = directory();
+    let text = scene(&source, "", STILL).replace("unit = \"mm\"", "unit = \"cm\"");
+    let path = write(own.path(), "s.toml", text);
+    let frames: Vec<Vec<Point>> = (5..8).map(|k| points(&at_frame(&path, k)).concat()).collect();
+    assert!(frames[0].len() > 500_000 && frames.iter().all(|f| f.len() == frames[0].len()));
+    let meshes: Vec<_> = (5..8).map(|k| triangles(&folder.join(format!("pullover.{k:04}.obj")))).collect();
+    for (yarns, cloth) in frames.windows(2).zip(meshes.windows(2)) {
+        let [(before, faces), (after, _)] = cloth else { panic!("two frames") };
+        let middles: Vec<DVec3> = faces.iter().map(|face| frame_of(before, face).0).collect();
+        // How far a point is from where it would be if it went with the triangle that is nearest to it.
+        let off = |(p, q): (&Point, &Point)| {
+            let [p, q] = [*p, *q].map(DVec3::from_array);
+            let far = |face: &usize| middles[*face].distance_squared(p);
+            let nearest = (0..faces.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+            let [(from, axes), (to, moved)] = [before, after].map(|points| frame_of(points, &faces[nearest]));
+            (to + moved * (axes.inverse() * (p - from))).distance(q)
+        };
+        let mut all: Vec<f64> = yarns[0].iter().zip(&yarns[1]).step_by(61).map(off).collect();
+        all.sort_by(f64::total_cmp);
+        let share = |below: f64| all[(below * (all.len() - 1) as f64) as usize];
+        let told = format!("{:.3} {:.2} {:.2} {:.1}", share(0.5), share(0.99), share(0.999), share(1.0));
+        assert!(share(0.5) < 0.05 && share(0.99) < 1.6 && share(0.999) < 4.5 && share(1.0) < 12.0, "{told}");
+    }
 }
 
 #[test]
