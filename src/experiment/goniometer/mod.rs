@@ -15,6 +15,7 @@ mod truth;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use specimen::Prepared;
 pub(crate) use specimen::straight_section;
 pub use specimen::{Specimen, ply_alone};
 pub use truth::truth;
@@ -259,8 +260,11 @@ pub fn measure(specimen: &Specimen<'_>, view: &View, effort: Effort) -> Measurem
 /// The value of the scattering for light from one direction: S cos(theta) in 1/steradian by lobe, averaged over what the
 /// view leaves open.
 pub fn value(specimen: &Specimen<'_>, view: &View, light: (f64, f64), effort: Effort) -> [[Mean; 3]; 5] {
-    let prepared = specimen.prepare(view);
-    let (theta, phi) = light;
+    value_of(&specimen.prepare(view), view, light, effort)
+}
+
+/// The same of a specimen that is prepared for the view.
+fn value_of(prepared: &Prepared, view: &View, (theta, phi): (f64, f64), effort: Effort) -> [[Mean; 3]; 5] {
     let w = Vec3A::new((theta.cos() * phi.cos()) as f32, (theta.cos() * phi.sin()) as f32, theta.sin() as f32);
     let batches: Vec<[[f64; 3]; 5]> = (0..BATCHES)
         .into_par_iter()

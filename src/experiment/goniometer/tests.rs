@@ -60,12 +60,13 @@ fn energies_are_the_same_by_cells_by_lobes_and_by_values() {
         assert!((cells - total(&m)[c]).abs() < 1e-9, "{cells} {:?}", total(&m));
     }
     // Values are drawn by another way through the model: their integral over the sphere.
+    let prepared = specimen.prepare(&view);
     let (rows, columns) = (18, 24);
     let mut sum = [0.0; 3];
     for i in 0..rows * columns {
         let theta = (f64::from(i / columns) + 0.5) / f64::from(rows) * PI - 0.5 * PI;
         let phi = (f64::from(i % columns) + 0.5) / f64::from(columns) * 2.0 * PI;
-        let v = value(&specimen, &view, (theta, phi), Effort { paths: 800, seed: i as u32 });
+        let v = value_of(&prepared, &view, (theta, phi), Effort { paths: 800, seed: i as u32 });
         let solid_angle = theta.cos() * PI / f64::from(rows) * 2.0 * PI / f64::from(columns);
         for (c, sum) in sum.iter_mut().enumerate() {
             *sum += v.iter().map(|lobe| lobe[c].mean).sum::<f64>() * solid_angle;
