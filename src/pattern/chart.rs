@@ -18,11 +18,19 @@
 //! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
 //! | `-`, `-4` | stitches that stay on the needle: a short row turns beside them, and the next row begins there |
 //! | `ds` | a double stitch: slipped with the yarn pulled over the needle; the first plain stitch after such a turn is one by itself |
+//! | `bo4`, `bop4` | stitches that are bound off, knitted or purled: each is passed over the next one, the last one over the `k` or `p` behind them |
+//! | `co4` | stitches that are cast on within a row, as backward loops: over what the row below has bound off, or at a side |
 //! | `mb`, `bobble` | five loops out of one stitch (`k yo k yo k`), turn, five purled, turn, all of them knitted together |
 //!
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
 
+mod gaps;
+mod steps;
+
 use std::{fmt, sync::Arc};
+
+use self::steps::parse_steps;
+pub(super) use self::{gaps::gaps, steps::WIDEST_CABLE};
 
 /// Which of several stitches worked together is on top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +98,13 @@ pub enum Step {
     Bobble,
     /// A stitch that stays on the needle: the yarn turns before it comes to it.
     Unworked,
+    /// A stitch that is worked and passed over the next one.
+    BindOff {
+        /// As in [`Step::Plain`].
+        purl: bool,
+    },
+    /// A stitch that is cast on.
+    CastOn,
 }
 
 impl Step {
@@ -99,7 +114,8 @@ impl Step {
             Self::Plain { .. } | Self::Slip { .. } | Self::Tuck | Self::Bobble | Self::Unworked => (1, 1),
             Self::Together { take, .. } => (take.into(), 1),
             Self::FrontBack { .. } => (1, 2),
-            Self::YarnOver | Self::MakeOne { .. } => (0, 1),
+            Self::YarnOver | Self::MakeOne { .. } | Self::CastOn => (0, 1),
+            Self::BindOff { .. } => (1, 0),
             Self::Cable { front, back, .. } => (u32::from(front) + u32::from(back), u32::from(front) + u32::from(back)),
         }
     }
@@ -130,6 +146,10 @@ pub enum Act {
     Unworked,
     /// The stitch below stays, and the yarn that has turned there is pulled over the needle: a double stitch.
     Double,
+    /// A loop is drawn through the one below and the one bound off before it; the next stitch is drawn through it.
+    BindOff,
+    /// A twisted loop is laid over the needle.
+    CastOn,
 }
 
 /// A stitch: what it is made of in the row below, and how.
@@ -214,16 +234,10 @@ pub const PATTERNS: [(&str, &[&str]); 20] = [
     ("feather-and-fan", &["k", "k2tog k2tog k2tog yo k yo k yo k yo k yo k yo k k2tog k2tog k2tog", "k", "p"]),
 ];
 
-/// Most rows and most steps of a row that a chart may have.
+/// Most rows that a chart may have.
 const MOST_ROWS: usize = 20_000;
-const MOST_STEPS: usize = 20_000;
-/// Most stitches in a cable.
-pub(super) const WIDEST_CABLE: u8 = 24;
 /// How far from what is asked a number of stitches is looked for that a chart fits.
 const LARGEST_STEP_ASIDE: usize = 200;
-const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, ssp, k3tog, sssk, cdd, p3tog, sssp, cddp, \
-                     kfb, pfb, m1l, m1r, m1lp, m1rp, \
-                     sl, slwyif, miss, tuck, c4f, c4b, t3f, t3b, 2/1lc, 2/1rpc, mb, -, ds, with spaces between them";
 
 impl Chart {
     /// A pattern by its name.
@@ -291,7 +305,7 @@ impl Chart {
         let mut width = 1_u32;
         for row in &self.rows {
             let (takes, makes) = row.takes_and_makes();
-            if takes != makes || row.is_short() {
+            if takes != makes || row.is_short() || row.binds_off() {
                 return None;
             }
             width = width.checked_mul(takes / common_divisor(width, takes))?;
@@ -336,10 +350,11 @@ impl Chart {
         [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
     }
 
-    /// Knits `rows` rows onto `cast_on` stitches.
+    /// Knits `rows` rows onto `cast_on` stitches. Stitches that are bound off keep their places in their row.
     ///
     /// # Errors
-    /// A row that does not fit the stitches it finds, or more than `most` stitches in all.
+    /// A row that does not fit the stitches it finds, stitches worked together from both sides of a gap, or more than `most`
+    /// stitches in all.
     pub fn work(&self, cast_on: u32, rows: u32, most: u64) -> Result<Vec<Vec<Stitch>>, ChartError> {
         let mut out: Vec<Vec<Stitch>> = Vec::new();
         let (mut found, mut total) = (cast_on, 0_u64);
@@ -365,8 +380,14 @@ impl Chart {
                 let problem = format!("more than {most} stitches by row {}", r + 1);
                 return Err(ChartError::new(Some(row.line), problem, "fewer stitches, rows or increases"));
             }
-            let stitches = row.work(found, made as usize);
-            found = stitches.len() as u32;
+            let mut stitches = row.work(found, made as usize);
+            if let Some(below) = out.last()
+                && !gaps::count_on(below, &mut stitches)
+            {
+                let problem = format!("row {} works stitches together from both sides of a gap", r + 1);
+                return Err(ChartError::new(Some(row.line), problem, "cast on over the gap between them (co)"));
+            }
+            found = made as u32;
             out.push(stitches);
         }
         Ok(out)
@@ -418,12 +439,17 @@ impl Row {
         self.steps.contains(&Step::Unworked)
     }
 
+    /// Whether stitches are bound off in it.
+    fn binds_off(&self) -> bool {
+        self.steps.iter().any(|step| matches!(step, Step::BindOff { .. }))
+    }
+
     fn work(&self, found: u32, made: usize) -> Vec<Stitch> {
         let mut out = Vec::with_capacity(made);
-        let mut at = 0_u32;
+        let (mut at, mut left) = (0_u32, made);
         for step in self.steps.iter().cycle() {
-            let (takes, _) = step.takes_and_makes();
-            if out.len() >= made && at >= found {
+            let (takes, makes) = step.takes_and_makes();
+            if left == 0 && at >= found {
                 break;
             }
             let plain = Stitch {
@@ -447,6 +473,8 @@ impl Row {
                 Step::Tuck => out.push(Stitch { act: Act::Tuck, ..plain }),
                 Step::Bobble => out.push(Stitch { act: Act::Bobble, ..plain }),
                 Step::Unworked => out.push(Stitch { act: Act::Unworked, ..plain }),
+                Step::BindOff { purl } => out.push(Stitch { act: Act::BindOff, purl, ..plain }),
+                Step::CastOn => out.push(Stitch { act: Act::CastOn, parents: 0, ..plain }),
                 Step::Cable { front, back, left, purl } => {
                     let (front, back) = (u32::from(front), u32::from(back));
                     let ahead = |i| Stitch { first_parent: at + if left { back } else { 0 } + i, layer: 1, ..plain };
@@ -462,97 +490,10 @@ impl Row {
                 }
             }
             at += takes;
+            left = left.saturating_sub(makes as usize);
         }
         out
     }
-}
-
-fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartError> {
-    let mut steps = Vec::new();
-    for token in text.split([' ', ',', '\t']).filter(|t| !t.is_empty()) {
-        let (count, step) = parse_step(token).ok_or_else(|| {
-            let shown: String = token.chars().take(20).collect();
-            ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), STEPS)
-        })?;
-        if steps.len() + count > MOST_STEPS {
-            return Err(ChartError::new(Some(line), format!("more than {MOST_STEPS} steps in a row"), "steps repeat"));
-        }
-        steps.extend(std::iter::repeat_n(step, count));
-    }
-    if steps.iter().all(|s| s.takes_and_makes().0 == 0) {
-        return Err(ChartError::new(Some(line), "a row that takes no stitch of the row below", STEPS));
-    }
-    Ok(steps)
-}
-
-fn parse_step(token: &str) -> Option<(usize, Step)> {
-    let plain = |purl, twisted| Step::Plain { purl, twisted };
-    let together = |take, purl, top| Step::Together { take, purl, top };
-    let named = match token {
-        "k2tog" => together(2, false, Top::Left),
-        "ssk" | "skp" => together(2, false, Top::Right),
-        "p2tog" => together(2, true, Top::Left),
-        "ssp" => together(2, true, Top::Right),
-        "k3tog" => together(3, false, Top::Left),
-        "sssk" | "sk2p" => together(3, false, Top::Right),
-        "p3tog" => together(3, true, Top::Left),
-        "cdd" | "s2kp" => together(3, false, Top::Middle),
-        "sssp" => together(3, true, Top::Right),
-        "cddp" => together(3, true, Top::Middle),
-        "kfb" => Step::FrontBack { purl: false },
-        "pfb" => Step::FrontBack { purl: true },
-        "yo" => Step::YarnOver,
-        "m1l" | "m1" => Step::MakeOne { left: true, purl: false },
-        "m1r" => Step::MakeOne { left: false, purl: false },
-        "m1lp" | "m1p" => Step::MakeOne { left: true, purl: true },
-        "m1rp" => Step::MakeOne { left: false, purl: true },
-        "mb" | "bobble" => Step::Bobble,
-        _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
-    };
-    Some((1, named))
-}
-
-/// Steps that may be counted: `k4`, `sl2`, `ktbl3`.
-fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usize, Step)> {
-    let word = token.trim_end_matches(|c: char| c.is_ascii_digit());
-    let step = match word {
-        "k" | "brk" => plain(false, false),
-        "p" | "brp" => plain(true, false),
-        "ktbl" => plain(false, true),
-        "ptbl" => plain(true, true),
-        "sl" | "slwyib" | "miss" => Step::Slip { front: false },
-        "slwyif" => Step::Slip { front: true },
-        "tuck" | "sl1yo" | "ds" => Step::Tuck,
-        "-" => Step::Unworked,
-        _ => return None,
-    };
-    let digits = &token[word.len()..];
-    let count = if digits.is_empty() { 1 } else { digits.parse().ok().filter(|n| (1..=MOST_STEPS).contains(n))? };
-    Some((count, step))
-}
-
-/// `c4f`, `t3b`, `2/1lc`, `2/2rpc`.
-fn parse_cable(token: &str) -> Option<Step> {
-    let cable = |front: u8, back: u8, left, purl| {
-        let fits = front > 0 && back > 0 && front.checked_add(back)? <= WIDEST_CABLE;
-        fits.then_some(Step::Cable { front, back, left, purl })
-    };
-    if let Some((front, rest)) = token.split_once('/') {
-        let word = rest.trim_start_matches(|c: char| c.is_ascii_digit());
-        let back = rest[..rest.len() - word.len()].parse().ok()?;
-        let (left, purl) = match word {
-            "lc" => (true, false),
-            "rc" => (false, false),
-            "lpc" => (true, true),
-            "rpc" => (false, true),
-            _ => return None,
-        };
-        return cable(front.parse().ok()?, back, left, purl);
-    }
-    let purl = token.starts_with('t');
-    let left = token.ends_with('f');
-    let size: u8 = token.strip_prefix(['c', 't'])?.strip_suffix(['f', 'b'])?.parse().ok()?;
-    cable(size.div_ceil(2), size / 2, left, purl)
 }
 
 #[cfg(test)]

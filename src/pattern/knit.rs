@@ -10,6 +10,7 @@
 mod cell;
 mod colors;
 mod curl;
+mod gaps;
 mod kinds;
 mod loops;
 mod make;
@@ -228,7 +229,7 @@ impl Knit {
     /// # Errors
     /// As [`Self::widths`].
     pub fn least_points(&self) -> Result<u64, ChartError> {
-        let is_drawn = |s: &&Stitch| matches!(s.act, Act::Draw | Act::Lift { .. });
+        let is_drawn = |s: &&Stitch| matches!(s.act, Act::Draw | Act::Lift { .. } | Act::BindOff);
         let rows = self.worked()?;
         let drawn = rows.iter().map(|row| row.iter().filter(is_drawn).count() as u64);
         // Of a stitch that is cast on, in percent of a row's: the bind-off, or what draws the last row together, comes to it.

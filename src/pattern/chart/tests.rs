@@ -40,6 +40,16 @@ fn a_hat_ends_with_few_stitches() {
 }
 
 #[test]
+fn what_is_bound_off_keeps_its_place_and_is_not_found_above() {
+    let rows = worked(&["k", "k2 bo2 k2", "k2 co3 k2", "k", "bo3 k4"], 6, 6);
+    assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [6, 6, 7, 7, 7, 4]);
+    let parents = |r: usize| rows[r].iter().filter(|s| s.parents > 0).map(|s| s.first_parent).collect::<Vec<_>>();
+    assert_eq!((parents(2), parents(5)), (vec![0, 1, 4, 5], vec![3, 4, 5, 6]));
+    // A row of shaping has no repeat, even where it keeps the number of stitches.
+    assert_eq!(Chart::parse(&["bo k co"]).unwrap().even_width(100), None);
+}
+
+#[test]
 fn cables_cross_halves() {
     let row = &worked(&["k4", "c4f"], 4, 2)[1];
     assert_eq!(row.iter().map(|s| (s.first_parent, s.layer)).collect::<Vec<_>>(), [(2, 1), (3, 1), (0, -1), (1, -1)]);

@@ -271,6 +271,11 @@ impl Loops {
         self.room
     }
 
+    /// Whether a loop is bound off within the piece: what is drawn through it is of its own row.
+    pub(in super::super) fn is_bound_within(&self, own: &Loop) -> bool {
+        own.held == Some(own.row) && own.row < self.rows
+    }
+
     /// Whether the cloth has two layers.
     pub(in super::super) fn is_double(&self) -> bool {
         self.apart > 0.0

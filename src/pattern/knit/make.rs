@@ -174,7 +174,7 @@ impl Knit {
         let (finished, round) = (self.is_finished(), self.form != Form::Flat);
         let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
         let mut ways = self.colors.as_ref().unwrap_or(&one()).ways(finished, round);
-        if short_rows::any(rows) {
+        if from_right || short_rows::any(rows) {
             short_rows::lead(&mut ways, rows, from_right);
         }
         ways

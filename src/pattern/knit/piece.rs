@@ -304,7 +304,9 @@ impl Laying<'_> {
             let from = own.rest.len();
             self.lay(course, k, piece, edge, &mut own);
             let is_last = (k == 0 && ends[0]) || (k + 1 == count && ends[1]);
-            let is_laid = |visit: &Visit| matches!(visit, Visit::Loop(i) if self.loops.loops[*i as usize].sign == 0.0);
+            // What is cast on holds itself.
+            let laid = |l: &Loop| l.sign == 0.0 && l.twist == 0.0;
+            let is_laid = |visit: &Visit| matches!(visit, Visit::Loop(i) if laid(&self.loops.loops[*i as usize]));
             let drawn = match is_last {
                 true if course.row >= 0 && is_laid(&course.visits[k].1) => LAID_AT_SIDE,
                 true => DRAWN_IN,

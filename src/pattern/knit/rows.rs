@@ -1,6 +1,6 @@
 //! The rows of a piece as they are worked: as the chart has them, with sides that hold.
 
-use super::{Closing, Knit, YARN_PER_STITCH, cell::Cell, short_rows};
+use super::{Closing, Knit, YARN_PER_STITCH, cell::Cell, gaps, short_rows};
 use crate::pattern::{
     MAX_POINTS,
     chart::{Act, ChartError, Stitch},
@@ -40,7 +40,9 @@ impl Knit {
                     Act::Pass { .. } => Held { rows: before.rows + 1, slipped: before.slipped + 1 },
                     Act::Tuck => Held { rows: before.rows + 1, ..before },
                     Act::Unworked | Act::Double => before,
-                    Act::Draw | Act::Over | Act::Lift { .. } | Act::Bobble => Held::default(),
+                    Act::Draw | Act::Over | Act::Lift { .. } | Act::Bobble | Act::BindOff | Act::CastOn => {
+                        Held::default()
+                    }
                 };
                 if own.slipped > most_slipped || own.rows > most_held {
                     let (what, count, most) = match own.slipped > most_slipped {
@@ -98,6 +100,7 @@ impl Knit {
     pub(super) fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
         let most_stitches = MAX_POINTS / (self.layers() * u64::from(self.points)).max(1);
         let mut rows = self.chart.work(self.stitches, self.rows, most_stitches)?;
+        gaps::check(&rows, self)?;
         short_rows::turned(&mut rows, self)?;
         self.check_held(&rows)?;
         self.check_repeat_held()?;

@@ -101,11 +101,17 @@ impl Loops {
         own.side * self.apart * share
     }
 
+    /// How many loops lie under the nearest one that a loop comes up through: what it is passed over lies around its legs.
+    fn stacked(&self, own: &Loop) -> f64 {
+        let count = own.parents.iter().filter(|p| !self.is_bound_within(&self.loops[**p as usize])).count();
+        count.saturating_sub(1) as f64
+    }
+
     /// How deep the feet of a loop dive: behind all that it is drawn through.
     fn foot_depth(&self, own: &Loop) -> f64 {
         // Feet of two layers must not pass each other.
         let over = own.side == 0.0 && own.parents.iter().any(|&p| self.loops[p as usize].sign == 0.0);
-        let others = LAYER * own.parents.len().saturating_sub(1) as f64;
+        let others = LAYER * self.stacked(own);
         // What binds off both layers is behind them.
         let closes = own.side == 0.0 && own.parents.iter().any(|&p| self.loops[p as usize].side != 0.0);
         let layers = if closes { (1.0 - CLOSED_BY) * self.apart } else { 0.0 };
@@ -118,7 +124,7 @@ impl Loops {
         match visit {
             Visit::Loop(i) => {
                 let l = &self.loops[*i as usize];
-                let stack = l.parents.len().saturating_sub(1) as f64;
+                let stack = self.stacked(l);
                 let (below, out) = match l.sign {
                     // Behind the stitches that it lies between, or in front of purl ones.
                     0.0 if l.is_lifted() && l.layer == self.child_sign(l) => (reach, (DEPTH + 0.6) * l.layer),
@@ -222,6 +228,7 @@ impl Loops {
                                 l if self.is_roped(l) => {
                                     self.roped_piece(l, *column, own, ends, step, [k == 0, k + 1 == n])
                                 }
+                                l if self.is_bound_within(l) => self.bound_piece(l, *column, own, ends, step),
                                 l => self.loop_piece(l, *column, own, ends, step),
                             },
                             Visit::Pass { .. } | Visit::Float { .. } => pass_piece(*column, course.row, own, ends),

@@ -7,6 +7,7 @@ use super::{
     super::chart::{Act, ChartError, Stitch},
     Form, Knit,
     colors::Way,
+    gaps,
 };
 
 /// How many stitches stay unworked on the left and on the right of a row.
@@ -26,10 +27,10 @@ pub(super) fn any(rows: &[Vec<Stitch>]) -> bool {
 /// Whether the first row goes from right to left: rows are written for a yarn that begins on either side. `bound` says
 /// whether it must end at an edge.
 pub(super) fn from_right(rows: &[Vec<Stitch>], bound: bool) -> bool {
-    any(rows) && follow(rows, false, bound).is_err()
+    gaps::from_right(rows) || (any(rows) && follow(rows, false, bound).is_err())
 }
 
-/// Leads the one yarn of a piece with short rows to where its rows begin; `first` says whether the first goes from right to left.
+/// Leads the one yarn of a piece with short rows or gaps to where its rows begin; `first` says whether the first goes from right to left.
 pub(super) fn lead(ways: &mut [Way], rows: &[Vec<Stitch>], first: bool) {
     for stretch in ways.iter_mut().flat_map(|way| &mut way.rows) {
         let row = usize::try_from(stretch.row).ok().and_then(|r| rows.get(r));

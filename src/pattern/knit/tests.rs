@@ -1,4 +1,5 @@
 mod double;
+mod gaps;
 mod openwork;
 mod rims;
 mod short_rows;

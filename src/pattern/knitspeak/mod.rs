@@ -219,6 +219,10 @@ impl Needle {
         row.body.work(self.behind, &mut place)?;
         let (worked, ahead) = (place.steps, place.left);
         let made = worked.iter().map(|s| s.makes.saturating_mul(s.count)).fold(0, u32::saturating_add);
+        if made == 0 && worked.iter().any(|s| s.name.starts_with("bo")) {
+            let problem = format!("row {number} binds off all stitches");
+            return error(row.line, problem, "the piece is bound off by a line of its own: Bind off");
+        }
         if made == 0 || made > MOST_STITCHES {
             return error(row.line, format!("row {number} makes {made} stitches"), "1 to 20000 fit on a needle");
         }
@@ -244,9 +248,9 @@ fn shown(row: &str, faces: &[bool], found: u32) -> Vec<bool> {
         Act::Pass { .. } | Act::Tuck | Act::Unworked | Act::Double => {
             faces.get(s.first_parent as usize).copied().unwrap_or_default()
         }
-        Act::Over | Act::Lift { .. } | Act::Bobble => s.purl,
+        Act::Over | Act::Lift { .. } | Act::Bobble | Act::BindOff | Act::CastOn => s.purl,
     };
-    worked.into_iter().flatten().map(|s| face(&s)).collect()
+    worked.into_iter().flatten().filter(|s| s.act != Act::BindOff).map(|s| face(&s)).collect()
 }
 
 /// Which side faces the knitter.
@@ -464,7 +468,7 @@ impl Side {
         }
         let words = worked.iter().map(|s| match (s.name.as_str(), s.count) {
             (name, 1) => name.to_owned(),
-            ("k" | "p" | "-", n) => format!("{}{n}", s.name),
+            ("k" | "p" | "bo" | "bop" | "co" | "-", n) => format!("{}{n}", s.name),
             (name, n) => vec![name; n as usize].join(" "),
         });
         Ok(words.collect::<Vec<String>>().join(" "))
@@ -473,7 +477,7 @@ impl Side {
 
 /// What a step on the wrong side looks like from the right side.
 fn other_face(name: &str) -> Option<&'static str> {
-    const FACES: [(&str, &str); 16] = [
+    const FACES: [(&str, &str); 18] = [
         ("k", "p"),
         ("ktbl", "ptbl"),
         ("k2tog", "p2tog"),
@@ -490,6 +494,8 @@ fn other_face(name: &str) -> Option<&'static str> {
         ("sl", "slwyif"),
         ("tuck", "tuck"),
         ("ds", "ds"),
+        ("bo", "bop"),
+        ("co", "co"),
         ("-", "-"),
         ("miss", "miss"),
     ];

@@ -90,8 +90,7 @@ pub(super) fn instead_of(word: &str) -> Option<&'static str> {
             "it is a stitch through the back loop to some, into the row below to others: k1 tbl, or `tuck` and k as in brioche"
         }
         "bind" | "bo" | "cast" | "co" => {
-            "a piece is bound off at its end only, by a line of its own: Bind off; at a side, narrow it by decreases in the next rows, \
-             as in k1, ssk, k to last 3 sts, k2tog, k1, or leave stitches by `turn`; for a buttonhole, yo, k2tog"
+            "say how many: bind off 4 sts, cast on 4 sts; all of them by a line of its own: Bind off"
         }
         "inc" | "increase" => "say which increase: kfb, m1l, m1r or yo",
         "dec" | "decrease" => "say which decrease: k2tog, ssk, p2tog or ssp",
@@ -210,6 +209,9 @@ pub(super) fn phrase(words: &mut Parser<'_>) -> Result<Option<Phrase>> {
     if let Some((_, name)) = SPELLED.iter().find(|(spelled, _)| words.take(spelled)) {
         return Ok(named(name).map(Phrase::Steps));
     }
+    if let Some(steps) = bound_or_cast(words) {
+        return Ok(Some(Phrase::Steps(steps)));
+    }
     let word = words.peek(0).unwrap_or_default().to_owned();
     if let Some(steps) = named(&word) {
         words.skip(1);
@@ -265,6 +267,41 @@ pub(super) fn phrase(words: &mut Parser<'_>) -> Result<Option<Phrase>> {
         ("knit" | "purl", None) => Phrase::Row(steps),
         _ => Phrase::Steps(steps),
     }))
+}
+
+/// "Bind off 4 sts purlwise", "bo4", "cast on 4 sts".
+fn bound_or_cast(words: &mut Parser<'_>) -> Option<Steps> {
+    const NAMES: [(&[&str], bool); 5] = [
+        (&["bind", "off"], true),
+        (&["cast", "off"], true),
+        (&["cast", "on"], false),
+        (&["bo"], true),
+        (&["co"], false),
+    ];
+    let spelled = NAMES.iter().find(|(name, _)| name.iter().enumerate().all(|(i, w)| words.peek(i) == Some(w)));
+    let (binds, mut at, mut count) = match spelled {
+        Some((name, binds)) => (*binds, name.len(), None),
+        // "bo4"
+        None => {
+            let word = words.peek(0)?;
+            let digits = word.strip_prefix("bo").or_else(|| word.strip_prefix("co"))?;
+            (word.starts_with('b'), 1, Some(digits.parse::<u32>().ok()?))
+        }
+    };
+    if count.is_none() {
+        at += (at..).take_while(|i| matches!(words.peek(*i), Some("the" | "next"))).count();
+        count = words.number(at);
+        at += 1;
+    }
+    let count = count.filter(|n| (1..=MOST_STITCHES).contains(n))?;
+    words.skip(at);
+    words.stitches();
+    let purl = words.take_any(&[&["purlwise"], &["pwise"]]);
+    words.take_any(&[&["knitwise"], &["kwise"]]);
+    Some(match binds {
+        true => Steps { count, ..one(if purl { "bop" } else { "bo" }, 1, 0) },
+        false => Steps { count, ..one("co", 0, 1) },
+    })
 }
 
 /// The same stitch through the back of its loops, if the next words say so.

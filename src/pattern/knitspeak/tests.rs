@@ -203,9 +203,9 @@ fn rows_are_repeated_as_they_are_told() {
 #[test]
 fn what_is_not_knitted_is_told_with_its_row_and_word() {
     for (text, problem, hint) in [
-        ("Row 1: k1\nRow 2: bind off 3 sts, k to end", "row 2: \"bind\"", "by a line of its own"),
-        ("Row 1: BO 3, k1", "row 1: \"bo\"", "k2tog"),
-        ("Row 1: cast off 3 sts", "row 1: \"cast\"", "k2tog"),
+        ("Row 1: k1\nRow 2: k1, bind off sts", "row 2: \"bind\"", "by a line of its own"),
+        ("Row 1: BO 3, k1", "needs 3 stitches for bo, 1 are left", "fits"),
+        ("Row 1: k1, cast off some sts", "row 1: \"cast\"", "4 sts"),
         ("Row 1: inc 1, k1", "row 1: \"inc\"", "kfb"),
         ("Row 1: k to m, k1", "row 1: markers", "say how many"),
         ("Row 1: k1b", "row 1: \"k1b\"", "k1 tbl"),
@@ -217,7 +217,7 @@ fn what_is_not_knitted_is_told_with_its_row_and_word() {
         ("Set-up row: k1\nRow 1: k1\nRow 1: k1", "row 1 is written twice", "are known"),
         ("Set-up row 1: k1\nSet-up row 3: k1\nRow 1: k1", "set-up row 2 is missing", "expected"),
         ("Set-up row: k1\nRow 1: k1\nRep rows 1-2", "row 2 is repeated", "rows 1 to 1"),
-        ("Row 1: k1\nRow 2: bind off 1 st", "row 2: \"bind\"", "for a buttonhole, yo, k2tog"),
+        ("Row 1: k1\nRow 2: bind off 1 st", "row 2 binds off all stitches", "a line of its own: Bind off"),
         ("Row 1: k the knits and p the purls", "row 1 is the first one", "say which"),
         ("Row 1: k1\nRep rows 1-4", "row 2 is repeated", "rows 1 to 1"),
         ("Row 1: k1\nRep row 1\nRow 2: p1", "rows come after", "3 times"),
@@ -229,6 +229,27 @@ fn what_is_not_knitted_is_told_with_its_row_and_word() {
         let wrong = Instructions::read(text).and_then(|read| read.work(1, 20)).unwrap_err();
         assert!(wrong.problem.contains(problem) && wrong.hint.contains(hint), "{text}: {wrong}");
     }
+}
+
+#[test]
+fn stitches_are_bound_off_and_cast_on_within_rows() {
+    let rows = |text: &str| chart_rows(text, 12).unwrap();
+    for (off, on) in [
+        ("BO4", "CO4"),
+        ("bind off 4 sts", "cast on 4 sts"),
+        ("bind off the next 4 stitches knitwise", "cast on 4"),
+        ("cast off 4", "co 4 sts"),
+    ] {
+        let text = format!(
+            "Row 1 (RS): k\nRow 2: p\nRow 3: k4, {off}, k to end (8 sts)\nRow 4: p4, {on}, p4 (12 sts)\nBind off."
+        );
+        assert_eq!(rows(&text), ["k12", "k12", "k4 bo4 k4", "k4 co4 k4"], "{text}");
+    }
+    // On the wrong side, and at the beginning of rows.
+    assert_eq!(
+        rows("Row 1 (WS): bo 2, k to end\nRow 2: bind off 2 sts, k to end\nRow 3: bo 2 purlwise, p to end"),
+        ["bop2 p10", "k8 bo2", "bo2 k6"]
+    );
 }
 
 #[test]

@@ -144,11 +144,14 @@ impl<'a> Maker<'a> {
                 let at = self.middles[r][j];
                 let base = Loop { layer: s.layer.into(), wide: self.width(r, j), ..Loop::laid(r as i32, at) };
                 let new = match s.act {
-                    Act::Draw | Act::Lift { .. } => Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base }),
+                    Act::Draw | Act::BindOff | Act::Lift { .. } => {
+                        Some(Loop { sign: if s.purl { -1.0 } else { 1.0 }, ..base })
+                    }
                     Act::Bobble => Some(Loop { sign: 1.0, bobble: true, yarn: BOBBLE, ..base }),
                     Act::Over => Some(Loop { yarn: OVER, ..base }),
                     Act::Tuck => Some(Loop { yarn: TUCKED, ..base }),
                     Act::Double => Some(Loop { yarn: DOUBLED, ..base }),
+                    Act::CastOn => Some(Loop { twist: 1.0, yarn: CAST_ON, ..base }),
                     Act::Unworked => None,
                     Act::Pass { front } => {
                         visits.push((j as u32, Visit::Pass { at, front }));
@@ -171,13 +174,16 @@ impl<'a> Maker<'a> {
             for j in 0..self.rows[r].len() {
                 let (s, own) = (self.rows[r][j], self.made[r][j]);
                 content.clear();
+                // It is passed over what comes out.
+                let before = self.bound_before(r, j);
+                content.extend(before.map(|b| (b, 0)));
                 match (s.act, self.under(r)) {
                     (Act::Lift { left }, under) => {
                         let twist = if left { -1.0 } else { 1.0 };
                         self.lift(own, under, s, twist);
                         continue;
                     }
-                    (Act::Draw | Act::Bobble, Some((below, down))) => {
+                    (Act::Draw | Act::BindOff | Act::Bobble, Some((below, down))) => {
                         let all = s.first_parent..s.first_parent + u32::from(s.parents);
                         let order: Vec<u32> = match s.top {
                             Top::Left => all.collect(),
@@ -189,26 +195,40 @@ impl<'a> Maker<'a> {
                         };
                         order.into_iter().for_each(|p| self.content(below, p as usize, down, &mut content));
                     }
-                    (Act::Draw | Act::Bobble, None) => {
+                    (Act::Draw | Act::BindOff | Act::Bobble, None) => {
                         let all = s.first_parent..s.first_parent + u32::from(s.parents);
                         content.extend(all.filter_map(|p| self.cast.get(p as usize)).map(|&c| (c, 0)));
                     }
                     _ => continue,
                 }
                 self.link(own, &content, r as i32, s.twisted);
+                if before.is_some() {
+                    let own = &mut self.loops[own as usize];
+                    own.foot = own.at;
+                }
             }
         }
+    }
+
+    /// The loop that is bound off right before a stitch, as the row is worked.
+    fn bound_before(&self, r: usize, j: usize) -> Option<u32> {
+        let backwards = self.border.round.is_none() && (r % 2 == 1) != self.border.mirrored;
+        let before = if backwards { j + 1 } else { j.checked_sub(1)? };
+        self.rows[r].get(before).filter(|s| s.act == Act::BindOff).map(|_| self.made[r][before])
     }
 
     /// A loop is drawn through others.
     fn link(&mut self, own: u32, through: &[(u32, i32)], row: i32, twisted: bool) {
         let at = self.loops[own as usize].at;
         let mut mean = 0.0;
-        for (rank, &(p, down)) in through.iter().enumerate() {
+        let mut rank = 0;
+        for &(p, down) in through {
             let held = row + down * self.rows.len() as i32;
             let parent = &mut self.loops[p as usize];
             parent.held = Some(held);
             parent.rank = rank as u8;
+            // What is bound off within the piece lies above, around its legs.
+            rank += usize::from(parent.row != row || down > 0 || row == self.rows.len() as i32);
             parent.children.push(own);
             if twisted {
                 parent.twist = 1.0;
@@ -259,11 +279,13 @@ impl<'a> Maker<'a> {
     pub(super) fn bind_off(&mut self, backwards: bool, together: usize, next: Option<&[Stitch]>) {
         let last = self.rows.len() - 1;
         let row = self.rows.len() as i32;
-        let n = self.rows[last].len() / together;
-        let mut visits = Vec::with_capacity(n);
+        let mut columns = self.open(last, together);
+        if backwards {
+            columns.reverse();
+        }
+        let mut visits = Vec::with_capacity(columns.len());
         let mut before: Option<u32> = None;
-        for k in 0..n {
-            let j = if backwards { n - 1 - k } else { k };
+        for j in columns {
             let bound = j * together..(j + 1) * together;
             let at = self.middles[last][bound.clone()].iter().sum::<f64>() / together as f64;
             // In pattern: as the next row has it, or wales of purl, as of a rib, are purled.
@@ -286,12 +308,18 @@ impl<'a> Maker<'a> {
         self.above = Some(Course::new(row, visits));
     }
 
+    /// Which columns of a row have live loops, counted in so many `together`.
+    fn open(&self, r: usize, together: usize) -> Vec<usize> {
+        let row = &self.rows[r];
+        (0..row.len() / together).filter(|j| row[j * together].act != Act::BindOff).collect()
+    }
+
     /// The yarn goes through every loop of the last row.
     pub(super) fn draw_together(&mut self) {
         let last = self.rows.len() - 1;
         let row = self.rows.len() as i32;
         let mut visits = Vec::with_capacity(self.rows[last].len());
-        for j in 0..self.rows[last].len() {
+        for j in self.open(last, 1) {
             let mut content = Vec::new();
             self.content(last, j, 0, &mut content);
             content.into_iter().for_each(|(p, _)| self.loops[p as usize].held = Some(row));
@@ -310,6 +338,9 @@ impl<'a> Maker<'a> {
             let Some((below, _)) = self.under(r) else { return 0.0 };
             let turn = if self.border.turns { self.rows[r].len() as f64 } else { 1.0 };
             let of = |(s, at): (&Stitch, &f64)| {
+                if s.act == Act::CastOn {
+                    return 0.0;
+                }
                 let lean = self.parent_middle(&self.middles[below], s, *at) - at;
                 let lean = CROSSING * turn * self.border.short(lean).abs();
                 match s.layer {

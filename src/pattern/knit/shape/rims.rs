@@ -1,4 +1,5 @@
-//! The rims of a finished piece: loops of the last row that are drawn together, and the rope of a cable cast-on.
+//! The rims of a finished piece: loops of the last row that are drawn together, the rope of a cable cast-on, and the chain of what
+//! is bound off within the piece.
 
 use std::f64::consts::TAU;
 
@@ -19,6 +20,13 @@ const AROUND: f64 = 1.0;
 const ROPE: usize = 32;
 /// Which part of a loop stands above a rope, as shares of it.
 const STANDS: [usize; 2] = [STEPS * 9 / 32, STEPS * 23 / 32];
+
+/// How far up the neck of a loop is that is bound off, where the one before lies around it, and how far its yarn goes up above
+/// that, in rows.
+const NECK: f64 = 0.62;
+const ABOVE: f64 = 0.87;
+/// Up to which place such a loop stands, and from which one on again.
+const UPRIGHT: [usize; 2] = [STEPS * 12 / 64, STEPS - STEPS * 12 / 64];
 
 impl Loops {
     /// Whether a loop is drawn together with all of its row.
@@ -57,6 +65,60 @@ impl Loops {
         };
         let (places, grid) = (0..=STEPS).map(place).unzip();
         Piece { places, grid, yarn: 0.0, bends: 0.0 }
+    }
+
+    /// A loop that is bound off within the piece: it stands up to its neck, is laid to the side and around the next one, the leg that was
+    /// worked first before both of its legs, the other one behind them.
+    pub(super) fn bound_piece(&self, own: &Loop, column: u32, foot: Foot, ends: [Foot; 2], step: f64) -> Piece {
+        let stands = Loop { children: Vec::new(), held: None, ..own.clone() };
+        let whole = self.loop_piece(&stands, column, foot, ends, step);
+        let next = &self.loops[own.children[0] as usize];
+        let away = self.border.short(next.at - own.at) / step;
+        let side = away.signum();
+        let next_sign = if next.sign == 0.0 { 1.0 } else { next.sign };
+        // Half the width of the next one's neck, and how far out that is.
+        let (wide, neck) = if self.is_bound_within(next) { (0.12, 0.25) } else { (0.3, 0.6) };
+        let [near, far] = [away.abs() - wide, away.abs() + wide];
+        let out = neck * next_sign;
+        let knots = [
+            [-0.12, NECK, 0.25 * own.sign],
+            [0.05, ABOVE, 0.6 * own.sign],
+            [0.36, ABOVE, own.sign],
+            [near, NECK, out + own.sign],
+            [far, NECK, out + own.sign],
+            [far + 0.23, NECK, out],
+            [far, NECK, out - own.sign],
+            [near, NECK, out - own.sign],
+            [0.54, ABOVE, -0.7 * own.sign],
+            [0.3, ABOVE, -0.2 * own.sign],
+            [0.12, NECK, 0.25 * own.sign],
+        ];
+        let up = self.up_at(own.row, own.at);
+        let place = |[across, above, out]: [f64; 3]| Place { at: own.at + side * across * step, up: up + above, out };
+        let mut knots: Vec<Place> = knots.map(place).into();
+        if side < 0.0 {
+            knots.reverse();
+        }
+        let [from, to] = UPRIGHT;
+        knots.insert(0, whole.places[from]);
+        knots.push(whole.places[to]);
+        let mut places = whole.places[..from].to_vec();
+        places.extend(through(&knots, 3 * ROPE));
+        places.extend(&whole.places[to..]);
+        let base = own.row as f32 + 0.02;
+        let rise = whole.grid[from][1] - base;
+        let course = |k: usize| {
+            let along = k.saturating_sub(from).min(3 * ROPE) as f32 / (3 * ROPE) as f32;
+            let laid = rise + (0.96 - rise) * (1.0 - (2.0 * along - 1.0).abs());
+            match k {
+                _ if k < from => whole.grid[k][1],
+                _ if k > from + 3 * ROPE => whole.grid[k - 3 * ROPE - from + to][1],
+                _ => base + laid,
+            }
+        };
+        let count = places.len() as f32;
+        let grid = (0..places.len()).map(|k| [column as f32 + k as f32 / count, course(k)]).collect();
+        Piece { places, grid, yarn: own.yarn, bends: own.yarn }
     }
 
     /// A loop of a cable cast-on: drawn to the front between the two before it, across the last one and up. `ends_row` says
