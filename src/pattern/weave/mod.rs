@@ -232,9 +232,15 @@ impl Weave {
             sett: (self.crimp.is_none() && (0.8..1.25).contains(&(self.half_rooms[0] / self.half_rooms[1])))
                 .then(|| sett(&self.draft)),
             beat,
-            nodes: self.points as usize,
+            nodes: self.nodes() as usize,
             thickness: [0, 1].map(|side| self.threads[side].thickness.clone()),
         }
+    }
+
+    /// Control points from one crossing to the next: where warps twine, these are so far apart that they turn twice between them, and
+    /// between few nodes they would slip into the wefts.
+    fn nodes(&self) -> u32 {
+        if self.draft.twines() { 7 * self.points / 4 } else { self.points }
     }
 
     /// Control points of its longest yarn, at least, as far as they are known before it is relaxed: lengths and whole repeats may
@@ -252,7 +258,7 @@ impl Weave {
         /// Warps beyond which a weft may turn.
         const TURNING: u64 = 12;
         let [warps, wefts] = count.map(u64::from);
-        let (points, longest) = (u64::from(self.points), warps.max(wefts));
+        let (points, longest) = (u64::from(self.nodes()), warps.max(wefts));
         if self.edges == Edges::Live || self.draft.cut_wefts() {
             return longest * points + 1;
         }
@@ -321,7 +327,7 @@ impl Weave {
         };
         let count = [count(0, self.warps, self.draft.warps())?, count(1, self.wefts, self.draft.wefts())?];
         // In f64, which does not overflow.
-        let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.points);
+        let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.nodes());
         if points > MAX_POINTS as f64 {
             return Err(Impossible::TooLarge);
         }

@@ -177,6 +177,7 @@ fn with_picks(cloth: &Cloth<'_>, draft: Draft, warp_spacing: Option<f64>) -> Wea
         cover: None,
         crimp: None,
         threads: [Threads::default(), picks],
+        points: cloth.cell.nodes as u32,
         ..cloth.weave.clone()
     }
 }

@@ -50,7 +50,6 @@ fn yarns_touch_and_hardly_run_into_each_other() {
         let [deepest, share] = cloth.cell.overlap(weave.options().unit());
         // Twined warps, the ridges of a honeycomb and wefts that are held in the same places press hardest.
         let (most, depth) = match *name {
-            "leno" => (0.06, 0.3),
             "honeycomb" | "honeycomb 10" | "corduroy" => (MOST_OVERLAP, 0.6),
             _ => (MOST_OVERLAP, 0.35),
         };
@@ -223,10 +222,11 @@ fn pairs_of_a_leno_are_twined() {
     let (crossing, straight) = (&strands[4], &strands[5]);
     let aside = |k: usize| crossing.curve.points[k].x - straight.curve.points[k].x;
     // Over one weft on one side of its neighbour, over the next on the other, below it between them.
-    let weft = |i: usize| POINTS as usize / 2 + i * POINTS as usize;
+    let nodes = 7 * POINTS as usize / 4;
+    let weft = |i: usize| nodes / 2 + i * nodes;
     for i in 2..7 {
         assert!(aside(weft(i)) * aside(weft(i + 1)) < 0.0, "{} {}", aside(weft(i)), aside(weft(i + 1)));
-        let between = weft(i) + POINTS as usize / 2;
+        let between = weft(i) + nodes / 2;
         assert!(crossing.curve.points[between].z < straight.curve.points[between].z);
     }
 }
@@ -524,8 +524,8 @@ fn threads_of_several_kinds_have_their_own_thickness_and_room() {
 /// Where yarns of one side lean aside together they have less room than their distance says.
 #[test]
 fn yarns_that_go_aside_keep_apart() {
-    // Measured: 0.0, 0.026 and 0.23 of the length.
-    for (name, most) in [("herringbone 2/2 8", 0.01), ("honeycomb", 0.045), ("leno", 0.25)] {
+    // Measured: 0.0, 0.026 and 0.0 of the length.
+    for (name, most) in [("herringbone 2/2 8", 0.01), ("honeycomb", 0.045), ("leno", 0.01)] {
         let weave = Weave { edges: Edges::Live, flatten: 1.5, ..weave(name) };
         let strands = weave.strands().unwrap();
         let radius = |s: &PatternStrand| s.curve.radii.clone().unwrap_or_else(|| vec![0.5; s.curve.points.len()]);
