@@ -371,4 +371,6 @@ mod azimuth_tests;
 #[cfg(test)]
 mod start_tests;
 #[cfg(test)]
+mod swirl_tests;
+#[cfg(test)]
 mod tests;
