@@ -23,10 +23,10 @@ const PARTS: [&str; 13] = [
     "B_indirect",
 ];
 
-/// The swatch above a floor, with the sky above the horizon.
+/// The swatch above a floor, with the sky above the horizon. Its fibres send some of TT all round, so that no lobe is dark.
 fn on_a_floor() -> String {
     let view = "direction = [0.25, 0.12, 1.0]\nmargin = 0.25";
-    SWATCH.replace("direction = [0.25, -0.35, 1.0]", view)
+    SWATCH.replace("direction = [0.25, -0.35, 1.0]", view).replace("beta_n = 25.0", "beta_n = 60.0")
         + "[ground]\nalbedo = [0.5, 0.4, 0.3]\n[output]\nlayers = [\"lobes\", \"albedo\"]\n"
 }
 
