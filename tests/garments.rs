@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use yarnray::{
     cloth::Cloth,
     scene::{
@@ -145,31 +145,24 @@ fn stitches_go_with_the_cloth_and_plies_keep_their_places() {
     assert!(slid(&b, true) < 0.2 && slid(&c, true) < 1e-3, "{} {}", slid(&b, true), slid(&c, true));
 }
 
-/// A mesh file of centimetres in millimetres: its points, and its faces cut into triangles.
-fn triangles(path: &Path) -> (Vec<DVec3>, Vec<[usize; 3]>) {
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut points, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words.split_first() {
-            Some((&"v", at)) => {
-                points.push(10.0 * DVec3::from_slice(&at.iter().map(|w| w.parse().unwrap()).collect::<Vec<f64>>()))
-            }
-            Some((&"f", corners)) => {
-                let corner = |w: &&str| w.split('/').next().unwrap().parse::<usize>().unwrap() - 1;
-                let all: Vec<usize> = corners.iter().map(corner).collect();
-                faces.extend((2..all.len()).map(|k| [all[0], all[k - 1], all[k]]));
-            }
-            _ => {}
-        }
-    }
-    (points, faces)
+/// The triangles of a mesh file of centimetres, in millimetres.
+fn triangles(path: &Path) -> Vec<[DVec3; 3]> {
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let (parts, _) = tobj::load_obj(path, &options).unwrap();
+    let of_part = |tobj::Model { mesh, .. }: tobj::Model| {
+        let corner = |i: u32| 10.0 * Vec3::from_slice(&mesh.positions[3 * i as usize..]).as_dvec3();
+        mesh.indices.chunks_exact(3).map(|face| [0, 1, 2].map(|k| corner(face[k]))).collect::<Vec<_>>()
+    };
+    parts.into_iter().flat_map(of_part).collect()
 }
 
-/// The middle of a triangle, and two of its edges and its normal as axes.
-fn frame_of(points: &[DVec3], face: &[usize; 3]) -> (DVec3, DMat3) {
-    let [a, b, c] = face.map(|i| points[i]);
-    ((a + b + c) / 3.0, DMat3::from_cols(b - a, c - a, (b - a).cross(c - a).normalize()))
+fn middle([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (a + b + c) / 3.0
+}
+
+/// Two edges of a triangle and its normal.
+fn axes([a, b, c]: &[DVec3; 3]) -> DMat3 {
+    DMat3::from_cols(b - a, c - a, (b - a).cross(c - a).normalize())
 }
 
 /// Frames of a simulated pullover in which its arms rise fastest: yarns are laid in each frame for itself, out of the body and
@@ -184,17 +177,18 @@ fn stitches_of_a_worn_pullover_do_not_jump() {
     let path = write(own.path(), "s.toml", text);
     let frames: Vec<Vec<Point>> = (5..8).map(|k| points(&at_frame(&path, k)).concat()).collect();
     assert!(frames[0].len() > 500_000 && frames.iter().all(|f| f.len() == frames[0].len()));
-    let meshes: Vec<_> = (5..8).map(|k| triangles(&folder.join(format!("pullover.{k:04}.obj")))).collect();
+    let meshes: Vec<Vec<[DVec3; 3]>> =
+        (5..8).map(|k| triangles(&folder.join(format!("pullover.{k:04}.obj")))).collect();
     for (yarns, cloth) in frames.windows(2).zip(meshes.windows(2)) {
-        let [(before, faces), (after, _)] = cloth else { panic!("two frames") };
-        let middles: Vec<DVec3> = faces.iter().map(|face| frame_of(before, face).0).collect();
+        let [before, after] = cloth else { panic!("two frames") };
+        let middles: Vec<DVec3> = before.iter().map(middle).collect();
         // How far a point is from where it would be if it went with the triangle that is nearest to it.
         let off = |(p, q): (&Point, &Point)| {
             let [p, q] = [*p, *q].map(DVec3::from_array);
             let far = |face: &usize| middles[*face].distance_squared(p);
-            let nearest = (0..faces.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
-            let [(from, axes), (to, moved)] = [before, after].map(|points| frame_of(points, &faces[nearest]));
-            (to + moved * (axes.inverse() * (p - from))).distance(q)
+            let nearest = (0..middles.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+            let (from, to) = (&before[nearest], &after[nearest]);
+            (middle(to) + axes(to) * (axes(from).inverse() * (p - middle(from)))).distance(q)
         };
         let mut all: Vec<f64> = yarns[0].iter().zip(&yarns[1]).step_by(61).map(off).collect();
         all.sort_by(f64::total_cmp);

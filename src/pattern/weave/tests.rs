@@ -218,11 +218,12 @@ fn cloth_is_as_large_as_it_is_asked_to_be() {
 
 #[test]
 fn pairs_of_a_leno_are_twined() {
-    let strands = weave("leno").strands().unwrap();
+    let leno = weave("leno");
+    let strands = leno.strands().unwrap();
     let (crossing, straight) = (&strands[4], &strands[5]);
     let aside = |k: usize| crossing.curve.points[k].x - straight.curve.points[k].x;
     // Over one weft on one side of its neighbour, over the next on the other, below it between them.
-    let nodes = 7 * POINTS as usize / 4;
+    let nodes = leno.nodes() as usize;
     let weft = |i: usize| nodes / 2 + i * nodes;
     for i in 2..7 {
         assert!(aside(weft(i)) * aside(weft(i + 1)) < 0.0, "{} {}", aside(weft(i)), aside(weft(i + 1)));

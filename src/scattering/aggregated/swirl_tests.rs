@@ -12,6 +12,7 @@ const WALKS: u32 = 60_000;
 const ALBEDO: f32 = 0.95;
 
 /// Light in a ply's section, a circle of radius 1.
+#[derive(Clone, Copy)]
 struct Walk {
     at: Vec2,
     way: Vec2,
@@ -72,32 +73,28 @@ fn cosines(density: f32, slope: f32, swirl: impl Fn(f32) -> f32) -> [f32; 3] {
     for _ in 0..WALKS {
         let aside = 2.0 * stream.next() - 1.0;
         let axial = -slope * aside;
-        let mut node =
-            Walk { at: Vec2::new(-(1.0 - aside * aside).sqrt(), aside), way: Vec2::X, leans: Some([axial, slope]) };
-        if !node.meets(density, &mut stream) {
+        let at = Vec2::new(-(1.0 - aside * aside).sqrt(), aside);
+        let mut first = Walk { at, way: Vec2::X, leans: Some([axial, slope]) };
+        if !first.meets(density, &mut stream) {
             continue;
         }
-        node.turns(&mut stream);
-        for leans in [node.leans, None] {
-            let mut walk = Walk { leans, ..node };
+        first.turns(&mut stream);
+        for leans in [first.leans, None] {
+            // The way on from the first fibre is the same for both.
+            let mut walk = first;
             let (mut kept, mut events) = (ALBEDO, 1);
-            // The way on from the first is the same for both.
-            walk.leans = node.leans;
             while walk.meets(density, &mut stream) {
                 walk.leans = leans;
                 walk.turns(&mut stream);
                 (kept, events) = (kept * ALBEDO, events + 1);
             }
             if events > 1 {
-                let mut add = |which: usize, way: Vec2| {
+                let turned = Vec2::from_angle(swirl(axial)).rotate(walk.way);
+                let ways: &[(usize, Vec2)] =
+                    if leans.is_some() { &[(0, walk.way)] } else { &[(1, walk.way), (2, turned)] };
+                for &(which, way) in ways {
                     sums[which][0] += kept;
                     sums[which][1] += kept * way.x;
-                };
-                if leans.is_some() {
-                    add(0, walk.way);
-                } else {
-                    add(1, walk.way);
-                    add(2, Vec2::from_angle(swirl(axial)).rotate(walk.way));
                 }
             }
         }
