@@ -9,6 +9,7 @@
 mod energy;
 #[cfg(test)]
 pub(super) mod passing;
+mod relaxation;
 mod search;
 
 use glam::{DVec2, DVec3};
@@ -204,91 +205,6 @@ impl Rods {
             let last = s.start + s.count - 1;
             edges[last] = s.jump.map_or(DVec3::ZERO, |jump| self.points[s.start] + jump - self.points[last]);
         }
-    }
-
-    /// Relaxes; gives the steps it took and the largest force that is left.
-    pub(super) fn relax(&mut self, run: &Run) -> (usize, f64) {
-        let n = self.points.len();
-        if n == 0 {
-            return (0, 0.0);
-        }
-        let has = self.has_segment();
-        let mut work = Work::default();
-        let mut speeds = vec![DVec3::ZERO; n];
-        // A cell's size moves as if it weighed as much as what is in it.
-        let weight = (n as f64).sqrt();
-        let mut cell_speed = DVec2::ZERO;
-        let time = TIME / run.firm.max(1.0).sqrt();
-        let mut fire = Fire::new(time);
-        // Where points were when neighbours were looked for, and how many have gone far since then.
-        let mut before: Vec<DVec3> = Vec::new();
-        let (mut gone, mut since) = (n, 0);
-        let (mut largest, mut strained) = (0.0, 0.0);
-        for step in 0..run.steps {
-            let grown = if run.growing > 0 { (step as f64 / run.growing as f64).min(1.0) } else { 1.0 };
-            let apart = APART * (run.thin + (1.0 - run.thin) * grown);
-            since += 1;
-            // In a large piece a few that still find their way do not hold up all others.
-            if gone > n / MANY || (gone > 0 && since >= OFTEN) {
-                since = 0;
-                self.search(&has, &mut work);
-                before.clone_from(&self.points);
-                strained = 0.0;
-            }
-            self.gone(&before, strained, &mut work.gone);
-            let virial = self.forces(&has, apart, CONTACT * run.firm, &mut work);
-            if run.press > 0.0 {
-                self.press(run.press, &mut work.forces);
-            }
-            let free = |k: usize| f64::from(u8::from(run.free[k]));
-            let cell_force = match self.period {
-                Some(period) => {
-                    let pull = run.load * period.x * period.y - virial;
-                    DVec2::new(pull.x * free(0), pull.y * free(1)) / weight
-                }
-                None => DVec2::ZERO,
-            };
-            if !self.fixed.is_empty() {
-                for (force, fixed) in work.forces.iter_mut().zip(&self.fixed) {
-                    if *fixed {
-                        *force = DVec3::ZERO;
-                    }
-                }
-            }
-            let [power, force2, speed2, max2] = sums(&work.forces, &speeds);
-            let power = power + cell_force.dot(cell_speed);
-            let force = (force2 + cell_force.length_squared()).sqrt();
-            let speed = (speed2 + cell_speed.length_squared()).sqrt();
-            largest = max2.sqrt();
-            if grown >= 1.0
-                && step > run.growing
-                && largest < run.calm
-                && cell_force.length() < run.calm * weight * 0.02
-            {
-                return (step, largest);
-            }
-            let (keep, turn) = fire.adapt(power, force, speed);
-            let dt = fire.dt;
-            #[cfg(test)]
-            let last = passing::before(self);
-            let far = (0.5 * MARGIN - strained).max(0.0).powi(2);
-            gone = self.advance(&mut speeds, &work.forces, &before, Step { keep, push: turn + dt, dt, far });
-            if let Some(period) = self.period {
-                cell_speed = cell_speed * keep + cell_force * (turn + dt);
-                // In a step the cell's rim moves no farther than a point may.
-                let by = cell_speed * dt / weight;
-                let by = by.clamp(DVec2::splat(-STEP) / period, DVec2::splat(STEP) / period);
-                // Its images move with it.
-                strained += (by * period).abs().max_element();
-                self.scale(DVec2::ONE + by);
-                before.iter_mut().for_each(|p| *p *= (DVec2::ONE + by).extend(1.0));
-            }
-            #[cfg(test)]
-            if let Some(last) = last {
-                passing::watch(&last, self, &has, &work);
-            }
-        }
-        (run.steps, largest)
     }
 
     /// Presses points towards the middle of the depth.

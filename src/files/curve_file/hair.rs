@@ -14,7 +14,10 @@
 //! A strand has one point more than segments. The format says nothing of a basis: points are taken as Catmull-Rom curves
 //! unless asked otherwise. Thickness is read and written as a diameter.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    ops::Range,
+};
 
 use glam::DVec3;
 
@@ -38,92 +41,121 @@ const POINTS: u32 = 2;
 const THICKNESS: u32 = 4;
 
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    if bytes.len() >= MAGIC.len() && !bytes.starts_with(MAGIC) {
-        let found = super::quoted(&bytes[..MAGIC.len()].escape_ascii().to_string());
-        let problem = format!("expected the letters HAIR, found {found}");
-        return Err(CurveFileError::byte(0, problem).hint("is this another kind of file?"));
-    }
-    if bytes.len() < HEADER_BYTES {
-        let problem = format!("the header takes {HEADER_BYTES} bytes but the file ends here");
-        return Err(CurveFileError::byte(bytes.len(), problem).hint(CUT_SHORT));
-    }
-    let (strands, points, arrays, default_segments) =
-        (u32_at(bytes, 4), u32_at(bytes, 8), u32_at(bytes, 12), u32_at(bytes, 16));
-    if arrays & POINTS == 0 {
-        return Err(CurveFileError::byte(12, "expected an array of points, found none"));
-    }
-    // Everything that the header promises must be there before anything is allocated for it.
-    let has = |bit: u32| u64::from(arrays & bit != 0);
-    let promised = 2 * u64::from(strands) * has(SEGMENTS) + u64::from(points) * (12 + 4 * has(THICKNESS));
-    let rest = (bytes.len() - HEADER_BYTES) as u64;
-    if promised > rest {
-        let problem = format!(
-            "the header promises {strands} strands of {points} points, {promised} bytes, but only {rest} follow"
-        );
-        return Err(CurveFileError::byte(4, problem).hint(CUT_SHORT));
-    }
-    if u64::from(points) > options.max_points {
-        return Err(CurveFileError::too_many_points(FileLocation::Byte(8), points, options));
-    }
-    let segments_end = HEADER_BYTES + if has(SEGMENTS) == 1 { 2 * strands as usize } else { 0 };
-    let thickness_start = segments_end + 12 * points as usize;
+    let file = Hair::of(bytes, options)?;
     let mut repair = Repair::default();
     let mut first = 0_usize;
-    for strand in 0..strands as usize {
-        let place = if has(SEGMENTS) == 1 { HEADER_BYTES + 2 * strand } else { 16 };
-        let segments = if has(SEGMENTS) == 1 {
-            usize::from(u16::from_le_bytes([bytes[place], bytes[place + 1]]))
-        } else {
-            default_segments as usize
+    for strand in 0..file.strands {
+        let points = file.points_of(strand, first)?;
+        first = points.end;
+        let mut curve = points.clone().map(|point| file.point(point)).collect::<Result<Vec<DVec3>, _>>()?;
+        let mut radii = match file.thickness {
+            Some(start) => Some(points.map(|point| file.radius(start + 4 * point)).collect::<Result<Vec<f64>, _>>()?),
+            None => None,
         };
-        let left = points as usize - first;
+        // As in text files: who repeats the first point means a ring.
+        let ring = curve.len() >= 4 && curve.first() == curve.last();
+        if ring {
+            curve.pop();
+            radii.iter_mut().for_each(|r| r.truncate(curve.len()));
+        }
+        let ends = if ring { Ends::Closed } else { Ends::Open };
+        repair.add(options.basis.unwrap_or(Basis::CatmullRom), ends, curve, radii);
+    }
+    if first < file.points {
+        repair.note(format!("{} of {} of no strand; ignored", counted(file.points - first, "point"), file.points));
+    }
+    Ok(repair.finish())
+}
+
+/// A file whose arrays are all there.
+struct Hair<'a> {
+    bytes: &'a [u8],
+    strands: usize,
+    points: usize,
+    /// Where the counts of segments begin, if there are any, and the count of a strand where there are none.
+    segments: Option<usize>,
+    default_segments: usize,
+    /// Where the points begin, and the thicknesses if there are any.
+    places: usize,
+    thickness: Option<usize>,
+}
+
+impl<'a> Hair<'a> {
+    /// Reads the header. Everything that it promises must be there before anything is allocated for it.
+    fn of(bytes: &'a [u8], options: &ReadOptions) -> Result<Self, CurveFileError> {
+        if bytes.len() >= MAGIC.len() && !bytes.starts_with(MAGIC) {
+            let found = super::quoted(&bytes[..MAGIC.len()].escape_ascii().to_string());
+            let problem = format!("expected the letters HAIR, found {found}");
+            return Err(CurveFileError::byte(0, problem).hint("is this another kind of file?"));
+        }
+        if bytes.len() < HEADER_BYTES {
+            let problem = format!("the header takes {HEADER_BYTES} bytes but the file ends here");
+            return Err(CurveFileError::byte(bytes.len(), problem).hint(CUT_SHORT));
+        }
+        let [strands, points, arrays, default_segments] = [4, 8, 12, 16].map(|at| u32_at(bytes, at));
+        if arrays & POINTS == 0 {
+            return Err(CurveFileError::byte(12, "expected an array of points, found none"));
+        }
+        let has = |bit: u32| u64::from(arrays & bit != 0);
+        let promised = 2 * u64::from(strands) * has(SEGMENTS) + u64::from(points) * (12 + 4 * has(THICKNESS));
+        let rest = (bytes.len() - HEADER_BYTES) as u64;
+        if promised > rest {
+            let problem = format!(
+                "the header promises {strands} strands of {points} points, {promised} bytes, but only {rest} follow"
+            );
+            return Err(CurveFileError::byte(4, problem).hint(CUT_SHORT));
+        }
+        if u64::from(points) > options.max_points {
+            return Err(CurveFileError::too_many_points(FileLocation::Byte(8), points, options));
+        }
+        let (strands, points) = (strands as usize, points as usize);
+        let places = HEADER_BYTES + if has(SEGMENTS) == 1 { 2 * strands } else { 0 };
+        Ok(Self {
+            bytes,
+            strands,
+            points,
+            segments: (has(SEGMENTS) == 1).then_some(HEADER_BYTES),
+            default_segments: default_segments as usize,
+            places,
+            thickness: (has(THICKNESS) == 1).then_some(places + 12 * points),
+        })
+    }
+
+    /// The points of a strand, which are those from `first` on.
+    fn points_of(&self, strand: usize, first: usize) -> Result<Range<usize>, CurveFileError> {
+        let place = self.segments.map_or(16, |start| start + 2 * strand);
+        let segments = self.segments.map_or(self.default_segments, |_| {
+            usize::from(u16::from_le_bytes([self.bytes[place], self.bytes[place + 1]]))
+        });
+        let left = self.points - first;
         if segments >= left {
             let problem = format!("strand {strand} has {segments} segments but only {left} points are left for it");
             return Err(CurveFileError::byte(place, problem));
         }
-        let count = segments + 1;
-        let mut curve = Vec::with_capacity(count);
-        for point in first..first + count {
-            let at = segments_end + 12 * point;
-            let p = [0, 4, 8].map(|axis| f64::from(f32_at(bytes, at + axis)));
-            if let Some(axis) = p.iter().position(|v| !v.is_finite()) {
+        Ok(first..first + segments + 1)
+    }
+
+    fn point(&self, point: usize) -> Result<DVec3, CurveFileError> {
+        let at = self.places + 12 * point;
+        let p = [0, 4, 8].map(|axis| f64::from(f32_at(self.bytes, at + axis)));
+        match p.iter().position(|v| !v.is_finite()) {
+            None => Ok(DVec3::from_array(p)),
+            Some(axis) => {
                 let problem = format!("expected a finite number for {}, found {}", ["x", "y", "z"][axis], p[axis]);
-                return Err(CurveFileError::byte(at + 4 * axis, problem));
+                Err(CurveFileError::byte(at + 4 * axis, problem))
             }
-            curve.push(DVec3::from_array(p));
         }
-        let mut radii = if has(THICKNESS) == 1 {
-            let mut radii = Vec::with_capacity(count);
-            for point in first..first + count {
-                let at = thickness_start + 4 * point;
-                let thickness = f64::from(f32_at(bytes, at));
-                if !(thickness > 0.0 && thickness.is_finite()) {
-                    return Err(CurveFileError::byte(at, format!("expected a thickness above 0, found {thickness}")));
-                }
-                radii.push(0.5 * thickness);
-            }
-            Some(radii)
+    }
+
+    /// The radius of which the thickness stands at a byte.
+    fn radius(&self, at: usize) -> Result<f64, CurveFileError> {
+        let thickness = f64::from(f32_at(self.bytes, at));
+        if thickness > 0.0 && thickness.is_finite() {
+            Ok(0.5 * thickness)
         } else {
-            None
-        };
-        // As in text files: who repeats the first point means a ring.
-        let ring = count >= 4 && curve.first() == curve.last();
-        if ring {
-            curve.pop();
-            radii.iter_mut().for_each(|r| r.truncate(count - 1));
+            Err(CurveFileError::byte(at, format!("expected a thickness above 0, found {thickness}")))
         }
-        repair.add(
-            options.basis.unwrap_or(Basis::CatmullRom),
-            if ring { Ends::Closed } else { Ends::Open },
-            curve,
-            radii,
-        );
-        first += count;
     }
-    if first < points as usize {
-        repair.note(format!("{} of {points} of no strand; ignored", counted(points as usize - first, "point")));
-    }
-    Ok(repair.finish())
 }
 
 fn u32_at(bytes: &[u8], at: usize) -> u32 {

@@ -113,40 +113,103 @@ pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], 
     if yarn.flatten == 1.0 {
         return;
     }
-    let room = yarn.radius * yarn.half_width;
     let lengths = || strands.iter().flat_map(|s| s.curve.points.windows(2).map(|w| w[0].distance(w[1])));
     let (count, longest) = lengths().fold((0, 0.0), |(count, longest), l| (count + 1, f64::max(longest, l)));
-    // What is farther bounds no section.
-    let far = room * yarn.flatten.sqrt();
-    let reach = 2.0 * far + longest;
+    let reach = Reach::of(yarn, longest);
     // Of those that are alike, the first.
     let first_of = firsts(alike, strands, count);
     let asked = |i: u32| first_of.get(i as usize).is_none_or(|first| *first == i);
-    let mut segments = segments(strands, &asked, reach, first_of.is_empty());
-    let mut last_of = Vec::new();
-    if let Alike::Tile { period, shear } = alike {
-        last_of = segments.chunk_by(|a, b| a.strand == b.strand).map(|own| own[own.len() - 1]).collect();
-        add_images(&mut segments, (*period, *shear), reach);
+    let around = Around::new(segments(strands, &asked, reach.middles, first_of.is_empty()), reach, alike);
+    let mut sections = vec![Section::round(reach.room); count];
+    around.sections(asked).into_iter().for_each(|(i, section)| sections[i as usize] = section);
+    for (i, first) in first_of.into_iter().enumerate() {
+        sections[i] = sections[first as usize];
     }
-    let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
-    let halves: Vec<f64> = segments.iter().map(|s| 0.5 * s.from.distance(s.to)).collect();
-    let grid = PointGrid::new(&middles, reach, None);
-    // Where a segment starts, by the half of it that follows and the half of the one before.
-    let section = |(walk, ways): &mut (Walk<'_>, Vec<DVec3>), i: usize| {
-        let (own, after) = (&segments[i], middles[i]);
-        let follows = |i: &usize| segments[*i].strand == own.strand && segments[*i].index + 1 == own.index;
-        let before = match (i.checked_sub(1).filter(follows), last_of.get(own.strand as usize)) {
-            (Some(i), _) => middles[i],
-            // A row of a tile goes on before its first point as it ends.
-            (None, Some(last)) => last.middle() + (own.from - last.to),
-            (None, None) => own.from,
-        };
+    give(strands, &sections, yarn, matches!(alike, Alike::Tile { .. }));
+}
+
+/// Gives curves their sections, one at the start of each segment.
+fn give(strands: &mut [PatternStrand], mut sections: &[Section], yarn: &Thickness, tile: bool) {
+    for strand in strands {
+        let points = &strand.curve.points;
+        let (own, after) = sections.split_at(points.len().saturating_sub(1));
+        sections = after;
+        // A row of a tile ends as it begins, another strand as its last segment.
+        let last = if tile { own.first() } else { own.last() };
+        let own: Vec<Section> = own.iter().chain(last).copied().collect();
+        strand.curve.radii = Some(own.iter().map(|s| f64::from(s.long) / yarn.half_width).collect());
+        strand.curve.flattening = Some(axes(points, &own, tile));
+    }
+}
+
+/// How far around a section others count, mm.
+#[derive(Clone, Copy)]
+struct Reach {
+    /// Radius of a round section.
+    room: f64,
+    /// Half way to what is farther bounds no section.
+    far: f64,
+    /// Middles of segments that may count are not farther.
+    middles: f64,
+    /// Of the yarn that is thicker in places, its mean half width over its radius.
+    half_width: f64,
+}
+
+impl Reach {
+    fn of(yarn: &Thickness, longest: f64) -> Self {
+        let room = yarn.radius * yarn.half_width;
+        let far = room * yarn.flatten.sqrt();
+        Self { room, far, middles: 2.0 * far + longest, half_width: yarn.half_width }
+    }
+}
+
+/// Segments, and where to look for those around a place.
+struct Around {
+    reach: Reach,
+    segments: Vec<Segment>,
+    /// Of the strands of a tile, what they end with.
+    last_of: Vec<Segment>,
+    middles: Vec<DVec3>,
+    halves: Vec<f64>,
+    grid: PointGrid,
+}
+
+impl Around {
+    fn new(mut segments: Vec<Segment>, reach: Reach, alike: &Alike) -> Self {
+        let mut last_of = Vec::new();
+        if let Alike::Tile { period, shear } = alike {
+            last_of = segments.chunk_by(|a, b| a.strand == b.strand).map(|own| own[own.len() - 1]).collect();
+            add_images(&mut segments, (*period, *shear), reach.middles);
+        }
+        let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
+        let halves = segments.iter().map(|s| 0.5 * s.from.distance(s.to)).collect();
+        let grid = PointGrid::new(&middles, reach.middles, None);
+        Self { reach, segments, last_of, middles, halves, grid }
+    }
+
+    /// The sections at the starts of segments that are asked for, with the segments' indices.
+    fn sections(&self, asked: impl Fn(u32) -> bool + Sync) -> Vec<(u32, Section)> {
+        let own = |entry: &Entry| &self.segments[entry.index as usize];
+        let is_asked = |entry: &&Entry| own(entry).index != IMAGE && asked(own(entry).index);
+        let entries = self.grid.in_order().par_iter().with_min_len(CHUNK).filter(is_asked);
+        entries
+            .map_init(
+                || (self.grid.walk(), Vec::new()),
+                |state, entry| (own(entry).index, self.section(entry.index as usize, state)),
+            )
+            .collect()
+    }
+
+    /// The section at the start of a segment, by the half of it that follows and the half of the one before.
+    fn section(&self, i: usize, (walk, ways): &mut (Walk<'_>, Vec<DVec3>)) -> Section {
+        let Reach { room, far, middles: reach, half_width } = self.reach;
+        let (own, before, after) = (&self.segments[i], self.before(i), self.middles[i]);
         ways.clear();
-        let half = halves[i].max(own.from.distance(before));
+        let half = self.halves[i].max(own.from.distance(before));
         walk.within(own.from, reach, |entry| {
-            let other = &segments[entry.index as usize];
+            let other = &self.segments[entry.index as usize];
             // However they lie.
-            let most = 2.0 * far + half + halves[entry.index as usize];
+            let most = 2.0 * far + half + self.halves[entry.index as usize];
             if entry.at.distance_squared(own.from) > most * most {
                 return;
             }
@@ -160,40 +223,21 @@ pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], 
             }
         });
         if before != own.from {
-            ways.extend(inwards(before, own.from, after).map(|way| INSIDE * yarn.half_width * way));
+            ways.extend(inwards(before, own.from, after).map(|way| INSIDE * half_width * way));
         }
         Section::between((after - before).normalize_or_zero(), ways, [room, far])
-    };
-    let is_asked = |entry: &&Entry| {
-        let own = &segments[entry.index as usize];
-        own.index != IMAGE && asked(own.index)
-    };
-    let found: Vec<(u32, Section)> = grid
-        .in_order()
-        .par_iter()
-        .with_min_len(CHUNK)
-        .filter(is_asked)
-        .map_init(
-            || (grid.walk(), Vec::new()),
-            |state, entry| (segments[entry.index as usize].index, section(state, entry.index as usize)),
-        )
-        .collect();
-    let mut sections = vec![Section::round(room); count];
-    found.into_iter().for_each(|(i, section)| sections[i as usize] = section);
-    for (i, first) in first_of.into_iter().enumerate() {
-        sections[i] = sections[first as usize];
     }
-    let mut rest = sections.as_slice();
-    for strand in strands {
-        let points = &strand.curve.points;
-        let (own, after) = rest.split_at(points.len().saturating_sub(1));
-        rest = after;
-        // A row of a tile ends as it begins, another strand as its last segment.
-        let repeats = matches!(alike, Alike::Tile { .. });
-        let last = if repeats { own.first() } else { own.last() };
-        let own: Vec<Section> = own.iter().chain(last).copied().collect();
-        strand.curve.radii = Some(own.iter().map(|s| f64::from(s.long) / yarn.half_width).collect());
-        strand.curve.flattening = Some(axes(points, &own, repeats));
+
+    /// The middle of what comes before a segment on its strand.
+    fn before(&self, i: usize) -> DVec3 {
+        let own = &self.segments[i];
+        let follows = |i: &usize| self.segments[*i].strand == own.strand && self.segments[*i].index + 1 == own.index;
+        match (i.checked_sub(1).filter(follows), self.last_of.get(own.strand as usize)) {
+            (Some(i), _) => self.middles[i],
+            // A row of a tile goes on before its first point as it ends.
+            (None, Some(last)) => last.middle() + (own.from - last.to),
+            (None, None) => own.from,
+        }
     }
 }
 

@@ -163,87 +163,22 @@ fn side_of(text: &str) -> Option<Side> {
 impl Head {
     /// The head of a line and what stands behind it; `None` if it has none.
     pub(super) fn split(text: &str, line: usize) -> Result<Option<(Self, &str)>> {
-        let mut head =
-            Self { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None, set_up: false };
-        let (mut known, mut range, mut end, mut said) = (false, false, 0, String::new());
+        let mut reading = Reading::new();
         let tokens = head_tokens(text);
-        // A list goes on behind a comma, and "Row 1 2/1 LC" is none.
-        let mut goes_on = true;
-        for (i, Token { text: word, end: here }) in tokens.iter().enumerate() {
+        let mut end = 0;
+        for (i, token) in tokens.iter().enumerate() {
             let next = tokens.get(i + 1).map_or("", |t| t.text.as_str());
-            let is_number = |word: &str| number(word).is_some() || word.starts_with(|c: char| c.is_ascii_digit());
-            match word.as_str() {
-                ":" | "." => {
-                    end = *here;
-                    break;
-                }
-                // "1st row - k2"
-                "-" | "\u{2013}" | "\u{2014}" => {
-                    end = *here;
-                    if !is_number(next) {
-                        break;
-                    }
-                    range = true;
-                }
-                "," | "&" | "and" | "plus" if is_number(next) || is_row(next) || is_all(next) => goes_on = true,
-                "to" | "through" | "thru" if is_number(next) && !head.rows.is_empty() => range = true,
-                word if is_row(word) => {
-                    known = true;
-                    head.round |= is_round(word);
-                    goes_on |= head.rows.is_empty();
-                }
-                word if word.starts_with(['(', '[']) && (side_of(word).is_some() || is_count(word)) => {}
-                word if is_all(word) => head.all = head.all.or(Some(1)),
-                "ws" | "rs" | "wrong" | "right" | "side" | "alternate" | "alt" | "even" | "odd" | "other"
-                | "numbered" => {
-                    if matches!(word.as_str(), "even" | "odd") {
-                        head.odd = Some(word == "odd");
-                    }
-                    head.all = head.all.map(|_| 2);
-                }
-                "next" => head.next = 1,
-                // "rows 1-2, 3 times more"
-                word if is_number(word) && matches!(next, "times" | "time" | "more" | "further") => break,
-                word if is_number(word) => {
-                    let Some(n) = number(word).map(|n| n as usize) else {
-                        if known && goes_on && head.all.is_none() {
-                            return error(line, format!("\"{}\" is no row", short(word)), "as in Row 1:");
-                        }
-                        break;
-                    };
-                    if head.next > 0 {
-                        head.next = n.min(MOST_ROWS);
-                    } else if let Some(apart) = &mut head.all {
-                        // "every 4th row"
-                        *apart = n.max(1);
-                    } else if std::mem::take(&mut range) {
-                        let first = head.rows.pop().unwrap_or(n);
-                        if first > n || n - first >= MOST_ROWS {
-                            let problem = format!("\"{first}-{n}\" is no range of rows");
-                            return error(line, problem, "as in Rows 1-4:");
-                        }
-                        head.rows.extend(first..=n);
-                    } else if goes_on {
-                        head.rows.push(n);
-                    } else {
-                        break;
-                    }
-                    goes_on = matches!(next, "-" | "\u{2013}" | "\u{2014}" | "to" | "through" | "thru");
-                }
-                _ => break,
+            let then = reading.word(&token.text, next, line)?;
+            if then != Then::EndBefore {
+                end = token.end;
             }
-            end = *here;
-            said.push_str(word);
-            said.push(' ');
+            if then != Then::GoOn {
+                break;
+            }
+            reading.said.push_str(&token.text);
+            reading.said.push(' ');
         }
-        head.side = side_of(&said);
-        let plural = || ["rows", "rnds", "rounds"].iter().any(|rows| said.split(' ').any(|word| word == *rows));
-        if head.rows.is_empty() && head.next == 0 && (head.side.is_some() || head.odd.is_some()) && plural() {
-            head.all = Some(2);
-        }
-        if !known || (head.rows.is_empty() && head.next == 0 && head.all.is_none()) {
-            return Ok(None);
-        }
+        let Some(mut head) = reading.finish() else { return Ok(None) };
         let mut body = text[end..].trim();
         // "1st row: (RS). K2."
         for (open, close) in [('(', ')'), ('[', ']')] {
@@ -256,6 +191,112 @@ impl Head {
             }
         }
         Ok(Some((head, body.trim_start_matches([':', '.', '-', ' ']))))
+    }
+}
+
+/// A head that is read word by word.
+struct Reading {
+    head: Head,
+    /// Whether it says that it is of rows.
+    known: bool,
+    /// Whether the next number ends a range.
+    range: bool,
+    /// Whether the next number is another row: a list goes on behind a comma, and "Row 1 2/1 LC" is none.
+    goes_on: bool,
+    /// The words so far.
+    said: String,
+}
+
+/// What follows a word of a head.
+#[derive(Clone, Copy, PartialEq)]
+enum Then {
+    GoOn,
+    /// The head ends behind it.
+    EndBehind,
+    /// The head ended before it.
+    EndBefore,
+}
+
+fn is_number(word: &str) -> bool {
+    number(word).is_some() || word.starts_with(|c: char| c.is_ascii_digit())
+}
+
+impl Reading {
+    fn new() -> Self {
+        let head = Head { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None, set_up: false };
+        Self { head, known: false, range: false, goes_on: true, said: String::new() }
+    }
+
+    fn word(&mut self, word: &str, next: &str, line: usize) -> Result<Then> {
+        let head = &mut self.head;
+        match word {
+            ":" | "." => return Ok(Then::EndBehind),
+            // "1st row - k2"
+            "-" | "\u{2013}" | "\u{2014}" if !is_number(next) => return Ok(Then::EndBehind),
+            "-" | "\u{2013}" | "\u{2014}" => self.range = true,
+            "," | "&" | "and" | "plus" if is_number(next) || is_row(next) || is_all(next) => self.goes_on = true,
+            "to" | "through" | "thru" if is_number(next) && !head.rows.is_empty() => self.range = true,
+            word if is_row(word) => {
+                self.known = true;
+                head.round |= is_round(word);
+                self.goes_on |= head.rows.is_empty();
+            }
+            word if word.starts_with(['(', '[']) && (side_of(word).is_some() || is_count(word)) => {}
+            word if is_all(word) => head.all = head.all.or(Some(1)),
+            "ws" | "rs" | "wrong" | "right" | "side" | "alternate" | "alt" | "even" | "odd" | "other" | "numbered" => {
+                if matches!(word, "even" | "odd") {
+                    head.odd = Some(word == "odd");
+                }
+                head.all = head.all.map(|_| 2);
+            }
+            "next" => head.next = 1,
+            word if is_number(word) => return self.number(word, next, line),
+            _ => return Ok(Then::EndBefore),
+        }
+        Ok(Then::GoOn)
+    }
+
+    fn number(&mut self, word: &str, next: &str, line: usize) -> Result<Then> {
+        // "rows 1-2, 3 times more"
+        if matches!(next, "times" | "time" | "more" | "further") {
+            return Ok(Then::EndBefore);
+        }
+        let head = &mut self.head;
+        let Some(n) = number(word).map(|n| n as usize) else {
+            if self.known && self.goes_on && head.all.is_none() {
+                return error(line, format!("\"{}\" is no row", short(word)), "as in Row 1:");
+            }
+            return Ok(Then::EndBefore);
+        };
+        if head.next > 0 {
+            head.next = n.min(MOST_ROWS);
+        } else if let Some(apart) = &mut head.all {
+            // "every 4th row"
+            *apart = n.max(1);
+        } else if std::mem::take(&mut self.range) {
+            let first = head.rows.pop().unwrap_or(n);
+            if first > n || n - first >= MOST_ROWS {
+                return error(line, format!("\"{first}-{n}\" is no range of rows"), "as in Rows 1-4:");
+            }
+            head.rows.extend(first..=n);
+        } else if self.goes_on {
+            head.rows.push(n);
+        } else {
+            return Ok(Then::EndBefore);
+        }
+        self.goes_on = matches!(next, "-" | "\u{2013}" | "\u{2014}" | "to" | "through" | "thru");
+        Ok(Then::GoOn)
+    }
+
+    /// The head, if that was one.
+    fn finish(self) -> Option<Head> {
+        let Self { mut head, known, said, .. } = self;
+        head.side = side_of(&said);
+        let plural = || ["rows", "rnds", "rounds"].iter().any(|rows| said.split(' ').any(|word| word == *rows));
+        if head.rows.is_empty() && head.next == 0 && (head.side.is_some() || head.odd.is_some()) && plural() {
+            head.all = Some(2);
+        }
+        (known && (!head.rows.is_empty() || head.next > 0 || head.all.is_some())).then_some(head)
     }
 }
 

@@ -158,17 +158,7 @@ pub(super) fn weave(
     let radius = [yarns.radius(), weft_of_its_own.map_or(yarns.radius(), |y| y.radius)];
     let half_width = [yarns.half_width(), weft_of_its_own.map_or(yarns.half_width(), Yarn::half_width)];
     let half_rooms = [0, 1].map(|side| written(side).unwrap_or(radius[side]) * half_width[side]);
-    let cover = table.f64("cover", Range::between(0.01, 1.0));
-    let filed = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
-    let asked =
-        [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
-    let gauge = gauge(table, fabric, &asked);
-    let asked = [0, 1].map(|side| asked[side].or(gauge.map(|g| g[side])));
-    let own_setting = [0, 1].map(|side| asked[side].is_none() && filed(side).is_some());
-    let [warp_spacing, weft_spacing] = [0, 1].map(|side| asked[side].or_else(|| filed(side)));
-    if cover.is_some() && warp_spacing.is_some() && weft_spacing.is_some() {
-        table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
-    }
+    let Setting { spacing: [warp_spacing, weft_spacing], filed, cover } = setting(table, fabric, context, wif);
     let count = wif.map_or([weave::YARNS; 2], |w| w.count);
     let warps = extent(table, context, "warps", "width", count[0]);
     let wefts = extent(table, context, "wefts", "height", count[1]);
@@ -216,8 +206,34 @@ pub(super) fn weave(
         colors,
         name,
         header: table.header(),
-        filed: own_setting,
+        filed,
     })
+}
+
+/// How closely yarns are set, of warp and weft.
+struct Setting {
+    /// From the middle of a yarn to that of the next, mm.
+    spacing: [Option<f64>; 2],
+    /// Whether that is of a draft's file and not of the scene.
+    filed: [bool; 2],
+    /// The share of the plane that yarns cover.
+    cover: Option<f64>,
+}
+
+/// The setting that is asked for, or that of the draft's file.
+fn setting(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>, wif: Option<&WovenWif>) -> Setting {
+    let cover = table.f64("cover", Range::between(0.01, 1.0));
+    let in_file = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
+    let asked =
+        [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
+    let gauge = gauge(table, fabric, &asked);
+    let asked = [0, 1].map(|side| asked[side].or(gauge.map(|g| g[side])));
+    let filed = [0, 1].map(|side| asked[side].is_none() && in_file(side).is_some());
+    let spacing = [0, 1].map(|side| asked[side].or_else(|| in_file(side)));
+    if cover.is_some() && spacing.iter().all(Option::is_some) {
+        table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
+    }
+    Setting { spacing, filed, cover }
 }
 
 /// Thickness of a thread over the mean from which on cloth is not hemmed unless asked.

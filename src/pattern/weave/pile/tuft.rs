@@ -145,88 +145,97 @@ impl Tuft {
         if strand.curve.radii.is_none() {
             way.iter_mut().for_each(|p| p.1 = self.radius);
         }
-        let last = way.len() - 1;
         let [first, second] = self.legs;
-        round_off(&mut way, [first, last - second]);
-        let (ground, middle) = (first..=last - second, (first + last - second) / 2);
-        let kept: Vec<usize> = (0..=last)
-            .filter(|&i| {
-                let (of, stride) = if i < first {
-                    (0, STRIDE)
-                } else if ground.contains(&i) {
-                    (middle, self.stride)
-                } else {
-                    (last, STRIDE)
-                };
-                i.abs_diff(of).is_multiple_of(stride)
-            })
-            .collect();
+        let ends = [first, way.len() - 1 - second];
+        round_off(&mut way, ends);
+        let kept = self.kept(way.len());
         let bundle = bundle();
-        let random = |what: u32| random(self.seed, what);
-        let turned = DVec2::from_angle(PI * random(0));
-        let thin = LOOSE / f64::from(ACROSS);
-        let height = (self.cut.top - self.cut.foot).abs().max(1e-12);
-        let ground = (GROUND * self.radius / height).min(MOST_GROUND);
-        let parted = |s: f64| {
-            let x = ((s - ground) / (1.0 - ground)).max(0.0);
-            x * (SOON - (SOON - 1.0) * x)
-        };
+        let turned = DVec2::from_angle(PI * random(self.seed, 0));
         let room = 4.0 * self.spread[0] * self.spread[1] / bundle.len() as f64;
-        let apart = room.sqrt();
         let (mut strands, mut tips) = (Vec::new(), Vec::new());
         for (k, at) in bundle.iter().enumerate() {
             let at = turned.rotate(*at);
-            let place = |i: usize| -> Point {
-                let (p, radius, axis, coordinates) = way[i];
-                let tangent = (way[(i + 1).min(last)].0 - way[i.saturating_sub(1)].0).normalize_or(DVec3::Z);
-                let major = (self.across - self.across.dot(tangent) * tangent).normalize_or(self.across);
-                let minor = tangent.cross(major);
-                // Pressed flat as the yarn is.
-                let ratio = if flat { f64::from(axis.length()) } else { 1.0 };
-                let off = at.x * major + at.y * ratio * minor;
-                let radius = PRESSED * radius;
-                (p + off * radius, thin * radius, minor.as_vec3() * ratio as f32, coordinates)
-            };
-            let places: Vec<Point> = kept.iter().map(|&i| place(i)).collect();
+            let places: Vec<Point> = kept.iter().map(|&i| self.beside(&way, i, at, flat)).collect();
             let mut made = from_points(strand.kind, strand.index, &places, flat);
             made.curve.radii = Some(places.iter().map(|p| p.1).collect());
             made.share = strand.share / bundle.len() as f64;
-            let even = evenly(at);
-            // Across the yarn and along it, in the plane of the cut.
-            let across = self.across.truncate();
-            let ends = [(first, 0, 1), (second, kept.len() - 1, -1)];
-            for (leg, (count, tip, step)) in ends.into_iter().enumerate().filter(|(_, end)| end.0 > 0) {
-                let chance = |what: u32| random(1 + 8 * k as u32 + 4 * leg as u32 + what);
-                let path = way[if leg == 0 { 0 } else { last }].0.truncate();
-                // As `minor` is: upwards the yarn goes the other way at its end.
-                let along = if leg == 0 { -across.perp() } else { across.perp() };
-                let off = across * (even.x * self.spread[0]) + along * (even.y * self.spread[1]);
-                let by_chance = DVec2::new(chance(0), chance(1)) * (UNEVEN * apart);
-                let on_leg: Vec<f64> = kept
-                    .iter()
-                    .map(|&i| if leg == 0 { i } else { last - i })
-                    .filter(|i| *i < count)
-                    .map(|i| parted(1.0 - i as f64 / count as f64))
-                    .collect();
-                // From the tip on.
-                let on_leg = if leg == 0 { on_leg } else { on_leg.into_iter().rev().collect() };
-                tips.push(Tip {
-                    tuft: 0,
-                    strand: strands.len(),
-                    within: across * at.x + along * at.y,
-                    leg,
-                    first: tip,
-                    step,
-                    parted: on_leg,
-                    stood: path + off + by_chance,
-                    room,
-                    cut: self.cut,
-                    chance: CUT * self.radius * chance(2),
-                });
-            }
             strands.push(made);
+            tips.extend([0, 1].into_iter().filter(|leg| self.legs[*leg] > 0).map(|leg| {
+                let path = way[if leg == 0 { 0 } else { way.len() - 1 }].0.truncate();
+                self.tip(k, at, leg, path, (&kept, way.len(), room))
+            }));
         }
         (strands, tips)
+    }
+
+    /// Which of so many points of the yarn its strands keep: the tips and the middle of the ground among them.
+    fn kept(&self, count: usize) -> Vec<usize> {
+        let last = count - 1;
+        let [first, second] = self.legs;
+        let (ground, middle) = (first..=last - second, (first + last - second) / 2);
+        let is_kept = |i: &usize| {
+            let (of, stride) = match *i {
+                i if i < first => (0, STRIDE),
+                i if ground.contains(&i) => (middle, self.stride),
+                _ => (last, STRIDE),
+            };
+            i.abs_diff(of).is_multiple_of(stride)
+        };
+        (0..=last).filter(is_kept).collect()
+    }
+
+    /// The point of a strand that is `at` such a place of the yarn's section, beside point `i` of the yarn's way.
+    fn beside(&self, way: &[Point], i: usize, at: DVec2, flat: bool) -> Point {
+        let (p, radius, axis, coordinates) = way[i];
+        let tangent = (way[(i + 1).min(way.len() - 1)].0 - way[i.saturating_sub(1)].0).normalize_or(DVec3::Z);
+        let major = (self.across - self.across.dot(tangent) * tangent).normalize_or(self.across);
+        let minor = tangent.cross(major);
+        // Pressed flat as the yarn is.
+        let ratio = if flat { f64::from(axis.length()) } else { 1.0 };
+        let off = at.x * major + at.y * ratio * minor;
+        let radius = PRESSED * radius;
+        (p + off * radius, LOOSE / f64::from(ACROSS) * radius, minor.as_vec3() * ratio as f32, coordinates)
+    }
+
+    /// The tip of strand `k` on a leg that ends above `path`, with the points that strands keep of the yarn's `count` and the room
+    /// of a tip.
+    fn tip(&self, k: usize, at: DVec2, leg: usize, path: DVec2, (kept, count, room): (&[usize], usize, f64)) -> Tip {
+        let chance = |what: u32| random(self.seed, 1 + 8 * k as u32 + 4 * leg as u32 + what);
+        // Across the yarn and along it, in the plane of the cut. As `minor` is: upwards the yarn goes the other way at its end.
+        let across = self.across.truncate();
+        let along = if leg == 0 { -across.perp() } else { across.perp() };
+        let even = evenly(at);
+        let off = across * (even.x * self.spread[0]) + along * (even.y * self.spread[1]);
+        let by_chance = DVec2::new(chance(0), chance(1)) * (UNEVEN * room.sqrt());
+        let points = self.legs[leg];
+        let parted = |i: usize| (i < points).then(|| self.parted(1.0 - i as f64 / points as f64));
+        // From the tip on.
+        let parted: Vec<f64> = match leg {
+            0 => kept.iter().filter_map(|&i| parted(i)).collect(),
+            _ => kept.iter().rev().filter_map(|&i| parted(count - 1 - i)).collect(),
+        };
+        let (first, step) = if leg == 0 { (0, 1) } else { (kept.len() - 1, -1) };
+        Tip {
+            tuft: 0,
+            strand: k,
+            within: across * at.x + along * at.y,
+            leg,
+            first,
+            step,
+            parted,
+            stood: path + off + by_chance,
+            room,
+            cut: self.cut,
+            chance: CUT * self.radius * chance(2),
+        }
+    }
+
+    /// How far strands have parted at a share of a leg's way from its foot: not at all in the ground, 1 at the tip.
+    fn parted(&self, s: f64) -> f64 {
+        let height = (self.cut.top - self.cut.foot).abs().max(1e-12);
+        let ground = (GROUND * self.radius / height).min(MOST_GROUND);
+        let x = ((s - ground) / (1.0 - ground)).max(0.0);
+        x * (SOON - (SOON - 1.0) * x)
     }
 }
 
