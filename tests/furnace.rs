@@ -77,9 +77,8 @@ fn white(name: &str, source: &str, plies: u32, density: f64, spp: u32, extra: &s
 fn knits_of_one_and_three_plies() {
     let source = "{ type = \"stockinette\", stitches = 5, rows = 8 }";
     let mut wrong = Vec::new();
-    // The sparsest loses 0.004 of the light where it covers pixels: so near the bound, noise needs to be small.
-    for (plies, density, spp) in [(1, 0.25, 256), (1, 0.6, 256), (3, 0.15, 2048), (3, 0.4, 256), (3, 0.8, 256)] {
-        wrong.extend(white("knit", source, plies, density, spp, ""));
+    for (plies, density) in [(1, 0.25), (1, 0.6), (3, 0.15), (3, 0.4), (3, 0.8)] {
+        wrong.extend(white("knit", source, plies, density, 256, ""));
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -1,3 +1,9 @@
+use std::{
+    collections::HashMap,
+    hash::Hash,
+    sync::{LazyLock, Mutex, OnceLock},
+};
+
 use glam::DVec2;
 
 use super::{
@@ -9,6 +15,26 @@ use crate::geometry::{curve::Curve, overlap::overlap};
 fn weave(draft: &str) -> Weave {
     let (warps, wefts) = (Extent::Yarns(12), Extent::Yarns(10));
     Weave { warps, wefts, ..Weave::of(Draft::named(draft).unwrap(), 1.0) }
+}
+
+/// What several tests look at, made once by the first that asks for it.
+struct Made<K, T: 'static>(LazyLock<Mutex<HashMap<K, &'static OnceLock<T>>>>);
+
+impl<K: Eq + Hash, T> Made<K, T> {
+    const fn new() -> Self {
+        Self(LazyLock::new(Mutex::default))
+    }
+
+    fn get(&self, key: K, make: impl FnOnce() -> T) -> &'static T {
+        let made = *self.0.lock().unwrap().entry(key).or_insert_with(|| Box::leak(Box::default()));
+        made.get_or_init(make)
+    }
+}
+
+/// The cloth of a draft as [`weave`] has it.
+fn relaxed(draft: &'static str) -> &'static Cloth<'static> {
+    static MADE: Made<&str, Cloth> = Made::new();
+    MADE.get(draft, || Box::leak(Box::new(weave(draft))).relax().unwrap())
 }
 
 /// Whether the warp is above the weft where both cross, seen from above: at the nearest pair of their points in plan.
@@ -32,12 +58,11 @@ fn warp_is_above(strands: &[PatternStrand], place: [f32; 2]) -> bool {
 #[test]
 fn the_draft_says_what_lies_on_top() {
     for name in NAMES {
-        let weave = weave(name);
-        let cloth = weave.relax().unwrap();
-        let strands = cloth.ground();
+        let strands = relaxed(name).ground();
+        let draft = Draft::named(name).unwrap();
         for (i, j) in (0..10_u32).flat_map(|i| (0..12_u32).map(move |j| (i, j))) {
             let above = warp_is_above(&strands, [j as f32 + 0.5, i as f32 + 0.5]);
-            assert_eq!(above, weave.draft.warp_over(i as usize, j as usize), "{name}: weft {i}, warp {j}");
+            assert_eq!(above, draft.warp_over(i as usize, j as usize), "{name}: weft {i}, warp {j}");
         }
     }
 }
@@ -45,9 +70,8 @@ fn the_draft_says_what_lies_on_top() {
 #[test]
 fn yarns_touch_and_hardly_run_into_each_other() {
     for name in NAMES {
-        let weave = weave(name);
-        let cloth = weave.relax().unwrap();
-        let [deepest, share] = cloth.cell.overlap(weave.options().unit());
+        let cloth = relaxed(name);
+        let [deepest, share] = cloth.cell.overlap(weave(name).options().unit());
         // Twined warps, the ridges of a honeycomb and wefts that are held in the same places press hardest.
         let (most, depth) = match *name {
             "honeycomb" | "honeycomb 10" | "corduroy" => (MOST_OVERLAP, 0.6),
@@ -107,7 +131,7 @@ fn closed_weaves_are_closed() {
     for (name, most) in
         [("plain", 0.08), ("twill 2/2", 0.08), ("satin 5", 0.01), ("satin 8", 0.01), ("double cloth", 0.01)]
     {
-        let see_through = weave(name).relax().unwrap().measures().see_through;
+        let see_through = relaxed(name).measures().see_through;
         assert!(see_through < most, "{name}: {see_through}");
     }
 }
@@ -137,7 +161,7 @@ fn warp_face(cell: &UnitCell) -> f64 {
 #[test]
 fn floats_of_a_satin_hide_what_crosses_them() {
     for (name, least) in [("satin 5", 0.9), ("satin 8/3", 0.95)] {
-        let face = warp_face(&weave(name).relax().unwrap().cell);
+        let face = warp_face(&relaxed(name).cell);
         eprintln!("{name}: {face:.3}");
         assert!(face > least, "{name}: {face}");
     }
@@ -148,8 +172,7 @@ fn floats_of_a_satin_hide_what_crosses_them() {
 #[test]
 fn a_herringbone_is_as_even_as_its_twill() {
     for name in ["herringbone 2/2 8", "herringbone"] {
-        let cell = weave(name).relax().unwrap().cell;
-        for yarn in &cell.yarns[0] {
+        for yarn in &relaxed(name).cell.yarns[0] {
             let mean = yarn.iter().map(|n| n.aside).sum::<f64>() / yarn.len() as f64;
             let square = yarn.iter().map(|n| (n.aside - mean).powi(2)).sum::<f64>() / yarn.len() as f64;
             assert!(square.sqrt() < 0.2, "{name}: {}", square.sqrt());
@@ -159,8 +182,7 @@ fn a_herringbone_is_as_even_as_its_twill() {
 
 #[test]
 fn warps_of_a_basket_draw_together() {
-    let weave = weave("basket 2");
-    let cell = weave.relax().unwrap().cell;
+    let cell = &relaxed("basket 2").cell;
     let mean =
         |yarn: usize| cell.yarns[0][yarn].iter().map(|n| n.aside).sum::<f64>() / cell.yarns[0][yarn].len() as f64;
     let within = cell.spacing[0] + mean(1) - mean(0);
@@ -242,15 +264,20 @@ fn turning() -> impl Iterator<Item = (&'static str, &'static [u32])> {
     one.chain(several.into_iter().flat_map(|name| ORDERS[1..].iter().map(move |order| (name, *order))))
 }
 
+/// The strands of such a piece: ten picks, and wide enough for warps that float at both sides of two layers.
+fn turned(draft: &'static str, order: &'static [u32]) -> &'static [PatternStrand] {
+    static MADE: Made<(&str, &[u32]), Vec<PatternStrand>> = Made::new();
+    let warps = Extent::Yarns(16);
+    let piece = || Weave { edges: Edges::Selvedge, shuttles: order.to_vec(), warps, ..weave(draft) };
+    MADE.get((draft, order), || piece().strands().unwrap())
+}
+
 #[test]
 fn selvedges_make_one_strand_of_each_shuttle() {
     for (name, order) in turning() {
-        // Wide enough for warps that float at both sides of two layers.
-        let warps = Extent::Yarns(16);
-        let weave = Weave { edges: Edges::Selvedge, shuttles: order.to_vec(), warps, ..weave(name) };
-        let strands = weave.strands().unwrap();
+        let strands = turned(name, order);
         let wefts: Vec<_> = strands.iter().filter(|s| s.kind == StrandKind::Weft).collect();
-        let layers = weave.draft.layers();
+        let layers = Draft::named(name).unwrap().layers();
         let yarns: std::collections::BTreeSet<_> =
             (0..10).map(|i| (i % layers, order.get(i % order.len().max(1)))).collect();
         assert_eq!(wefts.len(), yarns.len(), "{name} {order:?}");
@@ -340,12 +367,10 @@ fn yarns_have_room_at_selvedges() {
 #[test]
 fn wefts_turn_without_folding_into_themselves() {
     for (name, order) in turning() {
-        let weave = Weave { edges: Edges::Selvedge, shuttles: order.to_vec(), ..weave(name) };
-        let made = weave.strands().unwrap();
-        for weft in made.iter().filter(|s| s.kind == StrandKind::Weft) {
+        for weft in turned(name, order).iter().filter(|s| s.kind == StrandKind::Weft) {
             // Beyond the outermost crossings.
             let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
-                *fold = if (0.51..11.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, weave.half_rooms[1]) };
+                *fold = if (0.51..15.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, 1.0) };
                 Some(*fold)
             });
             let deepest = fold.fold(0.0, f64::max);
@@ -439,8 +464,7 @@ fn pile_is_made_in_pieces_of_any_size() {
 /// Once its floats are cut, what is left of a corduroy must cover what they did.
 #[test]
 fn corduroy_has_more_picks_than_ends() {
-    let cloth = weave("corduroy");
-    let Measures { spacing: [p, q], see_through, .. } = cloth.relax().unwrap().measures();
+    let Measures { spacing: [p, q], see_through, .. } = relaxed("corduroy").measures();
     // Radii are 1: picks lie closer than side by side.
     assert!(p > 1.9 * q && q < 2.0 && see_through < 0.01, "{p} {q} {see_through}");
 }
