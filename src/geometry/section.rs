@@ -38,7 +38,7 @@ use super::{
     walk::Walker,
     way::{self, Passage, Station, Way},
     yarn::YarnShape,
-    yarn_frame::{Pressed, YarnFrame},
+    yarn_frame::{Pressed, SectionGrowth, YarnFrame},
 };
 use crate::math::frame::sin_cos;
 
@@ -77,6 +77,8 @@ pub struct Section<'a> {
     pub pressed: Option<Pressed>,
     /// By how much the axis of pressing turns along the yarn, radians per yarn radius.
     pub pressed_turn: f32,
+    /// How it grows along the yarn.
+    pub growth: SectionGrowth,
     /// How far the yarn goes on either way, yarn radii.
     pub ends: [f32; 2],
     /// The way to the rest of the yarn, where it is more than this place.
@@ -124,6 +126,7 @@ impl<'a> Section<'a> {
             pressed: Pressed::new(place.flattening)
                 .map(|pressed| Pressed { axis: pressed.axis.rotate(normal), ..pressed }),
             pressed_turn: place.flattening_turn,
+            growth: place.growth,
             ends: [f32::NEG_INFINITY, f32::INFINITY],
             walker: None,
         }
@@ -219,11 +222,20 @@ impl<'a> Section<'a> {
         1.0 / self.squeeze()
     }
 
-    /// Of a slope across the yarn along it, at a point of the round section, that in the section as it is pressed there. What presses
-    /// turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J).
+    /// Of a slope across the yarn along it, at a point of the round section, that in the section as it is there: as wide as it grows, and
+    /// `pressed`. What presses turns as well: the map A at the angle phi is R(phi) S R(-phi), so that A' = phi' (J A - A J) + R(phi) S' R(-phi).
     #[inline]
-    fn pressed_slope(&self, pressed: &Pressed, at: Vec2, slope: Vec2) -> Vec2 {
-        pressed.real(slope) + self.pressed_turn * (pressed.real(at).perp() - pressed.real(at.perp()))
+    fn real_slope(&self, pressed: Option<Pressed>, at: Vec2, slope: Vec2) -> Vec2 {
+        let SectionGrowth { widening, thickening } = self.growth;
+        match pressed {
+            None => slope + widening * at,
+            Some(pressed) => {
+                let real = pressed.real(at);
+                let turned = self.pressed_turn * (real.perp() - pressed.real(at.perp()));
+                let grown = widening * real + thickening * at.dot(pressed.axis) * pressed.axis;
+                pressed.real(slope) + turned + grown
+            }
+        }
     }
 
     /// The tangent of a fibre of a ply at a `point` of this frame, `travel` farther along the yarn: its part along the yarn

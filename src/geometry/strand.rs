@@ -21,7 +21,7 @@ use super::{
     segment_uvs::SegmentUvs,
     spline::evaluate_f32,
     tube::curve_of,
-    yarn_frame::{ROUND, YarnFrame},
+    yarn_frame::{ROUND, SectionGrowth, YarnFrame},
 };
 
 /// What a curve must satisfy on its way to Embree.
@@ -409,7 +409,7 @@ impl Strands {
         // As fast at its ends as the segment, so that lines which wind about the yarn do not kink there.
         let [start, end] = [0.0, 1.0].map(|u| {
             let (at, speed, _) = evaluate_f32(self.basis, &p, u);
-            speed.length() / at.w.max(1e-30)
+            speed.truncate().length() / at.w.max(1e-30)
         });
         let (length, v) = (to - from, 1.0 - u);
         Some(from + u * (u * (3.0 - 2.0 * u) * length + v * (v * start - u * end)))
@@ -469,23 +469,26 @@ impl Strands {
 
     #[inline]
     fn frame_of(&self, first: usize, p: &[Vec4; 4], frame: &SegmentFrame, u: f32) -> YarnFrame {
-        let (at, d1, d2) = evaluate_f32(self.basis, p, u);
+        let (at, speed, d2) = evaluate_f32(self.basis, p, u);
+        let d1 = Vec3A::from_vec4(speed);
         let speed_squared = d1.length_squared().max(1e-30);
-        let speed = speed_squared.sqrt();
-        let tangent = d1 / speed;
-        let stride = speed / at.w.max(1e-30);
+        let length = speed_squared.sqrt();
+        let tangent = d1 / length;
+        let stride = length / at.w.max(1e-30);
+        let widening = speed.w / length;
         let curvature = (d2 - d2.dot(tangent) * tangent) / speed_squared;
         let normal = frame.normals[0].lerp(frame.normals[1], u);
         let normal = normal - normal.dot(tangent) * tangent;
-        let (flattening, flattening_turn) = if self.flattening.is_empty() {
-            (ROUND, 0.0)
+        let (flattening, flattening_turn, thickening) = if self.flattening.is_empty() {
+            (ROUND, 0.0, 0.0)
         } else {
             let (from, to) = (self.flattening[first + 1], self.flattening[first + 2]);
             let length = |v: Vec2| v.length();
             // The ratio by itself: between two axes a straight line is shorter than both.
-            let ratio = length(from) + u * (length(to) - length(from));
+            let growth = length(to) - length(from);
+            let ratio = length(from) + u * growth;
             let turn = from.perp_dot(to) / (length(from) * length(to)).max(1e-12);
-            (ratio * from.lerp(to, u).normalize_or(ROUND), turn / stride)
+            (ratio * from.lerp(to, u).normalize_or(ROUND), turn / stride, growth / stride)
         };
         YarnFrame {
             centre: Vec3A::from_vec4(at),
@@ -498,6 +501,7 @@ impl Strands {
             stride,
             flattening,
             flattening_turn,
+            growth: SectionGrowth { widening, thickening },
         }
     }
 }

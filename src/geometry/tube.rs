@@ -137,7 +137,7 @@ impl Tubes {
         let first = self.segments[segment as usize] as usize;
         let p: &[Vec4; 4] = self.points[first..first + 4].try_into().expect("a segment has four points");
         let (at, d1, _) = evaluate_f32(self.basis, p, u);
-        TubePlace { centre: Vec3A::from_vec4(at), tangent: d1.normalize_or(Vec3A::X), radius: at.w }
+        TubePlace { centre: Vec3A::from_vec4(at), tangent: Vec3A::from_vec4(d1).normalize_or(Vec3A::X), radius: at.w }
     }
 
     /// The tubes as curves with radii, to be written to a file.

@@ -26,6 +26,17 @@ pub struct YarnFrame {
     pub flattening: Vec2,
     /// By how much that axis turns in the frame along the yarn, radians per yarn radius.
     pub flattening_turn: f32,
+    /// How the section changes along the yarn.
+    pub growth: SectionGrowth,
+}
+
+/// How a section changes along the yarn, for each yarn radius: its fibres go with it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SectionGrowth {
+    /// Of the long axis, over it.
+    pub widening: f32,
+    /// Of the ratio of the short axis to the long one.
+    pub thickening: f32,
 }
 
 /// [`YarnFrame::flattening`] of a round yarn.

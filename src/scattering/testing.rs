@@ -7,7 +7,7 @@ use crate::geometry::{
     fiber::{packing::measured, slopes::Twist},
     section::Section,
     yarn::{YarnShape, tests::touching_yarn},
-    yarn_frame::{ROUND, YarnFrame},
+    yarn_frame::{ROUND, SectionGrowth, YarnFrame},
 };
 
 /// Albedos of R, TT and D.
@@ -48,6 +48,7 @@ pub(super) fn section(theta: f32, h: f32, phase: f32) -> Section<'static> {
         stride: 1.0,
         flattening: ROUND,
         flattening_turn: 0.0,
+        growth: SectionGrowth::default(),
     };
     let towards = Vec3A::new(theta.cos(), 0.0, theta.sin());
     Section::new(&place, h * Vec3A::Y, -towards, true)

@@ -7,7 +7,7 @@ use crate::{
     cloth::pressed_scatterer,
     geometry::{
         section::{Crossings, Section},
-        yarn_frame::{Pressed, ROUND, YarnFrame},
+        yarn_frame::{Pressed, ROUND, SectionGrowth, YarnFrame},
     },
     math::{Rgb, sampler::Sampler},
     scattering::{
@@ -68,6 +68,7 @@ pub(crate) fn straight_section(theta: f64, h: f32, phase: f64, tilted: bool) -> 
         stride: 1.0,
         flattening: ROUND,
         flattening_turn: 0.0,
+        growth: SectionGrowth::default(),
     };
     let towards = Vec3A::new(theta.cos() as f32, 0.0, theta.sin() as f32);
     Section::new(&place, Vec3A::new(0.0, h, 0.0), -towards, tilted)

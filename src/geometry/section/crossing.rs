@@ -11,7 +11,7 @@ use crate::{
         occluder::PlyGaps,
         way::{self, Station, Way},
         yarn::{MAX_PLIES, YarnShape, fiber_tangent},
-        yarn_frame::Pressed,
+        yarn_frame::{Pressed, SectionGrowth},
     },
     math::special::GAUSS_LEGENDRE_4,
 };
@@ -116,11 +116,9 @@ impl PlyAhead<'_> {
         let along = station.advance * station.straightness;
         let of = &shape.plies[self.ply];
         let at = station.at;
-        let mut t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at).truncate();
-        if let Some(pressed) = from.pressed {
-            let pressed = Pressed { axis: unrotate(pressed.axis, turned), ..pressed };
-            t = section.pressed_slope(&pressed, at, t);
-        }
+        let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at).truncate();
+        let pressed = from.pressed.map(|pressed| Pressed { axis: unrotate(pressed.axis, turned), ..pressed });
+        let t = section.real_slope(pressed, at, t);
         let (w, t) = (across.extend(along), (t / station.straightness).extend(1.0));
         let square = w.cross(t).length_squared() / w.length_squared().max(1e-12);
         section.squeeze() * square.max(1e-9).sqrt() / self.cos
@@ -143,7 +141,7 @@ impl Section<'_> {
     ) -> f32 {
         let of = &shape.plies[ply];
         let along = |at: &Station| if self.tilted { at.advance * at.straightness } else { -self.sin };
-        if of.fiber_rate == 0.0 && shape.ply_rate == 0.0 {
+        if of.fiber_rate == 0.0 && shape.ply_rate == 0.0 && self.growth == SectionGrowth::default() {
             // Fibres along the yarn.
             let along = 0.5 * (along(enter) + along(exit));
             return (1.0 - along * along).max(1e-6).sqrt() * self.squeeze();
@@ -156,7 +154,7 @@ impl Section<'_> {
             None => {
                 let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at.at);
                 let w = at.slope + self.turn(shape) * at.advance * at.at.perp();
-                (t.truncate() / at.straightness, w, along(at))
+                (self.real_slope(None, at.at, t.truncate()) / at.straightness, w, along(at))
             }
             Some(_) => {
                 let t = self.fiber_tangent(shape, ply, self.point(at.depth), at.travel);

@@ -154,11 +154,7 @@ impl Inside {
     pub(super) fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {
         let of = &shape.plies[ply];
         let t = fiber_tangent(of, shape.ply_rate, of.distance * of.direction, of.direction, at);
-        let mut across = t.truncate();
-        if let Some(pressed) = &self.pressed {
-            across = section.pressed_slope(pressed, at, across);
-        }
-        let across = across / self.straightness;
+        let across = section.real_slope(self.pressed, at, t.truncate()) / self.straightness;
         self.out(across.extend(1.0).into())
     }
 

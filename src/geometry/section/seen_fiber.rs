@@ -81,7 +81,7 @@ mod tests {
             fiber::{packing::hard_discs, slopes::Twist},
             section::Crossings,
             yarn::tests::touching_yarn,
-            yarn_frame::{ROUND, YarnFrame},
+            yarn_frame::{ROUND, SectionGrowth, YarnFrame},
         },
         math::sampler::Stream,
     };
@@ -99,6 +99,7 @@ mod tests {
             stride: 1.0,
             flattening: ROUND,
             flattening_turn: 0.0,
+            growth: SectionGrowth::default(),
         };
         Section::new(&place, Vec3A::new(x, y, 5.0), Vec3A::NEG_Z, true)
     }

@@ -11,7 +11,7 @@ use crate::{
         curve::{Basis, Curve},
         strand::{StrandOptions, Strands},
         yarn::{PlyParameters, tests::touching_yarn, touching_plies},
-        yarn_frame::ROUND,
+        yarn_frame::{ROUND, SectionGrowth},
     },
     math::sampler::Stream,
 };
@@ -28,6 +28,7 @@ fn place() -> YarnFrame {
         stride: 1.0,
         flattening: ROUND,
         flattening_turn: 0.0,
+        growth: SectionGrowth::default(),
     }
 }
 

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
+use crate::geometry::{section::Section, yarn::tests::touching_yarn};
 
 fn options(basis: Basis) -> StrandOptions {
     StrandOptions {
@@ -141,6 +142,41 @@ fn a_flattened_section_keeps_its_axes_wherever_points_are_put() {
                 assert!((f64::from(found.1.length()) / 0.5 - ratio).abs() < 0.01, "pressed along its axis");
             }
         }
+    }
+}
+
+/// The tangents of fibres are the directions in which they go on: with the plies, and with a section that becomes wider and flatter and
+/// whose axis turns.
+#[test]
+fn fibres_go_along_with_a_section_that_changes() {
+    let shape = touching_yarn(1, 40, 0.4, 0.0, 0.4);
+    let rate = f64::from(shape.plies[0].fiber_rate);
+    let points: Vec<DVec3> = (0..30).map(|i| DVec3::new(0.0, 0.0, 0.2 * f64::from(i))).collect();
+    let swell = |z: f64| (1.5 * z).sin();
+    let radii: Vec<f64> = points.iter().map(|p| 0.5 + 0.1 * swell(p.z)).collect();
+    let axis = |p: &DVec3| (DVec3::new((0.5 * p.z).cos(), (0.5 * p.z).sin(), 0.0) * (0.7 - 0.2 * swell(p.z))).as_vec3();
+    for pressed in [false, true] {
+        let flattening = pressed.then(|| points.iter().map(axis).collect());
+        let curve = Curve { basis: Basis::CatmullRom, closed: false, points: points.clone(), radii: None, flattening };
+        let s =
+            Strands::new(&[(curve, radii.clone())], &StrandOptions { ply_rate: rate, ..options(Basis::CatmullRom) });
+        let mut most = 0.0_f32;
+        for segment in 4..s.segments().len() as u32 - 4 {
+            for (k, u) in [0.2, 0.5, 0.8].into_iter().enumerate() {
+                let at = 0.8 * Vec2::from_angle(segment as f32 + k as f32);
+                let on_fibre = |u: f32| {
+                    let place = s.frame(segment, u);
+                    place.point(at.rotate(Vec2::from_angle(place.phase)))
+                };
+                let place = s.frame(segment, u);
+                let section = Section::new(&place, on_fibre(u) + 9.0 * Vec3A::Y, Vec3A::NEG_Y, true);
+                let local = section.to_local(on_fibre(u) - place.centre) / place.radius;
+                let tangent = section.to_world(section.fiber_tangent(&shape, 0, local, 0.0)).normalize();
+                let way = (on_fibre(u + 0.01) - on_fibre(u - 0.01)).normalize();
+                most = most.max(tangent.distance(way));
+            }
+        }
+        assert!(most < 0.012, "{pressed}: {most}");
     }
 }
 
