@@ -23,16 +23,20 @@ pub(super) struct Edge {
     pub(super) first: bool,
     /// Whether its first row is picked up along the other's edge.
     pub(super) picked_up: bool,
+    /// Whether it is hemmed: what goes on beyond it is not the border's.
+    pub(super) hemmed: bool,
 }
 
 /// Where a corner of a stitch goes on the border.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Landing {
     pub(super) at: DVec2,
-    /// Whether the border is sewn to nothing there.
+    /// Whether the border is sewn to nothing there, nor hemmed.
     pub(super) free: bool,
     /// Whether the first row is picked up there.
     pub(super) picked_up: bool,
+    /// Whether it is at the end of what is turned in.
+    pub(super) turned_in: bool,
 }
 
 /// A place of the panel near a seam that is turned in, or beyond it.
@@ -113,8 +117,8 @@ impl Border {
     pub(super) fn onto(&self, from: DVec2, reach: f64) -> Landing {
         let close = |e: &&Edge| on(&e.border, from).0.distance_squared(from) < (reach + e.margin.abs()).powi(2);
         let near: Vec<&Edge> = self.around(from, reach + self.widest).into_iter().filter(close).collect();
-        let Some(Edge { border, margin, picked_up, .. }) = nearest(from, near.iter().copied()) else {
-            return Landing { at: from, free: false, picked_up: false };
+        let Some(Edge { border, margin, picked_up, hemmed, .. }) = nearest(from, near.iter().copied()) else {
+            return Landing { at: from, free: false, picked_up: false, turned_in: false };
         };
         let mut at = on(border, from).0;
         if *margin < 0.0 {
@@ -133,7 +137,8 @@ impl Border {
                 }
             }
         }
-        Landing { at, free: border.sewn_to.is_none(), picked_up: *picked_up }
+        let free = border.sewn_to.is_none() && !hemmed;
+        Landing { at, free, picked_up: *picked_up, turned_in: *margin < 0.0 }
     }
 
     /// The place of the border nearest to a point.
@@ -156,6 +161,17 @@ impl Border {
         let out = -inside(border, at);
         // Straight before the seam, not beside its ends.
         *margin < 0.0 && out > 0.0 && out < -margin && out > BEFORE * on(border, at).0.distance(at)
+    }
+
+    /// Whether an edge that is not hemmed is within a distance of a place.
+    pub(super) fn is_near_other(&self, at: DVec2, within: f64) -> bool {
+        self.around(at, within).iter().any(|e| !e.hemmed && on(&e.border, at).0.distance(at) < within)
+    }
+
+    /// The distance to the nearest of the seams that are turned in, and its kind, if there is one within a distance.
+    pub(super) fn seam_within(&self, at: DVec2, within: f64) -> Option<(f64, SeamKind)> {
+        let edge = nearest(at, self.around(at, within).into_iter().filter(|e| e.margin < 0.0))?;
+        Some((on(&edge.border, at).0.distance(at), edge.seam)).filter(|(distance, _)| *distance < within)
     }
 
     /// Where a place lies against the nearest of the seams that are turned in, within a distance of it.

@@ -7,7 +7,8 @@ use super::{
     mesh::GarmentError,
     options::{Cloth, Options},
     panels::Panel,
-    surface::{BorderEdge, bounds},
+    sewing::Sewing,
+    surface::{BorderEdge, Finder, Surface, bounds},
 };
 
 /// More stitches than these are not laid.
@@ -73,4 +74,50 @@ pub(super) fn flat(lattices: &[Lattice], panels: &[Panel]) -> Result<(), Garment
         }
     }
     Ok(())
+}
+
+/// A hem holds so many stitches of the cloth beside its bend.
+const LEAST_IN_HEM: f64 = 3.0;
+/// No more of a hem's length than this may have no cloth over it: by a seam that slants the panel is narrower there.
+const BARE: f64 = 0.2;
+
+/// Hems of panels that are sewn all round, or that are too narrow or too wide; `cloth` is that of each panel.
+pub(super) fn hems(
+    sewing: &Sewing,
+    surface: &Surface,
+    borders: &[Vec<BorderEdge>],
+    (panels, cloth): (&[Panel], &[usize]),
+    cloths: &[Cloth],
+) -> Result<(), GarmentError> {
+    for (i, asked) in cloths.iter().enumerate() {
+        let Some(hem) = asked.hem else { continue };
+        let mut found = false;
+        for panel in (0..panels.len()).filter(|&p| cloth[p] == i) {
+            let division = sewing.division(panel);
+            let (_, line) = division.border(panel as u32, &borders[panel]);
+            let (Some(line), Panel { group, line: at, .. }) = (line, &panels[panel]) else { continue };
+            found = true;
+            let least = 2.0 * line.turnup.fold.begin() + LEAST_IN_HEM * division.stitch.max_element();
+            if hem.width < least {
+                let problem = format!("a hem of {:.2} mm is too narrow for the cloth of panel `{group}`", hem.width);
+                return Err(GarmentError::at(*at, problem, format!("`hem_width` of {least:.2} mm or more")));
+            }
+            if line.without_cloth(&Finder::new(surface, panel as u32)) > BARE {
+                let problem = format!("a hem of {:.2} mm is wider than panel `{group}` is high over it", hem.width);
+                let hint = "a smaller `hem_width`, or `hem = \"none\"` of that panel";
+                return Err(GarmentError::at(*at, problem, hint));
+            }
+        }
+        if let (false, Some(group)) = (found, &asked.group)
+            && asked.hems_itself
+        {
+            let problem = format!("no edge of the panels \"{group}\" is free to be hemmed: all are sewn");
+            return Err(GarmentError::new(problem, "leave `hem` out, or name the panels whose edges are free"));
+        }
+    }
+    let hemmed = (0..panels.len()).any(|p| (0..borders[p].len()).any(|edge| sewing.is_hemmed(p, edge)));
+    if hemmed || cloths.iter().all(|c| c.hem.is_none()) {
+        return Ok(());
+    }
+    Err(GarmentError::new("no edge of the garment is free to be hemmed: all are sewn", "leave `hem` out"))
 }

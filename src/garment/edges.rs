@@ -20,8 +20,11 @@ pub(super) struct Way {
     pub(super) panel: u32,
 }
 
-/// Joins edges `[from, to]` of one kind to ways.
-pub(super) fn ways(edges: &[([u32; 2], u32, Option<u32>)]) -> Vec<Way> {
+/// An edge of the cloth: its ends, the panel to its left, and the one that is sewn to it.
+pub(super) type ClothEdge = ([u32; 2], u32, Option<u32>);
+
+/// Joins edges of one kind to ways.
+pub(super) fn ways(edges: &[ClothEdge]) -> Vec<Way> {
     // Of a branching only one way goes on.
     let mut next: HashMap<u32, usize> = HashMap::with_capacity(edges.len());
     let mut before: HashMap<u32, usize> = HashMap::with_capacity(edges.len());

@@ -1,4 +1,5 @@
-//! How cloth is turned in where it is sewn: seen from the right side both panels go down into a line.
+//! How cloth is turned in where it is sewn: seen from the right side both panels go down into a line. At a hem it turns
+//! right round and lies under itself.
 //!
 //! Across a seam, s is the distance from it on the cloth (negative for what was left beyond the line, to be turned in),
 //! z the height over the cloth. Both panels do the same on either side of the plane through the line, so that yarns that
@@ -7,12 +8,15 @@
 //! Over a body seams are pressed flat: edges that are joined below are laid to one side, others apart, each under its own
 //! panel.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::seam::SeamKind;
 
-/// Exponent of the superellipse that the right side follows round a bend; 2 is a circle.
+/// Exponent of the superellipse that the right side follows round the bend of a seam, and of a hem, a circle.
 const FULL: f64 = 6.0;
+const ROUND: f64 = 2.0;
+/// Yarns on the inner side of a bend go round it with this radius, in diameters: more tightly they would run into each other.
+const BEND: f64 = 0.9;
 /// From the plane between two panels to the outermost middles of their yarns, in diameters: yarns of a weave touch all along. Those
 /// of a knit meet here and there, and a sewing yarn presses them on each other by a fifth.
 const ASIDE_WOVEN: f64 = 0.51;
@@ -39,7 +43,8 @@ pub(super) struct Fold {
     sides: [f64; 2],
     /// Between which heights the middles of its yarns lie, mm.
     heights: [f64; 2],
-    /// Up to which angle its right side is full: whole quarters of a turn, radians.
+    /// Exponent of the superellipse that its right side follows, and up to which angle: whole quarters of a turn, radians.
+    exponent: f64,
     full: f64,
     /// Whether what is turned in is laid to one side.
     laid_over: bool,
@@ -72,12 +77,52 @@ impl Fold {
             SeamKind::Overlock => (f64::INFINITY, 0.0),
         };
         let laid_over = pressed && kind == SeamKind::Overlock;
-        let radius = 0.9 * diameter - low;
+        let radius = BEND * diameter - low;
         let sides = [0.5 * diameter - low, 0.5 * diameter + high];
         let half = high + diameter * if knitted { ASIDE_KNITTED } else { ASIDE_WOVEN };
         let (neutral, least, heights) = (radius + 0.5 * low, 0.3 * diameter, [low, high]);
         let full = FRAC_PI_2 * (1.0 + (flare / FRAC_PI_2).floor());
-        Some(Self { radius, half, wall, flare, full, neutral, least, sides, heights, laid_over })
+        let exponent = FULL;
+        Some(Self { radius, half, wall, flare, exponent, full, neutral, least, sides, heights, laid_over })
+    }
+
+    /// Of a hem: half a turn, whose outermost place is the edge, and then straight back under the cloth.
+    pub(super) fn of_hem([low, high]: [f64; 2], diameter: f64) -> Self {
+        let sides = [0.5 * diameter - low, 0.5 * diameter + high];
+        let radius = BEND * diameter - low;
+        Self {
+            radius,
+            half: sides[1],
+            wall: 0.0,
+            flare: FRAC_PI_2,
+            exponent: ROUND,
+            full: PI,
+            neutral: radius + 0.5 * low,
+            least: 0.3 * diameter,
+            sides,
+            heights: [low, high],
+            laid_over: false,
+        }
+    }
+
+    /// How much cloth goes on beyond a hem's edge so that its raw edge lies so far inside of it, mm.
+    pub(super) fn beyond(&self, width: f64) -> f64 {
+        width + PI * self.neutral - 2.0 * self.begin()
+    }
+
+    /// Which share of a hem's turn is done at a distance on the cloth.
+    pub(super) fn turned_share(&self, s: f64) -> f64 {
+        ((self.begin() - s) / (PI * self.neutral)).clamp(0.0, 1.0)
+    }
+
+    /// Heights of the cloth's right side and of the outer side of what is turned under it at a hem, mm.
+    pub(super) fn skins(&self) -> [f64; 2] {
+        [self.sides[1], -2.0 * self.radius - self.sides[1]]
+    }
+
+    /// Height of the cloth's wrong side, mm.
+    pub(super) fn wrong_side(&self) -> f64 {
+        -self.sides[0]
     }
 
     /// The distance from the seam at which the bend begins, mm.
@@ -152,7 +197,7 @@ impl Fold {
     fn fullness(&self, angle: f64, z: f64) -> f64 {
         let [low, high] = self.heights;
         let front = ((z - low) / (high - low).max(1e-9)).clamp(0.0, 1.0);
-        let n = 2.0 + (FULL - 2.0) * front;
+        let n = ROUND + (self.exponent - ROUND) * front;
         let (sin, cos) = angle.min(self.full).sin_cos();
         (sin.abs().powf(n) + cos.abs().powf(n)).powf(-1.0 / n)
     }

@@ -8,12 +8,16 @@ use rayon::prelude::*;
 
 use super::{
     border::{Border, Edge, Landing, NearSeam, closing, is_side},
+    hem::{HemLine, NearHem, Turnup},
     seam::SeamKind,
     surface::{Anchor, BorderEdge, Finder, Surface, bounds},
 };
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
 pub(super) const PAD: usize = 2;
+
+/// The border of a panel, and its hemmed edges if there are any.
+type Edges<'a> = (&'a Border, Option<&'a HemLine>);
 
 /// How far corners with stitches on three sides go to the border.
 const INNER: f64 = 0.35;
@@ -34,10 +38,48 @@ pub(super) struct Division<'a> {
     pub(super) seams: &'a [SeamKind],
     /// Whether the first row is picked up, at each edge.
     pub(super) picked_up: &'a [bool],
+    /// How its free edges are hemmed, if they are, and which of the border's edges are.
+    pub(super) turnup: Option<Turnup>,
+    pub(super) hemmed: &'a [bool],
     /// Whether a panel that is sewn to itself goes round without a seam: knits do, of a weave no loom makes such a panel.
     pub(super) round: bool,
     /// Within this distance of a seam cloth is bent, mm.
     pub(super) bent: f64,
+}
+
+impl Division<'_> {
+    /// The border of a panel as stitches see it, and its hemmed edges.
+    pub(super) fn border(&self, panel: u32, border: &[BorderEdge]) -> (Border, Option<HemLine>) {
+        // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
+        let round = self.closing(panel, border).is_some();
+        let edge = |(i, border): (usize, &BorderEdge)| {
+            let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
+            let (seam, hemmed) = (self.seams[i], self.hemmed[i]);
+            let sides = match border.sewn_to {
+                _ if hemmed => [DVec2::ZERO; 2],
+                None => [self.free; 2],
+                Some(_) => self.sewn[seam as usize],
+            };
+            // The cloth is to the left of its edges.
+            let [x, y] = [sides[usize::from(d.y > 0.0)].x, sides[usize::from(d.x < 0.0)].y];
+            Edge {
+                border: *border,
+                margin: d.y.abs() * x + d.x.abs() * y,
+                seam,
+                first: border.is_first(panel, i),
+                picked_up: self.picked_up[i],
+                hemmed,
+            }
+        };
+        let edges: Vec<Edge> = border.iter().enumerate().map(edge).filter(|e| !(round && is_side(&e.border))).collect();
+        let hemmed: Vec<BorderEdge> = edges.iter().filter(|e| e.hemmed).map(|e| e.border).collect();
+        (Border::new(edges), self.turnup.and_then(|turnup| HemLine::new(&hemmed, turnup)))
+    }
+
+    /// Where a panel that is knitted in the round begins from the left, and its circumference.
+    fn closing(&self, panel: u32, border: &[BorderEdge]) -> Option<(f64, f64)> {
+        closing(panel, border).filter(|_| self.round)
+    }
 }
 
 /// The stitches of a panel.
@@ -67,6 +109,8 @@ pub(super) struct Lattice {
     pub(super) turned_in: [usize; 2],
     /// Corners near a seam that is turned in, in the order of their places.
     pub(super) near: Vec<(u32, NearSeam)>,
+    /// Corners near a hem or in what lies under it, in the order of their places.
+    pub(super) near_hem: Vec<(u32, NearHem)>,
 }
 
 impl Lattice {
@@ -78,23 +122,8 @@ impl Lattice {
         lays: &(impl Fn(Anchor) -> bool + Sync),
     ) -> Self {
         let finder = Finder::new(surface, panel);
-        let around = closing(panel, border).filter(|_| division.round);
-        let edge = |(i, ((border, seam), picked_up)): (usize, ((&BorderEdge, &SeamKind), &bool))| {
-            let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
-            let sides = if border.sewn_to.is_none() { [division.free; 2] } else { division.sewn[*seam as usize] };
-            // The cloth is to the left of its edges.
-            let [x, y] = [sides[usize::from(d.y > 0.0)].x, sides[usize::from(d.x < 0.0)].y];
-            Edge {
-                border: *border,
-                margin: d.y.abs() * x + d.x.abs() * y,
-                seam: *seam,
-                first: border.is_first(panel, i),
-                picked_up: *picked_up,
-            }
-        };
-        // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
-        let all = border.iter().zip(division.seams).zip(division.picked_up).enumerate().map(edge);
-        let edges = Border::new(all.filter(|e| around.is_none() || !is_side(&e.border)).collect());
+        let around = division.closing(panel, border);
+        let (edges, hem) = division.border(panel, border);
         let [mut low, mut high] = bounds(border);
         if border.is_empty() {
             (low, high) = (finder.low(), finder.low());
@@ -109,6 +138,9 @@ impl Lattice {
                 let most = |a: f64, b: f64| if a.max(b) > 0.0 { a.max(b) } else { a.min(b) };
                 side[axis] += sign * near.map(|e| e.margin).fold(0.0, most);
             }
+        }
+        if let Some([least, most]) = hem.as_ref().map(HemLine::bounds) {
+            (low, high) = (low.min(least), high.max(most));
         }
         let ring = around.is_some();
         if let Some((left, circumference)) = around {
@@ -139,47 +171,51 @@ impl Lattice {
             doubled: 0,
             turned_in: ((flat_low - low) / stitch).round().max(DVec2::ZERO).as_usizevec2().to_array(),
             near: Vec::new(),
+            near_hem: Vec::new(),
         };
         let middle = |i: usize| {
             let (x, y) = (i % counts[0], i / counts[0]);
             low + stitch * DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
         };
+        let under = |i: usize| hem.as_ref()?.under(middle(i), stitch, &finder, &edges);
         let layers: Vec<(usize, bool)> = (0..counts[0] * counts[1])
             .into_par_iter()
             .with_min_len(256)
             .map(|i| match finder.find(middle(i)) {
                 found if found.is_some() && lays(found) => (finder.layers(middle(i)).max(1), true),
                 found if found.is_some() => (1, false),
-                _ => (0, true),
+                _ => under(i).map_or((0, true), |found| (1, lays(found))),
             })
             .collect();
         lattice.doubled = layers.iter().filter(|(n, laid)| *laid && *n > 1).count();
-        lattice.keep(layers.iter().map(|(n, _)| *n > 0).collect(), &middle, &edges);
+        let all = (&edges, hem.as_ref());
+        lattice.keep(layers.iter().map(|(n, _)| *n > 0).collect(), &middle, all);
         if layers.iter().any(|(_, laid)| !laid) {
             lattice.whole = std::mem::take(&mut lattice.kept);
-            lattice.keep(layers.iter().map(|(n, laid)| *laid && *n > 0).collect(), &middle, &edges);
+            lattice.keep(layers.iter().map(|(n, laid)| *laid && *n > 0).collect(), &middle, all);
         }
         lattice.stitches = lattice.kept.iter().filter(|k| **k).count() as u64;
-        lattice.place(&finder, &edges, low, division.bent);
+        lattice.place(&finder, all, low, division.bent);
         lattice
     }
 
     /// Keeps some stitches, and those beyond seams beside them.
-    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &Border) {
+    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: Edges<'_>) {
         self.kept = kept;
         self.turn_in(middle, edges);
         self.drop_lonely();
     }
 
-    /// Adds the stitches beyond seams that are turned in.
-    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: &Border) {
+    /// Adds the stitches beyond seams that are turned in; where a hem turns these are cut away.
+    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), (edges, hem): Edges<'_>) {
+        let bends = |at: DVec2| hem.is_some_and(|hem| hem.near(at, hem.turnup.fold.begin(), 0.0).is_some());
         let steps = (edges.turned_in / self.stitch.min_element()).ceil() as usize;
         let columns = self.counts[0] as isize;
         for _ in 0..steps {
             let beyond = |&i: &usize| {
                 let (x, y) = (i as isize % columns, i as isize / columns);
                 let beside = || (-1..2).any(|dy| (-1..2).any(|dx| self.keeps(x + dx, y + dy)));
-                !self.kept[i] && beside() && edges.is_turned_in(middle(i))
+                !self.kept[i] && beside() && edges.is_turned_in(middle(i)) && !bends(middle(i))
             };
             let found: Vec<usize> = (0..self.kept.len()).into_par_iter().with_min_len(1024).filter(beyond).collect();
             if found.is_empty() {
@@ -273,7 +309,7 @@ impl Lattice {
     }
 
     /// Finds where each corner of a stitch lies.
-    fn place(&mut self, finder: &Finder<'_>, edges: &Border, low: DVec2, bent: f64) {
+    fn place(&mut self, finder: &Finder<'_>, (edges, hem): Edges<'_>, low: DVec2, bent: f64) {
         let (w, h) = (self.width(), self.height());
         let of_index = |i: usize| {
             let pad = if self.ring { 0 } else { PAD as isize };
@@ -283,6 +319,8 @@ impl Lattice {
             [(-1, -1), (0, -1), (-1, 0), (0, 0)].iter().filter(|(dx, dy)| self.keeps(x + dx, y + dy)).count()
         };
         let grid = |x: isize, y: isize| low + self.stitch * DVec2::new(x as f64, y as f64);
+        let (least, most) = (self.stitch.min_element(), self.stitch.max_element());
+        let by_hem = hem.map_or(0.0, |hem| hem.turnup.fold.begin()) + (PAD + 1) as f64 * most;
         // By how much corners at the border move: onto what is left of it.
         let border: Vec<Option<(DVec2, Landing)>> = (0..w * h)
             .into_par_iter()
@@ -298,6 +336,11 @@ impl Lattice {
                     _ => 1.0,
                 };
                 let landing = edges.onto(here, 2.5 * self.stitch.max_element());
+                // Neither what lies under a hem nor what ends above it is drawn out to an end.
+                let near_hem = hem.and_then(|hem| hem.near(here, by_hem, by_hem));
+                if near_hem.is_some_and(|near| landing.turned_in || f64::from(near.distance) < 0.5 * least) {
+                    return None;
+                }
                 Some((share * (landing.at - here), landing))
             })
             .collect();
@@ -329,13 +372,14 @@ impl Lattice {
             turned
                 && [(-steps, 0), (steps, 0), (0, -steps), (0, steps)].iter().any(|(dx, dy)| !self.keeps(x + dx, y + dy))
         };
-        let placed: Vec<(Anchor, Option<NearSeam>)> = (0..w * h)
+        let placed: Vec<(Anchor, Option<NearSeam>, Option<NearHem>)> = (0..w * h)
             .into_par_iter()
             .with_min_len(256)
             .map(|i| {
                 let (x, y) = of_index(i);
+                let near_hem = hem.and_then(|hem| hem.near(grid(x, y), by_hem, by_hem));
                 if stitches_at(x, y) == 0 {
-                    return (Anchor::NONE, None);
+                    return (Anchor::NONE, None, near_hem);
                 }
                 let mut here = grid(x, y) + moved[i].unwrap_or_default();
                 if self.ring {
@@ -343,13 +387,15 @@ impl Lattice {
                     here.x = here.x.max(low.x + 1e-6 * self.stitch.x);
                 }
                 let found = finder.find(here);
-                let near = by_border(x, y).then(|| edges.near_seam(here, bent, found.is_some())).flatten();
-                (if found.is_some() { found } else { edges.nearest_anchor(here) }, near)
+                let on_panel = found.is_some() || near_hem.is_some_and(|near| near.distance < 0.0);
+                let near = by_border(x, y).then(|| edges.near_seam(here, bent, on_panel)).flatten();
+                (if found.is_some() { found } else { edges.nearest_anchor(here) }, near, near_hem)
             })
             .collect();
         self.free = free;
         self.picked_up = if picked_up.contains(&true) { picked_up } else { Vec::new() };
         self.near = placed.iter().enumerate().filter_map(|(i, p)| Some((i as u32, p.1?))).collect();
+        self.near_hem = placed.iter().enumerate().filter_map(|(i, p)| Some((i as u32, p.2?))).collect();
         self.anchors = placed.into_iter().map(|p| p.0).collect();
     }
 }

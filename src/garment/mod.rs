@@ -1,7 +1,7 @@
 //! Yarns on garments: a mesh whose texture coordinates are its flat panels, and cloth that repeats, laid over them.
 //!
 //! [`mesh`] reads the garment, `panels` finds its panels and what is sewn to what, `surface` makes it smooth, `lattice`
-//! divides each panel into stitches up to its `border`, `strain` relaxes the cloth's tile at the strains that occur, `settle`
+//! divides each panel into stitches up to its `border` and what lies under a `hem`, `strain` relaxes the cloth's tile at the strains that occur, `settle`
 //! lets out what a frame presses together, `lay` lays its yarns from `run` to `run` over the `sheet` of a frame, each colour
 //! with its `floats`, `sewing` says what is at the borders by the kind of `seam`, of which `fold` turns in what is sewn and
 //! `edges` makes the yarns, and `body` keeps them outside of who wears them. `options` are what is asked for, `check` refuses
@@ -13,6 +13,8 @@ mod check;
 mod edges;
 mod floats;
 mod fold;
+mod hem;
+mod hem_threads;
 mod lattice;
 mod lay;
 pub(crate) mod mesh;
@@ -35,6 +37,7 @@ use self::{
     body::Body,
     edges::{Edging, finish, relaxed_link},
     floats::Lanes,
+    hem_threads::{HemThread, hem_threads},
     lattice::Lattice,
     lay::{Laying, lay},
     panels::Panels,
@@ -45,6 +48,7 @@ use self::{
 };
 pub(crate) use self::{
     floats::{Floats, Stranded},
+    hem::{Hem, HemKind},
     lay::{LaidYarn, Tension},
     mesh::{GarmentError, GarmentMesh},
     options::{Cloth, Options},
@@ -62,6 +66,7 @@ pub(crate) struct Garment {
     shapes: Vec<Shapes>,
     sewing: Sewing,
     edgings: Vec<Edging>,
+    hem_threads: Vec<HemThread>,
     /// How far the fine points of the surface are kept from a body, mm, if not all by the same.
     clearances: Vec<f32>,
     /// The lengths of the surface's finest edges as the first frame is worn, mm.
@@ -93,6 +98,7 @@ impl Garment {
         let wanted = |at: DVec3| options.near.is_none_or(|(middle, radius)| at.distance(middle) <= radius);
         let lays = |anchor| wanted(surface.at(&pose, anchor).0);
         let sewing = Sewing::new(&options, &shapes, &borders, &cloth);
+        check::hems(&sewing, &surface, &borders, (&panels.panels, &cloth), &options.cloths)?;
         let lattices: Vec<Lattice> = borders
             .par_iter()
             .enumerate()
@@ -102,11 +108,13 @@ impl Garment {
         check::flat(&lattices, &panels.panels)?;
         let mut edgings = sewing.edgings(&pose, &borders, &lattices);
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
+        let (hem_threads, hemmed) = hem_threads(&sewing, &surface, &pose, &borders);
+        let hem_threads = hem_threads.into_iter().flat_map(|thread| thread.on(&lays)).collect();
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
         let worn = surface.worn_lengths(&pose, panels.panels.len());
-        let report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &options);
-        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, clearances, worn, options, report })
+        let report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &hemmed, &options);
+        Ok(Self { panels, surface, lattices, shapes, sewing, edgings, hem_threads, clearances, worn, options, report })
     }
 
     /// What is known of it.
@@ -193,7 +201,7 @@ impl Garment {
                 continue;
             }
             let sheets: Vec<_> =
-                poses.iter().map(|p| Sheet::new(lattice, &self.surface, p, self.sewing.folds(cloth))).collect();
+                poses.iter().map(|p| Sheet::new(lattice, &self.surface, p, self.sewing.bends(cloth))).collect();
             let laying = Laying {
                 tension: self.options.tension,
                 stranded: stranded(cloth),
@@ -207,7 +215,9 @@ impl Garment {
         let link = relaxed_link();
         for cloth in 0..self.options.cloths.len() {
             let own: Vec<&Edging> = self.edgings.iter().filter(|e| e.cloth == cloth).collect();
-            for (frame, mut yarns) in laid.iter_mut().zip(finish(&poses, &own, &link)) {
+            let threads: Vec<&HemThread> = self.hem_threads.iter().filter(|t| t.cloth == cloth).collect();
+            for ((frame, pose), mut yarns) in laid.iter_mut().zip(&poses).zip(finish(&poses, &own, &link)) {
+                yarns.par_extend(threads.par_iter().map(|thread| thread.lay(&self.surface, pose)));
                 if self.options.coordinates {
                     for yarn in &mut yarns {
                         yarn.coordinates = vec![[0.5, 0.5]; yarn.points.len()];

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{lay::Tension, seam::SeamKind};
+use super::{hem::Hem, lay::Tension, seam::SeamKind};
 use crate::pattern::tile::Tile;
 
 /// The cloth of some panels.
@@ -18,6 +18,10 @@ pub(crate) struct Cloth {
     pub points: usize,
     /// How these panels are sewn, if not as all are; of two cloths that say it the later one counts.
     pub seam: Option<SeamKind>,
+    /// How free edges of these panels are hemmed, if they are.
+    pub hem: Option<Hem>,
+    /// Whether that is said of these panels and not of all.
+    pub hems_itself: bool,
 }
 
 /// What is laid on a garment.

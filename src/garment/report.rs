@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{
+    hem::Hem,
     lattice::Lattice,
     options::Options,
     panels::{LengthRatio, Panel, Panels},
@@ -35,12 +36,14 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Of panels divided into stitches; `points` are welded, mm, `cloth` is that of each panel.
+    /// Of panels divided into stitches; `points` are welded, mm, `cloth` is that of each panel, `hemmed` how long edges of each
+    /// kind of hem are, mm.
     pub(super) fn new(
         panels: &Panels,
         points: &[DVec3],
         lattices: &[Lattice],
         (cloth, shapes): (Vec<usize>, &[Shapes]),
+        hemmed: &[(Hem, f64)],
         options: &Options,
     ) -> Self {
         let mut notes = panels.notes.clone();
@@ -48,6 +51,10 @@ impl Report {
             if lattice.stitches == 0 && options.near.is_none() {
                 notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
             }
+        }
+        for (Hem { kind, width }, length) in hemmed {
+            let kind = kind.told();
+            notes.push(format!("hems of {width:.1} mm along {length:.0} mm of free edges, {kind}"));
         }
         let mut stitches_of = vec![0; shapes.len()];
         lattices.iter().zip(&cloth).for_each(|(lattice, own)| stitches_of[*own] += lattice.stitches);

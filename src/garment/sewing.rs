@@ -8,11 +8,13 @@ use rayon::prelude::*;
 use super::{
     border::is_picked_up,
     edges::{Edging, Finish, Way, ways},
-    fold::{Fold, Folds},
+    fold::Fold,
+    hem::{Hem, Turnup},
     lattice::{Division, Lattice},
     lay::{CUT_END, turn},
     options::{Cloth, Options},
     seam::SeamKind,
+    sheet::{Bends, Room},
     strain::Shapes,
     surface::{BorderEdge, Pose},
 };
@@ -21,10 +23,10 @@ use crate::{math::special::smooth_step, pattern::StrandKind};
 /// An overlock seam takes about so much of each panel, mm, in whole stitches, which are so many at most.
 const TAKEN: f64 = 3.0;
 const MOST_TAKEN: f64 = 6.0;
-/// Radius of an overlock machine's threads, mm.
-const THREAD: f64 = 0.1;
-/// Length of its stitches, mm.
-const STEP: f64 = 2.5;
+/// Radius of sewing threads, mm.
+pub(super) const THREAD: f64 = 0.1;
+/// Length of an overlock machine's and of a hem's stitches, mm.
+pub(super) const STEP: f64 = 2.5;
 /// Over a body cloth comes down from a seam within so many times its height.
 const SLOPE: f64 = 3.0;
 
@@ -39,7 +41,8 @@ struct Trim {
     radius: f64,
     free: DVec2,
     sewn: [[DVec2; 2]; SeamKind::COUNT],
-    folds: Folds,
+    bends: Bends,
+    turnup: Option<Turnup>,
     /// How far turns reach beyond what is turned in, mm.
     turn: f64,
 }
@@ -52,10 +55,14 @@ pub(super) struct Sewing {
     seams: Vec<Vec<SeamKind>>,
     /// Whether the first row is picked up, at each edge.
     picked_up: Vec<Vec<bool>>,
+    /// Whether it is hemmed, at each edge.
+    hemmed: Vec<Vec<bool>>,
 }
 
 impl Trim {
-    fn new(stitch: DVec2, repeat: [u32; 2], knitted: bool, shapes: &Shapes, pressed: bool) -> Self {
+    fn new(cloth: &Cloth, shapes: &Shapes, pressed: bool) -> Self {
+        let (stitch, repeat) = (cloth.tile.stitch(), cloth.tile.counts);
+        let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
         let d = shapes.diameter;
         let mut free = DVec2::ZERO;
         for axis in 0..2 {
@@ -65,7 +72,7 @@ impl Trim {
             let turned = if shapes.has_axis(axis) { turn(stitch[1 - axis], d) } else { 0.0 };
             free[axis] = beyond.max(turned) + if knitted { 1.2 * d } else { 1.1 * d };
         }
-        let folds = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, knitted, pressed));
+        let seams = SeamKind::ALL.map(|kind| Fold::new(kind, shapes.heights, d, knitted, pressed));
         // Edges that only meet: as far as yarns reach, and half a yarn.
         let ends = CUT_END * DVec2::new(turn(stitch.y, d), turn(stitch.x, d));
         let meets = match knitted {
@@ -73,12 +80,24 @@ impl Trim {
             true => DVec2::new(0.56 * d, 0.0),
             false => ends + 0.51 * d,
         };
-        let sewn = SeamKind::ALL.map(|kind| match &folds[kind as usize] {
+        let sewn = SeamKind::ALL.map(|kind| match &seams[kind as usize] {
             None => [meets; 2],
             Some(fold) => [-turned_in(kind, fold, stitch, d); 2],
         });
-        let (room, radius) = (2.0 * shapes.half_room, shapes.radius);
-        Self { stitch, repeat, knitted, diameter: d, room, radius, free, sewn, folds, turn: turn(stitch.y, d) }
+        let (room, radius, turn) = (2.0 * shapes.half_room, shapes.radius, turn(stitch.y, d));
+        let fold = Fold::of_hem(shapes.heights, d);
+        let turnup = cloth.hem.map(|hem| Turnup { hem, fold, aside: turn + 0.51 * d });
+        let rooms = SeamKind::ALL.map(|kind| match &seams[kind as usize] {
+            None => Room::default(),
+            Some(seam) => {
+                let over = -sewn[kind as usize][0].min_element();
+                let deep = seam.depth(over) + fold.wrong_side();
+                let within = over + seam.begin() + turn + d;
+                Room { deep, within, until: within + SLOPE * deep }
+            }
+        });
+        let bends = Bends { seams, hem: turnup.map(|t| t.fold), rooms };
+        Self { stitch, repeat, knitted, diameter: d, room, radius, free, sewn, bends, turnup, turn }
     }
 }
 
@@ -93,12 +112,54 @@ fn turned_in(kind: SeamKind, fold: &Fold, stitch: DVec2, diameter: f64) -> DVec2
     wanted.max(least).ceil() * stitch - fold.upright()
 }
 
+/// Places near which cloth is kept further off a body.
+struct Near {
+    /// A place, how far cloth is kept off there, mm, and within which distance; it comes down beyond.
+    places: Vec<(DVec3, f64, f64)>,
+    least: f64,
+    cells: HashMap<[i32; 3], Vec<usize>>,
+    size: f64,
+}
+
+impl Near {
+    /// Of places with how far cloth is kept off there, and within which distance; everywhere else it is `least`, mm.
+    fn new(places: Vec<(DVec3, f64, f64)>, least: f64) -> Self {
+        let size = places.iter().map(|s| s.2 + SLOPE * s.1).fold(0.0, f64::max);
+        let mut near = Self { places, least, cells: HashMap::new(), size };
+        for (i, place) in near.places.iter().enumerate() {
+            near.cells.entry(near.cell(place.0).to_array()).or_default().push(i);
+        }
+        near
+    }
+
+    fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    fn cell(&self, p: DVec3) -> IVec3 {
+        (p / self.size).floor().as_ivec3()
+    }
+
+    /// How far cloth is kept off at a place, mm.
+    fn kept_off(&self, p: DVec3) -> f64 {
+        if self.is_empty() {
+            return self.least;
+        }
+        let around = (0..27).map(|k| self.cell(p) + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
+        let near = around.filter_map(|c| self.cells.get(&c.to_array())).flatten();
+        let wanted = near.map(|&i| {
+            let (at, depth, wide) = self.places[i];
+            depth + (self.least - depth) * smooth_step((p.distance(at) - wide) / (SLOPE * depth))
+        });
+        wanted.fold(self.least, f64::max)
+    }
+}
+
 impl Sewing {
     pub(super) fn new(options: &Options, shapes: &[Shapes], borders: &[Vec<BorderEdge>], cloth: &[usize]) -> Self {
-        let trim = |(cloth, shapes): (&Cloth, &Shapes)| {
-            let knitted = cloth.tile.strands.iter().all(|s| s.kind == StrandKind::Course);
-            Trim::new(cloth.tile.stitch(), cloth.tile.counts, knitted, shapes, options.pressed)
-        };
+        // Seams are pressed before an edge is turned up over them.
+        let pressed = options.pressed || options.cloths.iter().any(|c| c.hem.is_some());
+        let trim = |(cloth, shapes): (&Cloth, &Shapes)| Trim::new(cloth, shapes, pressed);
         let kind = |panel: usize, edge: &BorderEdge| {
             let other = edge.sewn_to.map_or(cloth[panel], |(other, _)| cloth[other as usize]);
             let [first, last] = [cloth[panel].min(other), cloth[panel].max(other)];
@@ -115,52 +176,69 @@ impl Sewing {
         let all = borders.iter().enumerate();
         let picked_up = all.map(|(panel, border)| border.iter().map(|e| picked_up(panel, e)).collect()).collect();
         let seams = borders.iter().enumerate().map(of_panel).collect();
-        Self { trims, cloth: cloth.to_vec(), seams, picked_up }
+        let is_hemmed = |panel: usize, e: &BorderEdge| e.sewn_to.is_none() && trims[cloth[panel]].turnup.is_some();
+        let all = borders.iter().enumerate();
+        let hemmed = all.map(|(panel, border)| border.iter().map(|e| is_hemmed(panel, e)).collect()).collect();
+        Self { trims, cloth: cloth.to_vec(), seams, picked_up, hemmed }
     }
 
-    /// How a cloth is turned in.
-    pub(super) fn folds(&self, cloth: usize) -> &Folds {
-        &self.trims[cloth].folds
+    /// How a cloth is bent where it is sewn or hemmed.
+    pub(super) fn bends(&self, cloth: usize) -> &Bends {
+        &self.trims[cloth].bends
     }
 
-    /// How far each fine point of the sewn mesh is kept from a body's skin, mm: no less than `least`, and by seams as much as
-    /// what is turned in takes. Empty where that is nowhere more.
+    /// How the free edges of a panel are hemmed.
+    pub(super) fn hem(&self, panel: usize) -> Option<Hem> {
+        self.trims[self.cloth[panel]].turnup.map(|turnup| turnup.hem)
+    }
+
+    /// Whether an edge of a panel's border is hemmed.
+    pub(super) fn is_hemmed(&self, panel: usize, edge: usize) -> bool {
+        self.hemmed[panel][edge]
+    }
+
+    /// The cloth of a panel, and the distance of its yarns where they press on each other, mm.
+    pub(super) fn cloth(&self, panel: usize) -> (usize, f64) {
+        (self.cloth[panel], self.trims[self.cloth[panel]].diameter)
+    }
+
+    /// How far each fine point of the sewn mesh is kept from a body's skin, mm: no less than `least`, and by seams and hems as
+    /// much more as what is turned in takes. Empty where that is nowhere more.
     pub(super) fn clearances(&self, pose: &Pose, borders: &[Vec<BorderEdge>], least: f64) -> Vec<f32> {
-        let mut seams: Vec<(DVec3, f64, f64)> = Vec::new();
-        for (panel, (border, kinds)) in borders.iter().zip(&self.seams).enumerate() {
+        // Of seams and of hems: a place, how far cloth is kept off there, and within which distance.
+        let mut places: [Vec<(DVec3, f64, f64)>; 2] = Default::default();
+        for (panel, border) in borders.iter().enumerate() {
             let trim = &self.trims[self.cloth[panel]];
-            for (edge, kind) in border.iter().zip(kinds) {
-                let Some(fold) = trim.folds[*kind as usize].filter(|_| edge.sewn_to.is_some()) else { continue };
-                let over = -trim.sewn[*kind as usize][0].min_element();
-                let depth = fold.depth(over) + 1.4 * trim.diameter;
-                seams.extend(edge.vertices.map(|v| (pose.vertex(v).0, depth, over + fold.begin())));
+            for (i, edge) in border.iter().enumerate() {
+                let kind = self.seams[panel][i];
+                let hem = trim.turnup.filter(|_| self.hemmed[panel][i]);
+                let seam = trim.bends.seams[kind as usize].filter(|_| edge.sewn_to.is_some());
+                let (of, depth, wide) = match (hem, seam) {
+                    (Some(Turnup { hem, fold, .. }), _) => (1, -fold.skins()[1], hem.width),
+                    (None, Some(fold)) => {
+                        let over = -trim.sewn[kind as usize][0].min_element();
+                        (0, fold.depth(over), over + fold.begin())
+                    }
+                    (None, None) => continue,
+                };
+                places[of].extend(edge.vertices.map(|v| (pose.vertex(v).0, depth + 1.4 * trim.diameter, wide)));
             }
         }
-        let widest = seams.iter().map(|s| s.2 + SLOPE * s.1).fold(0.0, f64::max);
-        if widest <= 0.0 {
+        let [seams, hems] = places.map(|places| Near::new(places, least));
+        if seams.is_empty() && hems.is_empty() {
             return Vec::new();
         }
-        let cell = |p: DVec3| (p / widest).floor().as_ivec3();
-        let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
-        for (i, seam) in seams.iter().enumerate() {
-            cells.entry(cell(seam.0).to_array()).or_default().push(i);
-        }
-        let of = |p: &DVec3| {
-            let around = (0..27).map(|k| cell(*p) + IVec3::new(k % 3, k / 3 % 3, k / 9) - 1);
-            let near = around.filter_map(|c| cells.get(&c.to_array())).flatten();
-            let wanted = near.map(|&i| {
-                let (at, depth, wide) = seams[i];
-                depth + (least - depth) * smooth_step((p.distance(at) - wide) / (SLOPE * depth))
-            });
-            wanted.fold(least, f64::max) as f32
-        };
+        // What lies under a hem lies under the seams' allowances as well.
+        let of = |p: &DVec3| (seams.kept_off(*p) + (hems.kept_off(*p) - least)) as f32;
         pose.points().par_iter().with_min_len(1024).map(of).collect()
     }
 
     /// How a panel is divided for its cloth.
     pub(super) fn division(&self, panel: usize) -> Division<'_> {
         let trim = &self.trims[self.cloth[panel]];
-        let begin = trim.folds.iter().flatten().map(Fold::begin).fold(0.0, f64::max);
+        let begin = trim.bends.seams.iter().flatten().map(Fold::begin).fold(0.0, f64::max);
+        let over = trim.sewn.iter().map(|s| -s[0].min_element()).fold(0.0, f64::max);
+        let room = trim.bends.rooms.iter().map(|room| room.until).fold(0.0, f64::max);
         Division {
             stitch: trim.stitch,
             repeat: trim.repeat,
@@ -169,8 +247,9 @@ impl Sewing {
             seams: &self.seams[panel],
             picked_up: &self.picked_up[panel],
             round: trim.knitted,
-            bent: begin + 2.0 * trim.stitch.max_element()
-                - trim.sewn.iter().map(|s| s[0].min_element()).fold(0.0, f64::min),
+            turnup: trim.turnup,
+            hemmed: &self.hemmed[panel],
+            bent: 2.0 * trim.stitch.max_element() + if trim.turnup.is_some() { room } else { begin + over },
         }
     }
 
@@ -181,6 +260,7 @@ impl Sewing {
         for (panel, border) in borders.iter().enumerate() {
             for (i, edge) in border.iter().enumerate() {
                 match edge.sewn_to {
+                    None if self.hemmed[panel][i] => {}
                     None => free.push((edge.vertices, panel as u32, None)),
                     // Each seam once; what is knitted in the round has none.
                     Some((other, _)) => {
@@ -239,7 +319,7 @@ impl Sewing {
         let trims = [cloth, self.cloth[other as usize]].map(|c| &self.trims[c]);
         let sides = [0, 1].map(|side| (trims[side], over[side]));
         let (own, d) = (trims[0], trims[0].diameter);
-        let fold = |trim: &Trim| trim.folds[kind as usize];
+        let fold = |trim: &Trim| trim.bends.seams[kind as usize];
         match kind {
             SeamKind::None => {}
             SeamKind::Mattress => {

@@ -1,20 +1,22 @@
 //! The stitches of a panel in one frame: where their corners lie, and what lies between and over them.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
     border::NearSeam,
-    fold::Folds,
+    fold::{Fold, Folds},
+    hem::NearHem,
     lattice::{Lattice, PAD},
     seam::SeamKind,
     strain::{Strain, UNSTRAINED},
     surface::{Anchor, Pose, Surface, single},
 };
+use crate::math::special::smooth_step;
 
 /// What a corner near a seam knows of it.
 #[derive(Clone, Copy, Debug)]
-struct Hem {
+struct BySeam {
     /// The place of the seam that is nearest, mm.
     on: Vec3,
     /// Unit vector on the cloth from the seam.
@@ -24,10 +26,48 @@ struct Hem {
     first: bool,
 }
 
-impl Hem {
+impl BySeam {
     /// Distance of a place from the seam, negative beyond it, mm.
     fn distance(&self, at: Vec3) -> f32 {
         (at - self.on).dot(self.inward)
+    }
+}
+
+/// What a corner near a hem knows of it.
+#[derive(Clone, Copy, Debug)]
+struct ByHem {
+    /// Distance on the cloth, negative beyond the edge, mm.
+    distance: f32,
+    /// From the edge inwards, in stitches a millimetre.
+    inward: Vec2,
+}
+
+/// How cloth is bent at the border of a panel.
+#[derive(Clone, Debug)]
+pub(super) struct Bends {
+    /// At each kind of seam.
+    pub(super) seams: Folds,
+    /// At a hem.
+    pub(super) hem: Option<Fold>,
+    /// What lies under a hem makes room for the allowance of each kind of seam.
+    pub(super) rooms: [Room; SeamKind::COUNT],
+}
+
+/// How far what lies under a hem keeps from the cloth by a seam, for the seam's allowance lies between.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Room {
+    /// So much lower, mm.
+    pub(super) deep: f64,
+    /// Within such a distance of the seam, mm, and less and less up to another.
+    pub(super) within: f64,
+    pub(super) until: f64,
+}
+
+impl Room {
+    /// By how much it lies lower at a distance from the seam, mm.
+    pub(super) fn at(&self, distance: f64) -> f64 {
+        let width = (self.until - self.within).max(1e-9);
+        self.deep * (1.0 - smooth_step((distance - self.within) / width))
     }
 }
 
@@ -38,13 +78,15 @@ pub(super) struct Sheet<'a> {
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
     /// Of each corner, where any is near a seam that is turned in; empty without such seams.
-    hems: Vec<Option<Hem>>,
-    folds: &'a Folds,
+    seams: Vec<Option<BySeam>>,
+    /// The same of hems.
+    hems: Vec<Option<ByHem>>,
+    bends: &'a Bends,
 }
 
 impl<'a> Sheet<'a> {
-    /// The corners of a panel as they lie in a pose; `folds` are those of each kind of seam.
-    pub(super) fn new(lattice: &'a Lattice, surface: &Surface, pose: &Pose, folds: &'a Folds) -> Self {
+    /// The corners of a panel as they lie in a pose.
+    pub(super) fn new(lattice: &'a Lattice, surface: &Surface, pose: &Pose, bends: &'a Bends) -> Self {
         let place = |anchor: &Anchor| {
             if !anchor.is_some() {
                 return (Vec3::NAN, Vec3::Y);
@@ -53,10 +95,14 @@ impl<'a> Sheet<'a> {
             (single(at), single(normal))
         };
         let (points, normals) = lattice.anchors.par_iter().with_min_len(256).map(place).unzip();
-        let hems = if lattice.near.is_empty() { Vec::new() } else { vec![None; lattice.anchors.len()] };
-        let mut sheet = Self { lattice, points, normals, hems, folds };
+        let seams = if lattice.near.is_empty() { Vec::new() } else { vec![None; lattice.anchors.len()] };
+        let hems = if lattice.near_hem.is_empty() { Vec::new() } else { vec![None; lattice.anchors.len()] };
+        let mut sheet = Self { lattice, points, normals, seams, hems, bends };
         for (i, near) in &lattice.near {
             sheet.approach(*i as usize, near, pose);
+        }
+        for (i, near) in &lattice.near_hem {
+            sheet.approach_hem(*i as usize, near, pose);
         }
         for _ in 0..PAD {
             sheet.extend();
@@ -72,7 +118,18 @@ impl<'a> Sheet<'a> {
         if near.over > 0.0 {
             self.points[i] = on - inward * near.over;
         }
-        self.hems[i] = Some(Hem { on, inward, kind: near.kind, first: near.first });
+        self.seams[i] = Some(BySeam { on, inward, kind: near.kind, first: near.first });
+    }
+
+    /// Tells a corner of the hem that it is near; one beyond the edge goes on straight from it.
+    fn approach_hem(&mut self, i: usize, near: &NearHem, pose: &Pose) {
+        if near.distance < 0.0 && !self.points[i].is_nan() {
+            let [a, b]: [DVec3; 2] = near.vertices.map(|v| pose.vertex(v).0);
+            let inward = self.normals[i].cross(single(b - a)).normalize_or(Vec3::X);
+            self.points[i] = single(a.lerp(b, f64::from(near.share))) + inward * near.distance;
+        }
+        let inward = near.inward / self.lattice.stitch.as_vec2();
+        self.hems[i] = Some(ByHem { distance: near.distance, inward });
     }
 
     /// Goes on straight by one more corner on all sides.
@@ -80,7 +137,7 @@ impl<'a> Sheet<'a> {
         let lattice = self.lattice;
         let (w, h) = (lattice.width(), lattice.height());
         let pad = if lattice.ring { 0 } else { PAD as isize };
-        let made: Vec<(usize, Vec3, Vec3, Option<Hem>)> = (0..w * h)
+        let made: Vec<(usize, Vec3, Vec3, Option<BySeam>)> = (0..w * h)
             .into_par_iter()
             .with_min_len(1024)
             .filter(|&i| self.points[i].is_nan())
@@ -88,7 +145,7 @@ impl<'a> Sheet<'a> {
                 let (x, y) = ((i % w) as isize - pad, (i / w) as isize - PAD as isize);
                 let known = |dx: isize, dy: isize| lattice.index(x + dx, y + dy).filter(|&k| !self.points[k].is_nan());
                 let mut best = (0.0, Vec3::ZERO, Vec3::ZERO);
-                let mut hem: Option<(f32, Hem)> = None;
+                let mut seam: Option<(f32, BySeam)> = None;
                 // Straight on from the two before counts most; slantwise or from one alone is a last resort.
                 for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)] {
                     let Some(a) = known(dx, dy) else { continue };
@@ -98,39 +155,73 @@ impl<'a> Sheet<'a> {
                         None => (self.points[a], 1e-4 * slant),
                     };
                     best = (best.0 + weight, best.1 + weight * at, best.2 + weight * self.normals[a]);
-                    if let Some(own) = self.hem(a).filter(|_| hem.is_none_or(|(most, _)| weight > most)) {
-                        hem = Some((weight, own));
+                    if let Some(own) = self.seam(a).filter(|_| seam.is_none_or(|(most, _)| weight > most)) {
+                        seam = Some((weight, own));
                     }
                 }
-                (best.0 > 0.0).then(|| (i, best.1 / best.0, best.2.normalize_or(Vec3::Y), hem.map(|h| h.1)))
+                (best.0 > 0.0).then(|| (i, best.1 / best.0, best.2.normalize_or(Vec3::Y), seam.map(|s| s.1)))
             })
             .collect();
-        for (i, point, normal, hem) in made {
+        for (i, point, normal, seam) in made {
             (self.points[i], self.normals[i]) = (point, normal);
-            if let Some(own) = self.hems.get_mut(i) {
-                *own = hem;
+            if let Some(own) = self.seams.get_mut(i) {
+                *own = seam;
             }
         }
     }
 
-    fn hem(&self, i: usize) -> Option<Hem> {
+    fn seam(&self, i: usize) -> Option<BySeam> {
+        self.seams.get(i).copied().flatten()
+    }
+
+    fn hem(&self, i: usize) -> Option<ByHem> {
         self.hems.get(i).copied().flatten()
     }
 
-    /// Whether a corner is by a seam that is turned in.
+    /// Whether a corner is by a seam that is turned in, or under a hem.
     pub(super) fn is_turned_in(&self, x: usize, y: usize) -> bool {
-        let found = self.corner(x as isize, y as isize).and_then(|i| Some((self.points[i], self.hem(i)?)));
-        found.is_some_and(|(at, hem)| hem.distance(at) < 0.0)
+        let Some(i) = self.corner(x as isize, y as isize) else { return false };
+        let beyond_seam = self.seam(i).is_some_and(|seam| seam.distance(self.points[i]) < 0.0);
+        beyond_seam || self.hem(i).is_some_and(|hem| hem.distance < 0.0)
     }
 
     /// The place in stitches across, rows up and mm out: where cloth is turned in it goes round with it.
     #[inline]
     pub(super) fn place(&self, p: Vec3) -> Vec3 {
+        let (p, under) = if self.hems.is_empty() { (p, 0.0) } else { self.turned_up(p) };
         let (at, normal) = self.at(p.x, p.y);
-        if self.hems.is_empty() {
+        if self.seams.is_empty() {
             return at + normal * p.z;
         }
-        self.folded(p, at).map_or(at + normal * p.z, |(inward, [aside, out])| at + inward * aside + normal * out)
+        let Some((inward, distance, kind, first)) = self.by_seam(p, at) else { return at + normal * p.z };
+        let Some(fold) = &self.bends.seams[kind as usize] else { return at + normal * p.z };
+        let side = if first { 1.0 } else { -1.0 };
+        let [s, out] = fold.bend(f64::from(distance), f64::from(p.z), side).map(|c| c as f32);
+        let bent = at + inward * (s - distance) + normal * out;
+        if under == 0.0 {
+            return bent;
+        }
+        // What lies under a hem goes on flat under the seam's allowance.
+        let room = self.bends.rooms[kind as usize].at(f64::from(distance)) as f32;
+        bent.lerp(at + normal * (p.z - room), under)
+    }
+
+    /// Where a place comes to lie by a hem: under which place of the panel, and to which share it is turned.
+    fn turned_up(&self, p: Vec3) -> (Vec3, f32) {
+        let (i, j) = (p.x.floor(), p.y.floor());
+        let (mut distance, mut inward) = (0.0, Vec2::ZERO);
+        for (dx, dy, share) in corner_shares(p.x - i, p.y - j) {
+            let corner = self.lattice.index(i as isize + dx, j as isize + dy);
+            let Some(hem) = corner.and_then(|k| self.hem(k)) else { return (p, 0.0) };
+            distance += share * hem.distance;
+            inward += share * hem.inward;
+        }
+        let Some(fold) = self.bends.hem.as_ref().filter(|fold| f64::from(distance) < fold.begin()) else {
+            return (p, 0.0);
+        };
+        let [to, out] = fold.bend(f64::from(distance), f64::from(p.z), 1.0).map(|c| c as f32);
+        let under = smooth_step(fold.turned_share(f64::from(distance)));
+        ((p.truncate() + inward * (to - distance)).extend(out), under as f32)
     }
 
     /// The place, and in which direction a small step from it goes.
@@ -138,7 +229,8 @@ impl<'a> Sheet<'a> {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (u, v) = (p.x - i, p.y - j);
         let (i, j) = (i as isize, j as isize);
-        if self.hems.is_empty() || self.corner(i, j).is_some_and(|k| self.hem(k).is_none()) {
+        let flat = self.seams.is_empty() && self.hems.is_empty();
+        if flat || self.corner(i, j).is_some_and(|k| self.seam(k).is_none() && self.hem(k).is_none()) {
             let weights = [(cubic(u), cubic(v)), (cubic_slope(u), cubic(v)), (cubic(u), cubic_slope(v))];
             let [point, across, up] = self.bicubic([i, j], weights);
             if !point.is_nan() {
@@ -151,21 +243,19 @@ impl<'a> Sheet<'a> {
         (at, self.place(p + step) - at)
     }
 
-    /// By how much a place, which is at `at` on the flat cloth, is moved from the seam and lies over it, if it is near a seam.
-    fn folded(&self, p: Vec3, at: Vec3) -> Option<(Vec3, [f32; 2])> {
+    /// Unit vector from the seam, distance, kind and whether it is the first side, of a place that is at `at` on the flat cloth,
+    /// if it is near a seam.
+    fn by_seam(&self, p: Vec3, at: Vec3) -> Option<(Vec3, f32, SeamKind, bool)> {
         let (i, j) = (p.x.floor(), p.y.floor());
         let (u, v) = (p.x - i, p.y - j);
         let (mut inward, mut distance, mut most) = (Vec3::ZERO, 0.0, (0.0, SeamKind::None, false));
         for (dx, dy, share) in corner_shares(u, v) {
-            let hem = self.hem(self.corner(i as isize + dx, j as isize + dy)?)?;
-            inward += share * hem.inward;
-            distance += share * hem.distance(at);
-            most = if share > most.0 { (share, hem.kind, hem.first) } else { most };
+            let seam = self.seam(self.corner(i as isize + dx, j as isize + dy)?)?;
+            inward += share * seam.inward;
+            distance += share * seam.distance(at);
+            most = if share > most.0 { (share, seam.kind, seam.first) } else { most };
         }
-        let fold = self.folds[most.1 as usize].as_ref()?;
-        let side = if most.2 { 1.0 } else { -1.0 };
-        let [s, out] = fold.bend(f64::from(distance), f64::from(p.z), side);
-        Some((inward, [s as f32 - distance, out as f32]))
+        Some((inward, distance, most.1, most.2))
     }
 
     fn corner(&self, x: isize, y: isize) -> Option<usize> {
@@ -174,6 +264,18 @@ impl<'a> Sheet<'a> {
 
     /// How a stitch is strained against its cut.
     pub(super) fn strain(&self, x: isize, y: isize) -> Strain {
+        let middle = Vec3::new(x as f32 + 0.5, y as f32 + 0.5, 0.0);
+        let under = self.lattice.index(x, y).and_then(|i| self.hem(i)).filter(|hem| hem.distance < 0.0);
+        if under.is_none() {
+            return self.strain_on_panel(x, y);
+        }
+        // As the cloth that it lies under, and sheared the other way.
+        let at = self.turned_up(middle).0.floor();
+        let [across, up, sine] = self.strain_on_panel(at.x as isize, at.y as isize);
+        [across, up, -sine]
+    }
+
+    fn strain_on_panel(&self, x: isize, y: isize) -> Strain {
         let corner = |dx, dy| self.corner(x + dx, y + dy).map(|i| self.points[i]);
         let (Some(a), Some(b), Some(c), Some(d)) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)) else {
             return UNSTRAINED;

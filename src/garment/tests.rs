@@ -1,4 +1,5 @@
 mod floats;
+mod hems;
 mod seams;
 
 use std::fmt::Write;
@@ -23,7 +24,7 @@ fn options(tile: Tile) -> Options {
     Options {
         unit_mm: 1.0,
         uv_mm: None,
-        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12, seam: None }],
+        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12, seam: None, hem: None, hems_itself: false }],
         seam: SeamKind::Mattress,
         tension: None,
         coordinates: true,

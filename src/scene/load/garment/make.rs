@@ -152,7 +152,8 @@ impl GarmentPlan {
             let tile =
                 rule.cloth.tile(rule.stitch, yarn.map_or(own, |yarn| (Some(yarn), yarn.radius)), context, warnings)?;
             let (group, points) = (rule.group.clone(), rule.cloth.points);
-            Some(Cloth { group, tile, grain: rule.grain, points, seam: rule.seam })
+            let Rule { grain, seam, hem, hems_itself, .. } = *rule;
+            Some(Cloth { group, tile, grain, points, seam, hem, hems_itself })
         });
         made.collect()
     }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     files::{curve_file, stage::PrimPattern},
-    garment::SeamKind,
+    garment::{Hem, HemKind, SeamKind},
     input::diagnostic::Span,
     pattern::{
         chart::Chart,
@@ -73,6 +73,43 @@ struct Rule {
     color: Option<ColorPlan>,
     /// How it is sewn, if not as all are.
     seam: Option<SeamKind>,
+    /// How its free edges are hemmed, and whether it says so itself.
+    hem: Option<Hem>,
+    hems_itself: bool,
+}
+
+/// What a table says of hems.
+#[derive(Clone, Copy)]
+struct HemKeys {
+    kind: Option<Option<HemKind>>,
+    /// Millimetres.
+    width: Option<f64>,
+}
+
+const HEMS: [(&str, Option<HemKind>); 4] = [
+    ("none", None),
+    ("coverstitch", Some(HemKind::Coverstitch)),
+    ("lockstitch", Some(HemKind::Lockstitch)),
+    ("folded", Some(HemKind::Folded)),
+];
+/// Width of a hem of which none is given, mm.
+const HEM_WIDTH: f64 = 20.0;
+
+impl HemKeys {
+    fn read(table: &Reader<'_>, context: &Context<'_>) -> Self {
+        let width = table.f64("hem_width", Range::POSITIVE).map(|w| w * context.unit);
+        Self { kind: table.one_of("hem", &HEMS), width }
+    }
+
+    /// The hem of a table, which has what `outer` says where it says nothing.
+    fn hem(self, table: &Reader<'_>, outer: Option<Self>) -> Option<Hem> {
+        let kind = self.kind.or(outer.and_then(|o| o.kind)).flatten();
+        if kind.is_none() && self.width.is_some() {
+            table.error_at("hem_width", "a width of a hem where there is none", Some("hem = \"coverstitch\""));
+        }
+        let width = self.width.or(outer.and_then(|o| o.width)).unwrap_or(HEM_WIDTH);
+        kind.map(|kind| Hem { kind, width })
+    }
 }
 
 const SEAMS: [(&str, SeamKind); 3] =
@@ -113,6 +150,8 @@ pub(super) fn garment(
     let z_up = source.one_of("up", &[("y", false), ("z", true)]);
     let uv_unit = source.one_of("uv_unit", &UNITS);
     let seam = source.one_of("seam", &SEAMS);
+    let hem_keys = HemKeys::read(source, context);
+    let hem = hem_keys.hem(source, None);
     let body = source.string("body").map(|p| {
         let span = source.span("body").unwrap_or(source.header());
         (context.resolve(p, span), span)
@@ -135,8 +174,18 @@ pub(super) fn garment(
     };
     let (gauge, per) = (stitch(fabric, None), per(fabric));
     let grain = grain(fabric);
-    let first =
-        own.clone().map(|cloth| Rule { group: None, cloth, stitch: gauge, grain, yarn: None, color: None, seam: None });
+    let rule = |cloth| Rule {
+        group: None,
+        cloth,
+        stitch: gauge,
+        grain,
+        yarn: None,
+        color: None,
+        seam: None,
+        hem,
+        hems_itself: false,
+    };
+    let first = own.clone().map(rule);
     let panels: Vec<Option<Rule>> = fabric
         .tables("panel")
         .into_iter()
@@ -155,6 +204,8 @@ pub(super) fn garment(
             if color.tension().is_some() {
                 table.error_at("vary", "`tension` is of the whole garment", Some("`vary` of the fabric"));
             }
+            let own_hem = HemKeys::read(&table, context);
+            let hem = own_hem.hem(&table, Some(hem_keys));
             let rule = Rule {
                 group: Some(group?),
                 stitch: stitch(&table, Some(per)).or(gauge),
@@ -166,6 +217,8 @@ pub(super) fn garment(
                 yarn,
                 color: colored.then_some(color),
                 seam: table.one_of("seam", &SEAMS),
+                hem,
+                hems_itself: own_hem.kind.is_some(),
             };
             table.finish();
             Some(rule)
