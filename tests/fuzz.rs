@@ -125,7 +125,7 @@ fn damaged(random: &mut Random) -> Vec<u8> {
 
 #[test]
 fn damaged_scenes_never_panic() {
-    let cases = std::env::var("YARNRAY_FUZZ_CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(1500_u64);
+    let cases = std::env::var("YARNRAY_FUZZ_CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(4000_u64);
     let directory = directory();
     write(directory.path(), "weave.txt", weave_text(2));
     let mut loaded = 0;
