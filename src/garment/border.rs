@@ -122,7 +122,7 @@ impl Border {
         };
         let mut at = on(border, from).0;
         if *margin < 0.0 {
-            let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
+            let d = border.direction();
             // Where it slants what is turned in ends in steps: nobody sees them, and no stitch is drawn out for them.
             let slants = d.x.abs().min(d.y.abs()) > LEVEL;
             at = if slants { from } else { at + d.perp() * *margin };
@@ -190,7 +190,7 @@ impl Border {
 /// row: that edge slants or goes up its wales.
 pub(super) fn is_picked_up(edge: &BorderEdge, mate: &BorderEdge) -> bool {
     // The cloth is to the left of its edges: first rows stand on edges that go right, last ones hang from such as go left.
-    let [own, other] = [edge, mate].map(|e| (e.ends[1] - e.ends[0]).normalize_or(DVec2::X));
+    let [own, other] = [edge, mate].map(BorderEdge::direction);
     own.x > own.y.abs() && !(other.x < 0.0 && other.y.abs() <= LEVEL)
 }
 

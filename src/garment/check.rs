@@ -3,12 +3,12 @@
 use glam::DVec2;
 
 use super::{
-    lattice::Lattice,
+    lattice::{Ground, Lattice},
     mesh::GarmentError,
     options::{Cloth, Options},
     panels::Panel,
     sewing::Sewing,
-    surface::{BorderEdge, Finder, Surface, bounds},
+    surface::{BorderEdge, bounds},
 };
 
 /// More stitches than these are not laid.
@@ -84,7 +84,7 @@ const BARE: f64 = 0.2;
 /// Hems of panels that are sewn all round, or that are too narrow or too wide; `cloth` is that of each panel.
 pub(super) fn hems(
     sewing: &Sewing,
-    surface: &Surface,
+    grounds: &[Ground<'_>],
     borders: &[Vec<BorderEdge>],
     (panels, cloth): (&[Panel], &[usize]),
     cloths: &[Cloth],
@@ -93,16 +93,15 @@ pub(super) fn hems(
         let Some(hem) = asked.hem else { continue };
         let mut found = false;
         for panel in (0..panels.len()).filter(|&p| cloth[p] == i) {
-            let division = sewing.division(panel);
-            let (_, line) = division.border(panel as u32, &borders[panel]);
-            let (Some(line), Panel { group, line: at, .. }) = (line, &panels[panel]) else { continue };
+            let Ground { finder, hem: Some(line), .. } = &grounds[panel] else { continue };
+            let Panel { group, line: at, .. } = &panels[panel];
             found = true;
-            let least = 2.0 * line.turnup.fold.begin() + LEAST_IN_HEM * division.stitch.max_element();
+            let least = 2.0 * line.turnup.fold.begin() + LEAST_IN_HEM * sewing.division(panel).stitch.max_element();
             if hem.width < least {
                 let problem = format!("a hem of {:.2} mm is too narrow for the cloth of panel `{group}`", hem.width);
                 return Err(GarmentError::at(*at, problem, format!("`hem_width` of {least:.2} mm or more")));
             }
-            if line.without_cloth(&Finder::new(surface, panel as u32)) > BARE {
+            if line.without_cloth(finder) > BARE {
                 let problem = format!("a hem of {:.2} mm is wider than panel `{group}` is high over it", hem.width);
                 let hint = "a smaller `hem_width`, or `hem = \"none\"` of that panel";
                 return Err(GarmentError::at(*at, problem, hint));

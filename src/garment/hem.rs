@@ -112,7 +112,7 @@ impl HemLine {
         let lasts: HashMap<_, usize> = edges.iter().enumerate().map(|(i, e)| (key(e.ends[1]), i)).collect();
         let over = turnup.fold.beyond(turnup.hem.width);
         let edge = |border: &BorderEdge| {
-            let normal = |e: &BorderEdge| (e.ends[1] - e.ends[0]).normalize_or(DVec2::X).perp();
+            let normal = |e: &BorderEdge| e.direction().perp();
             let neighbours = [lasts.get(&key(border.ends[0])), firsts.get(&key(border.ends[1]))];
             let own = normal(border);
             let inward = neighbours.map(|other| match other.map(|&i| normal(&edges[i])) {

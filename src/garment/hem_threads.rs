@@ -6,14 +6,14 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{
-    border::Border,
     edges::{ClothEdge, Way, ways},
     fold::Fold,
     hem::{CORNER, Hem, HemKind},
+    lattice::Ground,
     lay::LaidYarn,
     sewing::{STEP, Sewing, THREAD},
     sheet::Bends,
-    surface::{Anchor, BorderEdge, Finder, Pose, Surface},
+    surface::{Anchor, BorderEdge, Pose, Surface},
 };
 use crate::pattern::StrandKind;
 
@@ -68,7 +68,7 @@ impl HemThread {
 /// The threads of all hems, and for each kind and width of hem the length of the edges that it is at, mm.
 pub(super) fn hem_threads(
     sewing: &Sewing,
-    surface: &Surface,
+    grounds: &[Ground<'_>],
     first: &Pose,
     borders: &[Vec<BorderEdge>],
 ) -> (Vec<HemThread>, Vec<(Hem, f64)>) {
@@ -86,7 +86,7 @@ pub(super) fn hem_threads(
         }
     }
     let panels: HashMap<usize, Panel<'_>> = (edges.values().map(|(panel, _)| *panel))
-        .map(|panel| (panel, Panel::new(sewing, surface, panel, &borders[panel])))
+        .map(|panel| (panel, Panel::new(sewing, &grounds[panel], panel, &borders[panel])))
         .collect();
     let mut threads = Vec::new();
     let mut lengths = Vec::new();
@@ -104,9 +104,8 @@ pub(super) fn hem_threads(
 
 /// A panel with hemmed edges.
 struct Panel<'a> {
-    border: Border,
+    ground: &'a Ground<'a>,
     edges: &'a [BorderEdge],
-    finder: Finder<'a>,
     fold: Fold,
     bends: &'a Bends,
     cloth: usize,
@@ -115,25 +114,16 @@ struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    fn new(sewing: &'a Sewing, surface: &'a Surface, panel: usize, edges: &'a [BorderEdge]) -> Self {
-        let division = sewing.division(panel);
-        let (border, _) = division.border(panel as u32, edges);
+    fn new(sewing: &'a Sewing, ground: &'a Ground<'a>, panel: usize, edges: &'a [BorderEdge]) -> Self {
         let (cloth, diameter) = sewing.cloth(panel);
         let bends = sewing.bends(cloth);
         let fold = bends.hem.expect("a panel with hemmed edges has a fold for them");
-        let finder = Finder::new(surface, panel as u32);
-        Self { border, edges, finder, fold, bends, cloth, diameter, stitch: division.stitch }
-    }
-
-    fn anchor(&self, at: DVec2) -> Anchor {
-        let found = self.finder.find(at);
-        if found.is_some() { found } else { self.border.nearest_anchor(at) }
+        Self { ground, edges, fold, bends, cloth, diameter, stitch: sewing.division(panel).stitch }
     }
 
     /// By how much what lies under the cloth is lower, for a seam's allowance lies between, mm.
     fn room(&self, at: DVec2) -> f64 {
-        let most = self.bends.rooms.iter().map(|room| room.until).fold(0.0, f64::max);
-        let seam = self.border.seam_within(at, most);
+        let seam = self.ground.border.seam_within(at, self.bends.widest_room());
         seam.map_or(0.0, |(distance, kind)| self.bends.rooms[kind as usize].at(distance))
     }
 
@@ -142,20 +132,15 @@ impl<'a> Panel<'a> {
     fn lean(&self, edge: &BorderEdge, last: bool) -> f64 {
         let end = edge.ends[usize::from(last)];
         let Some(beside) = self.edges.iter().find(|other| other.ends[usize::from(!last)] == end) else { return 0.0 };
-        let (along, inward) = (direction(edge), direction(edge).perp());
+        let (along, inward) = (edge.direction(), edge.direction().perp());
         if beside.sewn_to.is_some() {
-            let up = if last { direction(beside) } else { -direction(beside) };
+            let up = if last { beside.direction() } else { -beside.direction() };
             return (up.dot(along) / up.dot(inward).max(0.3)).clamp(-1.0, 1.0);
         }
-        let other = direction(beside).perp();
+        let other = beside.direction().perp();
         let cosine = inward.dot(other);
         if cosine > CORNER { 0.0 } else { (other.dot(along) / (1.0 + cosine).max(0.3)).clamp(-1.5, 1.5) }
     }
-}
-
-/// Unit vector along an edge in the flat panel.
-fn direction(edge: &BorderEdge) -> DVec2 {
-    (edge.ends[1] - edge.ends[0]).normalize_or(DVec2::X)
 }
 
 /// An edge on a [`Rail`].
@@ -194,7 +179,7 @@ impl<'a> Rail<'a> {
             found.push((panel, panels[&panel].edges[i]));
         }
         let goes_on = |[(panel, edge), (other, next)]: [&(usize, BorderEdge); 2]| {
-            panel == other && edge.ends[1] == next.ends[0] && direction(edge).dot(direction(next)) > CORNER
+            panel == other && edge.ends[1] == next.ends[0] && edge.direction().dot(next.direction()) > CORNER
         };
         // A ring starts where a panel does.
         let breaks = |i: &usize| !goes_on([&found[i - 1], &found[*i]]);
@@ -263,7 +248,7 @@ impl<'a> Rail<'a> {
             let (panel, at) = self.at(along * self.length / length, inside);
             // What is below goes down where what is turned in does, what is between by its share.
             let share = (height / bottom).clamp(0.0, 1.0);
-            (panel.anchor(at), height - share * panel.room(at))
+            (panel.ground.anchor(at).0, height - share * panel.room(at))
         };
         let thread = |places: Vec<Place>| HemThread {
             places: places.par_iter().with_min_len(256).map(place).collect(),
@@ -278,7 +263,7 @@ impl<'a> Rail<'a> {
 
 /// Edges of one panel in a row; `shares` of their length lie before each and in all.
 fn on_panel(number: usize, panel: &Panel<'_>, edges: &[BorderEdge], shares: &[f64]) -> Vec<Step> {
-    let normal = |e: &BorderEdge| direction(e).perp();
+    let normal = |e: &BorderEdge| e.direction().perp();
     let ends = [panel.lean(&edges[0], false), panel.lean(&edges[edges.len() - 1], true)];
     let lean = |i: usize| ends[0] + shares[i] * (ends[1] - ends[0]);
     let inward = |i: usize| {

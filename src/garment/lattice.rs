@@ -16,8 +16,23 @@ use super::{
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
 pub(super) const PAD: usize = 2;
 
-/// The border of a panel, and its hemmed edges if there are any.
-type Edges<'a> = (&'a Border, Option<&'a HemLine>);
+/// A flat panel, as it is divided into stitches and as threads are sewn through it.
+pub(super) struct Ground<'a> {
+    pub(super) finder: Finder<'a>,
+    /// The border as stitches see it.
+    pub(super) border: Border,
+    /// The hemmed edges, if there are any.
+    pub(super) hem: Option<HemLine>,
+}
+
+impl Ground<'_> {
+    /// The place of the cloth at one of the flat panel, or on its border beside one outside; and whether it is inside.
+    pub(super) fn anchor(&self, at: DVec2) -> (Anchor, bool) {
+        let found = self.finder.find(at);
+        let inside = found.is_some();
+        (if inside { found } else { self.border.nearest_anchor(at) }, inside)
+    }
+}
 
 /// How far corners with stitches on three sides go to the border.
 const INNER: f64 = 0.35;
@@ -48,12 +63,12 @@ pub(super) struct Division<'a> {
 }
 
 impl Division<'_> {
-    /// The border of a panel as stitches see it, and its hemmed edges.
-    pub(super) fn border(&self, panel: u32, border: &[BorderEdge]) -> (Border, Option<HemLine>) {
+    /// A panel with its border.
+    pub(super) fn ground<'s>(&self, surface: &'s Surface, panel: u32, border: &[BorderEdge]) -> Ground<'s> {
         // A panel sewn to itself from left to right is knitted in the round: its sides are no border.
         let round = self.closing(panel, border).is_some();
         let edge = |(i, border): (usize, &BorderEdge)| {
-            let d = (border.ends[1] - border.ends[0]).normalize_or(DVec2::X);
+            let d = border.direction();
             let (seam, hemmed) = (self.seams[i], self.hemmed[i]);
             let sides = match border.sewn_to {
                 _ if hemmed => [DVec2::ZERO; 2],
@@ -73,7 +88,8 @@ impl Division<'_> {
         };
         let edges: Vec<Edge> = border.iter().enumerate().map(edge).filter(|e| !(round && is_side(&e.border))).collect();
         let hemmed: Vec<BorderEdge> = edges.iter().filter(|e| e.hemmed).map(|e| e.border).collect();
-        (Border::new(edges), self.turnup.and_then(|turnup| HemLine::new(&hemmed, turnup)))
+        let hem = self.turnup.and_then(|turnup| HemLine::new(&hemmed, turnup));
+        Ground { finder: Finder::new(surface, panel), border: Border::new(edges), hem }
     }
 
     /// Where a panel that is knitted in the round begins from the left, and its circumference.
@@ -115,15 +131,14 @@ pub(super) struct Lattice {
 
 impl Lattice {
     pub(super) fn new(
-        surface: &Surface,
+        ground: &Ground<'_>,
         panel: u32,
         border: &[BorderEdge],
         division: &Division<'_>,
         lays: &(impl Fn(Anchor) -> bool + Sync),
     ) -> Self {
-        let finder = Finder::new(surface, panel);
+        let Ground { finder, border: edges, hem } = ground;
         let around = division.closing(panel, border);
-        let (edges, hem) = division.border(panel, border);
         let [mut low, mut high] = bounds(border);
         if border.is_empty() {
             (low, high) = (finder.low(), finder.low());
@@ -177,7 +192,7 @@ impl Lattice {
             let (x, y) = (i % counts[0], i / counts[0]);
             low + stitch * DVec2::new(x as f64 + 0.5, y as f64 + 0.5)
         };
-        let under = |i: usize| hem.as_ref()?.under(middle(i), stitch, &finder, &edges);
+        let under = |i: usize| hem.as_ref()?.under(middle(i), stitch, finder, edges);
         let layers: Vec<(usize, bool)> = (0..counts[0] * counts[1])
             .into_par_iter()
             .with_min_len(256)
@@ -188,27 +203,27 @@ impl Lattice {
             })
             .collect();
         lattice.doubled = layers.iter().filter(|(n, laid)| *laid && *n > 1).count();
-        let all = (&edges, hem.as_ref());
-        lattice.keep(layers.iter().map(|(n, _)| *n > 0).collect(), &middle, all);
+        lattice.keep(layers.iter().map(|(n, _)| *n > 0).collect(), &middle, ground);
         if layers.iter().any(|(_, laid)| !laid) {
             lattice.whole = std::mem::take(&mut lattice.kept);
-            lattice.keep(layers.iter().map(|(n, laid)| *laid && *n > 0).collect(), &middle, all);
+            lattice.keep(layers.iter().map(|(n, laid)| *laid && *n > 0).collect(), &middle, ground);
         }
         lattice.stitches = lattice.kept.iter().filter(|k| **k).count() as u64;
-        lattice.place(&finder, all, low, division.bent);
+        lattice.place(ground, low, division.bent);
         lattice
     }
 
     /// Keeps some stitches, and those beyond seams beside them.
-    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), edges: Edges<'_>) {
+    fn keep(&mut self, kept: Vec<bool>, middle: &(impl Fn(usize) -> DVec2 + Sync), ground: &Ground<'_>) {
         self.kept = kept;
-        self.turn_in(middle, edges);
+        self.turn_in(middle, ground);
         self.drop_lonely();
     }
 
     /// Adds the stitches beyond seams that are turned in; where a hem turns these are cut away.
-    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), (edges, hem): Edges<'_>) {
-        let bends = |at: DVec2| hem.is_some_and(|hem| hem.near(at, hem.turnup.fold.begin(), 0.0).is_some());
+    fn turn_in(&mut self, middle: &(impl Fn(usize) -> DVec2 + Sync), ground: &Ground<'_>) {
+        let Ground { border: edges, hem, .. } = ground;
+        let bends = |at: DVec2| hem.as_ref().is_some_and(|hem| hem.near(at, hem.turnup.fold.begin(), 0.0).is_some());
         let steps = (edges.turned_in / self.stitch.min_element()).ceil() as usize;
         let columns = self.counts[0] as isize;
         for _ in 0..steps {
@@ -309,7 +324,8 @@ impl Lattice {
     }
 
     /// Finds where each corner of a stitch lies.
-    fn place(&mut self, finder: &Finder<'_>, (edges, hem): Edges<'_>, low: DVec2, bent: f64) {
+    fn place(&mut self, ground: &Ground<'_>, low: DVec2, bent: f64) {
+        let (edges, hem) = (&ground.border, ground.hem.as_ref());
         let (w, h) = (self.width(), self.height());
         let of_index = |i: usize| {
             let pad = if self.ring { 0 } else { PAD as isize };
@@ -386,10 +402,10 @@ impl Lattice {
                     // The border at the seam is where the first corner lies, or a little outside by rounding.
                     here.x = here.x.max(low.x + 1e-6 * self.stitch.x);
                 }
-                let found = finder.find(here);
-                let on_panel = found.is_some() || near_hem.is_some_and(|near| near.distance < 0.0);
+                let (anchor, inside) = ground.anchor(here);
+                let on_panel = inside || near_hem.is_some_and(|near| near.distance < 0.0);
                 let near = by_border(x, y).then(|| edges.near_seam(here, bent, on_panel)).flatten();
-                (if found.is_some() { found } else { edges.nearest_anchor(here) }, near, near_hem)
+                (anchor, near, near_hem)
             })
             .collect();
         self.free = free;

@@ -38,7 +38,7 @@ use self::{
     edges::{Edging, finish, relaxed_link},
     floats::Lanes,
     hem_threads::{HemThread, hem_threads},
-    lattice::Lattice,
+    lattice::{Ground, Lattice},
     lay::{Laying, lay},
     panels::Panels,
     sewing::Sewing,
@@ -98,17 +98,22 @@ impl Garment {
         let wanted = |at: DVec3| options.near.is_none_or(|(middle, radius)| at.distance(middle) <= radius);
         let lays = |anchor| wanted(surface.at(&pose, anchor).0);
         let sewing = Sewing::new(&options, &shapes, &borders, &cloth);
-        check::hems(&sewing, &surface, &borders, (&panels.panels, &cloth), &options.cloths)?;
+        let grounds: Vec<Ground<'_>> = borders
+            .par_iter()
+            .enumerate()
+            .map(|(panel, border)| sewing.division(panel).ground(&surface, panel as u32, border))
+            .collect();
+        check::hems(&sewing, &grounds, &borders, (&panels.panels, &cloth), &options.cloths)?;
         let lattices: Vec<Lattice> = borders
             .par_iter()
             .enumerate()
-            .map(|(panel, border)| Lattice::new(&surface, panel as u32, border, &sewing.division(panel), &lays))
+            .map(|(panel, border)| Lattice::new(&grounds[panel], panel as u32, border, &sewing.division(panel), &lays))
             .collect();
         check::has_room(&lattices, &options)?;
         check::flat(&lattices, &panels.panels)?;
         let mut edgings = sewing.edgings(&pose, &borders, &lattices);
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));
-        let (hem_threads, hemmed) = hem_threads(&sewing, &surface, &pose, &borders);
+        let (hem_threads, hemmed) = hem_threads(&sewing, &grounds, &pose, &borders);
         let hem_threads = hem_threads.into_iter().flat_map(|thread| thread.on(&lays)).collect();
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };

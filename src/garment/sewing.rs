@@ -238,7 +238,7 @@ impl Sewing {
         let trim = &self.trims[self.cloth[panel]];
         let begin = trim.bends.seams.iter().flatten().map(Fold::begin).fold(0.0, f64::max);
         let over = trim.sewn.iter().map(|s| -s[0].min_element()).fold(0.0, f64::max);
-        let room = trim.bends.rooms.iter().map(|room| room.until).fold(0.0, f64::max);
+        let room = trim.bends.widest_room();
         Division {
             stitch: trim.stitch,
             repeat: trim.repeat,
@@ -308,7 +308,7 @@ impl Sewing {
     fn over(&self, kind: SeamKind, panel: u32, mate: u32, borders: &[Vec<BorderEdge>]) -> f64 {
         let sewn = self.trims[self.cloth[panel as usize]].sewn[kind as usize][0];
         let own = borders[panel as usize].iter().filter(|e| e.sewn_to.is_some_and(|(panel, _)| panel == mate));
-        let across = own.map(|e| (e.ends[1] - e.ends[0]).normalize_or(DVec2::X).abs());
+        let across = own.map(|e| e.direction().abs());
         let (sum, count) = across.fold((0.0, 0), |(sum, n), d| (sum - d.y * sewn.x - d.x * sewn.y, n + 1));
         sum / f64::from(count.max(1))
     }

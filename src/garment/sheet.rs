@@ -53,6 +53,13 @@ pub(super) struct Bends {
     pub(super) rooms: [Room; SeamKind::COUNT],
 }
 
+impl Bends {
+    /// How far from a seam what lies under a hem may make room, mm.
+    pub(super) fn widest_room(&self) -> f64 {
+        self.rooms.iter().map(|room| room.until).fold(0.0, f64::max)
+    }
+}
+
 /// How far what lies under a hem keeps from the cloth by a seam, for the seam's allowance lies between.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Room {

@@ -90,6 +90,11 @@ pub(super) fn bounds(border: &[BorderEdge]) -> [DVec2; 2] {
 }
 
 impl BorderEdge {
+    /// Unit vector along it in the flat panel, which is to its left.
+    pub(super) fn direction(&self) -> DVec2 {
+        (self.ends[1] - self.ends[0]).normalize_or(DVec2::X)
+    }
+
     /// Whether it, which is edge `i` of a panel, is the first of two that are sewn together.
     pub(super) fn is_first(&self, panel: u32, i: usize) -> bool {
         self.sewn_to.is_some_and(|mate| (panel, i as u32) < mate)
