@@ -10,7 +10,9 @@ use std::{
 use serde_json::Value;
 use yarnray::image::{self, Attribute};
 
-use crate::support::{SWATCH, bcc, directory, listing, program, read_json, render, weave_text, write, yarnray};
+use crate::support::{
+    SWATCH, bcc, directory, listing, program, project, read_json, render, weave_text, write, yarnray,
+};
 
 #[test]
 fn help_carries_examples() {
@@ -58,6 +60,16 @@ fn info_tells_of_scenes() {
         assert!(json[list].as_array().unwrap().iter().all(|f| f["name"].is_string() && f["reason"] != ""), "{json}");
     }
     assert_eq!(listing(directory.path()), ["s.toml"]);
+}
+
+/// The strands of a tuft are crowded as its fibres are: that is no overlap.
+#[test]
+fn info_tells_of_the_ground_of_pile_how_far_it_overlaps() {
+    let info = yarnray(&project("scenes/weaves"), &["info", "velvet.toml", "--json"]).good().stdout;
+    let json: Value = serde_json::from_str(&info).unwrap();
+    assert!(json["overlap"]["share"].as_f64().unwrap() < 0.02, "{}", json["overlap"]);
+    let text = yarnray(&project("scenes/weaves"), &["info", "velvet.toml"]).good().stdout;
+    assert!(text.contains("strands of tufts not counted"), "{text}");
 }
 
 #[test]

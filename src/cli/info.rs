@@ -333,6 +333,7 @@ fn scene_report(scene: &Scene) -> (Value, String) {
 }
 
 /// How far the yarns of a scene run into each other, each as wide as it is in the mean; `None` where nothing lies near.
+/// Without the strands of tufts, which are crowded in them as fibres are.
 fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
     let half_width = |fabric: &Fabric| match fabric.kind {
         CurveKind::Yarn(yarn) => scene.yarns[yarn].half_width(),
@@ -340,7 +341,8 @@ fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
     };
     let of_fabric = |fabric: &'s Fabric| {
         let half_width = half_width(fabric);
-        fabric.curves.iter().map(move |(curve, radii)| (curve, radii.as_slice(), half_width))
+        let yarns = fabric.curves.iter().enumerate().filter(|(i, _)| !fabric.tufts.has(*i));
+        yarns.map(move |(_, (curve, radii))| (curve, radii.as_slice(), half_width))
     };
     (scene.fabrics.iter().any(|f| !f.curves.is_empty()))
         .then(|| overlap_of_plied(scene.fabrics.iter().flat_map(of_fabric)))
@@ -429,7 +431,9 @@ impl<'a> SceneFacts<'a> {
         for facts in &scene.garments {
             text += &garment_lines(facts);
         }
-        text += &overlap_line(self.overlap);
+        let strands = self.scene.fabrics.iter().any(|f| !f.tufts.strands.is_empty());
+        let line = overlap_line(self.overlap);
+        text += &if strands { line.replace('\n', "; strands of tufts not counted\n") } else { line };
         text += &self.memory_lines();
         for used in [true, false] {
             text += if used { "  used\n" } else { "  left out\n" };
@@ -473,10 +477,10 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     let (noun, of) = match fabric.kind {
         CurveKind::Yarn(yarn) => {
             let yarn = &scene.yarns[yarn];
-            let tufts = match fabric.tufts {
+            let tufts = match &fabric.tufts {
                 Tufts { yarns: 0, .. } => String::new(),
                 Tufts { yarns, strands } => {
-                    format!("and {} ({}) ", counted(yarns, "cut tuft"), counted(strands, "strand"))
+                    format!("and {} ({}) ", counted(*yarns, "cut tuft"), counted(strands.len(), "strand"))
                 }
             };
             let (plies, fibers) = (counted(yarn.plies.len(), "ply"), counted(yarn.plies[0].fibers, "fibre"));
@@ -487,7 +491,7 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
     format!(
         "  fabric    {}: {} {of}, {:.1} m, {} given, {} to make\n",
         fabric.origin,
-        counted(fabric.curves.len() - fabric.tufts.strands, noun),
+        counted(fabric.curves.len() - fabric.tufts.strands.len(), noun),
         length(fabric) / 1000.0,
         counted(fabric.control_points(), "point"),
         counted(estimate.segments, "segment")

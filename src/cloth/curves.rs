@@ -307,9 +307,9 @@ impl Wound<'_> {
 
 fn plies<'a>(fabric: &Fabric, yarn: &'a Yarn, shape: &'a YarnShape, strands: &'a Strands) -> Plies<'a> {
     let plies = Plies::new(strands, &yarn.plies, shape, fabric.seed);
-    match fabric.tufts {
+    match &fabric.tufts {
         Tufts { yarns: 0, .. } => plies,
-        Tufts { yarns, strands } => plies.with_opened(yarn.radius, strands as f64 / yarns as f64),
+        Tufts { yarns, strands } => plies.with_opened(yarn.radius, strands.len() as f64 / *yarns as f64),
     }
 }
 

@@ -269,19 +269,24 @@ pub enum CurveKind {
 }
 
 /// Cut tufts of woven pile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tufts {
     /// Yarns that are cut tufts.
     pub yarns: usize,
-    /// Curves that are the strands which these open into.
-    pub strands: usize,
+    /// Indices of the curves that are the strands which these open into, in order.
+    pub strands: Vec<usize>,
 }
 
-impl std::ops::Add for Tufts {
-    type Output = Self;
+impl Tufts {
+    /// Of curves that are followed by other ones: how many come first, and the tufts of those that follow.
+    pub(crate) fn followed(mut self, curves: usize, other: &Self) -> Self {
+        self.strands.extend(other.strands.iter().map(|i| curves + i));
+        Self { yarns: self.yarns + other.yarns, ..self }
+    }
 
-    fn add(self, other: Self) -> Self {
-        Self { yarns: self.yarns + other.yarns, strands: self.strands + other.strands }
+    /// Whether a curve is a strand of one.
+    pub(crate) fn has(&self, curve: usize) -> bool {
+        self.strands.binary_search(&curve).is_ok()
     }
 }
 

@@ -161,21 +161,21 @@ impl<'a> Base<'a> {
 
     /// Warp and weft: apart if they are of different yarns.
     fn weave(&self, plan: &WeavePlan) -> Option<Vec<Made>> {
-        let Woven { origin, sides, tufts } = plan.make(self.context)?;
+        let Woven { origin, sides, tufts: [warp_tufts, weft_tufts] } = plan.make(self.context)?;
         let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
         let weft = self.named_or_own(plan.weft_yarn.as_deref())?;
         let [warp_radius, weft_radius] = plan.radii();
         let (mut warps, wefts) = (with_radius(warps, warp_radius), with_radius(wefts, weft_radius));
         let dyes = || Dyes::of_threads(&plan.colors);
         if weft == self.kind {
+            let tufts = warp_tufts.followed(warps.len(), &weft_tufts);
             warps.extend(wefts);
             coordinates.join(weft_coordinates);
-            let tufts = tufts[0] + tufts[1];
             return Some(vec![Made { tufts, dyes: dyes(), ..Made::new(origin, self.kind, warps, Some(coordinates)) }]);
         }
         let warp = Made::new(format!("warp of {origin}"), self.kind, warps, Some(coordinates));
         let weft = Made::new(format!("weft of {origin}"), weft, wefts, Some(weft_coordinates));
-        Some(vec![Made { tufts: tufts[0], dyes: dyes(), ..warp }, Made { tufts: tufts[1], dyes: dyes(), ..weft }])
+        Some(vec![Made { tufts: warp_tufts, dyes: dyes(), ..warp }, Made { tufts: weft_tufts, dyes: dyes(), ..weft }])
     }
 
     /// The curves of a file, with radii of their own if they may keep them.
