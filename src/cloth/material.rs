@@ -35,36 +35,64 @@ pub fn pressed_scatterer(yarn: &Yarn, model: Model, stretch: f64) -> YarnScatter
     of_shape(shape_for(yarn, model, stretch), &materials(yarn), model, stretch, &Solutions::default())
 }
 
+/// Fabrics whose yarns are pressed by no more than this apart, long over short axis, share what is solved for them: panels of one
+/// garment. Along each yarn it varies by more.
+const PRESSED_ALIKE: f64 = 0.08;
+
+/// A shape that yarns share.
+struct SharedShape<'a> {
+    /// One of the yarns.
+    yarn: &'a Yarn,
+    /// From the least to the most that they are pressed: long over short axis.
+    from: f64,
+    to: f64,
+    /// Halfway: that of the shape.
+    stretch: f64,
+    shape: Arc<YarnShape>,
+}
+
 /// What yarns share whose plies are alike, whatever their colour and their fabric.
 pub(super) struct Shared<'a> {
     model: Model,
-    /// With the yarns that have them, pressed to axes of some number to 1.
-    shapes: Vec<(&'a Yarn, f64, Arc<YarnShape>)>,
+    shapes: Vec<SharedShape<'a>>,
     solutions: Solutions,
 }
 
 impl<'a> Shared<'a> {
     /// With the shapes of some yarns, pressed to axes of some number to 1.
     pub(super) fn new(yarns: impl IntoIterator<Item = (&'a Yarn, f64)>, model: Model) -> Self {
-        let mut all: Vec<(&Yarn, f64)> = Vec::new();
-        for (yarn, stretch) in yarns {
-            if !all.iter().any(|of| is_shaped_as((yarn, stretch), *of)) {
-                all.push((yarn, stretch));
+        let mut all: Vec<(&Yarn, f64)> = yarns.into_iter().collect();
+        // From the least pressed on, so that each joins those that are a little less.
+        all.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let mut alike: Vec<(&Yarn, f64, f64)> = Vec::new();
+        for (yarn, stretch) in all {
+            match alike.iter_mut().find(|(of, from, _)| is_shaped_as(yarn, of) && stretch <= from + PRESSED_ALIKE) {
+                Some((_, _, to)) => *to = stretch,
+                None => alike.push((yarn, stretch, stretch)),
             }
         }
-        let shaped = |(yarn, stretch)| (yarn, stretch, Arc::new(shape_for(yarn, model, stretch)));
-        Self { model, shapes: all.into_par_iter().map(shaped).collect(), solutions: Solutions::default() }
+        let shaped = |(yarn, from, to)| {
+            let stretch = 0.5 * (from + to);
+            SharedShape { yarn, from, to, stretch, shape: Arc::new(shape_for(yarn, model, stretch)) }
+        };
+        Self { model, shapes: alike.into_par_iter().map(shaped).collect(), solutions: Solutions::default() }
     }
 
-    fn shape(&self, yarn: &Yarn, stretch: f64) -> Arc<YarnShape> {
-        let alike = self.shapes.iter().find(|(of, pressed, _)| is_shaped_as((yarn, stretch), (of, *pressed)));
-        alike.map_or_else(|| Arc::new(shape_for(yarn, self.model, stretch)), |(_, _, shape)| Arc::clone(shape))
+    /// The shape of a yarn that is pressed to axes of `stretch` : 1, and what these are of all that share it.
+    pub(super) fn shape(&self, yarn: &Yarn, stretch: f64) -> (Arc<YarnShape>, f64) {
+        let shares = |of: &&SharedShape<'_>| is_shaped_as(yarn, of.yarn) && (of.from..=of.to).contains(&stretch);
+        match self.shapes.iter().find(shares) {
+            Some(of) => (Arc::clone(&of.shape), of.stretch),
+            None => (Arc::new(shape_for(yarn, self.model, stretch)), stretch),
+        }
     }
 
     /// Whole yarns, pressed to axes of `stretch` : 1 on the mean.
     pub(super) fn of_yarns(&self, yarn: &Yarn, variants: &[Yarn], stretch: f64) -> PerVariant<YarnScatterer> {
-        let scatterer =
-            |of: &Yarn| of_shape(self.shape(of, stretch), &materials(of), self.model, stretch, &self.solutions);
+        let scatterer = |of: &Yarn| {
+            let (shape, stretch) = self.shape(of, stretch);
+            of_shape(shape, &materials(of), self.model, stretch, &self.solutions)
+        };
         PerVariant::new(scatterer(yarn), variants.par_iter().map(&scatterer).collect())
     }
 
@@ -86,9 +114,10 @@ impl<'a> Shared<'a> {
     }
 }
 
-fn is_shaped_as((yarn, stretch): (&Yarn, f64), (other, pressed): (&Yarn, f64)) -> bool {
+/// Whether yarns are alike but for their material and for how they are pressed.
+fn is_shaped_as(yarn: &Yarn, other: &Yarn) -> bool {
     let of = |yarn: &Yarn| (yarn.ply_twist, yarn.placement, yarn.known_packing, yarn.tilted);
-    stretch == pressed && yarn.plies == other.plies && of(yarn) == of(other)
+    yarn.plies == other.plies && of(yarn) == of(other)
 }
 
 /// The fibres of one ply of a yarn.

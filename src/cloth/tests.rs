@@ -1,14 +1,17 @@
 //! What stands for a scene's cloth, and what scatters where a ray meets it.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, sync::Arc};
 
 use glam::{DQuat, DVec3, Vec3A};
 
-use super::*;
+use super::{material::Shared, *};
 use crate::{
     geometry::{ray::Ray, section::Crossings},
     math::sampler::Stream,
-    scene::load::{LoadOptions, parse},
+    scene::{
+        Model,
+        load::{LoadOptions, parse},
+    },
 };
 
 /// Two straight yarns, one of each kind, and a single fibre and a box beside them.
@@ -94,6 +97,19 @@ fn fabrics_of_yarns_that_differ_in_colour_only_share_one_shape() {
     for more in ["ply_twist = 20\n", "fiber_twist = 20\n", "[yarn.g.packing]\ntype = \"measured\"\n"] {
         assert!(!shares(more), "{more}");
     }
+}
+
+#[test]
+fn fabrics_that_are_pressed_alike_share_what_is_solved() {
+    let scene = scene("yarn", "");
+    let (a, b) = (&scene.yarns[0], &scene.yarns[0].dyed([0.5; 3]));
+    let shared = Shared::new([(a, 1.33), (b, 1.27), (a, 1.5), (a, 1.32)], Model::Aggregated);
+    let [(first, stretch), (second, other), (third, apart)] =
+        [(a, 1.27), (b, 1.33), (a, 1.5)].map(|(yarn, stretch)| shared.shape(yarn, stretch));
+    assert!(Arc::ptr_eq(&first, &second) && !Arc::ptr_eq(&first, &third));
+    assert!((stretch - 1.3).abs() < 1e-12 && stretch == other && apart == 1.5, "{stretch} {other} {apart}");
+    // What nobody named has its own.
+    assert_eq!(shared.shape(a, 1.4).1, 1.4);
 }
 
 #[test]

@@ -8,8 +8,10 @@ use crate::{
     scene::Fabric,
 };
 
-/// Shades that variation draws yarns from.
-pub(super) const SHADES: u32 = 256;
+/// Shades that variation draws yarns from, all as likely: a model is made for each.
+pub(super) const SHADES: u32 = 32;
+/// Deviation of normal numbers that stand in the middle of so many parts.
+const SPREAD: f32 = 0.980_384;
 
 /// How much yarns differ; standard deviations.
 #[derive(Clone, Copy)]
@@ -48,5 +50,5 @@ impl Variation {
 /// The brightness of a shade, mean 1.
 pub(super) fn shine(variation: Variation, shade: u32) -> f32 {
     let z = normal((shade as f32 + 0.5) / SHADES as f32);
-    (1.0 + variation.color as f32 * z).max(0.0)
+    (1.0 + variation.color as f32 * z / SPREAD).max(0.0)
 }
