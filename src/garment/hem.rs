@@ -147,9 +147,20 @@ impl HemLine {
         [all().fold(DVec2::INFINITY, DVec2::min), all().fold(DVec2::NEG_INFINITY, DVec2::max)]
     }
 
+    /// How far from an edge a place may lie for which [`Self::near`] tells anything.
+    fn reach(&self, inside: f64, beyond: f64) -> f64 {
+        inside.max(self.over + beyond)
+    }
+
+    /// Whether [`Self::near`] may tell anything of places within a distance of one.
+    pub(super) fn is_around(&self, at: DVec2, distance: f64, inside: f64, beyond: f64) -> bool {
+        let reach = distance + self.reach(inside, beyond);
+        self.tree.locate_within_distance(at.to_array(), reach * reach).next().is_some()
+    }
+
     /// Where a place lies against the nearest of the edges, if it is within what is turned in by one of them or so far inside.
     pub(super) fn near(&self, at: DVec2, inside: f64, beyond: f64) -> Option<NearHem> {
-        let reach = inside.max(self.over + beyond);
+        let reach = self.reach(inside, beyond);
         if (at - self.low + reach).min(self.high - at + reach).min_element() < 0.0 {
             return None;
         }

@@ -15,6 +15,8 @@ use super::{
 
 /// Corners that are kept beyond the outermost stitches: what a cubic through four of them needs, and loops that reach out.
 pub(super) const PAD: usize = 2;
+/// Corners of a block that is looked at as a whole, along each side.
+const BLOCK: usize = 16;
 
 /// A flat panel, as it is divided into stitches and as threads are sewn through it.
 pub(super) struct Ground<'a> {
@@ -388,11 +390,25 @@ impl Lattice {
             turned
                 && [(-steps, 0), (steps, 0), (0, -steps), (0, steps)].iter().any(|(dx, dy)| !self.keeps(x + dx, y + dy))
         };
+        // Whole blocks of corners are far from a hem.
+        let across = w.div_ceil(BLOCK);
+        let hemmed: Vec<bool> = (0..across * h.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|block| {
+                let corner = |k: usize| {
+                    let (x, y) = of_index(BLOCK * (block / across * w + block % across));
+                    grid(x + (k * BLOCK) as isize, y + (k * BLOCK) as isize)
+                };
+                let (low, high) = (corner(0), corner(1));
+                hem.is_some_and(|hem| hem.is_around(low.midpoint(high), 0.5 * low.distance(high), by_hem, by_hem))
+            })
+            .collect();
         let placed: Vec<(Anchor, Option<NearSeam>, Option<NearHem>)> = (0..w * h)
             .into_par_iter()
             .with_min_len(256)
             .map(|i| {
                 let (x, y) = of_index(i);
+                let hem = hem.filter(|_| hemmed[i / w / BLOCK * across + i % w / BLOCK]);
                 let near_hem = hem.and_then(|hem| hem.near(grid(x, y), by_hem, by_hem));
                 if stitches_at(x, y) == 0 {
                     return (Anchor::NONE, None, near_hem);
