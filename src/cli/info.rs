@@ -168,8 +168,8 @@ fn overlap_json(found: Option<Overlap>) -> Value {
     })
 }
 
-fn overlap_line(found: Option<Overlap>) -> String {
-    found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o)))
+fn overlap_line(found: Option<Overlap>, tufts: bool) -> String {
+    found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o, tufts)))
 }
 
 fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
@@ -234,7 +234,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     if !of_plies.is_empty() {
         text += &format!("  plies     {}: curves are plies or fibres of yarns\n", of_plies.len());
     }
-    text += &overlap_line(found);
+    text += &overlap_line(found, false);
     if let Some(p) = proposal {
         text += &format!(
             "  proposal  radius {:.3}: at it {:.1} % of the length overlaps; one bend in a hundred is tighter than {:.3}, \
@@ -431,9 +431,7 @@ impl<'a> SceneFacts<'a> {
         for facts in &scene.garments {
             text += &garment_lines(facts);
         }
-        let strands = self.scene.fabrics.iter().any(|f| !f.tufts.strands.is_empty());
-        let line = overlap_line(self.overlap);
-        text += &if strands { line.replace('\n', "; strands of tufts not counted\n") } else { line };
+        text += &overlap_line(self.overlap, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
         text += &self.memory_lines();
         for used in [true, false] {
             text += if used { "  used\n" } else { "  left out\n" };

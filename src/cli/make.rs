@@ -304,6 +304,7 @@ fn write(
     color: impl Fn(&PatternStrand) -> Option<[f32; 3]>,
 ) -> Result<(), Failure> {
     let mut set = CurveSet { up_axis: Some(1), ..CurveSet::default() };
+    let of_tufts: Vec<bool> = strands.iter().map(PatternStrand::is_of_tuft).collect();
     for strand in strands {
         let radius = if strand.kind == StrandKind::Weft { weft_radius } else { radius };
         set.colors.push(color(&strand));
@@ -329,9 +330,11 @@ fn write(
     let _working = Working::on("looking for yarns that overlap", output.quiet);
     if !output.quiet && set.plies.is_empty() {
         let half_width = yarn.map_or(1.0, Yarn::half_width);
-        let curves = set.curves.iter().filter_map(|c| Some((c, c.radii.as_deref()?, half_width)));
+        // Strands are crowded in their tuft as fibres are.
+        let ground = set.curves.iter().enumerate().filter(|(i, _)| of_tufts.get(*i) != Some(&true));
+        let curves = ground.filter_map(|(_, c)| Some((c, c.radii.as_deref()?, half_width)));
         if let Some(found) = overlap_of_plied(curves) {
-            log::say(&super::overlap_in_words(&found));
+            log::say(&super::overlap_in_words(&found, of_tufts.contains(&true)));
         }
     }
     Ok(())

@@ -58,6 +58,11 @@ pub struct PatternStrand {
 }
 
 impl PatternStrand {
+    /// Whether it is a strand of a cut tuft.
+    pub(crate) fn is_of_tuft(&self) -> bool {
+        self.share < 1.0
+    }
+
     /// Length of yarn that it takes, in the curve's unit.
     pub fn yarn_length(&self) -> f64 {
         self.share * self.curve.polygon_length()

@@ -72,7 +72,7 @@ impl WeavePlan {
                     [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
                 let tufts = [&warps, &wefts].map(|side| {
-                    let strands = || side.iter().enumerate().filter(|(_, s)| s.share < 1.0);
+                    let strands = || side.iter().enumerate().filter(|(_, s)| s.is_of_tuft());
                     let yarns = strands().map(|(_, s)| s.share).sum::<f64>().round() as usize;
                     Tufts { yarns, strands: strands().map(|(i, _)| i).collect() }
                 });
