@@ -180,7 +180,7 @@ fn provide(directory: &Path, words: &[String]) {
 }
 
 /// A scene and the films that `merge` and `info` are shown with.
-static SHOWN: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+fn shown() -> tempfile::TempDir {
     let d = directory();
     write(d.path(), "tiny.toml", SWATCH);
     let render = |args: &str| {
@@ -192,16 +192,16 @@ static SHOWN: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     render("--crop 0,0,20,36 -o left.film");
     render("--crop 20,0,48,36 -o right.film");
     d
-});
+}
 
-/// A directory in which examples can run.
-fn place() -> tempfile::TempDir {
+/// A directory in which examples can run, with what they are shown with.
+fn place(shown: &Path) -> tempfile::TempDir {
     let d = directory();
     for name in ["scenes", "tools"] {
         #[cfg(unix)]
         std::os::unix::fs::symlink(project(name), d.path().join(name)).expect("a link");
     }
-    for file in std::fs::read_dir(SHOWN.path()).expect("a directory").map(|e| e.expect("an entry")) {
+    for file in std::fs::read_dir(shown).expect("a directory").map(|e| e.expect("an entry")) {
         std::fs::copy(file.path(), d.path().join(file.file_name())).expect("a copy");
     }
     d
@@ -218,12 +218,12 @@ fn renders_a_scene(words: &[String]) -> bool {
 }
 
 /// Runs commands one after the other in one directory; gives what went wrong.
-fn run_all(title: &str, commands: &[String], seen: &mut BTreeSet<Vec<String>>) -> Vec<String> {
+fn run_all(title: &str, commands: &[String], shown: &Path, seen: &mut BTreeSet<Vec<String>>) -> Vec<String> {
     let mut problems = Vec::new();
     if commands.is_empty() {
         return problems;
     }
-    let d = place();
+    let d = place(shown);
     for command in commands {
         let words = cheap(words(d.path(), command));
         if !seen.insert(words.clone()) || renders_a_scene(&words) {
@@ -262,7 +262,9 @@ fn every_printed_command_runs() {
         all.push((path.display().to_string(), examples_of_scene(&text)));
     }
     let mut seen = BTreeSet::new();
-    let problems: Vec<String> = all.iter().flat_map(|(title, commands)| run_all(title, commands, &mut seen)).collect();
+    let shown = shown();
+    let run = |(title, commands): &(String, Vec<String>)| run_all(title, commands, shown.path(), &mut seen);
+    let problems: Vec<String> = all.iter().flat_map(run).collect();
     eprintln!("{} commands of {} texts", seen.len(), all.iter().filter(|(_, c)| !c.is_empty()).count());
     assert!(seen.len() >= 60, "only {} commands were found", seen.len());
     assert!(problems.is_empty(), "{}", problems.join("\n"));
