@@ -392,17 +392,14 @@ impl Lattice {
         };
         // Whole blocks of corners are far from a hem.
         let across = w.div_ceil(BLOCK);
-        let hemmed: Vec<bool> = (0..across * h.div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                let corner = |k: usize| {
-                    let (x, y) = of_index(BLOCK * (block / across * w + block % across));
-                    grid(x + (k * BLOCK) as isize, y + (k * BLOCK) as isize)
-                };
-                let (low, high) = (corner(0), corner(1));
-                hem.is_some_and(|hem| hem.is_around(low.midpoint(high), 0.5 * low.distance(high), by_hem, by_hem))
-            })
-            .collect();
+        let by_hems = |hem: &HemLine, block: usize| {
+            let (x, y) = of_index(BLOCK * (block / across * w + block % across));
+            let (low, high) = (grid(x, y), grid(x + BLOCK as isize, y + BLOCK as isize));
+            hem.is_around(low.midpoint(high), 0.5 * low.distance(high), by_hem, by_hem)
+        };
+        let blocks = 0..across * h.div_ceil(BLOCK);
+        let hemmed: Vec<bool> =
+            hem.map_or_else(Vec::new, |hem| blocks.into_par_iter().map(|block| by_hems(hem, block)).collect());
         let placed: Vec<(Anchor, Option<NearSeam>, Option<NearHem>)> = (0..w * h)
             .into_par_iter()
             .with_min_len(256)
