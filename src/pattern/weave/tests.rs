@@ -167,15 +167,34 @@ fn floats_of_a_satin_hide_what_crosses_them() {
     }
 }
 
-/// Beside the turns of a herringbone its warps keep straight ways. They went a third of a radius aside, each another way, while they
-/// were packed at once.
+/// Between its turns a herringbone is a twill. Left to themselves its yarns gave way by turns, each another way, and its picks
+/// followed the zigzag, 3.8 radii up and down.
 #[test]
 fn a_herringbone_is_as_even_as_its_twill() {
+    // Half the way that the yarn which goes farthest aside goes from side to side, in its radii, for warps and wefts.
+    let aside = |name: &'static str| {
+        [0, 1].map(|side| {
+            let way = |yarn: &Vec<unit_cell::Node>| {
+                let ends = |(least, most): (f64, f64), n: &unit_cell::Node| (least.min(n.aside), most.max(n.aside));
+                let (least, most) = yarn.iter().fold((f64::MAX, f64::MIN), ends);
+                0.5 * (most - least)
+            };
+            relaxed(name).cell.yarns[side].iter().map(way).fold(0.0, f64::max)
+        })
+    };
+    let twill = aside("twill 2/2");
     for name in ["herringbone 2/2 8", "herringbone"] {
-        for yarn in &relaxed(name).cell.yarns[0] {
-            let mean = yarn.iter().map(|n| n.aside).sum::<f64>() / yarn.len() as f64;
-            let square = yarn.iter().map(|n| (n.aside - mean).powi(2)).sum::<f64>() / yarn.len() as f64;
-            assert!(square.sqrt() < 0.2, "{name}: {}", square.sqrt());
+        let [warp, weft] = aside(name);
+        assert!(warp < 1.1 * twill[0], "{name}: {warp} {twill:?}");
+        // Beside a turn floats of two neighbours meet, and push a pick twice as far.
+        assert!(weft < 2.1 * twill[1], "{name}: {weft} {twill:?}");
+        let cell = &relaxed(name).cell;
+        // The same float is alike from warp to warp where the next turn is farther than it reaches.
+        let at = |warp: usize, pick: usize| cell.yarns[1][pick % 4][(warp * cell.nodes) % cell.yarns[1][0].len()];
+        for pick in 0..4 {
+            let along: Vec<_> = (2..6).map(|warp| at(warp, pick + warp)).collect();
+            let against: Vec<_> = (2..6).map(|warp| at(warp, pick + 4 * warp - warp)).collect();
+            assert!(along.iter().all(|n| *n == along[0]) || against.iter().all(|n| *n == against[0]), "{along:?}");
         }
     }
 }

@@ -248,6 +248,10 @@ impl<'a> Energy<'a> {
         for side in 0..2 {
             sum += self.rods(side, x, spacing, gradient.nodes, &mut gradient.spacing);
             sum += self.neighbours(side, x, spacing, &tangents, &axes, &mut gradient);
+            // Pile comes slack from a beam of its own: the reed does not straighten it.
+            if self.draft.pile().is_none() {
+                sum += self.together(side, x, gradient.nodes);
+            }
             // Each yarn of the other side is pressed together by the spacings of this one.
             let yarns = (self.count[0] * self.count[1]) as f64;
             let tight = (self.densest[side] - spacing[side]).max(0.0);

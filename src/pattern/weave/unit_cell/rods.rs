@@ -10,6 +10,11 @@ const STIFF_LENGTH: f64 = 2.0;
 const SECTION_GRADIENT: f64 = 2.0;
 /// What holds a yarn at its dent of the reed, energy per crossing and squared distance.
 const REED: f64 = 0.2;
+/// What keeps neighbours together straight, as the reed beats picks up: energy per crossing and squared distance by which their
+/// mean goes aside.
+const BEATEN: f64 = 10.0;
+/// How many neighbours go aside together.
+const NEIGHBOURS: usize = 16;
 /// What keeps the cloth flat: the rollers of loom and finish.
 const FLAT: f64 = 0.2;
 /// Length of yarn over length of cloth between two nodes from which on yarns resist: about as steep as in Peirce's jammed
@@ -97,5 +102,42 @@ impl Energy<'_> {
             }
         }
         sum
+    }
+
+    /// The force on neighbours that go aside together: each float may push one of them, but none pushes the cloth's threads out of
+    /// their line. A herringbone's picks would follow its zigzag.
+    pub(super) fn together(&self, side: usize, x: &[f64], g: &mut [f64]) -> f64 {
+        let (count, crossings) = (self.count[side], self.count[1 - side]);
+        let many = count.min(NEIGHBOURS);
+        let aside = |yarn: usize, crossing: usize| -> f64 {
+            let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
+            nodes.map(|k| x[self.at(side, yarn, k)]).sum::<f64>() / self.nodes as f64
+        };
+        let mut line = vec![0.0; count * crossings];
+        for crossing in 0..crossings {
+            // Sums of so many from each yarn on.
+            let of: Vec<f64> = (0..count).map(|yarn| aside(yarn, crossing)).collect();
+            let mut sum: f64 = of[..many].iter().sum();
+            for yarn in 0..count {
+                line[yarn * crossings + crossing] = sum / many as f64;
+                sum += of[(yarn + many) % count] - of[yarn];
+            }
+        }
+        for line in line.chunks_mut(crossings) {
+            let mean = line.iter().sum::<f64>() / crossings as f64;
+            line.iter_mut().for_each(|v| *v -= mean);
+        }
+        let by_node = BEATEN / (many * self.nodes) as f64;
+        for crossing in 0..crossings {
+            let off = |first: usize| line[first % count * crossings + crossing];
+            // A yarn is in the sums that begin up to so many before it.
+            let mut sum: f64 = (1..=many).map(|first| off(first + count - many)).sum();
+            for yarn in 0..count {
+                let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
+                nodes.for_each(|k| g[self.at(side, yarn, k)] += by_node * sum);
+                sum += off(yarn + 1) - off(yarn + 1 + count - many);
+            }
+        }
+        0.5 * BEATEN * line.iter().map(|v| v * v).sum::<f64>()
     }
 }
