@@ -12,6 +12,9 @@ use crate::support::{SWATCH, directory, program, project, scenes, write, yarnray
 /// Options whose value is written, not read.
 const OUTPUTS: [&str; 6] = ["-o", "--out", "--stats", "--checkpoint", "--cache", "--display"];
 
+/// Seconds from which on a command is named, so that a slow one is found.
+const SLOW: u64 = 2;
+
 /// Whether there is a denoiser on this machine.
 static DENOISER: LazyLock<bool> = LazyLock::new(|| {
     let d = directory();
@@ -101,6 +104,23 @@ fn with(words: &mut Vec<String>, more: &str) {
     words.extend(more.split_whitespace().map(str::to_owned));
 }
 
+/// The same crop of an eighth of the pixels each way, where the command says of how many it is.
+fn smaller(words: &mut [String]) {
+    let value_of = |option: &str| words.iter().position(|w| w == option).map(|i| i + 1).filter(|i| *i < words.len());
+    let [Some(width), Some(height), Some(crop)] = ["--width", "--height", "--crop"].map(value_of) else { return };
+    for place in [width, height, crop] {
+        let eighth = |number: &str| number.parse::<u32>().map_or(number.to_owned(), |n| (n / 8).to_string());
+        words[place] = words[place].split(',').map(eighth).collect::<Vec<_>>().join(",");
+    }
+}
+
+/// What makes two commands the same: the name of a picture does not.
+fn told_apart(words: &[String]) -> Vec<String> {
+    let named = |i: usize, word: &str| i > 0 && words[i - 1] == "-o" && word.ends_with(".png");
+    let words = words.iter().enumerate();
+    words.map(|(i, word)| if named(i, word) { "x.png".to_owned() } else { word.clone() }).collect()
+}
+
 /// The same command with little work, without the program's name.
 fn cheap(mut words: Vec<String>) -> Vec<String> {
     words.remove(0);
@@ -113,7 +133,9 @@ fn cheap(mut words: Vec<String>) -> Vec<String> {
             if without(&mut words, "--frames") {
                 with(&mut words, "--frames 1..2");
             }
-            if !words.iter().any(|w| w == "--crop") {
+            if words.iter().any(|w| w == "--crop") {
+                smaller(&mut words);
+            } else {
                 ["--width", "--height"].iter().for_each(|o| _ = without(&mut words, o));
                 with(&mut words, "--width 24 --height 18");
             }
@@ -226,11 +248,15 @@ fn run_all(title: &str, commands: &[String], shown: &Path, seen: &mut BTreeSet<V
     let d = place(shown);
     for command in commands {
         let words = cheap(words(d.path(), command));
-        if !seen.insert(words.clone()) || renders_a_scene(&words) {
+        if !seen.insert(told_apart(&words)) || renders_a_scene(&words) {
             continue;
         }
         provide(d.path(), &words);
+        let began = std::time::Instant::now();
         let output = program(d.path()).args(&words).output().expect("the program starts");
+        if began.elapsed().as_secs() >= SLOW {
+            eprintln!("{:.1} s: {}", began.elapsed().as_secs_f64(), words.join(" "));
+        }
         let stderr = String::from_utf8_lossy(&output.stderr);
         let good = match words[0].as_str() {
             "bench" => output.status.code() == Some(2) && stderr.contains("no row of"),
