@@ -6,11 +6,10 @@ use clap::Args;
 
 use super::{
     Failure,
+    curve_files::{refuse_unknown, write_curves},
     files::Files,
     level::LevelArgs,
-    log,
-    make::{refuse_unknown, write_curves},
-    positive,
+    log, positive,
 };
 use crate::{
     files::{

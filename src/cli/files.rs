@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{Failure, log};
-use crate::image::output;
+use crate::image::whole_file;
 
 /// The files of a command, each with the option or argument that names it.
 #[derive(Default)]
@@ -51,7 +51,7 @@ impl Files {
                 return Err(Failure::hinted(format!("{a} and {b} name the same file"), "give each its own name"));
             }
         }
-        self.written().try_for_each(output::check_place).map_err(Failure::from)
+        self.written().try_for_each(whole_file::check_place).map_err(Failure::from)
     }
 
     fn written(&self) -> impl Iterator<Item = &Path> {
@@ -66,7 +66,7 @@ impl Files {
         self.refuse()?;
         for path in self.written() {
             let folder = path.parent().filter(|f| !f.as_os_str().is_empty() && !f.exists());
-            output::check_target(path)?;
+            whole_file::check_target(path)?;
             if let Some(folder) = folder
                 && !quiet
             {

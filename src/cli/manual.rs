@@ -6,7 +6,7 @@ use clap::{Args, Command};
 use clap_complete::Shell;
 
 use super::{Failure, log, terminal::print};
-use crate::image::output;
+use crate::image::whole_file;
 
 const COMPLETIONS: &str = "Examples:
   yarnray completions bash      into ~/.local/share/bash-completion/completions/yarnray
@@ -43,8 +43,8 @@ pub(super) fn man(args: &ManArgs, mut command: Command) -> Result<(), Failure> {
     add_pages("yarnray".to_owned(), command, &mut pages);
     for (name, page) in pages {
         let path = args.folder.join(format!("{name}.1"));
-        output::check_target(&path)?;
-        output::write_file(&path, |file| {
+        whole_file::check_target(&path)?;
+        whole_file::write(&path, |file| {
             let mut text = Vec::new();
             clap_mangen::Man::new(page).title(&name).render(&mut text)?;
             file.write_all(&text)

@@ -11,7 +11,7 @@ use super::{
     render::is_film_path,
 };
 use crate::{
-    image::output,
+    image::{output, whole_file},
     math::words::counted,
     render::{film_file, merge::merge, picture},
     report,
@@ -44,7 +44,7 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     Files::default().reads("PART", &args.parts).writes("-o", &args.out).check(false)?;
     for path in &args.out {
         if is_film_path(path) {
-            output::check_file(path)?;
+            whole_file::check(path)?;
             if args.partial {
                 return Err(Failure::Input(format!(
                     "error: {}: a partial merge cannot be a film: nobody could tell later which samples it has",

@@ -7,9 +7,8 @@ mod bench;
 mod compare;
 mod converge;
 mod convert;
-mod fibers;
+mod curve_files;
 mod files;
-mod garment;
 mod info;
 mod level;
 mod log;
@@ -36,7 +35,7 @@ use crate::{
         overlap::{self, Overlap},
         strand::Folds,
     },
-    image::output,
+    image::whole_file,
     input::{diagnostic::hinted, document::Value},
     math::words::counted,
     plan,
@@ -391,7 +390,7 @@ impl SceneArgs {
 /// Writes text to a file that appears whole or not at all.
 fn write_text(path: &std::path::Path, text: &str) -> Result<(), Failure> {
     use std::io::Write as _;
-    Ok(output::write_file(path, |file| file.write_all(text.as_bytes()))?)
+    Ok(whole_file::write(path, |file| file.write_all(text.as_bytes()))?)
 }
 
 /// Where the yarns of a fabric fold into themselves, for people: `yarns` are all that it has.

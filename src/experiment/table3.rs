@@ -24,7 +24,7 @@ use crate::{
     image::{
         self, Image, interleaved,
         metric::{Comparison, Halves, Pair},
-        output,
+        whole_file,
     },
     math::stats::{Estimate, ratio},
     report::{
@@ -262,7 +262,7 @@ pub(crate) fn run(
             match measure(suite, case, renderer, directory, &mut say) {
                 Ok(row) => {
                     let text = serde_json::to_string_pretty(&row).expect("numbers and text become JSON");
-                    output::write_file(&file, |file| std::io::Write::write_all(file, text.as_bytes()))
+                    whole_file::write(&file, |file| std::io::Write::write_all(file, text.as_bytes()))
                         .map_err(|e| BenchError::Suite(format!("error: {e}")))?;
                     table.rows.push(row);
                 }

@@ -2,8 +2,6 @@
 
 use wide::f32x8;
 
-use super::density::ChordFibers;
-
 /// How many fibres fewer than at random places light meets on its way out after one that it met: others are kept away by the first, and
 /// then follow all the closer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +10,7 @@ pub struct AfterFiber {
     pub first: MissingFibers,
     /// Of light that goes on after another one.
     pub later: MissingFibers,
-    /// Of light that goes back after the first, where those in the [`ClearedStrip`] are not expected. Below 0 where more are met than
+    /// Of light that goes back after the first, where those in the [`ClearedStrip`](super::cleared_strip::ClearedStrip) are not expected. Below 0 where more are met than
     /// expected.
     pub back: MissingFibers,
     /// Of light that goes back after another one, where all are expected, and the one before is in its way.
@@ -37,7 +35,7 @@ pub struct MissingFibers {
 pub struct Missing {
     /// On ways through the inside of the ply.
     pub inside: [[f32; 2 * TURNED]; AfterFiber::KNOTS],
-    /// On ways by its rim ([`PlyShape::by_rim`](super::yarn::PlyShape::by_rim)).
+    /// On ways by its rim ([`PlyShape::by_rim`](super::ply::PlyShape::by_rim)).
     pub rim: [[f32; 2 * TURNED]; AfterFiber::KNOTS],
 }
 
@@ -145,40 +143,6 @@ impl AfterTurn<'_> {
         });
         let missing = from + (to - from) * f32x8::splat(at);
         (expected - (missing * self.shares).reduce_add()).max(0.0)
-    }
-}
-
-/// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ClearedStrip {
-    /// The length after which the way has left the strip.
-    cleared: f32,
-}
-
-impl ClearedStrip {
-    /// For light that is turned by an angle of a cosine.
-    #[inline]
-    pub(crate) fn new(width: f32, turn: f32) -> Self {
-        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
-        Self { cleared: if turn < 0.0 { width / aside } else { width } }
-    }
-
-    /// The length between two distances along the way, less what lies in the strip.
-    #[inline]
-    pub(crate) fn length(&self, from: f32, to: f32) -> f32 {
-        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
-        outside(to) - outside(from)
-    }
-
-    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
-    #[inline]
-    pub(crate) fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
-        let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);
-        if to <= 0.0 {
-            return 0.0;
-        }
-        let ring = self.length((to - chord.zone).max(0.0), to) / chord.zone;
-        chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
     }
 }
 

@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
 use wide::f32x4;
 
-use super::{after_fiber::AfterFiber, yarn::PlyShape};
+use super::{after_fiber::AfterFiber, ply::PlyShape};
 
 /// How the fibres of a ply lie.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,14 +2,17 @@
 
 pub(crate) mod after_fiber;
 pub(crate) mod chain;
+pub(crate) mod cleared_strip;
 pub(crate) mod contact;
 pub mod curve;
 pub(crate) mod density;
 pub mod fiber;
+pub(crate) mod gaps;
 pub mod material_indices;
 pub mod mesh;
 pub(crate) mod occluder;
 pub mod overlap;
+pub mod ply;
 pub(crate) mod proposal;
 pub mod ray;
 pub mod section;

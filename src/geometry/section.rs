@@ -14,10 +14,12 @@
 //! Frame: z is the yarn's tangent where the ray enters, x points to the camera (projected into the section), y = z x x;
 //! the origin is on the yarn's axis. Lengths are in yarn radii. In the section the ray travels towards -x at y = h.
 
+mod bowed;
 mod crossing;
 mod inside;
 mod march;
 mod neighbourhood;
+mod reach;
 mod seen_fiber;
 
 use std::ops::ControlFlow;
@@ -29,12 +31,9 @@ pub use self::{
     inside::Inside,
     seen_fiber::SeenFiber,
 };
-use self::{
-    march::{LIGHT, Line},
-    neighbourhood::Unbent,
-};
+use self::{march::Line, neighbourhood::Unbent, reach::LIGHT};
 use super::{
-    occluder::PlyGaps,
+    gaps::PlyGaps,
     walk::Walker,
     way::{self, Passage, Station, Way},
     yarn::YarnShape,
@@ -263,7 +262,7 @@ impl<'a> Section<'a> {
         out.clear();
         let mut way = Way::new();
         self.march_ray(shape, |a, b| keep(&mut way, a, b));
-        way::passages::<true>(&way, shape, |index, passage| {
+        way::passages::<true>(&way, &shape.plies, &shape.fours, |index, passage| {
             let ply = &shape.plies[index];
             if ply.fibers == 0.0 {
                 return;
@@ -307,14 +306,14 @@ impl<'a> Section<'a> {
         if self.ends == [f32::NEG_INFINITY, f32::INFINITY]
             && let Some(way) = from.way_out(self, shift, direction)
         {
-            return way::passages::<false>(&way, shape, |ply, passage| pass(&way, ply, passage));
+            return way::passages::<false>(&way, &shape.plies, &shape.fours, |ply, passage| pass(&way, ply, passage));
         }
         let line = Line { start: from.point + shift, direction, reach: LIGHT };
         let mut near = self.neighbourhood(self.turn(shape), from.travel, LIGHT);
         let first = self.step(&mut near, line.start, direction, 0.0, LIGHT);
         let mut way = Way::new();
         self.march(&line, first, &mut near, |a, b| keep(&mut way, a, b));
-        way::passages::<false>(&way, shape, |ply, passage| pass(&way, ply, passage));
+        way::passages::<false>(&way, &shape.plies, &shape.fours, |ply, passage| pass(&way, ply, passage));
     }
 
     /// The length in the section of a unit of a way out in the direction `w`, of which a steep way has little, and where the way leads.

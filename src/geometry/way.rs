@@ -14,7 +14,7 @@ use arrayvec::ArrayVec;
 use glam::Vec2;
 use wide::f32x4;
 
-use super::yarn::{PlyShape, YarnShape};
+use super::ply::PlyShape;
 
 /// The most by which plies turn between two stations, radians.
 pub(super) const MOST_TURN: f32 = 0.8;
@@ -387,15 +387,20 @@ impl Open {
     }
 }
 
-/// Calls `visit` with every passage of a way through a ply and the ply's index; without `ENDS` where it enters and leaves is
-/// not asked.
+/// Calls `visit` with every passage of a way through one of `plies`, which are `fours` four by four, and the ply's index;
+/// without `ENDS` where it enters and leaves is not asked.
 #[inline]
-pub(super) fn passages<const ENDS: bool>(way: &[Station], shape: &YarnShape, mut visit: impl FnMut(usize, Passage)) {
+pub(super) fn passages<const ENDS: bool>(
+    way: &[Station],
+    plies: &[PlyShape],
+    fours: &[FourPlies],
+    mut visit: impl FnMut(usize, Passage),
+) {
     let end = way.last().map_or(0.0, |last| last.depth);
     // A way that ends before it comes to the core has not passed the ply.
     let passed = |open: &Open| !ENDS || open.core || open.depth < end;
-    for four in &shape.fours {
-        let plies = &shape.plies[four.first..];
+    for four in fours {
+        let plies = &plies[four.first..];
         let mut open = [None; 4];
         let mut opened = 0;
         for pair in way.windows(2) {

@@ -3,7 +3,7 @@
 //! Reading ([`read`]) looks at what a file is, not at what it is called. EXR and PNG need nothing but this program;
 //! all else goes through OpenImageIO, which is loaded only then. Writing ([`exr::write`], [`output::write_colors`])
 //! asks for row after row, so that no second copy of the picture is needed, and a file appears whole or not at all
-//! ([`output::write_file`]).
+//! ([`whole_file::write`]).
 //!
 //! Colours are linear, with the primaries of Rec. 709, and associated with alpha wherever there is one.
 //! The top row comes first. What is rendered, and what a number means, is not this room's business.
@@ -17,6 +17,7 @@ pub mod output;
 mod palette;
 pub mod png;
 pub(crate) mod texture;
+pub mod whole_file;
 
 use std::{fs::File, io::Read as _, path::Path};
 

@@ -8,8 +8,11 @@ use super::{Image, ImageError};
 
 #[cfg(feature = "oiio")]
 use {
-    super::{Channel, SAMPLE_LIMIT, png},
-    crate::ffi::oiio::{self as library, OiioError},
+    super::{Channel, SAMPLE_LIMIT},
+    crate::{
+        ffi::oiio::{self as library, OiioError},
+        math::srgb::srgb_to_linear,
+    },
 };
 
 #[cfg(not(feature = "oiio"))]
@@ -26,7 +29,7 @@ pub(super) fn read(path: &Path) -> Result<Image, ImageError> {
         OiioError::Failed(reason) => ImageError::Read { path: path.into(), reason },
     })?;
     let names = picture.channel_names();
-    let decode: fn(f32) -> f32 = if picture.is_srgb_encoded() { png::srgb_to_linear } else { |value| value };
+    let decode: fn(f32) -> f32 = if picture.is_srgb_encoded() { srgb_to_linear } else { |value| value };
     let channels = names
         .into_iter()
         .enumerate()

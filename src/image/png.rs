@@ -8,7 +8,7 @@ use std::{
 
 pub use crate::math::srgb::{linear_to_srgb, srgb_to_linear};
 
-use super::{Channel, Image, ImageError, check_size, output, palette::Indexed};
+use super::{Channel, Image, ImageError, check_size, palette::Indexed, whole_file};
 use crate::input::system::in_words;
 
 /// The curve from linear light to the light that a screen shows, before the sRGB encoding.
@@ -87,7 +87,7 @@ pub fn write(
 ) -> Result<(), ImageError> {
     let number = |value| u32::try_from(value).map_err(|_| ImageError::unwritable(path, "too large for PNG"));
     let (columns, rows) = (number(width)?, number(height)?);
-    output::write_file(path, |file| {
+    whole_file::write(path, |file| {
         let mut buffer = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut buffer, columns, rows);
         encoder.set_color(if display.alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });

@@ -7,7 +7,7 @@ use super::{
     exr::{ChannelSpec, ExrLayout, Line, Sample},
     output::{self, Format},
     png::{self, Display, ToneMap, linear_to_srgb, srgb_to_linear},
-    read,
+    read, whole_file,
 };
 
 /// Splitmix64: the same damage in every run.
@@ -368,7 +368,7 @@ fn outputs_that_cannot_be_leave_nothing() {
     let mut permissions = fs::metadata(at("file")).expect("the file").permissions();
     permissions.set_readonly(true);
     fs::set_permissions(at("file"), permissions).expect("the file");
-    let error = output::write_file(&at("file"), |_| Ok(())).expect_err("read-only").to_string();
+    let error = whole_file::write(&at("file"), |_| Ok(())).expect_err("read-only").to_string();
     assert!(error.ends_with("file: the file exists and is read-only"), "{error}");
 }
 
@@ -376,8 +376,8 @@ fn outputs_that_cannot_be_leave_nothing() {
 fn a_failed_write_keeps_the_older_file() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("results.csv");
-    output::write_file(&path, |file| std::io::Write::write_all(file, b"old")).expect("a file");
-    output::write_file(&path, |file| {
+    whole_file::write(&path, |file| std::io::Write::write_all(file, b"old")).expect("a file");
+    whole_file::write(&path, |file| {
         std::io::Write::write_all(file, b"new and unfinished")?;
         Err(std::io::ErrorKind::StorageFull.into())
     })
@@ -395,7 +395,7 @@ fn permissions_links_and_devices_are_respected() {
     fs::write(at("ordinary"), b"").expect("a file");
     symlink(at("linked.txt"), at("link.txt")).expect("a link");
     fs::write(at("linked.txt"), b"").expect("a file");
-    let hello = |path: &Path| output::write_file(path, |file| std::io::Write::write_all(file, b"hello"));
+    let hello = |path: &Path| whole_file::write(path, |file| std::io::Write::write_all(file, b"hello"));
     hello(&at("new.txt")).expect("a file");
     let mode = |name: &str| fs::metadata(at(name)).expect("the file").permissions().mode();
     assert_eq!(mode("new.txt"), mode("ordinary"), "the umask decides, not the temporary file");
@@ -604,8 +604,8 @@ fn pipes_and_links_stay_what_they_are() {
     let mut pipe = fs::File::options().read(true).write(true).open(at("pipe")).unwrap();
     for durable in [false, true] {
         let write = |path: &Path| match durable {
-            true => output::write_durable(path, content),
-            false => output::write_file(path, content),
+            true => whole_file::write_durable(path, content),
+            false => whole_file::write(path, content),
         };
         write(&at("pipe")).unwrap();
         assert!(!at("pipe").is_file(), "a file took the place of the pipe");

@@ -30,7 +30,10 @@ mod steps;
 use std::{fmt, sync::Arc};
 
 use self::steps::parse_steps;
-pub(super) use self::{gaps::gaps, steps::WIDEST_CABLE};
+pub(super) use self::{
+    gaps::{binds_from_right, gaps},
+    steps::WIDEST_CABLE,
+};
 
 /// Which of several stitches worked together is on top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

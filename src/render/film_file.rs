@@ -26,8 +26,9 @@ use super::{Job, Shard, picture::Frame};
 use crate::{
     film::{Film, TILE, Tile},
     image::{
-        Attribute, Compression, ImageError, exr, output,
+        Attribute, Compression, ImageError, exr,
         png::{Display, ToneMap},
+        whole_file,
     },
     integrator::Counters,
     scene::{Layers, Scene, Storage, identity},
@@ -112,7 +113,7 @@ pub(crate) struct Header {
 /// # Errors
 /// [`ImageError::Write`]; an older file of this name is then as it was.
 pub(crate) fn write(path: &Path, about: &About, job: &Job) -> Result<(), ImageError> {
-    output::write_durable(path, |file| write_to(&mut BufWriter::with_capacity(1 << 20, file), about, job))
+    whole_file::write_durable(path, |file| write_to(&mut BufWriter::with_capacity(1 << 20, file), about, job))
 }
 
 fn write_to(out: &mut impl Write, about: &About, job: &Job) -> io::Result<()> {

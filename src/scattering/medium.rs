@@ -11,7 +11,7 @@ use super::{
     kernel::{DIFFUSE, Latitudes, kappa_of_spread, kappa_of_variance, kernel, normalisation, spread},
 };
 use crate::{
-    geometry::{after_fiber::AfterFiber, occluder::PlyGaps, yarn::PlyShape},
+    geometry::{after_fiber::AfterFiber, gaps::PlyGaps, ply::PlyShape},
     math::{Rgb, special::escape_probability_of_disc},
 };
 

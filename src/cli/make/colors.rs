@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::super::{Failure, named, two};
 use crate::{
+    cli::{Failure, named, two},
     math::srgb::srgb_to_linear,
     pattern::knit::{CARRY_ROWS, CATCH_FLOATS, Colors, Knit, Work},
     scene::motif::{Cells, FITS, Motif, REPEATS, WrongRow, hex, wrong_row, wrong_sign},

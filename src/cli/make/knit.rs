@@ -5,7 +5,10 @@ use std::path::Path;
 use clap::Args;
 use glam::DVec2;
 
-use super::{EXAMPLES, Output, RADIUS, colors::ColorArgs, write};
+use super::{
+    colors::ColorArgs,
+    output::{EXAMPLES, Output, RADIUS, write},
+};
 use crate::{
     cli::{Failure, log, named, positive, two, working::Working},
     math::words::counted,

@@ -134,7 +134,7 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
         layered |= image::output::check_writable(path)? == Format::Exr;
     }
     for path in outputs.films.iter().chain(&args.checkpoint) {
-        image::output::check_file(path)?;
+        image::whole_file::check(path)?;
     }
     check_shard(args, scene, outputs)?;
     scene.denoise |= args.denoise;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::*;
 use crate::{
-    geometry::yarn::{PlyParameters, touching_plies},
+    geometry::{ply::PlyParameters, yarn::touching_plies},
     scattering::fiber::FiberMaterial,
     scene::{
         Model, Yarn,
@@ -105,7 +105,7 @@ fn a_ply_alone_has_the_density_it_has_in_its_yarn() {
     let definitions = library(&[]);
     let yarn = definitions.yarn("silk1").unwrap();
     let alone = ply_alone(yarn, 1);
-    let density = |p: &crate::geometry::yarn::PlyParameters| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2);
+    let density = |p: &crate::geometry::ply::PlyParameters| f64::from(p.fibers) * (p.fiber_radius / p.radius).powi(2);
     assert!((density(&alone.plies[0]) / density(&yarn.plies[1]) - 1.0).abs() < 1e-12);
     assert_eq!(alone.plies.len(), alone.fibers.len());
     let long = alone.plies[0].radius / alone.plies[0].aspect.sqrt();

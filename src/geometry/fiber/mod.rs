@@ -25,10 +25,11 @@ use super::{
     curve::{Basis, Curve},
     density::{KnownPacking, PlyPacking},
     material_indices::MaterialIndices,
+    ply::{PlyParameters, PlyShape},
     segment_uvs::SegmentUvs,
     strand::Strands,
     tube::{Tubes, spline_through},
-    yarn::{PlyParameters, PlyShape, YarnShape},
+    yarn::YarnShape,
     yarn_frame::{Pressed, YarnFrame},
 };
 use crate::math::sampler::{Stream, hash2};

@@ -11,11 +11,9 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 pub use self::measure::measured;
+pub use super::slopes::DENSEST;
 use super::slopes::{Slopes, Twist};
 use crate::math::sampler::Stream;
-
-/// Area fraction (of fibres in the ply) up to which [`hard_discs`] finds packings without overlap for any number.
-pub const DENSEST: f64 = 0.78;
 
 /// Centres of `count` discs of radius `radius` in a ply, in units of the core radius, within which the centres lie: even
 /// over the core as far as discs that do not overlap can be. Where they do not fit they overlap as little as possible.

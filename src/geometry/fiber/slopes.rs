@@ -6,8 +6,10 @@
 
 use glam::{DMat2, DVec2};
 
-use super::packing::DENSEST;
-use crate::geometry::yarn::PlyShape;
+use crate::geometry::ply::PlyShape;
+
+/// Area fraction (of fibres in the ply) up to which [`hard_discs`](super::packing::hard_discs) finds packings without overlap for any number.
+pub const DENSEST: f64 = 0.78;
 
 /// How the fibres of a ply lean against its axis, and the ply against the yarn's.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -81,7 +81,7 @@ fn fibers_stay_in_their_ply_and_turn_as_the_model_says() {
         let in_ply = p - f64::from(ply.distance) * axis;
         assert!(in_ply.length() < f64::from(ply.core_radius) * 1.002, "{in_ply}");
         // The tangent that the aggregated model takes for this place.
-        let model = crate::geometry::yarn::fiber_tangent(
+        let model = crate::geometry::ply::fiber_tangent(
             ply,
             shape.ply_rate,
             (f64::from(ply.distance) * axis).as_vec2(),

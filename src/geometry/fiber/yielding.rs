@@ -10,8 +10,8 @@
 use glam::{DMat2, DVec2};
 
 use super::{
-    packing::{DENSEST, DiscGrid},
-    slopes::Slopes,
+    packing::DiscGrid,
+    slopes::{DENSEST, Slopes},
 };
 
 /// How often all pairs are pushed apart. At an area fraction of 0.5 and axes of 1.5 : 1 the area that lies in two fibres falls

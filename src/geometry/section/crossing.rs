@@ -8,9 +8,10 @@ use super::{Inside, Section, unrotate};
 use crate::{
     geometry::{
         density::ChordFibers,
-        occluder::PlyGaps,
+        gaps::PlyGaps,
+        ply::fiber_tangent,
         way::{self, Station, Way},
-        yarn::{MAX_PLIES, YarnShape, fiber_tangent},
+        yarn::{MAX_PLIES, YarnShape},
         yarn_frame::{Pressed, SectionGrowth},
     },
     math::special::GAUSS_LEGENDRE_4,

@@ -6,68 +6,22 @@ use glam::{Vec2, Vec3A};
 
 use super::{
     Section,
-    inside::Bowed,
+    bowed::Bowed,
     neighbourhood::{Neighbourhood, Placed},
+    reach::{GATHER, LEAST_LEFT, LOOK, Reach, Step, angle},
 };
-use crate::{
-    geometry::{
-        way::{MOST_TURN, Station},
-        yarn::YarnShape,
-        yarn_frame::Pressed,
-    },
-    math::frame::sin_cos,
-};
+use crate::geometry::{way::Station, yarn::YarnShape, yarn_frame::Pressed};
 
-/// How far and how finely a way is followed.
-#[derive(Clone, Copy)]
-pub(super) struct Reach {
-    /// How far along the yarn it is taken for its circle of curvature, in yarn radii; beyond it is looked up anew.
-    pub(super) near: f32,
-    /// The longest way, in yarn radii.
-    pub(super) longest: f32,
-    /// The most by which plies turn from station to station, radians.
-    pub(super) turn: f32,
-    /// How much a bend counts as a turn.
-    pub(super) bend: f32,
-}
-
-/// By how much a yarn may turn where it is taken for its circle of curvature, radians.
-const SHARP_REACH: f32 = 0.3;
-
-impl Reach {
-    /// How far along the yarn from a place with that bend it is taken for its circle of curvature: a sharp bend is over soon.
-    #[inline]
-    pub(super) fn near(&self, bend: Vec2) -> f32 {
-        self.near.min(SHARP_REACH / bend.length().max(1e-6))
-    }
-}
-
-/// A ray that looks: off by less than 0.02 yarn radii.
-pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
-/// A ray that gathers light.
-pub(super) const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
-/// Light that leaves from inside: how far it still has to go is felt in all, and a weave's bend turns round within a radius or two.
-pub(super) const LIGHT: Reach = Reach { near: 0.5, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
 /// The shortest step towards the surface, in yarn radii.
 const LEAST_STEP: f32 = 0.1;
 /// The shortest that a step is made by turns and bends, in yarn radii.
 const SHORTEST_STEP: f32 = 0.02;
 /// Of what a reach lets plies turn in a step, how much they may turn when the step is made; else it is halved.
 const MOST_TURNED: f32 = 0.8;
-/// What may be left of a way without another station, in yarn radii.
-pub(super) const LEAST_LEFT: f32 = 1e-3;
 /// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
 const AT_SURFACE: f32 = 0.02;
 /// Turns, in radians, below which a way is taken for straight.
 const STRAIGHT: f32 = 1e-3;
-
-/// A station with what only the making of a way needs: the place in the yarn's real section, and its change with depth.
-#[derive(Clone, Copy)]
-pub(super) struct Step {
-    pub(super) station: Station,
-    pub(super) real: Vec2,
-    pub(super) real_slope: Vec2,
-}
 
 /// A straight line through a yarn.
 #[derive(Clone, Copy)]
@@ -232,11 +186,4 @@ impl Section<'_> {
         }
         near.unwind(&unbent, depth)
     }
-}
-
-/// (cos, sin) of an angle.
-#[inline]
-pub(super) fn angle(by: f32) -> Vec2 {
-    let (sin, cos) = sin_cos(by);
-    Vec2::new(cos, sin)
 }

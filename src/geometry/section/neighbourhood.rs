@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3A};
 
 use super::{
-    march::{Reach, Step, angle},
+    reach::{Reach, Step, angle},
     unrotate,
 };
 use crate::{

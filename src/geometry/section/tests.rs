@@ -3,14 +3,15 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::{
-    march::{LOOK, angle},
+    reach::{LOOK, angle},
     *,
 };
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        ply::PlyParameters,
         strand::{StrandOptions, Strands},
-        yarn::{PlyParameters, tests::touching_yarn, touching_plies},
+        yarn::{tests::touching_yarn, touching_plies},
         yarn_frame::{ROUND, SectionGrowth},
     },
     math::sampler::Stream,
@@ -508,7 +509,7 @@ fn short_ways_out_are_those_that_are_followed() {
         // The length inside of all cores.
         let cores = |way: &[Station]| {
             let mut sum = 0.0;
-            way::passages::<true>(way, &shape, |_, p| sum += p.exit.depth - p.enter.depth);
+            way::passages::<true>(way, &shape.plies, &shape.fours, |_, p| sum += p.exit.depth - p.enter.depth);
             sum
         };
         off.push((cores(&way) - cores(&long)).abs());

@@ -19,7 +19,7 @@ use exr::{
 use rayon::prelude::*;
 
 use super::{
-    super::{ImageError, output},
+    super::{ImageError, whole_file},
     Attribute, ExrLayout, Line, SOFTWARE, Sample,
     attributes::sort_attributes,
 };
@@ -52,7 +52,7 @@ pub fn write(path: &Path, layout: &ExrLayout, mut row: impl FnMut(usize, &mut [L
         (BATCH_BYTES / block_bytes.max(1)).clamp(1, rayon::current_num_threads() * BATCH_ROWS / block_rows);
     let mut rows = Rows::new(layout);
 
-    output::write_file(path, |file| {
+    whole_file::write(path, |file| {
         let written =
             exr::block::write(BufWriter::new(&mut *file), [header].into_iter().collect(), true, |meta, chunks| {
                 let headers = meta.headers.as_slice();

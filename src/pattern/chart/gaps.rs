@@ -42,3 +42,11 @@ pub(super) fn count_on(below: &[Stitch], row: &mut [Stitch]) -> bool {
         sides().zip(sides().skip(1)).all(|(before, after)| before <= after)
     })
 }
+
+/// Whether the first row of a flat piece goes from right to left: stitches at a side are bound off where a row begins.
+pub(in super::super) fn binds_from_right(rows: &[Vec<Stitch>]) -> bool {
+    let ends_there = |(r, row): (usize, &Vec<Stitch>)| {
+        gaps(row).iter().any(|gap| if r % 2 == 1 { gap.start == 0 } else { gap.end == row.len() })
+    };
+    rows.iter().enumerate().any(ends_there)
+}

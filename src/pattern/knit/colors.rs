@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::{
     Form,
-    loops::{Course, Loops, Visit},
+    loops::{Course, Hold, Loops, Visit},
 };
 
 /// How a row of several colours is knitted.
@@ -315,18 +315,6 @@ fn fields(course: &Course, of: &dyn Fn(usize) -> u16) -> Vec<Course> {
 
 /// How far apart the floats of two colours lie, in rows.
 const LIFT: f64 = 0.42;
-
-/// What happens between a visit and the next one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Hold {
-    None,
-    /// The float goes between the cloth and the working yarn.
-    Caught,
-    /// The working yarn goes behind the float.
-    Catches,
-    /// The yarn goes over to the other layer.
-    Crosses,
-}
 
 /// After which stitches of a row of some colours a float is caught between two loops of one colour: its colour and that of
 /// the working yarn.

@@ -3,17 +3,9 @@
 use std::ops::Range;
 
 use super::{
-    super::chart::{Act, ChartError, Stitch, gaps},
+    super::chart::{Act, ChartError, Stitch, binds_from_right, gaps},
     Form, Knit, short_rows,
 };
-
-/// Whether the first row goes from right to left: stitches at a side are bound off where a row begins.
-pub(super) fn from_right(rows: &[Vec<Stitch>]) -> bool {
-    let ends_there = |(r, row): (usize, &Vec<Stitch>)| {
-        gaps(row).iter().any(|gap| if r % 2 == 1 { gap.start == 0 } else { gap.end == row.len() })
-    };
-    rows.iter().enumerate().any(ends_there)
-}
 
 /// What is wrong with a gap, and what to do.
 type Wrong = (String, String);
@@ -34,7 +26,7 @@ pub(super) fn check(rows: &[Vec<Stitch>], knit: &Knit) -> Result<(), ChartError>
     if short_rows::any(rows) {
         return wrong(first, (does("beside short rows"), "leave out `bo` and `co`, or `-`".to_owned()));
     }
-    let first = knit.form == Form::Flat && from_right(rows);
+    let first = knit.form == Form::Flat && binds_from_right(rows);
     for (r, row) in rows.iter().enumerate() {
         let backwards = knit.form == Form::Flat && (r % 2 == 1) != first;
         for gap in gaps(row) {

@@ -6,10 +6,27 @@ mod maker;
 use self::maker::{LIFTED, Maker};
 use super::{
     super::chart::Stitch,
-    colors::Hold,
     rims::{Closing, Rims},
-    shape::REACH,
 };
+
+/// How far feet and heads reach beyond the line where they hold each other, in rows (2.28 diameters apart).
+pub(in super::super) const REACH: f64 = 0.775 / 2.28;
+/// The yarn of a bobble, in shares of a stitch's.
+pub(in super::super) const BOBBLE: f64 = 10.0;
+/// The room that a bobble takes above its row, in rows.
+pub(in super::super) const BELLY: f64 = 1.9;
+
+/// What happens between a visit and the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Hold {
+    None,
+    /// The float goes between the cloth and the working yarn.
+    Caught,
+    /// The working yarn goes behind the float.
+    Catches,
+    /// The yarn goes over to the other layer.
+    Crosses,
+}
 
 /// A loop of yarn that a needle has held.
 #[derive(Clone, Debug)]

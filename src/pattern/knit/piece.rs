@@ -16,8 +16,8 @@ use super::{
     super::revolution::Revolution,
     STITCH_WIDTH, YARN_PER_STITCH,
     cell::Cell,
-    colors::{Hold, Stretch, Way},
-    loops::{Course, Loop, Loops, Visit},
+    colors::{Stretch, Way},
+    loops::{Course, Hold, Loop, Loops, Visit},
     shape::{Piece, Place, points_of, spaced},
 };
 use crate::{geometry::spline::through_points, math::special::smooth_step};

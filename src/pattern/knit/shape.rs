@@ -13,8 +13,7 @@ use glam::DVec3;
 
 use self::bobble::PILED;
 use super::{
-    colors::Hold,
-    loops::{Border, Course, Loop, Loops, Visit},
+    loops::{Border, Course, Hold, Loop, Loops, Visit},
     rims::Rims,
 };
 use crate::{geometry::spline::through_points, math::special::smooth_step};
@@ -39,10 +38,9 @@ pub(in super::super) struct Piece {
     pub(in super::super) bends: f64,
 }
 
-/// How deep a loop dives, how far feet and heads reach beyond the line where they hold each other (rows 2.28 apart), and how
-/// far legs lean (stitch 4.13 wide): the densest plain stitch of this form whose strands keep apart, found by a search.
+/// How deep a loop dives and how far legs lean (stitch 4.13 wide): with [`REACH`](super::loops::REACH) the densest plain stitch of this form whose
+/// strands keep apart, found by a search.
 const DEPTH: f64 = 0.763;
-pub(super) const REACH: f64 = 0.775 / 2.28;
 pub(super) const LEAN: f64 = 0.982 / 4.13;
 /// Distance of loops that lie over each other.
 const LAYER: f64 = 0.85;

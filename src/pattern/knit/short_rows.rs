@@ -4,10 +4,9 @@
 //! with it; a later row works both together.
 
 use super::{
-    super::chart::{Act, ChartError, Stitch},
+    super::chart::{Act, ChartError, Stitch, binds_from_right},
     Form, Knit,
     colors::Way,
-    gaps,
 };
 
 /// How many stitches stay unworked on the left and on the right of a row.
@@ -27,7 +26,7 @@ pub(super) fn any(rows: &[Vec<Stitch>]) -> bool {
 /// Whether the first row goes from right to left: rows are written for a yarn that begins on either side. `bound` says
 /// whether it must end at an edge.
 pub(super) fn from_right(rows: &[Vec<Stitch>], bound: bool) -> bool {
-    gaps::from_right(rows) || (any(rows) && follow(rows, false, bound).is_err())
+    binds_from_right(rows) || (any(rows) && follow(rows, false, bound).is_err())
 }
 
 /// Leads the one yarn of a piece with short rows or gaps to where its rows begin; `first` says whether the first goes from right to left.

@@ -7,6 +7,7 @@
 //! the next one begins there.
 
 mod lines;
+mod parser;
 mod rows;
 mod step;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The stitches of a row by their words.
 
-use super::{super::chart::WIDEST_CABLE, KNOWN, Look, MOST_STITCHES, Result, Steps, short, words::Parser};
+use super::{super::chart::WIDEST_CABLE, KNOWN, Look, MOST_STITCHES, Result, Steps, parser::Parser, short};
 
 /// What words say.
 pub(super) enum Phrase {

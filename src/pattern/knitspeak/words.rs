@@ -1,8 +1,9 @@
 //! The words of a row: steps, repeats and brackets.
 
 use super::{
-    Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps, error,
+    Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps,
     lines::number,
+    parser::Parser,
     short,
     step::{self, Phrase},
 };
@@ -71,13 +72,6 @@ pub(super) fn parse_body(text: &str, line: usize, row: usize) -> Result<Sequence
     }
 }
 
-pub(super) struct Parser<'a> {
-    tokens: &'a [String],
-    at: usize,
-    line: usize,
-    row: usize,
-}
-
 /// Where a repeat begins, by the items before it.
 #[derive(Default)]
 struct Star {
@@ -87,39 +81,6 @@ struct Star {
 }
 
 impl Parser<'_> {
-    pub(super) fn peek(&self, ahead: usize) -> Option<&str> {
-        self.tokens.get(self.at + ahead).map(String::as_str)
-    }
-
-    pub(super) fn wrong<T>(&self, problem: &str, hint: impl Into<String>) -> Result<T> {
-        error(self.line, format!("row {}: {problem}", self.row), hint)
-    }
-
-    pub(super) fn skip(&mut self, words: usize) {
-        self.at += words;
-    }
-
-    /// Takes the next words if they are these.
-    pub(super) fn take(&mut self, words: &[&str]) -> bool {
-        let found = words.iter().enumerate().all(|(i, word)| self.peek(i) == Some(word));
-        if found {
-            self.at += words.len();
-        }
-        found
-    }
-
-    pub(super) fn take_any(&mut self, all: &[&[&str]]) -> bool {
-        all.iter().any(|words| self.take(words))
-    }
-
-    pub(super) fn stitches(&mut self) -> bool {
-        self.take_any(&[&["sts"], &["st"], &["stitches"], &["stitch"]])
-    }
-
-    pub(super) fn number(&self, ahead: usize) -> Option<u32> {
-        self.peek(ahead).and_then(number)
-    }
-
     fn separators(&mut self) {
         while matches!(self.peek(0), Some("," | ";" | ":" | "and" | "then" | "&")) {
             self.at += 1;

@@ -9,6 +9,7 @@
 mod contact;
 mod energy;
 mod rods;
+mod spheroid;
 mod symmetry;
 
 use glam::DVec3;

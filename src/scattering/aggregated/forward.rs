@@ -17,7 +17,7 @@ use super::{
 use crate::{
     geometry::{
         after_fiber::AfterTurn,
-        occluder::PlyGaps,
+        gaps::PlyGaps,
         section::{Crossings, PlyCrossing},
     },
     math::{Rgb, sampler::Stream, special::wrapped_normal, warp::normal},

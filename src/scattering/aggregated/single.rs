@@ -20,10 +20,7 @@ use super::{
     forward::ChainEnd,
 };
 use crate::{
-    geometry::{
-        after_fiber::{AfterTurn, ClearedStrip},
-        section::PlyCrossing,
-    },
+    geometry::{after_fiber::AfterTurn, cleared_strip::ClearedStrip, section::PlyCrossing},
     math::{Rgb, sampler::Stream},
 };
 

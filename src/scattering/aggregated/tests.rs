@@ -9,11 +9,7 @@ use glam::Vec2;
 
 use super::*;
 use crate::{
-    geometry::{
-        after_fiber::ClearedStrip,
-        yarn::{PlyParameters, touching_plies},
-        yarn_frame::Pressed,
-    },
+    geometry::{cleared_strip::ClearedStrip, ply::PlyParameters, yarn::touching_plies, yarn_frame::Pressed},
     math::special::{GAUSS_LEGENDRE_4, front_share_of_wrapped_normal, wrapped_normal},
     scattering::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, spread},

@@ -4,7 +4,7 @@ use std::f64::consts::PI as PI64;
 
 use super::ChordModel;
 use crate::{
-    geometry::yarn::PlyShape,
+    geometry::ply::PlyShape,
     math::{Rgb, special::front_share_of_wrapped_normal},
     scattering::{fiber::FiberMaterial, kernel::kappa_of_variance},
 };

@@ -142,7 +142,7 @@ pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<De
         let root = Reader::new(&document, &diagnostics);
         let unit = root.one_of_or("unit", 1.0, &UNITS);
         let context = Context::new(&sources, &diagnostics, unit, true);
-        let mut library = yarns::read(&root, &context, true);
+        let mut library = yarns::read(&root, &context, true, built_in_fiber);
         let described = library.yarn_names.clone();
         if path.is_some() {
             add_built_in(&mut library, root.node("fabric"), true);

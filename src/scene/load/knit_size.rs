@@ -1,6 +1,6 @@
 //! Keys of how large a knit is to be: `gauge`, `width`, `height` and `circumference`.
 
-use super::{Context, Range, Reader, garment};
+use super::{Context, Range, Reader, gauge};
 use crate::{
     input::diagnostic::Span,
     pattern::knit::{Form, Knit, Sizes, Thickness},
@@ -22,10 +22,10 @@ impl GivenSizes {
         context: &Context<'_>,
         form: &Option<Form>,
     ) -> Self {
-        let gauge = garment::gauged(table, fabric);
+        let gauge = gauge::gauged(table, fabric);
         let mm = |key: &str| table.f64(key, Range::POSITIVE).map(|v| v * context.unit);
         let sizes = Sizes {
-            stitch: gauge.and_then(|t| garment::stitch(t, None)).map(|s| s.to_array()),
+            stitch: gauge.and_then(|t| gauge::stitch(t, None)).map(|s| s.to_array()),
             width: mm("width"),
             circumference: mm("circumference"),
             height: mm("height"),

@@ -9,7 +9,9 @@ mod color;
 mod definitions;
 mod dyes;
 mod garment;
+mod gauge;
 mod knit_size;
+mod known_yarns;
 mod mesh;
 mod motion;
 mod pattern;
@@ -402,7 +404,7 @@ impl Plans {
         let tilted = table.one_of_or("ply_intersection", defaults::TILTED, &intersections);
         let mut detail = cloth::Detail::read(&table);
         table.finish();
-        let mut library = yarns::read(root, context, tilted);
+        let mut library = yarns::read(root, context, tilted, definitions::built_in_fiber);
         definitions::add_built_in(&mut library, root.node("fabric"), tilted);
         let tables = root.tables("fabric");
         if tables.is_empty() && options.curves.is_some() {

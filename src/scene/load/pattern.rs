@@ -4,9 +4,9 @@ use glam::DVec2;
 
 use super::{
     Context, Range, Reader, chart_picture,
-    cloth::Yarns,
     color::{FabricCoordinates, StitchColors},
     knit_size::GivenSizes,
+    known_yarns::KnownYarns,
 };
 use crate::{
     geometry::{curve::Curve, overlap::sampled_overlap},
@@ -287,7 +287,7 @@ pub(super) fn knit(
     table: &Reader<'_>,
     fabric: &Reader<'_>,
     context: &Context<'_>,
-    yarns: &Yarns<'_>,
+    yarns: &KnownYarns<'_>,
 ) -> Option<KnitPlan> {
     let charted = chart(table, context);
     let profile = table.pairs("profile", Range::FINITE);
@@ -318,7 +318,7 @@ pub(super) fn stockinette(
     table: &Reader<'_>,
     fabric: &Reader<'_>,
     context: &Context<'_>,
-    yarns: &Yarns<'_>,
+    yarns: &KnownYarns<'_>,
 ) -> Option<KnitPlan> {
     let form = Some(Form::Flat);
     let sizes = GivenSizes::read(table, Some(fabric), context, &form);
@@ -352,7 +352,7 @@ pub(super) fn work_of_tile(table: &Reader<'_>) -> Option<Stranding> {
 
 fn counted(
     table: &Reader<'_>,
-    yarns: &Yarns<'_>,
+    yarns: &KnownYarns<'_>,
     Charted { name, chart, lines, stitches, rows }: Charted,
     form: Option<Form>,
     sizes: GivenSizes,

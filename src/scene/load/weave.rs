@@ -2,9 +2,9 @@
 
 use super::{
     Context, Range, Reader,
-    cloth::Yarns,
     color::{ColorPlan, FabricCoordinates},
-    garment,
+    gauge,
+    known_yarns::KnownYarns,
 };
 use crate::{
     geometry::curve::Curve,
@@ -139,7 +139,7 @@ pub(super) fn weave(
     table: &Reader<'_>,
     fabric: &Reader<'_>,
     context: &Context<'_>,
-    yarns: &Yarns<'_>,
+    yarns: &KnownYarns<'_>,
 ) -> Option<WeavePlan> {
     let (name, drafted) = draft(table, context);
     let wif = drafted.as_ref().and_then(|d| d.wif.as_ref());
@@ -323,8 +323,8 @@ fn spacing(table: &Reader<'_>, context: &Context<'_>, key: &str, density: &str) 
 
 /// Distances of warps and of wefts by the `gauge`, ends and picks, of the weave or of its fabric.
 fn gauge(table: &Reader<'_>, fabric: &Reader<'_>, spacings: &[Option<f64>; 2]) -> Option<[f64; 2]> {
-    let place = garment::gauged(table, Some(fabric))?;
-    let given = garment::stitch(place, None)?;
+    let place = gauge::gauged(table, Some(fabric))?;
+    let given = gauge::stitch(place, None)?;
     if spacings.iter().any(Option::is_some) {
         let hint = "`gauge` has ends and picks: leave out `ends_per_cm`, `picks_per_cm` and spacings";
         place.error_at("gauge", "both a gauge and distances of yarns are given", Some(hint));

@@ -13,23 +13,39 @@ use crate::{
             Distribution, Placement,
             flyaway::{Flyaways, Spread},
         },
-        yarn::{MAX_PLIES, PlyParameters, touching_plies},
+        ply::PlyParameters,
+        yarn::{MAX_PLIES, touching_plies},
     },
     input::diagnostic::Sources,
     scattering::fiber::FiberMaterial,
 };
 
-/// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake.
-pub(super) fn read(root: &Reader<'_>, context: &Context<'_>, tilted: bool) -> Library {
+/// The fibres that a yarn may name.
+#[derive(Clone, Copy)]
+struct Fibers<'a> {
+    described: &'a BTreeMap<String, FiberMaterial>,
+    /// Asked for one that is not described.
+    built_in: fn(&str) -> Option<FiberMaterial>,
+}
+
+/// Reads every fibre and yarn, also those that the scene does not use: a mistake in a library is a mistake. `built_in` is asked
+/// for fibres that nothing describes.
+pub(super) fn read(
+    root: &Reader<'_>,
+    context: &Context<'_>,
+    tilted: bool,
+    built_in: fn(&str) -> Option<FiberMaterial>,
+) -> Library {
     let fibers: BTreeMap<String, FiberMaterial> = root
         .named_tables("fiber")
         .into_iter()
         .filter_map(|(name, table)| Some((name.to_owned(), fiber(table)?)))
         .collect();
+    let known = Fibers { described: &fibers, built_in };
     let yarns = root
         .named_tables("yarn")
         .into_iter()
-        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, &fibers, tilted)?)))
+        .filter_map(|(name, table)| Some((name.to_owned(), yarn(name, table, context, known, tilted)?)))
         .collect();
     let names = |key| root.named_tables(key).into_iter().map(|(name, _)| name.to_owned()).collect();
     Library { yarns, fibers, yarn_names: names("yarn"), fiber_names: names("fiber") }
@@ -209,7 +225,7 @@ struct PlyMaker<'a> {
     distance: Option<f64>,
     /// Radius of plies that touch each other.
     touching: f64,
-    fibers: &'a BTreeMap<String, FiberMaterial>,
+    fibers: Fibers<'a>,
 }
 
 impl PlyMaker<'_> {
@@ -292,10 +308,10 @@ impl PlyMaker<'_> {
             }
             return None;
         };
-        let material = self.fibers.get(name).cloned().or_else(|| super::definitions::built_in_fiber(name));
+        let material = self.fibers.described.get(name).cloned().or_else(|| (self.fibers.built_in)(name));
         if material.is_none() {
             let span = place.span("fiber").unwrap_or(place.header());
-            let names: Vec<String> = self.fibers.keys().cloned().collect();
+            let names: Vec<String> = self.fibers.described.keys().cloned().collect();
             self.context.unknown_thread(span, "fiber", name, &names);
         }
         Some((name, material?))
@@ -303,13 +319,7 @@ impl PlyMaker<'_> {
 }
 
 /// One `[yarn.NAME]`.
-fn yarn(
-    name: &str,
-    table: Reader<'_>,
-    context: &Context<'_>,
-    fibers: &BTreeMap<String, FiberMaterial>,
-    tilted: bool,
-) -> Option<Yarn> {
+fn yarn(name: &str, table: Reader<'_>, context: &Context<'_>, fibers: Fibers<'_>, tilted: bool) -> Option<Yarn> {
     let tex = table.f64("tex", Range::POSITIVE);
     let radius = table.f64("radius", Range::POSITIVE);
     let ply_twist = table.f64_or("ply_twist", 0.0, TWIST);

@@ -13,8 +13,9 @@ use crate::{
     geometry::{
         density::KnownPacking,
         fiber::Placement,
+        ply::PlyParameters,
         section::Crossings,
-        yarn::{MAX_PLIES, PlyParameters, touching_plies},
+        yarn::{MAX_PLIES, touching_plies},
     },
     math::{Rgb, sampler::Stream},
     scattering::{fiber::FiberMaterial, yarn::YarnScatterer},

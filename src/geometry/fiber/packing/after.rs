@@ -8,8 +8,9 @@ use wide::f32x8;
 use super::lines::Lines;
 use crate::{
     geometry::{
-        after_fiber::{AfterFiber, AfterTurn, ClearedStrip, Missing, MissingFibers},
-        yarn::PlyShape,
+        after_fiber::{AfterFiber, AfterTurn, Missing, MissingFibers},
+        cleared_strip::ClearedStrip,
+        ply::PlyShape,
     },
     math::sampler::Stream,
 };

@@ -8,8 +8,9 @@ use crate::{
     geometry::{
         density::ChordFibers,
         fiber::slopes::Slopes,
-        occluder::PlyGaps,
-        yarn::{PlyParameters, PlyShape, YarnShape},
+        gaps::PlyGaps,
+        ply::{PlyParameters, PlyShape},
+        yarn::YarnShape,
     },
     math::sampler::Stream,
 };

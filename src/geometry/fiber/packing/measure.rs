@@ -31,7 +31,7 @@ const SQUEEZED: u32 = 4;
 ///
 /// The crowding and its depth are those with which lines by the rim meet as many discs as they do, by least squares of what
 /// would pass if these lay at random. The regularity is that with which the gaps of
-/// [`PlyGaps`](crate::geometry::occluder::PlyGaps) pass as much as pieces of lines away from the rim do; that by the rim with
+/// [`PlyGaps`](crate::geometry::gaps::PlyGaps) pass as much as pieces of lines away from the rim do; that by the rim with
 /// which they pass as much as lines in all directions through the packings, by least squares of the roots over the ply's
 /// width. What is free after a fibre is that with which as much light leaves that met one as on lines from the place where it
 /// did.

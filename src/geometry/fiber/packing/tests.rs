@@ -1,7 +1,7 @@
 //! Packings, and what is measured of them against other packings.
 
 use super::{lines::Lines, *};
-use crate::geometry::occluder::PlyGaps;
+use crate::geometry::gaps::PlyGaps;
 
 #[test]
 fn discs_do_not_overlap_and_fill_the_core_evenly() {

@@ -4,11 +4,7 @@
 //! one of every pair. Both yarns are behind the knit stitches and in front of the purl ones, so that what goes from one layer
 //! to the other lies between them.
 
-use super::{
-    super::colors::{Colors, Hold},
-    Border, Course, Loops, Visit,
-    maker::Maker,
-};
+use super::{super::colors::Colors, Border, Course, Hold, Loops, Visit, maker::Maker};
 use crate::pattern::chart::Stitch;
 
 /// Yarn of a loop of the cast-on edge, which goes to the front and to the back by turns, in shares of a stitch's.

@@ -3,13 +3,7 @@
 mod across;
 mod net;
 
-use super::{
-    super::{
-        rims::CastOn,
-        shape::bobble::{BELLY, BOBBLE},
-    },
-    Border, Course, Loop, Loops, Visit,
-};
+use super::{super::rims::CastOn, BELLY, BOBBLE, Border, Course, Loop, Loops, Visit};
 use crate::pattern::chart::{Act, Stitch, Top};
 
 /// Yarn of what is no whole loop, in shares of a stitch's.

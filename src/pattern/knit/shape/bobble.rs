@@ -8,14 +8,10 @@
 use std::f64::consts::TAU;
 
 use super::{
-    super::loops::{Loop, Loops},
-    CLOSING, DEPTH, Foot, LEAN, Piece, Place, REACH, smooth_step, through,
+    super::loops::{BELLY, Loop, Loops, REACH},
+    CLOSING, DEPTH, Foot, LEAN, Piece, Place, smooth_step, through,
 };
 
-/// Its yarn, in shares of a stitch's.
-pub(in super::super) const BOBBLE: f64 = 10.0;
-/// The room that it takes above its row, in rows.
-pub(in super::super) const BELLY: f64 = 1.9;
 /// The share of its yarn before the head of the loop that closes it.
 pub(in super::super) const CLOSED: f64 = 0.94;
 

@@ -7,7 +7,10 @@ use super::{
     topology::{Stitches, yarn_of_stitches},
     *,
 };
-use crate::pattern::{chart::Act, rods::passing::passed};
+use crate::pattern::{
+    chart::{Act, binds_from_right},
+    rods::passing::passed,
+};
 
 fn piece(rows: &[&str], form: Form) -> Knit {
     let chart = Chart::parse(rows).unwrap();
@@ -38,7 +41,7 @@ fn passes_bound(stitches: &Stitches, ring: (i32, i32), own: (i32, i32)) -> [i32;
 fn undrawn(piece: &Knit) -> (Vec<String>, usize) {
     let (rows, stitches) = (piece.worked().unwrap(), yarn_of_stitches(piece, true));
     let (mut wrong, mut count) = (Vec::new(), 0);
-    let first = super::super::gaps::from_right(&rows);
+    let first = binds_from_right(&rows);
     for (r, row) in rows.iter().enumerate().skip(1) {
         let backwards = piece.form == Form::Flat && (r % 2 == 1) != first;
         for (k, s) in row.iter().enumerate().skip(2).take(row.len() - 4) {

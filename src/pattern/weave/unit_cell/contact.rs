@@ -1,44 +1,14 @@
 //! Contact of yarns as soft elliptical tubes: neighbours of one side, and warps with the wefts that they cross.
 
-use glam::DVec3;
-
-use super::energy::{Energy, PER_NODE, Tangent, local, world};
+use super::{
+    energy::{Energy, Gradient, PER_NODE, Tangent, local, world},
+    spheroid::Spheroid,
+};
 
 /// Stiffness of contact.
 const CONTACT: f64 = 250.0;
 /// How much harder yarns on the wrong side of each other are pushed back.
 const BEHIND: f64 = 20.0;
-
-/// A node as crossing yarns meet it.
-pub(super) struct Spheroid {
-    /// Squared half axes: wide, high.
-    wide: f64,
-    high: f64,
-    /// The level part of its matrix: xx, xy, yy.
-    level: [f64; 3],
-    /// Level unit vector across the yarn.
-    across: [f64; 2],
-}
-
-impl Spheroid {
-    pub(super) fn new(axes: [f64; 2], tangent: DVec3) -> Self {
-        let flat = tangent.truncate().length().max(1e-3);
-        let across = [-tangent.y / flat, tangent.x / flat];
-        let [wide, high] = axes.map(|v| v * v);
-        let more = wide - high;
-        let level =
-            [high + more * across[0] * across[0], more * across[0] * across[1], high + more * across[1] * across[1]];
-        Self { wide, high, level, across }
-    }
-
-    /// Of w' Q w by the logarithm of the flattening and by the yarn's heading, for the level part of w and its height.
-    fn gradient(&self, way: [f64; 2], up: f64) -> (f64, f64) {
-        let across = way[0] * self.across[0] + way[1] * self.across[1];
-        let along = way[0] * self.across[1] - way[1] * self.across[0];
-        let by_flattening = 2.0 * (self.wide * across * across - self.high * (along * along + up * up));
-        (by_flattening, -2.0 * (self.wide - self.high) * across * along)
-    }
-}
 
 /// A sloping yarn cut by a plane across the cloth. It is higher there whichever way it slopes, so that twined yarns keep apart, and
 /// wider where it goes aside.
@@ -61,15 +31,6 @@ impl Cut {
             slopes: [[-aside * aside / square, aside / (level * along)], [-1.0 / (along * along), 0.0]],
         }
     }
-}
-
-/// What the gradient of the energy is gathered in.
-pub(super) struct Gradient<'a> {
-    pub(super) nodes: &'a mut [f64],
-    pub(super) spacing: [f64; 2],
-    pub(super) tangents: Vec<DVec3>,
-    /// By the angle of each node's tangent in the plane.
-    pub(super) headings: Vec<f64>,
 }
 
 impl Energy<'_> {

@@ -2,12 +2,7 @@
 
 use glam::DVec3;
 
-use super::{
-    super::minimize::minimize,
-    CellOptions, Node,
-    contact::{Gradient, Spheroid},
-    full,
-};
+use super::{super::minimize::minimize, CellOptions, Node, full, spheroid::Spheroid};
 use crate::pattern::draft::Draft;
 
 /// Resistance of a section to being flattened, energy per crossing and squared logarithm of its width.
@@ -52,6 +47,15 @@ pub(super) struct Tangent {
     pub(super) unit: DVec3,
     /// Length of the way from the node before to the one after.
     pub(super) length: f64,
+}
+
+/// What the gradient of the energy is gathered in.
+pub(super) struct Gradient<'a> {
+    pub(super) nodes: &'a mut [f64],
+    pub(super) spacing: [f64; 2],
+    pub(super) tangents: Vec<DVec3>,
+    /// By the angle of each node's tangent in the plane.
+    pub(super) headings: Vec<f64>,
 }
 
 /// From along, aside and height of a warp or a weft to x, y, z.

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use glam::DAffine3;
 
 use super::{
-    super::{Mode, Yarn, defaults},
+    super::{Mode, defaults},
     Context, Range, Reader, UNITS,
     color::{self, ColorPlan},
     garment::{self, GarmentPlan},
+    known_yarns::KnownYarns,
     mesh::prim_pattern,
     pattern::{self, KnitPlan},
     placement, radians,
@@ -21,7 +22,6 @@ use crate::{
     files::{curve_file::ReadOptions, has_extension},
     geometry::curve::Basis,
     input::diagnostic::Span,
-    pattern::knit::Thickness,
 };
 
 /// Cells of a periodic pattern that `--curves` shows, where the scene does not say how many: one looks like no cloth.
@@ -163,7 +163,7 @@ pub(super) fn plan(
         Some(source_table) => {
             let own = yarn.as_deref().map_or(("", None), |y| (y, library.yarns.get(y)));
             let fallback = if fiber.is_some() { defaults::FIBER_RADIUS } else { 0.5 };
-            let known = Yarns { library, own, radius, fallback };
+            let known = KnownYarns { library, own, radius, fallback };
             source(source_table, &table, context, &known, curves)
         }
         None if curves.is_some() => {
@@ -225,52 +225,6 @@ fn file_source(
     Source::File(CurveFile { path, rest, span, unit, options, up, colors })
 }
 
-/// How thick yarn of a radius is where it is pressed to a width over height of `flatten`; fibres, which are no yarn, stay round.
-pub(super) fn thickness(yarn: Option<&Yarn>, radius: f64, flatten: f64) -> Thickness {
-    match yarn {
-        Some(yarn) => Thickness { radius, half_width: yarn.half_width(), flatten },
-        None => Thickness::round(radius),
-    }
-}
-
-/// The yarns that a source may name.
-pub(super) struct Yarns<'a> {
-    pub(super) library: &'a Library,
-    /// The fabric's own, by name and, where it is sound, as it is.
-    own: (&'a str, Option<&'a Yarn>),
-    /// What the fabric says in place of its yarn's radius.
-    radius: Option<f64>,
-    /// That of fibres, or something to go on with where the yarn has mistakes.
-    fallback: f64,
-}
-
-impl Yarns<'_> {
-    /// Radius of the fabric's yarns or fibres, millimetres.
-    pub(super) fn radius(&self) -> f64 {
-        self.radius.or(self.own.1.map(|y| y.radius)).unwrap_or(self.fallback)
-    }
-
-    /// Mean half width of the fabric's yarns over their radius, see [`Yarn::half_width`]; 1 of fibres.
-    pub(super) fn half_width(&self) -> f64 {
-        self.own.1.map_or(1.0, Yarn::half_width)
-    }
-
-    /// How thick they are where stitches press them to a width over height of `flatten`; fibres stay round.
-    pub(super) fn thickness(&self, flatten: f64) -> Thickness {
-        thickness(self.own.1, self.radius(), flatten)
-    }
-
-    /// Whether the fabric itself says it.
-    pub(super) fn has_radius(&self) -> bool {
-        self.radius.is_some()
-    }
-
-    /// Name of the fabric's yarn.
-    pub(super) fn name(&self) -> &str {
-        self.own.0
-    }
-}
-
 /// What a fabric's curves come from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum SourceKind {
@@ -287,7 +241,7 @@ fn source(
     table: Reader<'_>,
     fabric: &Reader<'_>,
     context: &Context<'_>,
-    yarns: &Yarns<'_>,
+    yarns: &KnownYarns<'_>,
     curves: Option<&Path>,
 ) -> Option<Source> {
     let kinds = [

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{
-    Failure, SceneArgs,
-    files::Files,
-    level,
-    make::{refuse_unknown, write_all},
-    terminal::print,
-};
 use crate::{
+    cli::{
+        Failure, SceneArgs,
+        curve_files::{refuse_unknown, write_all},
+        files::Files,
+        level,
+        terminal::print,
+    },
     cloth::{self, Estimate},
     math::words::{bytes_in_words, counted},
     scene::Mode,

@@ -4,14 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{
-    Failure, SceneArgs,
-    files::Files,
-    level::{self, LEVELS},
-    log,
-    make::{refuse_unknown, write_all},
+use crate::{
+    cli::{
+        Failure, SceneArgs,
+        curve_files::{refuse_unknown, write_all},
+        files::Files,
+        level::{self, LEVELS},
+        log,
+    },
+    math::words::counted,
 };
-use crate::math::words::counted;
 
 const EXAMPLES: &str = "Examples:
   yarnray make garment scenes/pullover.toml -o pullover.bcc

@@ -1,0 +1,183 @@
+//! `yarnray make weave`
+
+use clap::Args;
+
+use super::output::{EXAMPLES, Output, RADIUS, write};
+use crate::{
+    cli::{Failure, log, named, positive, working::Working},
+    input::system::in_words,
+    pattern::{
+        PatternStrand,
+        draft::{Draft, DraftError},
+        weave::{self, Extent, Impossible, Measures, Weave},
+        wif::{self, WifUse, WovenWif},
+    },
+    scene::Yarn,
+};
+
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct WeaveArgs {
+    #[command(flatten)]
+    output: Output,
+    /// plain, 'basket 2', 'twill 2/1', 'satin 5', 'satin 8/3', 'sateen 5'; a row of a matrix of # and ., top row first
+    /// (repeatable); or a draft of a weaving program (.wif), whose lengths count as millimetres.
+    #[arg(long, default_value = "plain", value_name = "DRAFT")]
+    draft: Vec<String>,
+    /// Number of warps; 20, or those of the file.
+    #[arg(long, conflicts_with = "width", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    warps: Option<u32>,
+    /// Number of wefts; 20, or those of the file.
+    #[arg(long, conflicts_with = "height", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    wefts: Option<u32>,
+    /// How wide the cloth is, in place of a number of warps: as many as fill it best.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    width: Option<f64>,
+    /// How high the cloth is, in place of a number of wefts.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    height: Option<f64>,
+    /// Radius of the weft yarn, if not that of the warp.
+    #[arg(long, value_name = "R", value_parser = positive)]
+    weft_radius: Option<f64>,
+    /// Distance between warps; the least possible if not given.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    warp_spacing: Option<f64>,
+    /// Distance between wefts.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    weft_spacing: Option<f64>,
+    /// Share of the plane that yarns cover, 0 to 1; what the loom gives if neither this nor spacings are given.
+    #[arg(long, value_name = "X", value_parser = share)]
+    cover: Option<f64>,
+    /// The warp's share of the crimp, 0 to 1; by the yarns' stiffness if not given.
+    #[arg(long, value_name = "X", value_parser = share)]
+    crimp: Option<f64>,
+    /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
+    #[arg(long, value_parser = named(&weave::Edges::NAMES))]
+    edges: Option<weave::EdgesOf>,
+    /// Whole repeats, cut all around: cloth that goes on at one border as it begins at the other.
+    #[arg(long, conflicts_with = "edges")]
+    tile: bool,
+    /// How high the pile of terry, velvet and corduroy stands.
+    #[arg(long, value_name = "L", value_parser = positive)]
+    pile_height: Option<f64>,
+    /// Control points between two crossings.
+    #[arg(long, default_value_t = weave::POINTS, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=24))]
+    points: u32,
+}
+
+/// Crossings of a repeat from which on a weave takes more than some seconds.
+const LONG_REPEAT: usize = 1024;
+
+fn share(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
+pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
+    let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
+    let (draft, file) = match args.draft.as_slice() {
+        [path] if path.to_lowercase().ends_with(".wif") => {
+            wif_draft(path).map(|file| (file.draft.clone(), Some(file)))?
+        }
+        [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
+        rows => (Draft::matrix(rows).map_err(wrong)?, None),
+    };
+    let yarn = args.output.checked()?;
+    let [warps, wefts] = file.as_ref().map_or([weave::YARNS; 2], |f| f.count);
+    let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
+    let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
+    let radius = own(args.output.radius, 0).unwrap_or(otherwise);
+    let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
+    let weft_radius = own(args.weft_radius, 1).unwrap_or(radius);
+    let half_width = yarn.as_ref().map_or(1.0, Yarn::half_width);
+    let half_rooms = [radius, weft_radius].map(|radius| radius * half_width);
+    let piece = Weave {
+        warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
+        wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
+        half_rooms,
+        half_width: [half_width; 2],
+        warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
+        weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
+        cover: args.cover,
+        crimp: args.crimp,
+        // Curve files know round yarns only.
+        flatten: 1.0,
+        points: args.points,
+        edges: args.edges.map_or(weave::Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
+        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
+        draft,
+        shuttles: file.as_ref().map(|f| weave::shuttles(&f.colors[1])).unwrap_or_default(),
+        threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
+        tile: args.tile,
+    };
+    if let Err((problem, instead)) = piece.edges.suit(&piece.draft) {
+        return Err(Failure::hinted(problem, format!("--edges {}", instead.name())));
+    }
+    let repeat = [piece.draft.warps(), piece.draft.wefts()];
+    let task = format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]);
+    let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
+    let most = weave::longest(half_rooms[0]);
+    if piece.pile_height > most {
+        return Err(Failure::Input(format!(
+            "error: --pile-height is at most {most}, five hundred times a warp's width"
+        )));
+    }
+    args.output.hold(piece.least_points())?;
+    if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
+        log::say(&task);
+    }
+    let working = Working::on(task, args.output.quiet);
+    let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
+    drop(working);
+    args.output.hold(cloth.least_points())?;
+    let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
+    write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
+    if !args.output.quiet {
+        let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
+        log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
+        log::say(&format!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]));
+        log::say(&format!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through));
+        let extent = match args.tile {
+            true => format!("period {:.6} across, {:.6} up", size[0], size[1]),
+            false => format!("{:.3} wide, {:.3} high", size[0], size[1]),
+        };
+        log::say(&format!("{extent}; {:.1} of warp, {:.1} of weft", length[0], length[1]));
+    }
+    Ok(())
+}
+
+/// Why a weave cannot be; a spacing is the command line's or the file's.
+fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
+    Failure::Input(match *why {
+        Impossible::TooTight { warp, least } => {
+            let name = if warp { "warp" } else { "weft" };
+            if given[usize::from(!warp)] {
+                format!("error: --{name}-spacing leaves the yarns no room to pass; at least {least:.4} here")
+            } else {
+                return Failure::hinted(
+                    format!(
+                        "the {name} spacing of the draft leaves the yarns no room to pass; at least {least:.4} here"
+                    ),
+                    format!("thinner yarns (--radius), or a spacing of your own (--{name}-spacing)"),
+                );
+            }
+        }
+        Impossible::TooMuchCover { most } => {
+            format!("error: these yarns cover at most {most:.3} of the plane in this weave")
+        }
+        Impossible::TooSmall { warp, least } => {
+            let name = if warp { "width" } else { "height" };
+            format!("error: --{name} has no room for one yarn, or one repeat of a tile; at least {least:.3}")
+        }
+        Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),
+    })
+}
+
+/// A draft of a weaving program; what it leaves open is said.
+fn wif_draft(path: &str) -> Result<WovenWif, Failure> {
+    let wrong = |problem: String| Failure::Input(format!("error: {path}: {problem}"));
+    let bytes = std::fs::read(path).map_err(|e| wrong(in_words(&e)))?;
+    let file = wif::parse(&bytes).map_err(|e| wrong(e.to_string()))?;
+    let woven = file.woven(WifUse::default()).map_err(|e| wrong(e.to_string()))?;
+    woven.notes.iter().for_each(|note| log::say(&format!("{path}: {note}")));
+    Ok(woven)
+}
