@@ -54,16 +54,39 @@ impl FiberMaterial {
     /// half-space of isotropic scatterers of their albedo reflects (van de Hulst, Multiple Light Scattering, 1980). Linear
     /// Rec.709.
     pub fn cloth_color(&self) -> [f64; 3] {
+        std::array::from_fn(|c| half_space((1.0 - self.albedo(c).clamp(0.0, 1.0)).sqrt()))
+    }
+
+    /// What TT and D of each channel are multiplied by, so that [`Self::cloth_color`] is `by` times as much: of white fibres
+    /// hardly anything, for light meets so many of them. At least 0, and at most what makes no light.
+    pub fn lightening(&self, by: f64) -> [f64; 3] {
+        let colors = self.cloth_color();
         std::array::from_fn(|c| {
-            let s = (1.0 - (self.r[c] + self.tt[c] + self.d[c]).clamp(0.0, 1.0)).sqrt();
-            (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s)
+            let inside = self.tt[c] + self.d[c];
+            let s = half_space_root((by * colors[c]).clamp(0.0, 1.0));
+            if inside > 0.0 { ((1.0 - s * s - self.r[c]) / inside).max(0.0) } else { 1.0 }
         })
+    }
+
+    fn albedo(&self, channel: usize) -> f64 {
+        self.r[channel] + self.tt[channel] + self.d[channel]
     }
 
     /// The largest r + tt + d of the three channels.
     pub fn largest_albedo(&self) -> f64 {
-        (0..3).map(|c| self.r[c] + self.tt[c] + self.d[c]).fold(0.0, f64::max)
+        (0..3).map(|c| self.albedo(c)).fold(0.0, f64::max)
     }
+}
+
+/// What a half-space of isotropic scatterers reflects whose albedo is 1 - s^2.
+fn half_space(s: f64) -> f64 {
+    (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s)
+}
+
+/// The s of [`half_space`], for 0 to 1.
+fn half_space_root(reflected: f64) -> f64 {
+    let (left, b) = (1.0 - reflected, 1.139 + 1.17 * reflected);
+    2.0 * left / (b + (b * b - 4.0 * 0.139 * left).sqrt())
 }
 
 /// A fibre's BCSDF made ready to evaluate: for explicit fibres, and the yardstick of every aggregate.
@@ -174,6 +197,31 @@ impl FiberBcsdf {
 mod tests {
     use super::*;
     use crate::scattering::testing::{lossless, sphere};
+
+    #[test]
+    fn lightened_fibers_make_cloth_as_light_as_is_wanted() {
+        let fiber = FiberMaterial { r: [0.04; 3], tt: [0.6, 0.3, 0.02], d: [0.33, 0.2, 0.1], ..lossless() };
+        for by in [0.5, 0.9, 1.0, 1.1] {
+            let factors = fiber.lightening(by);
+            let times = |lobe: [f64; 3]| std::array::from_fn(|c| lobe[c] * factors[c]);
+            let dyed = FiberMaterial { tt: times(fiber.tt), d: times(fiber.d), ..fiber.clone() };
+            for (was, is) in fiber.cloth_color().iter().zip(dyed.cloth_color()) {
+                assert!((is / was - by).abs() < 1e-9, "{by}: {is} of {was}");
+            }
+        }
+        // Of white cloth a hundredth is a thousandth of what fibres pass on.
+        let white = fiber.lightening(0.99)[0];
+        assert!((0.997..0.999).contains(&white), "{white}");
+        assert!(
+            fiber
+                .lightening(9.0)
+                .iter()
+                .zip(0..)
+                .all(|(f, c)| fiber.r[c] + f * (fiber.tt[c] + fiber.d[c]) < 1.0 + 1e-9)
+        );
+        assert_eq!(fiber.lightening(0.0), [0.0; 3], "what the surface reflects stays");
+        assert_eq!(FiberMaterial { tt: [0.0; 3], d: [0.0; 3], ..fiber }.lightening(2.0), [1.0; 3]);
+    }
 
     #[test]
     fn a_white_fiber_keeps_all_light_from_every_side() {

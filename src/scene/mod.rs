@@ -218,9 +218,18 @@ impl Yarn {
     /// The same of dyed fibres: what passes through them, TT and D, times a colour; what their surface reflects is not.
     /// A colour above 1 stops where the fibre would make light.
     pub fn dyed(&self, color: [f64; 3]) -> Self {
+        self.dyed_by_fiber(|_| color)
+    }
+
+    /// The same of fibres so dyed that thick cloth of them is `by` times as light: [`FiberMaterial::lightening`].
+    pub fn lighter(&self, by: f64) -> Self {
+        self.dyed_by_fiber(|fiber| fiber.lightening(by))
+    }
+
+    fn dyed_by_fiber(&self, color: impl Fn(&FiberMaterial) -> [f64; 3]) -> Self {
         let mut yarn = self.clone();
         for (_, fiber) in &mut yarn.fibers {
-            for (c, factor) in color.into_iter().enumerate() {
+            for (c, factor) in color(fiber).into_iter().enumerate() {
                 let inside = fiber.tt[c] + fiber.d[c];
                 let most = if inside > 0.0 { (1.0 - fiber.r[c]).max(0.0) / inside } else { 1.0 };
                 fiber.tt[c] *= factor.min(most);

@@ -97,7 +97,12 @@ impl Painter<'_> {
     /// What lies at each place along a curve.
     fn keys(&self, index: usize, curve: &Curve, radii: &[f64]) -> Numbered {
         let shade = self.shades.map(|v| hash2(v.seed, index as u32 ^ 0x51ed_270b) % SHADES);
-        let shine = self.shine(shade);
+        // A print has the shade in its levels: that of the fibres before they are printed.
+        let lightened = |yarn: usize| {
+            let fiber = self.yarns[yarn].fibers.first().filter(|_| shade.is_some());
+            fiber.map_or([1.0; 3], |(_, fiber)| fiber.lightening(self.shine(shade)).map(|v| v as f32))
+        };
+        let mut of_yarn = None;
         let cells = self.cells.of(index, self.coordinates);
         let own = self.coordinates.own.get(index).copied();
         let thread = self.coordinates.thread(index).filter(|_| self.cells.motif.is_none());
@@ -118,8 +123,13 @@ impl Painter<'_> {
                     let mut stream = Stream::new(hash2(index as u32, place as u32));
                     // One number for all channels: what is dithered is brightness, not the hue.
                     let dither = stream.next();
-                    let level = |v: f32| LEVELS * (shine * v).clamp(0.0, 1.0).sqrt() + dither;
-                    let levels = print.color(at, next).map(level).map(|level| level.min(LEVELS) as u8);
+                    let lightened = match of_yarn {
+                        Some((of, known)) if of == yarn => known,
+                        _ => of_yarn.insert((yarn, lightened(yarn))).1,
+                    };
+                    let color = print.color(at, next);
+                    let level = |c: usize| LEVELS * (lightened[c] * color[c]).clamp(0.0, 1.0).sqrt() + dither;
+                    let levels = [0, 1, 2].map(|c| level(c).min(LEVELS) as u8);
                     Key { yarn, shade: None, dye, levels: Some(levels) }
                 }
             };
@@ -129,15 +139,16 @@ impl Painter<'_> {
         out
     }
 
-    fn shine(&self, shade: Option<u32>) -> f32 {
-        self.shades.zip(shade).map_or(1.0, |(v, shade)| shine(v, shade))
+    fn shine(&self, shade: Option<u32>) -> f64 {
+        self.shades.zip(shade).map_or(1.0, |(v, shade)| f64::from(shine(v, shade)))
     }
 
     /// The yarn of a key, in its colour.
     fn variant(&self, key: Key) -> Yarn {
         let dyed = self.dyes.map_or(Vec3::ONE, |d| d.color(key.dye));
         let printed = key.levels.map_or(Vec3::ONE, |l| Vec3::from(l.map(|l| (f32::from(l) / LEVELS).powi(2))));
-        self.yarns[key.yarn].dyed((dyed * printed * self.shine(key.shade)).to_array().map(f64::from))
+        let yarn = self.yarns[key.yarn].dyed((dyed * printed).to_array().map(f64::from));
+        if key.shade.is_some() { yarn.lighter(self.shine(key.shade)) } else { yarn }
     }
 }
 
