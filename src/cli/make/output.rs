@@ -1,4 +1,4 @@
-//! What `make knit` and `make weave` have in common: their options of files and yarns, and how strands are written.
+//! What `make knit` and `make weave` have in common: examples, options of files and yarns, and how strands are written.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ The extension names the format: .bcc (no radii), .hair, .obj (lines, no radii), 
 .usda and .usdc (BasisCurves with widths, colours and the numbers of yarns and plies, in millimetres). Lengths have no unit
 in the others; what reads them gives one.";
 
-/// What all of them share.
+/// Where cloth is written, and of which yarn it is.
 #[derive(Args, Debug)]
 pub(super) struct Output {
     #[arg(

@@ -115,12 +115,9 @@ impl Energy<'_> {
         };
         let mut line = vec![0.0; count * crossings];
         for crossing in 0..crossings {
-            // Sums of so many from each yarn on.
             let of: Vec<f64> = (0..count).map(|yarn| aside(yarn, crossing)).collect();
-            let mut sum: f64 = of[..many].iter().sum();
-            for yarn in 0..count {
+            for (yarn, sum) in sums_from(&of, many).into_iter().enumerate() {
                 line[yarn * crossings + crossing] = sum / many as f64;
-                sum += of[(yarn + many) % count] - of[yarn];
             }
         }
         for line in line.chunks_mut(crossings) {
@@ -129,15 +126,26 @@ impl Energy<'_> {
         }
         let by_node = BEATEN / (many * self.nodes) as f64;
         for crossing in 0..crossings {
-            let off = |first: usize| line[first % count * crossings + crossing];
-            // A yarn is in the sums that begin up to so many before it.
-            let mut sum: f64 = (1..=many).map(|first| off(first + count - many)).sum();
-            for yarn in 0..count {
+            let off: Vec<f64> = (0..count).map(|yarn| line[yarn * crossings + crossing]).collect();
+            for (first, sum) in sums_from(&off, many).into_iter().enumerate() {
+                // The last yarn of those that begin there is in all of their sums.
+                let yarn = (first + many - 1) % count;
                 let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
                 nodes.for_each(|k| g[self.at(side, yarn, k)] += by_node * sum);
-                sum += off(yarn + 1) - off(yarn + 1 + count - many);
             }
         }
         0.5 * BEATEN * line.iter().map(|v| v * v).sum::<f64>()
     }
+}
+
+/// Sums of so many values from each on, around the end.
+fn sums_from(values: &[f64], many: usize) -> Vec<f64> {
+    let count = values.len();
+    let mut sum: f64 = values[..many].iter().sum();
+    let from = |first: usize| {
+        let here = sum;
+        sum += values[(first + many) % count] - values[first];
+        here
+    };
+    (0..count).map(from).collect()
 }

@@ -12,26 +12,26 @@ impl Energy<'_> {
     /// the longest float reaches, and what lies between alike crossings is alike too: all warps of a twill or satin, and in a
     /// herringbone those between its turns. Without it they would give way by turns, which friction keeps them from.
     pub(super) fn alike(&self) -> Vec<usize> {
-        let mut leader: Vec<usize> = (0..self.variables()).collect();
-        if !self.draft.twines() {
-            let around = self.surroundings();
-            let mut leaders = HashMap::new();
-            for side in 0..2 {
-                let places = (0..self.count[side]).flat_map(|y| (0..self.length(side)).map(move |k| (y, k)));
-                for (yarn, k) in places {
-                    let (crossing, between) = (k / self.nodes, k % self.nodes);
-                    let next = if between == 0 { crossing } else { (crossing + 1) % self.count[1 - side] };
-                    let of = |c: usize| if side == 0 { around[c][yarn] } else { around[yarn][c] };
-                    let at = self.at(side, yarn, k);
-                    let first = *leaders.entry((side, between, of(crossing), of(next))).or_insert(at);
-                    (0..PER_NODE).for_each(|c| leader[at + c] = first + c);
-                }
+        if self.draft.twines() {
+            return (0..self.variables()).collect();
+        }
+        let around = self.surroundings();
+        let mut numbers = HashMap::new();
+        let mut alike = Vec::with_capacity(self.variables());
+        for side in 0..2 {
+            let nodes = (0..self.count[side]).flat_map(|yarn| (0..self.length(side)).map(move |k| (yarn, k)));
+            for (yarn, k) in nodes {
+                let (crossing, between) = (k / self.nodes, k % self.nodes);
+                let next = if between == 0 { crossing } else { (crossing + 1) % self.count[1 - side] };
+                let of = |c: usize| if side == 0 { around[c][yarn] } else { around[yarn][c] };
+                let node = number(&mut numbers, (side, between, of(crossing), of(next)));
+                alike.extend((0..PER_NODE).map(|c| PER_NODE * node + c));
             }
         }
-        // Where nothing is alike each leads itself.
-        let mut number = vec![None; leader.len()];
-        let mut next = 0..;
-        leader.iter().map(|&leads| *number[leads].get_or_insert_with(|| next.next().unwrap_or(0))).collect()
+        // Both spacings.
+        let nodes = PER_NODE * numbers.len();
+        alike.extend([nodes, nodes + 1]);
+        alike
     }
 
     /// For each weft, for each warp: a number of what lies around their crossing.
@@ -40,14 +40,17 @@ impl Energy<'_> {
         let reach = self.longest_float().max(LEAST_REACH);
         let thick = |side: usize, yarn: usize| self.thickness[side][yarn].to_bits();
         let crossing = |i: usize, j: usize| (self.draft.warp_over(i, j), thick(1, i), thick(0, j));
-        // First along the wefts, then across them.
-        let rows = numbers_of(wefts, warps, |i, j| near(j, reach, warps).map(|j| crossing(i, j)).collect::<Vec<_>>());
-        numbers_of(wefts, warps, |i, j| near(i, reach, wefts).map(|i| rows[i][j]).collect::<Vec<_>>())
+        let mut numbers = HashMap::new();
+        let mut row = |i: usize| (0..warps).map(|j| number(&mut numbers, crossing(i, j))).collect();
+        let crossings: Vec<Vec<usize>> = (0..wefts).map(&mut row).collect();
+        // Along the wefts, then across them.
+        let along = transposed(&around(&transposed(&crossings), reach));
+        around(&along, reach)
     }
 
     /// Crossings of the longest float.
     fn longest_float(&self) -> usize {
-        let float = |side: usize, yarn: usize| {
+        let float = |(side, yarn): (usize, usize)| {
             let length = self.count[1 - side];
             let over = |k: usize| {
                 let k = k % length;
@@ -60,25 +63,62 @@ impl Energy<'_> {
             }
             longest.min(length)
         };
-        (0..2)
-            .flat_map(|side| (0..self.count[side]).map(move |yarn| (side, yarn)))
-            .map(|(s, y)| float(s, y))
-            .max()
-            .unwrap_or(0)
+        let yarns = (0..2).flat_map(|side| (0..self.count[side]).map(move |yarn| (side, yarn)));
+        yarns.map(float).max().unwrap_or(0)
     }
 }
 
-/// Those up to `reach` on both sides of one of so many that repeat.
-fn near(middle: usize, reach: usize, count: usize) -> impl Iterator<Item = usize> {
-    (0..=2 * reach).map(move |k| (middle + k + count * reach - reach) % count)
+/// The number of a key, in the order in which keys are met.
+fn number<K: Eq + Hash>(numbers: &mut HashMap<K, usize>, key: K) -> usize {
+    let next = numbers.len();
+    *numbers.entry(key).or_insert(next)
 }
 
-/// Numbers what has the same key.
-fn numbers_of<K: Eq + Hash>(wefts: usize, warps: usize, key: impl Fn(usize, usize) -> K) -> Vec<Vec<usize>> {
-    let mut numbers = HashMap::new();
-    let mut number = |key: K| {
-        let next = numbers.len();
-        *numbers.entry(key).or_insert(next)
+/// For each of rows that repeat, numbers of what stands in each column from `reach` rows before it to as many behind. A run is told
+/// by two shorter ones, each half as long or more, so that long runs cost no more room than short ones.
+fn around(rows: &[Vec<usize>], reach: usize) -> Vec<Vec<usize>> {
+    let (count, whole) = (rows.len(), 2 * reach + 1);
+    let joined = |runs: &[Vec<usize>], by: usize| -> Vec<Vec<usize>> {
+        let mut numbers = HashMap::new();
+        let mut join = |r: usize| {
+            let pairs = runs[r].iter().zip(&runs[(r + by) % count]);
+            pairs.map(|(a, b)| number(&mut numbers, (*a, *b))).collect()
+        };
+        (0..count).map(&mut join).collect()
     };
-    (0..wefts).map(|i| (0..warps).map(|j| number(key(i, j))).collect()).collect()
+    let (mut runs, mut length) = (rows.to_vec(), 1);
+    while length < whole {
+        let by = length.min(whole - length);
+        runs = joined(&runs, by);
+        length += by;
+    }
+    // They began so many rows before.
+    runs.rotate_right(reach % count);
+    runs
+}
+
+fn transposed(rows: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    (0..rows[0].len()).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_alike_where_all_that_stands_in_them_is() {
+        let rows: Vec<Vec<usize>> = [0, 1, 0, 2, 1, 0, 1, 0, 2, 1, 0].map(|v| vec![v, v % 2]).to_vec();
+        for reach in [1, 2, 3, 5, 8] {
+            let window = |middle: usize, column: usize| -> Vec<usize> {
+                (0..=2 * reach).map(|k| rows[(middle + k + rows.len() * reach - reach) % rows.len()][column]).collect()
+            };
+            let found = around(&rows, reach);
+            let places: Vec<(usize, usize)> = (0..rows.len()).flat_map(|r| [(r, 0), (r, 1)]).collect();
+            for &(a, b) in &places {
+                for &(c, d) in &places {
+                    assert_eq!(found[a][b] == found[c][d], window(a, b) == window(c, d), "{reach}: {a} {b} {c} {d}");
+                }
+            }
+        }
+    }
 }
