@@ -262,11 +262,12 @@ impl<'a> Section<'a> {
         out.clear();
         let mut way = Way::new();
         self.march_ray(shape, |a, b| keep(&mut way, a, b));
-        way::passages::<true>(&way, &shape.plies, &shape.fours, |index, passage| {
+        way::passages::<true>(&way, &shape.plies, &shape.fours, |index, passing| {
             let ply = &shape.plies[index];
             if ply.fibers == 0.0 {
                 return;
             }
+            let passage = passing.as_it_goes(ply.core_radius);
             let Passage { enter, exit, offset, .. } = passage;
             let length = passage.speed / self.cos;
             let chord = ply.chord(passage.offset, length, self.thinness(), self.squeeze() / self.rounded());
@@ -300,20 +301,30 @@ impl<'a> Section<'a> {
         mut visit: impl FnMut(PlyAhead<'_>),
     ) {
         let (cos, direction) = self.direction_out(w);
-        let mut pass = |way: &[Station], ply: usize, Passage { offset, foot, speed, .. }: Passage| {
-            visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos, way, cos });
+        let start = from.point + shift;
+        let mut pass = |way: &[Station]| {
+            let bent = way::is_bent(way);
+            let mut ahead = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
+                visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos, way, start, bent, cos });
+            };
+            if bent {
+                return way::bent_passages(way, &shape.plies, &shape.fours, &mut ahead);
+            }
+            way::passages::<false>(way, &shape.plies, &shape.fours, |ply, passing| {
+                ahead(ply, passing.as_it_goes(shape.plies[ply].core_radius));
+            });
         };
         if self.ends == [f32::NEG_INFINITY, f32::INFINITY]
             && let Some(way) = from.way_out(self, shift, direction)
         {
-            return way::passages::<false>(&way, &shape.plies, &shape.fours, |ply, passage| pass(&way, ply, passage));
+            return pass(&way);
         }
-        let line = Line { start: from.point + shift, direction, reach: LIGHT };
+        let line = Line { start, direction, reach: LIGHT };
         let mut near = self.neighbourhood(self.turn(shape), from.travel, LIGHT);
         let first = self.step(&mut near, line.start, direction, 0.0, LIGHT);
         let mut way = Way::new();
         self.march(&line, first, &mut near, |a, b| keep(&mut way, a, b));
-        way::passages::<false>(&way, &shape.plies, &shape.fours, |ply, passage| pass(&way, ply, passage));
+        pass(&way);
     }
 
     /// The length in the section of a unit of a way out in the direction `w`, of which a steep way has little, and where the way leads.

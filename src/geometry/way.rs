@@ -75,6 +75,8 @@ struct Arc {
 const BENT: f32 = 1e-5;
 /// Less off a line, one step of Newton's method tells where an arc enters a ply, in yarn radii.
 const LITTLE: f32 = 0.02;
+/// Farther off a line, in yarn radii, where an arc is nearest to a ply's axis does not tell what it has of the ply.
+const MUCH: f32 = 0.15;
 
 impl Arc {
     #[inline]
@@ -166,8 +168,20 @@ impl Arc {
             let rise = (speed + at.dot(bend)).fast_max(f32x4::splat(0.2) * speed + f32x4::splat(1e-20));
             u = between(u - at.dot(slope) / rise);
         }
-        let at = at(u);
-        let inside = at.dot(at).simd_lt(plies.radius * plies.radius) & plies.present;
+        let square = |u: f32x4| {
+            let at = at(u);
+            at.dot(at)
+        };
+        let mut nearest = square(u);
+        if self.off > MUCH {
+            // It may turn back, and be nearest where it begins or ends.
+            for end in [f32x4::ZERO, f32x4::ONE] {
+                let there = square(end);
+                u = there.simd_lt(nearest).select(end, u);
+                nearest = nearest.fast_min(there);
+            }
+        }
+        let inside = nearest.simd_lt(plies.radius * plies.radius) & plies.present;
         (inside.to_bitmask(), u)
     }
 
@@ -306,9 +320,9 @@ const LEAST_CURVE: f32 = 0.2;
 /// How far a line is followed to its nearest point, in yarn radii.
 const FARTHEST_FOOT: f32 = 16.0;
 
-/// A passage that has begun.
+/// A passage as it is found.
 #[derive(Clone, Copy)]
-struct Open {
+pub(super) struct Passing {
     /// Square of the least distance so far, and its depth.
     nearest: f32,
     depth: f32,
@@ -319,7 +333,7 @@ struct Open {
     whole: [bool; 2],
 }
 
-impl Open {
+impl Passing {
     #[inline]
     fn at(a: &Station) -> Self {
         let passage = Passage { enter: *a, exit: *a, foot: a.depth, offset: 0.0, speed: 0.0, share: 1.0 };
@@ -359,16 +373,17 @@ impl Open {
                 self.core = true;
                 self.whole[0] = begins;
             }
-            let ends = arc.to.length_squared() >= inside;
-            let exit = if ends { arc.crossing(ply.core_radius, u, 1.0) } else { 1.0 };
+            let leaves = arc.to.length_squared() >= inside;
+            let exit = if leaves { arc.crossing(ply.core_radius, u, 1.0) } else { 1.0 };
             passage.exit = way.station(a, b, exit);
-            self.whole[1] = ends;
+            self.whole[1] = leaves;
         }
         arc.to.length_squared() < ply.radius * ply.radius
     }
 
+    /// As the way goes: where it enters and leaves the core of this radius, if that was asked.
     #[inline]
-    fn closed(mut self, core_radius: f32) -> Passage {
+    pub(super) fn as_it_goes(mut self, core_radius: f32) -> Passage {
         let p = &mut self.passage;
         p.speed = p.speed.max(1e-4);
         if !self.core {
@@ -385,6 +400,33 @@ impl Open {
         }
         self.passage
     }
+
+    /// The passage of a bent way that begins within the yarn: the straight one that is as far from its ends, where it begins and leaves.
+    pub(super) fn straightened(mut self, ply: &PlyShape) -> Passage {
+        let p = &mut self.passage;
+        p.speed = p.speed.max(1e-4);
+        if !self.core {
+            return self.passage;
+        }
+        let beside = |square: f32| (square - p.offset * p.offset).max(0.0).sqrt();
+        // Along the chord, from its middle.
+        let place = |at: &Station, whole: bool, outward: f32| {
+            let square = if whole { ply.core_radius * ply.core_radius } else { ply.in_circle(at.at).length_squared() };
+            let before = if whole { outward < 0.0 } else { at.depth < self.depth };
+            if before { -beside(square) } else { beside(square) }
+        };
+        let (from, to) = (place(&p.enter, self.whole[0], -1.0), place(&p.exit, self.whole[1], 1.0));
+        let short = SHORT_CHORD * ply.core_radius;
+        p.speed = ((to - from).max(0.0) + short) / (p.exit.depth - p.enter.depth + short / p.speed);
+        p.foot = p.enter.depth - from / p.speed;
+        self.passage
+    }
+}
+
+/// Whether a way is bent so much that what it has of a ply is not told by where it is nearest to the ply's axis.
+#[inline]
+pub(super) fn is_bent(way: &[Station]) -> bool {
+    way.windows(2).any(|pair| Arc::between(&pair[0], &pair[1]).off > MUCH)
 }
 
 /// Calls `visit` with every passage of a way through one of `plies`, which are `fours` four by four, and the ply's index;
@@ -394,11 +436,11 @@ pub(super) fn passages<const ENDS: bool>(
     way: &[Station],
     plies: &[PlyShape],
     fours: &[FourPlies],
-    mut visit: impl FnMut(usize, Passage),
+    mut visit: impl FnMut(usize, Passing),
 ) {
     let end = way.last().map_or(0.0, |last| last.depth);
     // A way that ends before it comes to the core has not passed the ply.
-    let passed = |open: &Open| !ENDS || open.core || open.depth < end;
+    let passed = |open: &Passing| !ENDS || open.core || open.depth < end;
     for four in fours {
         let plies = &plies[four.first..];
         let mut open = [None; 4];
@@ -416,21 +458,38 @@ pub(super) fn passages<const ENDS: bool>(
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
                 let stays = met >> lane & 1 != 0
-                    && open[lane].get_or_insert_with(|| Open::at(a)).follow::<ENDS>(&arc, &plies[lane], a, b, u[lane]);
+                    && open[lane].get_or_insert_with(|| Passing::at(a)).follow::<ENDS>(
+                        &arc,
+                        &plies[lane],
+                        a,
+                        b,
+                        u[lane],
+                    );
                 if stays {
                     opened |= 1 << lane;
                 } else if let Some(open) = open[lane].take() {
                     opened &= !(1 << lane);
-                    visit(four.first + lane, open.closed(plies[lane].core_radius));
+                    visit(four.first + lane, open);
                 }
             }
         }
         for (lane, open) in open.iter().enumerate() {
             if let Some(open) = open.as_ref().filter(|open| passed(open)) {
-                visit(four.first + lane, open.closed(plies[lane].core_radius));
+                visit(four.first + lane, *open);
             }
         }
     }
+}
+
+/// The same of a bent way, each as [`Passing::straightened`]. Few are.
+#[inline(never)]
+pub(super) fn bent_passages(
+    way: &[Station],
+    plies: &[PlyShape],
+    fours: &[FourPlies],
+    visit: &mut dyn FnMut(usize, Passage),
+) {
+    passages::<true>(way, plies, fours, |ply, passing| visit(ply, passing.straightened(&plies[ply])));
 }
 
 /// The station at a depth of a way, from those before and behind it.

@@ -106,6 +106,9 @@ pub(crate) fn escape_probability_of_disc(t: f64) -> f64 {
         / (1.0 + (V[0] + 8.0 / (3.0 * PI)) * t + V[2] * t * t + V[1] * FRAC_PI_2 * t * t * t)
 }
 
+/// The nodes of two-point Gauss-Legendre quadrature over 0 to 1, whose weights are alike.
+pub(crate) const GAUSS_LEGENDRE_2: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
 /// Nodes and weights of Gauss-Legendre quadrature with four points on [0, 1].
 pub(crate) const GAUSS_LEGENDRE_4: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),

@@ -14,7 +14,7 @@ use crate::{
         yarn::{MAX_PLIES, YarnShape},
         yarn_frame::{Pressed, SectionGrowth},
     },
-    math::special::GAUSS_LEGENDRE_4,
+    math::special::{GAUSS_LEGENDRE_2, GAUSS_LEGENDRE_4},
 };
 
 /// The same of a chord on which fibres are counted.
@@ -97,8 +97,11 @@ pub struct PlyAhead<'w> {
     pub foot: f32,
     /// Length in the circle of one unit of that distance.
     pub length: f32,
-    /// The whole way.
+    /// The whole way, from `start` in the section's frame.
     pub(super) way: &'w [Station],
+    pub(super) start: Vec3A,
+    /// Whether it bends so much that the ply is not met as by a straight one.
+    pub(super) bent: bool,
     /// Length in the section of one unit of it.
     pub(super) cos: f32,
 }
@@ -108,8 +111,11 @@ impl PlyAhead<'_> {
     /// middle of what is ahead of the ply's `chord`, over the way's length in the section, times [`Section::squeeze`].
     #[inline]
     pub fn tilt(&self, shape: &YarnShape, section: &Section<'_>, from: &Inside, w: Vec3A, chord: &ChordFibers) -> f32 {
-        let middle = 0.5 * ((self.foot - chord.half).max(0.0) + self.foot + chord.half);
-        let station = way::station_at(self.way, middle / self.cos);
+        let (enter, exit) = ((self.foot - chord.half).max(0.0), (self.foot + chord.half).max(0.0));
+        if self.bent {
+            return self.mean_tilt(shape, section, w, [enter, exit]);
+        }
+        let station = way::station_at(self.way, 0.5 * (enter + exit) / self.cos);
         // The direction as it is seen from the unwound yarn's axes there.
         let turned = from.turn * (station.travel - from.travel);
         let turned = Vec2::new(1.0 - 0.5 * turned * turned, turned);
@@ -123,6 +129,18 @@ impl PlyAhead<'_> {
         let (w, t) = (across.extend(along), (t / station.straightness).extend(1.0));
         let square = w.cross(t).length_squared() / w.length_squared().max(1e-12);
         section.squeeze() * square.max(1e-9).sqrt() / self.cos
+    }
+
+    /// The same as the mean of two places between distances at which the way is in the ply.
+    fn mean_tilt(&self, shape: &YarnShape, section: &Section<'_>, w: Vec3A, [enter, exit]: [f32; 2]) -> f32 {
+        let tilt_at = |share: f32| {
+            let depth = (enter + share * (exit - enter)) / self.cos;
+            let travel = way::station_at(self.way, depth).travel;
+            let t = section.fiber_tangent(shape, self.ply, self.start + depth * w, travel);
+            w.cross(t).length()
+        };
+        let mean = 0.5 * GAUSS_LEGENDRE_2.map(|share| tilt_at(share as f32)).iter().sum::<f32>();
+        section.squeeze() * mean.max(3e-5) / self.cos
     }
 }
 

@@ -12,6 +12,8 @@ use crate::{
 pub(super) struct Reach {
     /// How far along the yarn it is taken for its circle of curvature, in yarn radii; beyond it is looked up anew.
     pub(super) near: f32,
+    /// By how much the yarn may turn in that, radians: a sharp bend is over soon.
+    pub(super) sharp: f32,
     /// The longest way, in yarn radii.
     pub(super) longest: f32,
     /// The most by which plies turn from station to station, radians.
@@ -20,23 +22,20 @@ pub(super) struct Reach {
     pub(super) bend: f32,
 }
 
-/// By how much a yarn may turn where it is taken for its circle of curvature, radians.
-const SHARP_REACH: f32 = 0.3;
-
 impl Reach {
-    /// How far along the yarn from a place with that bend it is taken for its circle of curvature: a sharp bend is over soon.
+    /// How far along the yarn from a place with that bend it is taken for its circle of curvature.
     #[inline]
     pub(super) fn near(&self, bend: Vec2) -> f32 {
-        self.near.min(SHARP_REACH / bend.length().max(1e-6))
+        self.near.min(self.sharp / bend.length().max(1e-6))
     }
 }
 
 /// A ray that looks: off by less than 0.02 yarn radii.
-pub(super) const LOOK: Reach = Reach { near: 0.5, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+pub(super) const LOOK: Reach = Reach { near: 0.5, sharp: 0.15, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
 /// A ray that gathers light.
-pub(super) const GATHER: Reach = Reach { near: 1.0, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
+pub(super) const GATHER: Reach = Reach { near: 1.0, sharp: 0.3, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
 /// Light that leaves from inside: how far it still has to go is felt in all, and a weave's bend turns round within a radius or two.
-pub(super) const LIGHT: Reach = Reach { near: 0.5, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
+pub(super) const LIGHT: Reach = Reach { near: 0.5, sharp: 0.3, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
 /// What may be left of a way without another station, in yarn radii.
 pub(super) const LEAST_LEFT: f32 = 1e-3;
 

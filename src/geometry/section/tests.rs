@@ -9,9 +9,14 @@ use super::{
 use crate::{
     geometry::{
         curve::{Basis, Curve},
+        fiber::{Placement, Plies},
         ply::PlyParameters,
         strand::{StrandOptions, Strands},
-        yarn::{tests::touching_yarn, touching_plies},
+        tube::Tubes,
+        yarn::{
+            tests::{touching, touching_yarn},
+            touching_plies,
+        },
         yarn_frame::{ROUND, SectionGrowth},
     },
     math::sampler::Stream,
@@ -509,7 +514,10 @@ fn short_ways_out_are_those_that_are_followed() {
         // The length inside of all cores.
         let cores = |way: &[Station]| {
             let mut sum = 0.0;
-            way::passages::<true>(way, &shape.plies, &shape.fours, |_, p| sum += p.exit.depth - p.enter.depth);
+            way::passages::<true>(way, &shape.plies, &shape.fours, |k, passing| {
+                let p = passing.as_it_goes(shape.plies[k].core_radius);
+                sum += p.exit.depth - p.enter.depth;
+            });
             sum
         };
         off.push((cores(&way) - cores(&long)).abs());
@@ -700,4 +708,96 @@ fn points_of_the_unwound_yarn_are_found_where_they_lie() {
         assert!((inside.at - at).length() < 1e-3, "{} {at}: {place:?}", inside.at);
         assert!((inside.travel - travel).abs() < 1e-3, "{} {travel}: {place:?}", inside.travel);
     }
+}
+
+/// A yarn of radius 1 that is pressed to half of its width and dives as warps of a weave do: 60 degrees steep, bent by `bend` at its
+/// crests. Short axes lie in the plane of the wave.
+fn dive(shape: &YarnShape, bend: f64) -> Strands {
+    const STEEP: f64 = 1.73;
+    let (rate, height) = (bend / STEEP, STEEP * STEEP / bend);
+    let count = (4.0 * std::f64::consts::TAU / rate) as u32;
+    let place = |i: u32| 0.5 * f64::from(i);
+    let points = (0..count).map(|i| DVec3::new(0.0, place(i), height * (rate * place(i)).sin())).collect();
+    let short = |i: u32| (0.5 * DVec3::new(0.0, -STEEP * (rate * place(i)).cos(), 1.0).normalize()).as_vec3();
+    let flattening = Some((0..count).map(short).collect());
+    let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
+    let options = StrandOptions {
+        basis: Basis::CatmullRom,
+        tolerance: 0.0,
+        longest_segment: f64::INFINITY,
+        ply_rate: f64::from(shape.ply_rate),
+        symmetry: shape.symmetry,
+        phases: vec![0.4],
+        distances: false,
+        unevenness: None,
+    };
+    Strands::new(&[(curve, vec![1.0; count as usize])], &options)
+}
+
+/// Light that goes along a pressed yarn leaves through fibres that lie there: the share that meets none is that of explicit fibres, also
+/// where the yarn turns away.
+#[test]
+fn light_along_a_sharp_bend_meets_the_fibers_that_are_there() {
+    const TWIST: f64 = -0.33;
+    let shape = touching_yarn(3, 40, 0.4, 0.2, TWIST);
+    let parameters = touching(3, 40, 0.4, TWIST);
+    let strands = dive(&shape, 1.0);
+    let (mut clear, mut expected, mut rays) = (0.0, 0.0, 0);
+    for seed in 1..4 {
+        let made = Plies::new(&strands, &parameters, &shape, seed);
+        let plies: Vec<Tubes> = (0..3).map(|ply| made.fibers(ply, Placement::Regular).0).collect();
+        let ways: Vec<Vec<Vec3A>> =
+            plies.iter().flat_map(|tubes| (0..tubes.count()).map(|fiber| way_of(tubes, fiber))).collect();
+        for (ply, tubes) in plies.iter().enumerate() {
+            for segment in (0..tubes.segments().len() as u32).step_by(3) {
+                let at = tubes.place(segment, 0.5);
+                let own = 40 * ply + tubes.tube_of(segment);
+                let Some((walker, place)) = abreast(&strands, at.centre) else { continue };
+                // Along the yarn, by 0.4 radians off it.
+                let w = (place.tangent + 0.42 * Vec3A::new(0.8, 0.36, 0.48)).normalize();
+                let meets = |way: &Vec<Vec3A>| {
+                    way.iter().any(|p| {
+                        let (off, along) = (*p - at.centre, (*p - at.centre).dot(w));
+                        along > 0.0 && along < 3.0 && (off - along * w).length() < at.radius
+                    })
+                };
+                let met = ways.iter().enumerate().any(|(fiber, way)| fiber != own && meets(way));
+                let section = Section::at_start((walker, place), at.centre, w, true);
+                let (inside, w) = (section.inside(&shape, section.point(0.0), 0.0), section.to_local(w));
+                let mut fibers = 0.0;
+                section.plies_ahead(&shape, &inside, Vec3A::ZERO, w, |ahead| {
+                    let chord =
+                        shape.plies[ahead.ply].chord(ahead.offset, ahead.length, section.thinness(), inside.wide(w));
+                    fibers += ahead.tilt(&shape, &section, &inside, w, &chord) * chord.ahead(-ahead.foot);
+                });
+                clear += f64::from(u8::from(!met));
+                expected += f64::from((-fibers).exp());
+                rays += 1;
+            }
+        }
+    }
+    let [clear, expected] = [clear, expected].map(|sum: f64| sum / f64::from(rays));
+    assert!(rays > 1000 && (expected / clear - 1.0).abs() < 0.12, "{rays} rays: clear {clear}, expected {expected}");
+}
+
+/// The axis of a fibre, finely.
+fn way_of(tubes: &Tubes, fiber: usize) -> Vec<Vec3A> {
+    let places = tubes.segments_of(fiber).flat_map(|s| (0..16).map(move |k| (s as u32, k as f32 / 16.0)));
+    places.map(|(segment, u)| tubes.place(segment, u).centre).collect()
+}
+
+/// The place abreast of a point within a strand, away from its ends.
+fn abreast(strands: &Strands, point: Vec3A) -> Option<(Walker<'_>, YarnFrame)> {
+    let segments = strands.segments().len() as u32;
+    let places = (4..segments - 4).flat_map(|s| (0..8).map(move |k| (s, k as f32 / 8.0)));
+    let (segment, u) = places.min_by(|a, b| {
+        let off = |&(s, u): &(u32, f32)| strands.frame(s, u).centre.distance_squared(point);
+        off(a).total_cmp(&off(b))
+    })?;
+    let (mut walker, mut place) = Walker::new(strands, segment, u, 0.0);
+    for _ in 0..4 {
+        place = walker.walk_abreast(&place, point)?;
+    }
+    let near = (4..segments - 4).contains(&walker.segment()) && (point - place.centre).dot(place.tangent).abs() < 1e-2;
+    near.then_some((walker, place))
 }
