@@ -12,6 +12,7 @@ mod winding;
 use std::{borrow::Cow, sync::Arc};
 
 use glam::{DVec3, Vec2, Vec3A, Vec4};
+use wide::f32x4;
 
 use self::frames::{PointFrame, SegmentFrame};
 pub use self::unevenness::Unevenness;
@@ -482,12 +483,14 @@ impl Strands {
         let (flattening, flattening_turn, thickening) = if self.flattening.is_empty() {
             (ROUND, 0.0, 0.0)
         } else {
-            let (from, to) = (self.flattening[first + 1], self.flattening[first + 2]);
-            let length = |v: Vec2| v.length();
-            // The ratio by itself: between two axes a straight line is shorter than both.
-            let growth = length(to) - length(from);
-            let ratio = length(from) + u * growth;
-            let turn = from.perp_dot(to) / (length(from) * length(to)).max(1e-12);
+            // The ratio by itself: between two axes a straight line is shorter than both. Its growth goes on from segment to segment, as
+            // fibres lean with it.
+            let near: &[Vec2; 4] = self.flattening[first..].first_chunk().expect("a segment has four points");
+            let (x, y) = (f32x4::new(near.map(|f| f.x)), f32x4::new(near.map(|f| f.y)));
+            let ratios = (x * x + y * y).sqrt().to_array();
+            let [ratio, growth] = smooth(ratios, u);
+            let (from, to) = (near[1], near[2]);
+            let turn = from.perp_dot(to) / (ratios[1] * ratios[2]).max(1e-12);
             (ratio * from.lerp(to, u).normalize_or(ROUND), turn / stride, growth / stride)
         };
         YarnFrame {
@@ -508,6 +511,16 @@ impl Strands {
 
 /// The flattest section there is: short over long axis.
 pub const FLATTEST: f64 = 0.05;
+
+/// A ratio of axes from the second to the third of four places, and its change with `u`, 0 to 1: a cubic whose slopes are those from
+/// neighbour to neighbour, within the ratios that there are.
+#[inline]
+fn smooth([before, from, to, after]: [f32; 4], u: f32) -> [f32; 2] {
+    let (rise, begins, ends) = (to - from, 0.5 * (to - before), 0.5 * (after - from));
+    let (square, cube) = (3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise);
+    let ratio = from + u * (begins + u * (square + u * cube));
+    [ratio.clamp(FLATTEST as f32, 1.0), begins + u * (2.0 * square + 3.0 * u * cube)]
+}
 
 #[cfg(test)]
 mod tests;
