@@ -2,7 +2,7 @@
 
 use super::{Draft, DraftError};
 
-/// The most crossings of a repeat: relaxing it takes some milliseconds and 12 kB for each.
+/// The most crossings of a repeat: relaxing a large one takes half a millisecond and 5 kB for each.
 pub const MOST_CROSSINGS: usize = 512 * 512;
 
 /// How the threads of one system differ: one value for each of the repeat, relative to their mean; empty where all are

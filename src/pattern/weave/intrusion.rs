@@ -1,6 +1,7 @@
 //! How far flattened yarns run into each other: points of each yarn's surface, looked for inside the others.
 
 use glam::DVec3;
+use rstar::{AABB, RTree, RTreeObject};
 
 /// A cross-section: an ellipse about a yarn's centre.
 #[derive(Clone, Copy, Debug)]
@@ -17,33 +18,51 @@ pub(super) struct Section {
 
 /// Points around a section.
 const AROUND: usize = 16;
+/// Most sections whose surface is looked at: of larger cloth, each of so many.
+const MOST: usize = 1 << 15;
+
+/// From one section of a yarn to the next.
+struct Piece<'a> {
+    yarn: usize,
+    ends: &'a [Section],
+    /// How far its surface may be from its middle line.
+    widest: f64,
+}
+
+impl RTreeObject for Piece<'_> {
+    type Envelope = AABB<[f64; 3]>;
+
+    fn envelope(&self) -> Self::Envelope {
+        let low = self.ends.iter().fold(DVec3::INFINITY, |m, s| m.min(s.at)) - self.widest;
+        let high = self.ends.iter().fold(DVec3::NEG_INFINITY, |m, s| m.max(s.at)) + self.widest;
+        AABB::from_corners(low.to_array(), high.to_array())
+    }
+}
 
 /// The deepest point of any yarn inside another, as a length, and the share of surface points deeper than `tolerated`.
 /// Yarns are chains of sections.
 pub(super) fn intrusion(yarns: &[Vec<Section>], tolerated: f64) -> (f64, f64) {
-    let widest = yarns.iter().flatten().fold(0.0f64, |w, s| w.max(s.axes[0]).max(s.axes[1]));
-    let boxes: Vec<(DVec3, DVec3)> = yarns
-        .iter()
-        .map(|yarn| {
-            let low = yarn.iter().fold(DVec3::INFINITY, |m, s| m.min(s.at));
-            let high = yarn.iter().fold(DVec3::NEG_INFINITY, |m, s| m.max(s.at));
-            (low - widest, high + widest)
+    let pieces = yarns.iter().enumerate().flat_map(|(yarn, sections)| {
+        sections.windows(2).map(move |ends| {
+            let widest = ends.iter().fold(0.0f64, |w, s| w.max(s.axes[0]).max(s.axes[1]));
+            Piece { yarn, ends, widest }
         })
-        .collect();
+    });
+    let tree = RTree::bulk_load(pieces.collect());
+    let sections = || yarns.iter().enumerate().flat_map(|(yarn, sections)| sections.iter().map(move |s| (yarn, s)));
+    let every = sections().count().div_ceil(MOST).max(1);
     let (mut deepest, mut deep, mut all) = (0.0f64, 0usize, 0usize);
-    for (i, yarn) in yarns.iter().enumerate() {
-        for section in yarn {
-            let major = section.tangent.cross(section.minor);
-            for k in 0..AROUND {
-                let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
-                let point = section.at + major * (cos * section.axes[0]) + section.minor * (sin * section.axes[1]);
-                let others = yarns.iter().enumerate().filter(|(j, _)| *j != i);
-                let near = others.filter(|(j, _)| point.cmpge(boxes[*j].0).all() && point.cmple(boxes[*j].1).all());
-                let depth = near.map(|(_, other)| depth_in(other, point)).fold(0.0, f64::max);
-                deepest = deepest.max(depth);
-                deep += usize::from(depth > tolerated);
-                all += 1;
-            }
+    for (yarn, section) in sections().step_by(every) {
+        let major = section.tangent.cross(section.minor);
+        for k in 0..AROUND {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+            let point = section.at + major * (cos * section.axes[0]) + section.minor * (sin * section.axes[1]);
+            let near = tree.locate_in_envelope_intersecting(&AABB::from_point(point.to_array()));
+            let depth = near.filter(|piece| piece.yarn != yarn).map(|piece| depth_in(piece.ends, point));
+            let depth = depth.fold(0.0, f64::max);
+            deepest = deepest.max(depth);
+            deep += usize::from(depth > tolerated);
+            all += 1;
         }
     }
     (deepest, deep as f64 / all.max(1) as f64)

@@ -1,36 +1,69 @@
 //! Minimising a smooth function of many variables: L-BFGS (Nocedal and Wright, "Numerical Optimization", 2006, Ch. 7).
 
-use std::collections::VecDeque;
+use std::{
+    collections::VecDeque,
+    mem::{replace, swap},
+};
 
-/// Pairs of steps and changes of the gradient that stand for the curvature.
-const MEMORY: usize = 12;
 /// Share of the decrease promised by the slope that a step must bring (Armijo).
 const DECREASE: f64 = 1e-4;
+/// Length from which on products are added up in lanes, as processors do it fastest.
+const LONG: usize = 1 << 15;
+/// Sums that are added up beside each other.
+const LANES: usize = 8;
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+/// How a minimum is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    /// Root mean square of the gradient at which it ends.
+    pub(super) tolerance: f64,
+    /// How far a variable moves in a step at most.
+    pub(super) longest: f64,
+    /// Most steps.
+    pub(super) most: usize,
+    /// Pairs of steps and changes of the gradient that stand for the curvature.
+    pub(super) memory: usize,
 }
 
-/// Moves `x` downhill until the root mean square of the gradient is below `tolerance`, no step goes down any more, or
-/// `most` steps are taken. `f` gives the value and fills the gradient; no variable moves by more than `longest` in a step.
+/// Takes a gradient to a better step than itself, by what is known of the curvature.
+pub(super) type Precondition<'a> = &'a dyn Fn(&mut [f64]);
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() < LONG {
+        return a.iter().zip(b).map(|(x, y)| x * y).sum();
+    }
+    let mut lanes = [0.0; LANES];
+    let (parts_a, parts_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = parts_a.remainder().iter().zip(parts_b.remainder()).map(|(x, y)| x * y).sum();
+    for (a, b) in parts_a.zip(parts_b) {
+        lanes.iter_mut().zip(a.iter().zip(b)).for_each(|(lane, (x, y))| *lane += x * y);
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// Moves `x` downhill until the root mean square of the gradient is below the tolerance, no step goes down any more, or the most
+/// steps are taken. `f` gives the value and fills the gradient; of the
+/// curvature it learns from steps what no `precondition` tells.
 pub(super) fn minimize(
     x: &mut [f64],
     f: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
-    tolerance: f64,
-    longest: f64,
-    most: usize,
+    search: Search,
+    precondition: Option<Precondition<'_>>,
 ) {
+    let Search { tolerance, longest, most, memory } = search;
     let n = x.len();
     let mut gradient = vec![0.0; n];
     let mut value = f(x, &mut gradient);
-    let mut history: VecDeque<(Vec<f64>, Vec<f64>, f64)> = VecDeque::with_capacity(MEMORY);
-    let (mut trial, mut trial_gradient) = (vec![0.0; n], vec![0.0; n]);
+    let mut history: VecDeque<(Vec<f64>, Vec<f64>, f64)> = VecDeque::with_capacity(memory);
+    let (mut trial, mut trial_gradient, mut direction) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    // Room for the next pair.
+    let (mut s, mut y) = (vec![0.0; n], vec![0.0; n]);
     let rms = |g: &[f64]| (dot(g, g) / n.max(1) as f64).sqrt();
     for _ in 0..most {
         if rms(&gradient) <= tolerance {
             break;
         }
-        let mut direction: Vec<f64> = gradient.iter().map(|g| -g).collect();
+        direction.iter_mut().zip(&gradient).for_each(|(d, g)| *d = -g);
         let mut shares = Vec::with_capacity(history.len());
         for (s, y, rho) in history.iter().rev() {
             let share = rho * dot(s, &direction);
@@ -38,8 +71,20 @@ pub(super) fn minimize(
             shares.push(share);
         }
         if let Some((s, y, _)) = history.back() {
-            let scale = dot(s, y) / dot(y, y);
+            let size = match precondition {
+                None => dot(y, y),
+                Some(precondition) => {
+                    precondition(&mut direction);
+                    // The trial is not needed here.
+                    trial.copy_from_slice(y);
+                    precondition(&mut trial);
+                    dot(y, &trial)
+                }
+            };
+            let scale = dot(s, y) / size;
             direction.iter_mut().for_each(|d| *d *= scale);
+        } else if let Some(precondition) = precondition {
+            precondition(&mut direction);
         }
         for ((s, y, rho), share) in history.iter().zip(shares.iter().rev()) {
             let back = rho * dot(y, &direction);
@@ -48,8 +93,11 @@ pub(super) fn minimize(
         let mut slope = dot(&direction, &gradient);
         if slope >= 0.0 {
             history.clear();
-            direction = gradient.iter().map(|g| -g).collect();
-            slope = -dot(&gradient, &gradient);
+            direction.iter_mut().zip(&gradient).for_each(|(d, g)| *d = -g);
+            if let Some(precondition) = precondition {
+                precondition(&mut direction);
+            }
+            slope = dot(&direction, &gradient);
         }
         let widest = direction.iter().fold(0.0f64, |w, d| w.max(d.abs()));
         let mut step = if widest > longest { longest / widest } else { 1.0 };
@@ -63,17 +111,19 @@ pub(super) fn minimize(
             }
             let there = f(&trial, &mut trial_gradient);
             if there <= value + DECREASE * step * slope {
-                let s: Vec<f64> = trial.iter().zip(x.iter()).map(|(a, b)| a - b).collect();
-                let y: Vec<f64> = trial_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
+                (0..n).for_each(|i| {
+                    s[i] = trial[i] - x[i];
+                    y[i] = trial_gradient[i] - gradient[i];
+                });
                 let curvature = dot(&s, &y);
                 if curvature > 1e-12 * dot(&y, &y) {
-                    if history.len() == MEMORY {
-                        history.pop_front();
-                    }
-                    history.push_back((s, y, 1.0 / curvature));
+                    let full = history.len() == memory;
+                    let oldest = if full { history.pop_front() } else { None };
+                    let (next_s, next_y, _) = oldest.unwrap_or_else(|| (vec![0.0; n], vec![0.0; n], 0.0));
+                    history.push_back((replace(&mut s, next_s), replace(&mut y, next_y), 1.0 / curvature));
                 }
                 x.copy_from_slice(&trial);
-                std::mem::swap(&mut gradient, &mut trial_gradient);
+                swap(&mut gradient, &mut trial_gradient);
                 value = there;
                 found = true;
                 break;
@@ -108,7 +158,7 @@ mod tests {
             sum
         };
         let mut x: Vec<f64> = (0..10).map(|i| if i % 2 == 0 { -0.4 } else { 0.6 }).collect();
-        minimize(&mut x, &mut f, 1e-9, 1.0, 2000);
+        minimize(&mut x, &mut f, Search { tolerance: 1e-9, longest: 1.0, most: 2000, memory: 12 }, None);
         assert!(x.iter().all(|v| (v - 1.0).abs() < 1e-6), "{x:?}");
     }
 }

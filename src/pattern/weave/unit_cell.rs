@@ -4,17 +4,28 @@
 //! bending and tension of each yarn, contact of crossing and of neighbouring yarns as soft elliptical tubes, the
 //! resistance of sections to flattening (area kept), and the force that packs the cloth in its plane. Peirce's crimp
 //! balance (h1 + h2 = D, shared by stiffness) and jamming follow from it, and so does what his geometry leaves out: yarns
-//! that group, floats that slide over crossings, layers. Lengths here are in mean yarn radii.
+//! that group, floats that slide over crossings, layers. Lengths here are in mean yarn radii. Large repeats are relaxed part by part
+//! (`large`).
 
+mod beside;
+mod blocks;
 mod contact;
+mod cut;
 mod energy;
+mod large;
+mod parts;
+mod precondition;
+mod regular;
 mod rods;
 mod spheroid;
 mod symmetry;
 
 use glam::DVec3;
 
-use self::energy::Energy;
+use self::{
+    energy::Energy,
+    parts::{Part, Parts},
+};
 use super::{
     super::draft::Draft,
     intrusion::{Section, intrusion},
@@ -23,10 +34,9 @@ use super::{
 /// Distance of yarns, in half their width, at which the reed is full and they lie side by side: what presses harder makes
 /// them climb over each other.
 const FULL: f64 = 2.04;
-/// Crossings from which on a part of a repeat is relaxed first. A large one comes to its spacings too slowly: it begins with
-/// those of the part.
+/// Crossings from which on a repeat is relaxed part by part: together they would come to their spacings too slowly.
 const LARGE: usize = 1024;
-/// Most ends and picks of that part.
+/// Most ends and picks of the part that gives the spacings of a repeat without regular ones.
 const PART: usize = 24;
 /// Most steps of a relaxation.
 const MOST_STEPS: usize = 1500;
@@ -96,20 +106,14 @@ pub(super) fn full(draft: &Draft, options: &CellOptions, side: usize) -> f64 {
 impl UnitCell {
     /// Relaxes one repeat of `draft`.
     pub(super) fn relax(draft: &Draft, options: &CellOptions) -> Self {
-        let unit = options.unit();
-        let mut energy = Energy::new(draft, options, unit);
-        let begin = Self::first_spacing(draft, options).map(|s| s.map(|s| s / unit));
-        let mut x = energy.start(begin);
-        let rest = energy.rest;
-        // Round yarns first find their places, hardly packed, then all give way. Where a repeat leaves them a choice, as beside the
-        // turns of a herringbone, the full force would push each aside another way.
-        // If one spacing is given, the other would grow far too wide meanwhile.
-        let packed = if options.spacing == [None; 2] { FIRST_BEAT } else { 1.0 };
-        (energy.rest, energy.beat) = ([0.0; 2], packed * options.beat);
-        energy.minimize(&mut x, &[], 400);
-        (energy.rest, energy.beat) = (rest, options.beat);
-        energy.minimize(&mut x, &[], MOST_STEPS);
-        Self::of(&energy, &x, options)
+        let simple = draft.layers() == 1 && !draft.twines() && draft.pile().is_none();
+        if draft.warps() * draft.wefts() > LARGE && simple {
+            return Self::relax_large(draft, options);
+        }
+        let whole = [Part { draft: draft.clone(), thickness: options.thickness.clone(), share: 1.0 }];
+        let mut parts = Parts::new(&whole, options);
+        parts.relax(options);
+        Self::of(&parts.energies[0], &parts.x[0], options)
     }
 
     /// Relaxes one repeat of which some nodes are known about: of a `[side, yarn, node]`, and whether it stays there.
@@ -139,23 +143,6 @@ impl UnitCell {
     pub(super) fn overlap(&self, unit: f64) -> [f64; 2] {
         let (deepest, share) = intrusion(&self.sections(), 0.1 * unit);
         [deepest / (2.0 * unit), share]
-    }
-
-    /// The spacings of the middle of a large repeat by itself, in the unit of the radii.
-    fn first_spacing(draft: &Draft, options: &CellOptions) -> Option<[f64; 2]> {
-        let whole = [draft.warps(), draft.wefts()];
-        let simple = draft.layers() == 1 && !draft.twines();
-        if whole[0] * whole[1] <= LARGE || !simple || options.spacing.iter().all(Option::is_some) {
-            return None;
-        }
-        let count = whole.map(|n| n.min(PART));
-        let first = [0, 1].map(|side| (whole[side] - count[side]) / 2);
-        let part = draft.part(first, count);
-        let thickness = [0, 1].map(|side| match options.thickness[side].as_slice() {
-            [] => Vec::new(),
-            given => given[first[side]..first[side] + count[side]].to_vec(),
-        });
-        Some(Self::relax(&part, &CellOptions { thickness, ..options.clone() }).spacing)
     }
 
     /// The cross-sections of all yarns, with a crossing or more of the next repeats.

@@ -1,7 +1,8 @@
 //! Contact of yarns as soft elliptical tubes: neighbours of one side, and warps with the wefts that they cross.
 
 use super::{
-    energy::{Energy, Gradient, PER_NODE, Tangent, local, world},
+    cut::Cut,
+    energy::{Energy, Gradient, PER_NODE, world},
     spheroid::Spheroid,
 };
 
@@ -10,26 +11,38 @@ const CONTACT: f64 = 250.0;
 /// How much harder yarns on the wrong side of each other are pushed back.
 const BEHIND: f64 = 20.0;
 
-/// A sloping yarn cut by a plane across the cloth. It is higher there whichever way it slopes, so that twined yarns keep apart, and
-/// wider where it goes aside.
-struct Cut {
-    /// Half width and half height, over those of its section.
-    longer: [f64; 2],
-    /// Derivatives of both by the tangent's components along and aside.
-    slopes: [[f64; 2]; 2],
+/// Bounds of the nodes of a weft that a warp may meet.
+struct Piece {
+    /// Least and most aside.
+    aside: [f64; 2],
+    /// The most towards the warp's side.
+    top: f64,
+    /// Largest squared half axes of spheroids: level, and upright.
+    widest: f64,
+    high: f64,
 }
 
-impl Cut {
-    /// Of a unit tangent along, aside and up.
-    fn of([along, aside, _]: [f64; 3]) -> Self {
-        const STEEPEST: f64 = 0.2;
-        let along = along.max(STEEPEST);
-        let level = along.hypot(aside);
-        let square = level * along * along;
-        Self {
-            longer: [level / along, 1.0 / along],
-            slopes: [[-aside * aside / square, aside / (level * along)], [-1.0 / (along * along), 0.0]],
-        }
+impl Piece {
+    /// Of nodes: how far each is aside and towards the warp's side.
+    fn of<'a>(nodes: impl Iterator<Item = ([f64; 2], &'a Spheroid)>) -> Self {
+        let none = Self { aside: [f64::MAX, f64::MIN], top: f64::MIN, widest: 0.0, high: 0.0 };
+        nodes.fold(none, |all, ([aside, up], spheroid)| Self {
+            aside: [all.aside[0].min(aside), all.aside[1].max(aside)],
+            top: all.top.max(up),
+            widest: all.widest.max(spheroid.widest),
+            high: all.high.max(spheroid.high),
+        })
+    }
+
+    /// How far along the weft a node of the warp, so far across it and up, may touch it, if it may at all.
+    fn reach(&self, [across, up]: [f64; 2], warp: &Spheroid, parts: [f64; 2]) -> Option<f64> {
+        let off = (self.aside[0] - across).max(across - self.aside[1]).max(0.0);
+        let inside = (up - self.top).max(0.0);
+        let high = parts[0] * warp.high + parts[1] * self.high;
+        let widest = parts[0] * warp.widest + parts[1] * self.widest;
+        // A little more, for what is rounded.
+        let square = widest * (1.0 + 1e-9 - inside * inside / high) - off * off;
+        (square > 0.0).then(|| square.sqrt() + 1e-9)
     }
 }
 
@@ -40,7 +53,7 @@ impl Energy<'_> {
         side: usize,
         x: &[f64],
         spacing: [f64; 2],
-        tangents: &[Tangent],
+        cuts: &[Cut],
         axes: &[[f64; 2]],
         gradient: &mut Gradient<'_>,
     ) -> f64 {
@@ -48,21 +61,19 @@ impl Energy<'_> {
         let count = self.count[side];
         let thickest = self.thickness[side].iter().fold(1.0, |m: f64, t| m.max(*t));
         let far = ((3.2 * thickest * self.radius[side] / spacing[side]).ceil() as usize).clamp(1, 5);
-        let first = self.at(side, 0, 0) / PER_NODE;
-        let cuts: Vec<Cut> = tangents[first..first + count * n].iter().map(|t| Cut::of(local(side, t.unit))).collect();
         let mut sum = 0.0;
         for yarn in 0..count {
             for apart in 1..=far {
                 let size = self.round(side, yarn) + self.round(side, (yarn + apart) % count);
                 let stiff = 4.0 * CONTACT * size * size / self.nodes as f64;
-                for k in 0..n {
+                for k in (0..n).filter(|k| self.counts(side, yarn, k / self.nodes)) {
                     let (a, b) = (self.at(side, yarn, k), self.at(side, (yarn + apart) % count, k));
                     let d = [apart as f64 * spacing[side] + x[b] - x[a], x[b + 1] - x[a + 1]];
                     if d[0].abs() > 2.0 * size || d[1].abs() > 2.0 * size {
                         continue;
                     }
                     let (s, t) = (axes[a / PER_NODE], axes[b / PER_NODE]);
-                    let (cut_s, cut_t) = (&cuts[a / PER_NODE - first], &cuts[b / PER_NODE - first]);
+                    let (cut_s, cut_t) = (&cuts[a / PER_NODE], &cuts[b / PER_NODE]);
                     let axes = [0, 1].map(|c| s[c] * cut_s.longer[c] + t[c] * cut_t.longer[c]);
                     let scaled = [d[0] / axes[0], d[1] / axes[1]];
                     let f = scaled[0] * scaled[0] + scaled[1] * scaled[1];
@@ -109,7 +120,7 @@ impl Energy<'_> {
         let g = &mut *gradient.nodes;
         let mut sum = 0.0;
         for i in 0..self.count[1] {
-            for j in 0..self.count[0] {
+            for j in (0..self.count[0]).filter(|j| self.counts(0, *j, i)) {
                 let sign = if self.draft.warp_over(i, j) { 1.0 } else { -1.0 };
                 let (own, other) = (self.round(0, j), self.round(1, i));
                 let (size, ratio) = (own + other, own / other);
@@ -118,17 +129,40 @@ impl Energy<'_> {
                 let stiff = CONTACT * size * size * (4.0 * per_node).powi(2);
                 let limit = 1.6 * size;
                 let reach_y = (limit / step_y).ceil() as isize;
+                let first = self.at(1, i, 0);
+                let warp_node = |b: isize| ((i * self.nodes) as isize + b).rem_euclid(warp_length) as usize;
+                let weft_node = |a: isize| ((j * self.nodes) as isize + a).rem_euclid(weft_length) as usize;
+                let asides = (-reach_y..=reach_y).map(|b| x[self.at(0, j, warp_node(b))]);
+                let [left, right] = asides.fold([f64::MAX, f64::MIN], |[l, r], x| [l.min(x), r.max(x)]);
+                let near = ((left - limit) / step_x) as isize - 1..=((right + limit) / step_x) as isize;
+                let near = near.map(|a| first + PER_NODE * weft_node(a));
+                let piece = Piece::of(near.map(|v| ([x[v], sign * x[v + 1]], &spheroids[v / PER_NODE])));
                 for b in -reach_y..=reach_y {
-                    let node = ((i * self.nodes) as isize + b).rem_euclid(warp_length) as usize;
-                    let w = self.at(0, j, node);
+                    let w = self.at(0, j, warp_node(b));
                     let warp = &spheroids[w / PER_NODE];
+                    let Some(reach_x) = piece.reach([b as f64 * step_y, sign * x[w + 1]], warp, parts) else {
+                        continue;
+                    };
+                    let reach_x = reach_x.min(limit);
                     // Nodes of the weft near this one of the warp.
-                    let (from, to) = (((x[w] - limit) / step_x).ceil() as isize, ((x[w] + limit) / step_x) as isize);
+                    let (from, to) =
+                        (((x[w] - reach_x) / step_x).ceil() as isize, ((x[w] + reach_x) / step_x) as isize);
+                    let mut node = weft_node(from);
                     for a in from..=to {
-                        let node = ((j * self.nodes) as isize + a).rem_euclid(weft_length) as usize;
-                        let v = self.at(1, i, node);
+                        let v = first + PER_NODE * node;
+                        node = if node + 1 == weft_length as usize { 0 } else { node + 1 };
                         let weft = &spheroids[v / PER_NODE];
                         let d = [x[w] - a as f64 * step_x, b as f64 * step_y - x[v]];
+                        let dz = sign * (x[w + 1] - x[v + 1]);
+                        // On the wrong side: back through the middle.
+                        let inside = dz.max(0.0);
+                        // Most do not touch, which is soon told of the level ellipse's circumcircle.
+                        let widest = parts[0] * warp.widest + parts[1] * weft.widest;
+                        let high = parts[0] * warp.high + parts[1] * weft.high;
+                        if (d[0] * d[0] + d[1] * d[1]) * high + inside * inside * widest >= widest * high * (1.0 + 1e-9)
+                        {
+                            continue;
+                        }
                         if d[1].abs() > limit {
                             continue;
                         }
@@ -139,10 +173,8 @@ impl Energy<'_> {
                         if flat >= 1.0 {
                             continue;
                         }
-                        let pz = 1.0 / (parts[0] * warp.high + parts[1] * weft.high);
-                        let dz = sign * (x[w + 1] - x[v + 1]);
-                        // On the wrong side: back through the middle.
-                        let (inside, behind) = (dz.max(0.0), BEHIND * (-dz).max(0.0) / size);
+                        let pz = 1.0 / high;
+                        let behind = BEHIND * (-dz).max(0.0) / size;
                         let f = flat + inside * inside * pz;
                         if f >= 1.0 {
                             continue;

@@ -2,7 +2,14 @@
 
 use glam::DVec3;
 
-use super::{super::minimize::minimize, CellOptions, Node, full, spheroid::Spheroid};
+use super::{
+    super::minimize::{Precondition, Search, minimize},
+    CellOptions, Node,
+    beside::Beside,
+    cut::Cut,
+    full,
+    spheroid::Spheroid,
+};
 use crate::pattern::draft::Draft;
 
 /// Resistance of a section to being flattened, energy per crossing and squared logarithm of its width.
@@ -18,6 +25,12 @@ const DENSE: f64 = 1.99;
 const CLOSE: f64 = 0.75;
 /// A yarn's node in the vector of variables: `[aside, height, ln(width / round)]`.
 pub(super) const PER_NODE: usize = 3;
+/// What a variable follows that stays as it is.
+pub(super) const HELD: usize = usize::MAX;
+/// Root mean square of the forces of what is at rest.
+const AT_REST: f64 = 1e-3;
+/// How equilibrium is looked for.
+pub(super) const SEARCH: Search = Search { tolerance: AT_REST, longest: 0.3, most: 0, memory: 12 };
 
 pub(super) struct Energy<'a> {
     pub(super) draft: &'a Draft,
@@ -40,22 +53,39 @@ pub(super) struct Energy<'a> {
     pub(super) densest: [f64; 2],
     /// How much a variable of spacing moves it.
     pub(super) gear: f64,
+    /// What lies around a window of a larger repeat.
+    pub(super) beside: Option<Beside>,
+    /// For each crossing, those of the lowest weft first, whether what is there counts; all does where this is empty.
+    pub(super) counted: Vec<bool>,
+    /// The same of what is so near to these that it may touch them.
+    pub(super) near: Vec<bool>,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Tangent {
     pub(super) unit: DVec3,
     /// Length of the way from the node before to the one after.
     pub(super) length: f64,
 }
 
+/// Room that is used again by each evaluation of the energy.
+#[derive(Default)]
+pub(super) struct Scratch {
+    tangents: Vec<Tangent>,
+    axes: Vec<[f64; 2]>,
+    spheroids: Vec<Spheroid>,
+    cuts: Vec<Cut>,
+    by_tangent: Vec<DVec3>,
+    headings: Vec<f64>,
+}
+
 /// What the gradient of the energy is gathered in.
 pub(super) struct Gradient<'a> {
     pub(super) nodes: &'a mut [f64],
     pub(super) spacing: [f64; 2],
-    pub(super) tangents: Vec<DVec3>,
+    pub(super) tangents: &'a mut [DVec3],
     /// By the angle of each node's tangent in the plane.
-    pub(super) headings: Vec<f64>,
+    pub(super) headings: &'a mut [f64],
 }
 
 /// From along, aside and height of a warp or a weft to x, y, z.
@@ -92,6 +122,9 @@ impl<'a> Energy<'a> {
             sett: options.sett.filter(|_| options.spacing == [None; 2] && !draft.twines()),
             densest: [0, 1].map(|side| full(draft, options, side) / unit),
             gear: 0.5 / (total as f64).sqrt(),
+            beside: None,
+            counted: Vec::new(),
+            near: Vec::new(),
         };
         let floats = |sett: &f64| !(1.0 / DENSE..DENSE).contains(sett) && draft.pile().is_none();
         // What is round does not give way.
@@ -184,21 +217,18 @@ impl<'a> Energy<'a> {
     /// Makes the energy least by at most so many steps, where what is alike stays alike and what is `held`, if anything, as it
     /// is.
     pub(super) fn minimize(&self, x: &mut [f64], held: &[bool], most: usize) {
-        let alike = if held.is_empty() { self.alike() } else { (0..x.len()).collect() };
-        let mut free = vec![0.0; alike.iter().max().map_or(0, |m| m + 1)];
-        // Alike by what starts alike.
-        x.iter().zip(&alike).for_each(|(v, &i)| free[i] = *v);
-        let (mut full, mut by_full) = (vec![0.0; x.len()], vec![0.0; x.len()]);
-        let mut value = |free: &[f64], by_free: &mut [f64]| {
-            full.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
-            let value = self.value(&full, &mut by_full);
-            by_full.iter_mut().zip(held).filter(|(_, held)| **held).for_each(|(g, _)| *g = 0.0);
-            by_free.fill(0.0);
-            by_full.iter().zip(&alike).for_each(|(g, &i)| by_free[i] += g);
-            value
+        let alike = if held.is_empty() {
+            self.alike()
+        } else {
+            let mut free = 0..;
+            held.iter().map(|held| if *held { HELD } else { free.next().unwrap_or(HELD) }).collect()
         };
-        minimize(&mut free, &mut value, 1e-3, 0.3, most);
-        x.iter_mut().zip(&alike).for_each(|(v, &i)| *v = free[i]);
+        // What is held counts as at rest.
+        let free = alike.iter().filter(|&&i| i != HELD).count().max(1);
+        let tolerance = AT_REST * if held.is_empty() { 1.0 } else { (x.len() as f64 / free as f64).sqrt() };
+        let mut scratch = Scratch::default();
+        let f = |x: &[f64], g: &mut [f64]| self.value(x, g, &mut scratch);
+        minimize_alike(x, &alike, f, Search { tolerance, most, ..SEARCH }, None);
     }
 
     /// The nodes of the yarns of a side.
@@ -237,39 +267,8 @@ impl<'a> Energy<'a> {
         [0, 1].map(|side| self.fixed[side].unwrap_or(x[n - 2 + side] * self.gear))
     }
 
-    pub(super) fn value(&self, x: &[f64], g: &mut [f64]) -> f64 {
-        g.fill(0.0);
-        let spacing = self.spacing(x);
-        let tangents = self.tangents(x, spacing);
-        let axes = self.all_axes(x);
-        let mut gradient = Gradient {
-            nodes: g,
-            spacing: [0.0; 2],
-            tangents: vec![DVec3::ZERO; tangents.len()],
-            headings: vec![0.0; tangents.len()],
-        };
-        let mut sum = 0.0;
-        for side in 0..2 {
-            sum += self.rods(side, x, spacing, gradient.nodes, &mut gradient.spacing);
-            sum += self.neighbours(side, x, spacing, &tangents, &axes, &mut gradient);
-            // Pile comes slack from a beam of its own: the reed does not straighten it.
-            if self.draft.pile().is_none() {
-                sum += self.together(side, x, gradient.nodes);
-            }
-            // Each yarn of the other side is pressed together by the spacings of this one.
-            let yarns = (self.count[0] * self.count[1]) as f64;
-            let tight = (self.densest[side] - spacing[side]).max(0.0);
-            sum += yarns * (self.beat * spacing[side] + 0.5 * WALL * tight * tight);
-            gradient.spacing[side] += yarns * (self.beat - WALL * tight);
-        }
-        let spheroids: Vec<Spheroid> = axes.iter().zip(&tangents).map(|(a, t)| Spheroid::new(*a, t.unit)).collect();
-        sum += self.crossings(x, spacing, &spheroids, &mut gradient);
-        let Gradient { nodes: g, spacing: mut by_spacing, tangents: mut by_tangent, headings } = gradient;
-        for ((by, heading), tangent) in by_tangent.iter_mut().zip(headings).zip(&tangents) {
-            let t = tangent.unit;
-            *by += heading / t.truncate().length_squared().max(1e-6) * DVec3::new(-t.y, t.x, 0.0);
-        }
-        self.hand_on_tangents(&by_tangent, &tangents, g, &mut by_spacing);
+    pub(super) fn value(&self, x: &[f64], g: &mut [f64], scratch: &mut Scratch) -> f64 {
+        let (sum, by_spacing) = self.of_counted(x, g, scratch);
         let n = g.len();
         if let Some(sett) = self.sett {
             g[n - 2] = (by_spacing[0] + sett * by_spacing[1]) * self.gear;
@@ -282,6 +281,55 @@ impl<'a> Energy<'a> {
         sum
     }
 
+    /// The energy of what is counted, with its derivatives by the spacings; fills its gradient by the nodes.
+    pub(super) fn of_counted(&self, x: &[f64], g: &mut [f64], scratch: &mut Scratch) -> (f64, [f64; 2]) {
+        g.fill(0.0);
+        let spacing = self.spacing(x);
+        self.sections(x, spacing, scratch);
+        let Scratch { tangents, axes, spheroids, cuts, by_tangent, headings } = scratch;
+        let mut gradient = Gradient { nodes: g, spacing: [0.0; 2], tangents: by_tangent, headings };
+        let yarns = match self.counted.as_slice() {
+            [] => (self.count[0] * self.count[1]) as f64,
+            counted => counted.iter().filter(|counts| **counts).count() as f64,
+        };
+        let mut sum = 0.0;
+        for side in 0..2 {
+            sum += self.rods(side, x, spacing, gradient.nodes, &mut gradient.spacing);
+            sum += self.neighbours(side, x, spacing, cuts, axes, &mut gradient);
+            // Pile comes slack from a beam of its own: the reed does not straighten it.
+            if self.draft.pile().is_none() {
+                sum += match &self.beside {
+                    Some(beside) => self.together_beside(beside, side, x, gradient.nodes),
+                    None => self.together(side, x, gradient.nodes),
+                };
+            }
+            // Each yarn of the other side is pressed together by the spacings of this one.
+            let tight = (self.densest[side] - spacing[side]).max(0.0);
+            sum += yarns * (self.beat * spacing[side] + 0.5 * WALL * tight * tight);
+            gradient.spacing[side] += yarns * (self.beat - WALL * tight);
+        }
+        sum += self.crossings(x, spacing, spheroids, &mut gradient);
+        let Gradient { nodes: g, spacing: mut by_spacing, tangents: by_tangent, headings } = gradient;
+        for ((by, heading), tangent) in by_tangent.iter_mut().zip(headings.iter()).zip(tangents.iter()) {
+            let t = tangent.unit;
+            *by += *heading / t.truncate().length_squared().max(1e-6) * DVec3::new(-t.y, t.x, 0.0);
+        }
+        self.hand_on_tangents(by_tangent, tangents, g, &mut by_spacing);
+        (sum, by_spacing)
+    }
+
+    /// Whether what a yarn of a side does at a crossing, and from there to the next, counts.
+    pub(super) fn counts(&self, side: usize, yarn: usize, crossing: usize) -> bool {
+        let (weft, warp) = if side == 0 { (crossing, yarn) } else { (yarn, crossing) };
+        self.counted.is_empty() || self.counted[weft * self.count[0] + warp]
+    }
+
+    /// Whether what counts may touch a yarn of a side from a crossing to the next.
+    fn is_near(&self, side: usize, yarn: usize, crossing: usize) -> bool {
+        let (weft, warp) = if side == 0 { (crossing, yarn) } else { (yarn, crossing) };
+        self.near.is_empty() || self.near[weft * self.count[0] + warp]
+    }
+
     /// Radius of a yarn where it is round.
     pub(super) fn round(&self, side: usize, yarn: usize) -> f64 {
         self.radius[side] * self.thickness[side][yarn]
@@ -291,31 +339,36 @@ impl<'a> Energy<'a> {
         [self.round(side, yarn) * flat.exp(), self.round(side, yarn) * (-flat).exp()]
     }
 
-    /// Half width and half height of all nodes.
-    fn all_axes(&self, x: &[f64]) -> Vec<[f64; 2]> {
-        let nodes = x[..x.len() - 2].chunks_exact(PER_NODE);
-        let warps = self.base(1) / PER_NODE;
-        let place = |i: usize| if i < warps { (0, i / self.length(0)) } else { (1, (i - warps) / self.length(1)) };
-        let axes = |(side, yarn): (usize, usize), flat: f64| self.axes(side, yarn, flat);
-        nodes.enumerate().map(|(i, node)| axes(place(i), node[2])).collect()
-    }
-
-    /// Unit tangents of all nodes, in the world, with half the way between their neighbours along the yarn.
-    fn tangents(&self, x: &[f64], spacing: [f64; 2]) -> Vec<Tangent> {
-        let mut all = Vec::with_capacity(x.len() / PER_NODE);
+    /// Unit tangents of all nodes that are near, in the world, with half the way between their neighbours along the yarn, and their
+    /// sections. What by which the energy changes is cleared.
+    fn sections(&self, x: &[f64], spacing: [f64; 2], scratch: &mut Scratch) {
+        let count = x.len() / PER_NODE;
+        let Scratch { tangents, axes, spheroids, cuts, by_tangent, headings } = scratch;
+        tangents.resize(count, Tangent::default());
+        axes.resize(count, [1.0; 2]);
+        spheroids.resize_with(count, Spheroid::default);
+        cuts.resize_with(count, Cut::default);
+        by_tangent.clear();
+        by_tangent.resize(count, DVec3::ZERO);
+        headings.clear();
+        headings.resize(count, 0.0);
         for side in 0..2 {
             let n = self.length(side);
             let along = 2.0 * spacing[1 - side] / self.nodes as f64;
             for yarn in 0..self.count[side] {
-                for k in 0..n {
+                for k in (0..n).filter(|k| self.is_near(side, yarn, k / self.nodes)) {
                     let (a, b) = (self.at(side, yarn, (k + n - 1) % n), self.at(side, yarn, (k + 1) % n));
                     let way = world(side, [along, x[b] - x[a], x[b + 1] - x[a + 1]]);
                     let length = way.length();
-                    all.push(Tangent { unit: way / length, length });
+                    let at = self.at(side, yarn, k);
+                    let node = at / PER_NODE;
+                    tangents[node] = Tangent { unit: way / length, length };
+                    axes[node] = self.axes(side, yarn, x[at + 2]);
+                    spheroids[node] = Spheroid::new(axes[node], tangents[node].unit);
+                    cuts[node] = Cut::of(local(side, tangents[node].unit));
                 }
             }
         }
-        all
     }
 
     /// Hands the gradient by tangents on to nodes and spacings.
@@ -323,7 +376,7 @@ impl<'a> Energy<'a> {
         for side in 0..2 {
             let n = self.length(side);
             for yarn in 0..self.count[side] {
-                for k in 0..n {
+                for k in (0..n).filter(|k| self.is_near(side, yarn, k / self.nodes)) {
                     let (a, b) = (self.at(side, yarn, (k + n - 1) % n), self.at(side, yarn, (k + 1) % n));
                     let node = self.at(side, yarn, k) / PER_NODE;
                     let t = &tangents[node];
@@ -338,6 +391,30 @@ impl<'a> Energy<'a> {
             }
         }
     }
+}
+
+/// Makes a function of variables least. Each of them follows the free one of a number, or is [`HELD`].
+pub(super) fn minimize_alike(
+    x: &mut [f64],
+    follows: &[usize],
+    mut f: impl FnMut(&[f64], &mut [f64]) -> f64,
+    search: Search,
+    precondition: Option<Precondition<'_>>,
+) {
+    let followers: Vec<(usize, usize)> = follows.iter().copied().enumerate().filter(|(_, i)| *i != HELD).collect();
+    let mut free = vec![0.0; followers.iter().map(|(_, i)| i + 1).max().unwrap_or(0)];
+    // Alike by what starts alike.
+    followers.iter().for_each(|&(k, i)| free[i] = x[k]);
+    let mut by_all = vec![0.0; x.len()];
+    let mut value = |free: &[f64], by_free: &mut [f64]| {
+        followers.iter().for_each(|&(k, i)| x[k] = free[i]);
+        let value = f(x, &mut by_all);
+        by_free.fill(0.0);
+        followers.iter().for_each(|&(k, i)| by_free[i] += by_all[k]);
+        value
+    };
+    minimize(&mut free, &mut value, search, precondition);
+    followers.iter().for_each(|&(k, i)| x[k] = free[i]);
 }
 
 #[cfg(test)]
@@ -361,6 +438,9 @@ mod tests {
             sett: None,
             densest: [1.6, 2.4],
             gear: 0.1,
+            beside: None,
+            counted: Vec::new(),
+            near: Vec::new(),
         };
         let n = energy.variables();
         let mut x: Vec<f64> = (0..n).map(|i| 0.3 * (i as f64 * 1.7).sin()).collect();
@@ -376,14 +456,14 @@ mod tests {
         }
         (x[n - 2], x[n - 1]) = (22.0, 28.0);
         let mut g = vec![0.0; n];
-        energy.value(&x, &mut g);
+        energy.value(&x, &mut g, &mut Scratch::default());
         let mut other = vec![0.0; n];
         for i in 0..n {
             let h = 1e-5;
             let mut at = |d: f64| {
                 let mut y = x.clone();
                 y[i] += d;
-                energy.value(&y, &mut other)
+                energy.value(&y, &mut other, &mut Scratch::default())
             };
             let want = (at(h) - at(-h)) / (2.0 * h);
             assert!((g[i] - want).abs() < 1e-3 * (1.0 + want.abs()), "variable {i} of {n}: {} {want}", g[i]);

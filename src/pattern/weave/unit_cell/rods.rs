@@ -1,20 +1,21 @@
 //! What a yarn by itself resists: stretching, bending, steepness, flattening, and leaving its dent of the reed.
 
-use super::energy::Energy;
+use super::{
+    beside::{Beside, NEIGHBOURS},
+    energy::Energy,
+};
 
 /// Axial tension of a yarn; the unit of all forces here.
-const TENSION: f64 = 1.0;
+pub(super) const TENSION: f64 = 1.0;
 /// Length over which tension straightens what bending resists, sqrt(B / T).
-const STIFF_LENGTH: f64 = 2.0;
+pub(super) const STIFF_LENGTH: f64 = 2.0;
 /// Resistance to changing its shape along the yarn.
-const SECTION_GRADIENT: f64 = 2.0;
+pub(super) const SECTION_GRADIENT: f64 = 2.0;
 /// What holds a yarn at its dent of the reed, energy per crossing and squared distance.
 const REED: f64 = 0.2;
 /// What keeps neighbours together straight, as the reed beats picks up: energy per crossing and squared distance by which their
 /// mean goes aside.
 const BEATEN: f64 = 10.0;
-/// How many neighbours go aside together.
-const NEIGHBOURS: usize = 16;
 /// What keeps the cloth flat: the rollers of loom and finish.
 const FLAT: f64 = 0.2;
 /// Length of yarn over length of cloth between two nodes from which on yarns resist: about as steep as in Peirce's jammed
@@ -47,13 +48,15 @@ impl Energy<'_> {
                 let length = (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt();
                 (e.map(|v| v / length), length)
             };
-            let mut before = edge(n - 1);
-            for k in 0..n {
+            // The last edge, and which it is.
+            let mut last = (n - 1, edge(n - 1));
+            for k in (0..n).filter(|k| self.counts(side, yarn, k / self.nodes)) {
                 let (a, b) = (self.at(side, yarn, k), self.at(side, yarn, (k + 1) % n));
                 let p = self.at(side, yarn, (k + n - 1) % n);
                 let (t2, l2) = edge(k);
-                let (t1, l1) = before;
-                before = (t2, l2);
+                let before = (k + n - 1) % n;
+                let (t1, l1) = if last.0 == before { last.1 } else { edge(before) };
+                last = (k, (t2, l2));
                 // Tension.
                 sum += tension * l2;
                 by_spacing[1 - side] += tension * t2[0] * per_node;
@@ -109,13 +112,24 @@ impl Energy<'_> {
     pub(super) fn together(&self, side: usize, x: &[f64], g: &mut [f64]) -> f64 {
         let (count, crossings) = (self.count[side], self.count[1 - side]);
         let many = count.min(NEIGHBOURS);
-        let aside = |yarn: usize, crossing: usize| -> f64 {
-            let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
-            nodes.map(|k| x[self.at(side, yarn, k)]).sum::<f64>() / self.nodes as f64
-        };
+        let line = self.out_of_line(side, x);
+        for crossing in 0..crossings {
+            let off: Vec<f64> = (0..count).map(|yarn| line[yarn * crossings + crossing]).collect();
+            for (first, sum) in sums_from(&off, many).into_iter().enumerate() {
+                // The last yarn of those that begin there is in all of their sums.
+                self.push_aside(side, [(first + many - 1) % count, crossing], sum, g);
+            }
+        }
+        0.5 * BEATEN * line.iter().map(|v| v * v).sum::<f64>()
+    }
+
+    /// How far each yarn, with those that follow it, goes aside at each crossing from where they are in the mean.
+    pub(super) fn out_of_line(&self, side: usize, x: &[f64]) -> Vec<f64> {
+        let (count, crossings) = (self.count[side], self.count[1 - side]);
+        let many = count.min(NEIGHBOURS);
         let mut line = vec![0.0; count * crossings];
         for crossing in 0..crossings {
-            let of: Vec<f64> = (0..count).map(|yarn| aside(yarn, crossing)).collect();
+            let of: Vec<f64> = (0..count).map(|yarn| self.aside(side, yarn, crossing, x)).collect();
             for (yarn, sum) in sums_from(&of, many).into_iter().enumerate() {
                 line[yarn * crossings + crossing] = sum / many as f64;
             }
@@ -124,17 +138,59 @@ impl Energy<'_> {
             let mean = line.iter().sum::<f64>() / crossings as f64;
             line.iter_mut().for_each(|v| *v -= mean);
         }
-        let by_node = BEATEN / (many * self.nodes) as f64;
+        line
+    }
+
+    /// How far a yarn is aside between one crossing and the next, in the mean.
+    pub(super) fn aside(&self, side: usize, yarn: usize, crossing: usize, x: &[f64]) -> f64 {
+        let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
+        nodes.map(|k| x[self.at(side, yarn, k)]).sum::<f64>() / self.nodes as f64
+    }
+
+    /// Hands on to the nodes of a yarn from one crossing to the next by how much the groups that it is in are out of line.
+    fn push_aside(&self, side: usize, [yarn, crossing]: [usize; 2], sum: f64, g: &mut [f64]) {
+        let by_node = BEATEN / (self.many(side) * self.nodes) as f64;
+        let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
+        nodes.for_each(|k| g[self.at(side, yarn, k)] += by_node * sum);
+    }
+
+    /// Neighbours that go aside together.
+    fn many(&self, side: usize) -> usize {
+        self.beside.as_ref().map_or(self.count[side].min(NEIGHBOURS), |beside| beside.many(side))
+    }
+
+    /// The same where the repeat is a window of a larger one: groups reach beyond it, and are out of line by what the whole was
+    /// when `beside` was taken and by what has changed since.
+    pub(super) fn together_beside(&self, beside: &Beside, side: usize, x: &[f64], g: &mut [f64]) -> f64 {
+        let (count, crossings, many) = (self.count[side], self.count[1 - side], self.many(side));
+        // Of a whole side groups go around; else the first ones begin before the window.
+        let around = beside.whole[side] == count;
+        let before = if around { 0 } else { many - 1 };
+        let mut sum = 0.0;
         for crossing in 0..crossings {
-            let off: Vec<f64> = (0..count).map(|yarn| line[yarn * crossings + crossing]).collect();
-            for (first, sum) in sums_from(&off, many).into_iter().enumerate() {
-                // The last yarn of those that begin there is in all of their sums.
-                let yarn = (first + many - 1) % count;
-                let nodes = crossing * self.nodes..(crossing + 1) * self.nodes;
-                nodes.for_each(|k| g[self.at(side, yarn, k)] += by_node * sum);
+            let mut moved = vec![0.0; before + count + many];
+            for yarn in 0..count {
+                let index = yarn * crossings + crossing;
+                moved[before + yarn] = self.aside(side, yarn, crossing, x) - beside.aside[side][index];
+            }
+            if around {
+                let (own, next) = moved.split_at_mut(count);
+                next.copy_from_slice(&own[..many]);
+            }
+            let groups = before + count;
+            let mut line: Vec<f64> = sums_from(&moved, many)[..groups].iter().map(|v| v / many as f64).collect();
+            for (group, line) in line.iter_mut().enumerate() {
+                *line += beside.line[side][group * crossings + crossing];
+            }
+            sum += line.iter().map(|v| v * v).sum::<f64>();
+            // The groups of a yarn are those that begin up to so many before it.
+            let first = |yarn: usize| if around { yarn + count + 1 - many } else { yarn };
+            for yarn in 0..count {
+                let of = (first(yarn)..first(yarn) + many).map(|group| line[group % groups]).sum();
+                self.push_aside(side, [yarn, crossing], of, g);
             }
         }
-        0.5 * BEATEN * line.iter().map(|v| v * v).sum::<f64>()
+        0.5 * BEATEN * sum
     }
 }
 

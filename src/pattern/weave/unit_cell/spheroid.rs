@@ -3,10 +3,13 @@
 use glam::DVec3;
 
 /// A node as crossing yarns meet it.
+#[derive(Default)]
 pub(super) struct Spheroid {
     /// Squared half axes: wide, high.
     pub(super) wide: f64,
     pub(super) high: f64,
+    /// The larger of both.
+    pub(super) widest: f64,
     /// The level part of its matrix: xx, xy, yy.
     pub(super) level: [f64; 3],
     /// Level unit vector across the yarn.
@@ -21,7 +24,7 @@ impl Spheroid {
         let more = wide - high;
         let level =
             [high + more * across[0] * across[0], more * across[0] * across[1], high + more * across[1] * across[1]];
-        Self { wide, high, level, across }
+        Self { wide, high, widest: wide.max(high), level, across }
     }
 
     /// Of w' Q w by the logarithm of the flattening and by the yarn's heading, for the level part of w and its height.

@@ -3,9 +3,10 @@
 use std::{collections::HashMap, hash::Hash};
 
 use super::energy::{Energy, PER_NODE};
+use crate::pattern::draft::Draft;
 
 /// Least number of yarns to each side of a crossing that must be alike.
-const LEAST_REACH: usize = 2;
+pub(super) const LEAST_REACH: usize = 2;
 
 impl Energy<'_> {
     /// The number of the free variable that each variable follows. Crossings are alike if yarns cross alike as far around them as
@@ -15,7 +16,7 @@ impl Energy<'_> {
         if self.draft.twines() {
             return (0..self.variables()).collect();
         }
-        let around = self.surroundings();
+        let around = surroundings(self.draft, &self.thickness, longest_float(self.draft).max(LEAST_REACH));
         let mut numbers = HashMap::new();
         let mut alike = Vec::with_capacity(self.variables());
         for side in 0..2 {
@@ -33,39 +34,37 @@ impl Energy<'_> {
         alike.extend([nodes, nodes + 1]);
         alike
     }
+}
 
-    /// For each weft, for each warp: a number of what lies around their crossing.
-    fn surroundings(&self) -> Vec<Vec<usize>> {
-        let [warps, wefts] = self.count;
-        let reach = self.longest_float().max(LEAST_REACH);
-        let thick = |side: usize, yarn: usize| self.thickness[side][yarn].to_bits();
-        let crossing = |i: usize, j: usize| (self.draft.warp_over(i, j), thick(1, i), thick(0, j));
-        let mut numbers = HashMap::new();
-        let mut row = |i: usize| (0..warps).map(|j| number(&mut numbers, crossing(i, j))).collect();
-        let crossings: Vec<Vec<usize>> = (0..wefts).map(&mut row).collect();
-        // Along the wefts, then across them.
-        let along = transposed(&around(&transposed(&crossings), reach));
-        around(&along, reach)
-    }
+/// For each weft, for each warp: a number of what lies as far as `reach` around their crossing.
+pub(super) fn surroundings(draft: &Draft, thickness: &[Vec<f64>; 2], reach: usize) -> Vec<Vec<usize>> {
+    let crossing = |i: usize, j: usize| (draft.warp_over(i, j), thickness[1][i].to_bits(), thickness[0][j].to_bits());
+    let mut numbers = HashMap::new();
+    let mut row = |i: usize| (0..draft.warps()).map(|j| number(&mut numbers, crossing(i, j))).collect();
+    let crossings: Vec<Vec<usize>> = (0..draft.wefts()).map(&mut row).collect();
+    // Along the wefts, then across them.
+    let along = transposed(&around(&transposed(&crossings), reach));
+    around(&along, reach)
+}
 
-    /// Crossings of the longest float.
-    fn longest_float(&self) -> usize {
-        let float = |(side, yarn): (usize, usize)| {
-            let length = self.count[1 - side];
-            let over = |k: usize| {
-                let k = k % length;
-                if side == 0 { self.draft.warp_over(k, yarn) } else { self.draft.warp_over(yarn, k) }
-            };
-            let (mut longest, mut float) = (0, 1);
-            for k in 1..2 * length {
-                float = if over(k) == over(k - 1) { float + 1 } else { 1 };
-                longest = longest.max(float);
-            }
-            longest.min(length)
+/// Crossings of the longest float.
+pub(super) fn longest_float(draft: &Draft) -> usize {
+    let count = [draft.warps(), draft.wefts()];
+    let float = |(side, yarn): (usize, usize)| {
+        let length = count[1 - side];
+        let over = |k: usize| {
+            let k = k % length;
+            if side == 0 { draft.warp_over(k, yarn) } else { draft.warp_over(yarn, k) }
         };
-        let yarns = (0..2).flat_map(|side| (0..self.count[side]).map(move |yarn| (side, yarn)));
-        yarns.map(float).max().unwrap_or(0)
-    }
+        let (mut longest, mut float) = (0, 1);
+        for k in 1..2 * length {
+            float = if over(k) == over(k - 1) { float + 1 } else { 1 };
+            longest = longest.max(float);
+        }
+        longest.min(length)
+    };
+    let yarns = (0..2).flat_map(|side| (0..count[side]).map(move |yarn| (side, yarn)));
+    yarns.map(float).max().unwrap_or(0)
 }
 
 /// The number of a key, in the order in which keys are met.
