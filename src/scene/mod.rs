@@ -9,6 +9,7 @@ pub(crate) mod animation;
 pub mod builder;
 pub mod camera;
 pub mod defaults;
+pub(crate) mod drawn_draft;
 mod fiber_detail;
 pub(crate) mod force;
 pub(crate) mod identity;
@@ -16,6 +17,7 @@ mod layers;
 pub mod load;
 pub(crate) mod motif;
 pub(crate) mod motion;
+pub(crate) mod palette;
 pub mod view;
 
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! `yarnray make weave`
 
 use clap::Args;
+use glam::Vec3;
 
 use super::output::{EXAMPLES, Output, RADIUS, write};
 use crate::{
@@ -12,7 +13,7 @@ use crate::{
         weave::{self, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
-    scene::Yarn,
+    scene::{Yarn, drawn_draft::Legend, palette},
 };
 
 #[derive(Args, Debug)]
@@ -21,9 +22,13 @@ pub(super) struct WeaveArgs {
     #[command(flatten)]
     output: Output,
     /// plain, 'basket 2', 'twill 2/1', 'satin 5', 'satin 8/3', 'sateen 5'; a row of a matrix of # and ., top row first
-    /// (repeatable); or a draft of a weaving program (.wif), whose lengths count as millimetres.
+    /// (repeatable); a draft of a weaving program (.wif), whose lengths count as millimetres; or a picture (.png), a pixel for
+    /// each end and pick, dark where the warp is on top, or in the colours of --weave.
     #[arg(long, default_value = "plain", value_name = "DRAFT")]
     draft: Vec<String>,
+    /// The weave that a colour of the picture stands for, as '#b02020=satin 8' (repeatable).
+    #[arg(long, value_name = "COLOR=WEAVE", value_parser = colored)]
+    weave: Vec<(Vec3, Draft)>,
     /// Number of warps; 20, or those of the file.
     #[arg(long, conflicts_with = "width", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     warps: Option<u32>,
@@ -74,15 +79,18 @@ fn share(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
     let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
-    let (draft, file) = match args.draft.as_slice() {
-        [path] if path.to_lowercase().ends_with(".wif") => {
+    let drawn = drawn(args)?;
+    let whole = drawn.as_ref().map(|draft| [draft.warps() as u32, draft.wefts() as u32]);
+    let (draft, file) = match (drawn, args.draft.as_slice()) {
+        (Some(draft), _) => (draft, None),
+        (None, [path]) if path.to_lowercase().ends_with(".wif") => {
             wif_draft(path).map(|file| (file.draft.clone(), Some(file)))?
         }
-        [name] if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
-        rows => (Draft::matrix(rows).map_err(wrong)?, None),
+        (None, [name]) if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
+        (None, rows) => (Draft::matrix(rows).map_err(wrong)?, None),
     };
     let yarn = args.output.checked()?;
-    let [warps, wefts] = file.as_ref().map_or([weave::YARNS; 2], |f| f.count);
+    let [warps, wefts] = file.as_ref().map(|f| f.count).or(whole).unwrap_or([weave::YARNS; 2]);
     let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
     let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
     let radius = own(args.output.radius, 0).unwrap_or(otherwise);
@@ -170,6 +178,30 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         }
         Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),
     })
+}
+
+/// A colour and its weave.
+fn colored(text: &str) -> Result<(Vec3, Draft), String> {
+    let (sign, name) = text.split_once('=').ok_or_else(|| "expected COLOR=WEAVE, as '#b02020=satin 8'".to_owned())?;
+    let color = palette::color(sign.trim()).ok_or_else(|| format!("`{sign}` is no colour, as #b02020 is"))?;
+    let draft = Draft::named(name).map_err(|error| error.to_string())?;
+    Legend::suits(name, &draft).map_err(|error| error.to_string())?;
+    Ok((color, draft))
+}
+
+/// The draft that is a picture, if one is given.
+fn drawn(args: &WeaveArgs) -> Result<Option<Draft>, Failure> {
+    let path = match args.draft.as_slice() {
+        [path] if path.to_lowercase().ends_with(".png") => path,
+        _ if args.weave.is_empty() => return Ok(None),
+        _ => return Err(Failure::hinted("--weave without a picture".to_owned(), "--draft FILE.png".to_owned())),
+    };
+    let legend = if args.weave.is_empty() { Legend::Up(Vec3::ZERO) } else { Legend::Weaves(args.weave.clone()) };
+    let told = |(problem, hint): (String, Option<String>)| match hint {
+        Some(hint) => Failure::hinted(problem, hint),
+        None => Failure::Input(format!("error: {problem}")),
+    };
+    legend.draft(std::path::Path::new(path)).map(Some).map_err(told)
 }
 
 /// A draft of a weaving program; what it leaves open is said.

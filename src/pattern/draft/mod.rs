@@ -76,6 +76,19 @@ impl Draft {
         Self { warps, over: over.collect(), layers: 1, crossing: false, pile: None }
     }
 
+    /// All of a cloth as its repeat: for each pick from the bottom, for each end from the left, whether the end is on top.
+    ///
+    /// # Errors
+    /// No crossings, rows of different lengths, more than [`MOST_CROSSINGS`].
+    pub fn of_crossings(over: &[Vec<bool>]) -> Result<Self, DraftError> {
+        let ends = over.first().map_or(0, Vec::len);
+        if ends == 0 || over.iter().any(|row| row.len() != ends) {
+            let problem = "a draft without crossings".to_owned();
+            return Err(DraftError { problem, hint: "every pick crosses every end".to_owned() });
+        }
+        Self::from_fn(ends, over.len(), |weft, warp| over[weft][warp]).limited()
+    }
+
     /// Some warps and wefts of a cloth of one layer, from `first` on, as a repeat of their own.
     pub(super) fn part(&self, first: [usize; 2], count: [usize; 2]) -> Self {
         Self::from_fn(count[0], count[1], |weft, warp| self.warp_over(first[1] + weft, first[0] + warp))

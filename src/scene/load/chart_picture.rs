@@ -5,11 +5,14 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::{Context, Reader};
-use crate::{image, math::srgb::srgb_to_linear, pattern::chart::Chart, scene::motif::hex};
+use crate::{
+    pattern::chart::Chart,
+    scene::palette::{self, Pixels},
+};
 
 /// A colour of the palette and what it stands for.
 struct Symbol {
-    /// In the square root of light.
+    /// As pixels are compared with it.
     color: Vec3,
     /// Empty where there is no stitch.
     steps: String,
@@ -47,11 +50,10 @@ pub(super) fn rows(table: Reader<'_>, context: &Context<'_>) -> Option<Vec<Strin
 fn symbol(stitches: &Reader<'_>, sign: &str, context: &Context<'_>) -> Option<Symbol> {
     let span = stitches.span(sign).unwrap_or(stitches.header());
     let steps = stitches.string(sign)?.trim().to_owned();
-    let Some(color) = hex(sign) else {
+    let Some(color) = palette::color(sign) else {
         context.error(span, format!("`{sign}` is no colour"), Some("as in \"#c02a1f\" = \"k2tog\"".to_owned()));
         return None;
     };
-    let color = seen(color.map(srgb_to_linear));
     if steps.is_empty() {
         return Some(Symbol { color, steps, width: 0 });
     }
@@ -69,25 +71,13 @@ fn symbol(stitches: &Reader<'_>, sign: &str, context: &Context<'_>) -> Option<Sy
     }
 }
 
-/// Distances are in the square root of light, as eyes nearly see it.
-fn seen(color: [f32; 3]) -> Vec3 {
-    Vec3::from(color.map(|v| v.max(0.0).sqrt()))
-}
-
 fn read(path: &Path, symbols: &[Symbol]) -> Result<Vec<String>, String> {
-    let picture = image::read(path).map_err(|e| e.to_string())?;
-    let [r, g, b] = picture.rgb().ok_or_else(|| format!("{}: no colour channels", path.display()))?;
-    let nearest = |i: usize| {
-        let color = seen([r[i], g[i], b[i]]);
-        let distance = |s: &Symbol| color.distance_squared(s.color);
-        (0..symbols.len()).min_by(|&i, &j| distance(&symbols[i]).total_cmp(&distance(&symbols[j]))).unwrap_or(0)
-    };
-    let (width, height) = (picture.width, picture.height);
-    // Rows of the picture run from the top.
-    (0..height)
-        .rev()
+    let colors: Vec<Vec3> = symbols.iter().map(|s| s.color).collect();
+    let pixels = Pixels::read(path, &colors)?;
+    let width = pixels.width;
+    (0..pixels.height)
         .map(|y| {
-            let row: Vec<usize> = (0..width).map(|x| nearest(y * width + x)).collect();
+            let row = pixels.row(y);
             let mut steps: Vec<&str> = Vec::new();
             let mut x = 0;
             while x < width {
@@ -101,7 +91,7 @@ fn read(path: &Path, symbols: &[Symbol]) -> Result<Vec<String>, String> {
                     return Err(format!(
                         "{}: row {} from the bottom, pixel {} from the left: `{}` makes {} stitches, but there {} of it",
                         path.display(),
-                        height - y,
+                        y + 1,
                         x + 1,
                         own.steps,
                         own.width,
@@ -112,7 +102,7 @@ fn read(path: &Path, symbols: &[Symbol]) -> Result<Vec<String>, String> {
                 x += own.width;
             }
             if steps.is_empty() {
-                return Err(format!("{}: row {} from the bottom has no stitch", path.display(), height - y));
+                return Err(format!("{}: row {} from the bottom has no stitch", path.display(), y + 1));
             }
             Ok(steps.join(" "))
         })
@@ -126,7 +116,7 @@ mod tests {
     fn symbols() -> Vec<Symbol> {
         let of = |color: [f32; 3], steps: &str| {
             let width = if steps.is_empty() { 0 } else { Chart::stitches_of(steps).unwrap() as usize };
-            Symbol { color: seen(color), steps: steps.to_owned(), width }
+            Symbol { color: palette::seen(color), steps: steps.to_owned(), width }
         };
         vec![
             of([1.0, 1.0, 1.0], "k"),

@@ -7,6 +7,7 @@ mod chart_picture;
 mod cloth;
 mod color;
 mod definitions;
+mod draft_picture;
 mod dyes;
 mod garment;
 mod gauge;

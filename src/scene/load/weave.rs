@@ -3,7 +3,7 @@
 use super::{
     Context, Range, Reader,
     color::{ColorPlan, FabricCoordinates},
-    gauge,
+    draft_picture, gauge,
     known_yarns::KnownYarns,
 };
 use crate::{
@@ -159,7 +159,7 @@ pub(super) fn weave(
     let half_width = [yarns.half_width(), weft_of_its_own.map_or(yarns.half_width(), Yarn::half_width)];
     let half_rooms = [0, 1].map(|side| written(side).unwrap_or(radius[side]) * half_width[side]);
     let Setting { spacing: [warp_spacing, weft_spacing], filed, cover } = setting(table, fabric, context, wif);
-    let count = wif.map_or([weave::YARNS; 2], |w| w.count);
+    let count = drafted.as_ref().map_or([weave::YARNS; 2], Drafted::count);
     let warps = extent(table, context, "warps", "width", count[0]);
     let wefts = extent(table, context, "wefts", "height", count[1]);
     let crimp = table.f64("crimp", Range::UNIT);
@@ -174,7 +174,7 @@ pub(super) fn weave(
     if !table.bool_or("flat", true) {
         table.error_at("flat", "woven cloth lies flat by itself", Some("leave out `flat`"));
     }
-    let Drafted { draft, wif } = drafted?;
+    let Drafted { draft, wif, .. } = drafted?;
     let (threads, colors) = wif.map(|w| (w.threads, w.colors)).unwrap_or_default();
     let default_pile = weave::pile_height(&draft, half_rooms[0]);
     let weave = Weave {
@@ -241,7 +241,7 @@ const UNEQUAL: f64 = 1.5;
 
 /// Cloth that is not hemmed unless asked: three layers of it do not lie flat, and hems of a small sample would leave no pile.
 fn is_too_thick_for_hems(drafted: &Drafted) -> bool {
-    let Drafted { draft, wif } = drafted;
+    let Drafted { draft, wif, .. } = drafted;
     draft.pile().is_some() || draft.layers() > 1 || wif.as_ref().is_some_and(has_unequal_threads)
 }
 
@@ -346,14 +346,33 @@ fn extent(table: &Reader<'_>, context: &Context<'_>, key: &str, length: &str, de
 pub(super) struct Drafted {
     pub(super) draft: Draft,
     pub(super) wif: Option<WovenWif>,
+    /// Whether it is a picture, all of which is woven unless the scene says otherwise.
+    pub(super) drawn: bool,
 }
 
-/// `draft`: a name, rows of a matrix, a loom's lists or a file.
+impl Drafted {
+    /// Warps and wefts where the scene gives none.
+    fn count(&self) -> [u32; 2] {
+        match &self.wif {
+            Some(wif) => wif.count,
+            None if self.drawn => [self.draft.warps() as u32, self.draft.wefts() as u32],
+            None => [weave::YARNS; 2],
+        }
+    }
+}
+
+/// `draft`: a name, rows of a matrix, a loom's lists, a picture or a file.
 pub(super) fn draft(table: &Reader<'_>, context: &Context<'_>) -> (String, Option<Drafted>) {
     if let Some(Value::Table(_)) = table.node("draft").map(|node| &node.value)
-        && let Some(file) = table.table("draft").filter(|t| t.has("type"))
+        && let Some(own) = table.table("draft")
     {
-        return from_file(file, context);
+        if own.has("type") {
+            return from_file(own, context);
+        }
+        if own.has("image") {
+            let drafted = draft_picture::draft(own, context).map(|draft| Drafted { draft, wif: None, drawn: true });
+            return ("figured weave".to_owned(), drafted);
+        }
     }
     let read: Option<(String, Result<Draft, DraftError>)> =
         if matches!(table.node("draft").map(|node| &node.value), Some(Value::Table(_))) {
@@ -378,7 +397,7 @@ pub(super) fn draft(table: &Reader<'_>, context: &Context<'_>) -> (String, Optio
             }
         };
     match read {
-        Some((name, Ok(draft))) => (name, Some(Drafted { draft, wif: None })),
+        Some((name, Ok(draft))) => (name, Some(Drafted { draft, wif: None, drawn: false })),
         Some((_, Err(error))) => {
             table.error_at("draft", error.problem, Some(&error.hint));
             (String::new(), None)
@@ -421,7 +440,7 @@ fn from_file(table: Reader<'_>, context: &Context<'_>) -> (String, Option<Drafte
                 context.warning(span, format!("{}: {note}", path.display()));
             }
             let name = file.title.clone().unwrap_or_else(|| "weave".to_owned());
-            (name, Some(Drafted { draft: woven.draft.clone(), wif: Some(woven) }))
+            (name, Some(Drafted { draft: woven.draft.clone(), wif: Some(woven), drawn: false }))
         }
         Err(error) => wrong(error.problem, Some(error.hint)),
     }
