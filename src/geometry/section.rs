@@ -303,7 +303,8 @@ impl<'a> Section<'a> {
         let (cos, direction) = self.direction_out(w);
         let start = from.point + shift;
         let mut pass = |way: &[Station]| {
-            let bent = way::is_bent(way);
+            // Measured of pressed yarns alone: of round ones light from behind, which is too little, became less.
+            let bent = from.pressed.is_some() && way::is_bent(way);
             let mut ahead = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
                 visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos, way, start, bent, cos });
             };

@@ -173,7 +173,7 @@ impl Arc {
             at.dot(at)
         };
         let mut nearest = square(u);
-        if self.off > MUCH {
+        if ROUNDS > 1 && self.off > MUCH {
             // It may turn back, and be nearest where it begins or ends.
             for end in [f32x4::ZERO, f32x4::ONE] {
                 let there = square(end);

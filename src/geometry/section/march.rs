@@ -8,7 +8,7 @@ use super::{
     Section,
     bowed::Bowed,
     neighbourhood::{Neighbourhood, Placed},
-    reach::{GATHER, LEAST_LEFT, LOOK, Reach, Step, angle},
+    reach::{GATHER, LEAST_LEFT, LOOK, LOOK_INTO_PRESSED, Reach, Step, angle},
 };
 use crate::geometry::{way::Station, yarn::YarnShape, yarn_frame::Pressed};
 
@@ -43,7 +43,11 @@ impl Section<'_> {
     /// Goes along the ray from station to station, until it leaves the yarn or `visit` has seen enough.
     #[inline]
     pub(super) fn march_ray(&self, shape: &YarnShape, visit: impl FnMut(&Station, &Station) -> ControlFlow<()>) {
-        let reach = if self.looked_at { LOOK } else { GATHER };
+        let reach = match self.pressed {
+            _ if !self.looked_at => GATHER,
+            Some(_) => LOOK_INTO_PRESSED,
+            None => LOOK,
+        };
         let line = Line { start: self.point(0.0), direction: self.direction(), reach };
         let mut near = self.neighbourhood(self.turn(shape), 0.0, reach);
         let first = near.enter(line.start, line.direction);

@@ -31,7 +31,9 @@ impl Reach {
 }
 
 /// A ray that looks: off by less than 0.02 yarn radii.
-pub(super) const LOOK: Reach = Reach { near: 0.5, sharp: 0.15, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+pub(super) const LOOK: Reach = Reach { near: 0.5, sharp: 0.3, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+/// The same into a pressed yarn, whose bends change within a radius where a weave's dives.
+pub(super) const LOOK_INTO_PRESSED: Reach = Reach { sharp: 0.15, ..LOOK };
 /// A ray that gathers light.
 pub(super) const GATHER: Reach = Reach { near: 1.0, sharp: 0.3, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
 /// Light that leaves from inside: how far it still has to go is felt in all, and a weave's bend turns round within a radius or two.
