@@ -103,6 +103,14 @@ pub(crate) fn evaluate_f32(basis: Basis, p: &[Vec4; 4], u: f32) -> (Vec4, Vec4, 
     (sum(a), sum(b), Vec3A::from_vec4(sum(c)))
 }
 
+/// A number between the second and the third of four points, and its change with `u`: Catmull-Rom.
+#[inline]
+pub(crate) fn catmull_rom_f32(values: [f32; 4], u: f32) -> [f32; 2] {
+    let sum = |w: [f32; 4]| w[0] * values[0] + w[1] * values[1] + w[2] * values[2] + w[3] * values[3];
+    let [a, b, _] = weights_f32(Basis::CatmullRom, u);
+    [sum(a), sum(b)]
+}
+
 /// Catmull-Rom between the second and the third of four points, at `t` in 0..1.
 #[inline]
 pub(crate) fn catmull_rom([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {

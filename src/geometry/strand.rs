@@ -20,7 +20,7 @@ use super::{
     curve::{Basis, Curve},
     material_indices::MaterialIndices,
     segment_uvs::SegmentUvs,
-    spline::evaluate_f32,
+    spline::{catmull_rom_f32, evaluate_f32},
     tube::curve_of,
     yarn_frame::{ROUND, SectionGrowth, YarnFrame},
 };
@@ -488,7 +488,8 @@ impl Strands {
             let near: &[Vec2; 4] = self.flattening[first..].first_chunk().expect("a segment has four points");
             let (x, y) = (f32x4::new(near.map(|f| f.x)), f32x4::new(near.map(|f| f.y)));
             let ratios = (x * x + y * y).sqrt().to_array();
-            let [ratio, growth] = smooth(ratios, u);
+            let [ratio, growth] = catmull_rom_f32(ratios, u);
+            let ratio = ratio.clamp(FLATTEST as f32, 1.0);
             let (from, to) = (near[1], near[2]);
             let turn = from.perp_dot(to) / (ratios[1] * ratios[2]).max(1e-12);
             (ratio * from.lerp(to, u).normalize_or(ROUND), turn / stride, growth / stride)
@@ -511,16 +512,6 @@ impl Strands {
 
 /// The flattest section there is: short over long axis.
 pub const FLATTEST: f64 = 0.05;
-
-/// A ratio of axes from the second to the third of four places, and its change with `u`, 0 to 1: a cubic whose slopes are those from
-/// neighbour to neighbour, within the ratios that there are.
-#[inline]
-fn smooth([before, from, to, after]: [f32; 4], u: f32) -> [f32; 2] {
-    let (rise, begins, ends) = (to - from, 0.5 * (to - before), 0.5 * (after - from));
-    let (square, cube) = (3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise);
-    let ratio = from + u * (begins + u * (square + u * cube));
-    [ratio.clamp(FLATTEST as f32, 1.0), begins + u * (2.0 * square + 3.0 * u * cube)]
-}
 
 #[cfg(test)]
 mod tests;

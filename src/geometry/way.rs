@@ -174,7 +174,8 @@ impl Arc {
         };
         let mut nearest = square(u);
         if ROUNDS > 1 && self.off > MUCH {
-            // It may turn back, and be nearest where it begins or ends.
+            // It may turn back, and be nearest where it begins or ends. (Where only straight ways are asked for, this is left out: see
+            // `Section::plies_ahead`.)
             for end in [f32x4::ZERO, f32x4::ONE] {
                 let there = square(end);
                 u = there.simd_lt(nearest).select(end, u);

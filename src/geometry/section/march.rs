@@ -20,8 +20,6 @@ const SHORTEST_STEP: f32 = 0.02;
 const MOST_TURNED: f32 = 0.8;
 /// Square of the yarn's radius less that of a point's distance from the axis: below, it is at the surface.
 const AT_SURFACE: f32 = 0.02;
-/// How often a pressed yarn is looked up for one point: where it bends otherwise on the way, a look-up falls short.
-const MOST_LOOKS: usize = 2;
 /// Turns, in radians, below which a way is taken for straight.
 const STRAIGHT: f32 = 1e-3;
 
@@ -184,7 +182,7 @@ impl Section<'_> {
         reach: Reach,
     ) -> Step {
         let mut unbent = near.unbend(point, direction);
-        for _ in 0..if self.pressed.is_some() { MOST_LOOKS } else { 1 } {
+        for _ in 0..reach.looks {
             if unbent.travel.abs() <= reach.near(near.bend) {
                 break;
             }

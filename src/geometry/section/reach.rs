@@ -14,6 +14,8 @@ pub(super) struct Reach {
     pub(super) near: f32,
     /// By how much the yarn may turn in that, radians: a sharp bend is over soon.
     pub(super) sharp: f32,
+    /// How often it is looked up for one point: where it bends otherwise on the way there, a look-up falls short.
+    pub(super) looks: usize,
     /// The longest way, in yarn radii.
     pub(super) longest: f32,
     /// The most by which plies turn from station to station, radians.
@@ -31,13 +33,15 @@ impl Reach {
 }
 
 /// A ray that looks: off by less than 0.02 yarn radii.
-pub(super) const LOOK: Reach = Reach { near: 0.5, sharp: 0.3, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
+pub(super) const LOOK: Reach = Reach { near: 0.5, sharp: 0.3, looks: 1, longest: 16.0, turn: MOST_TURN, bend: 1.0 };
 /// The same into a pressed yarn, whose bends change within a radius where a weave's dives.
-pub(super) const LOOK_INTO_PRESSED: Reach = Reach { sharp: 0.15, ..LOOK };
+pub(super) const LOOK_INTO_PRESSED: Reach = Reach { sharp: 0.15, looks: 2, ..LOOK };
 /// A ray that gathers light.
-pub(super) const GATHER: Reach = Reach { near: 1.0, sharp: 0.3, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
+pub(super) const GATHER: Reach =
+    Reach { near: 1.0, sharp: 0.3, looks: 1, longest: 16.0, turn: 1.6 * MOST_TURN, bend: 0.5 };
 /// Light that leaves from inside: how far it still has to go is felt in all, and a weave's bend turns round within a radius or two.
-pub(super) const LIGHT: Reach = Reach { near: 0.5, sharp: 0.3, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
+pub(super) const LIGHT: Reach =
+    Reach { near: 0.5, sharp: 0.3, looks: 1, longest: 16.0, turn: 2.0 * MOST_TURN, bend: 0.5 };
 /// What may be left of a way without another station, in yarn radii.
 pub(super) const LEAST_LEFT: f32 = 1e-3;
 

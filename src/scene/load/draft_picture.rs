@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{Context, Reader};
 use crate::{
-    pattern::draft::Draft,
+    pattern::draft::{Draft, DraftError},
     scene::{drawn_draft::Legend, palette},
 };
 
@@ -60,7 +60,7 @@ fn weave(table: &Reader<'_>, sign: &str, context: &Context<'_>) -> Option<(Vec3,
     let name = table.string(sign)?;
     let color = color(table, sign, sign, context)?;
     let draft = Draft::named(name).and_then(|draft| Legend::suits(name, &draft).map(|()| draft));
-    let told = |error: crate::pattern::draft::DraftError| {
+    let told = |error: DraftError| {
         table.error_at(sign, error.problem, Some(&error.hint));
     };
     draft.map_err(told).ok().map(|draft| (color, draft))
