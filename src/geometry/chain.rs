@@ -28,34 +28,41 @@ impl Chain {
     /// The chain of the same curve while its points are elsewhere.
     pub(crate) fn at_time(curve: &Curve, radii: &[f64], points: &[DVec3]) -> Self {
         assert_eq!(points.len(), curve.points.len(), "a curve has as many points at all times");
-        let all = points.iter().zip(radii).map(|(p, &r)| p.extend(r));
+        Self::of_values(curve, |i| points[i].extend(radii[i]))
+    }
+
+    /// The chain of what is known at each point of a curve, asked for in their order.
+    pub(crate) fn of_values(curve: &Curve, value: impl FnMut(usize) -> DVec4) -> Self {
+        let points = curve.points.len();
         // Only repeated B-spline points mean something; elsewhere they make segments without a direction.
         let repeated = |i: usize| curve.basis != Basis::BSpline && i > 0 && curve.points[i] == curve.points[i - 1];
-        let mut given: Vec<DVec4> = all.enumerate().filter(|(i, _)| !repeated(*i)).map(|(_, p)| p).collect();
-        let n = given.len();
-        if n == 1 {
-            let p = given[0];
-            given.push(p + DVec4::new(1e-6 * p.w.max(1e-12), 0.0, 0.0, 0.0));
+        let kept = || (0..points).filter(|i| !repeated(*i));
+        let closed = curve.closed && kept().take(3).count() == 3;
+        // The point before the first is known when all are there.
+        let before = usize::from(closed || curve.basis != Basis::BSpline);
+        let mut all = Vec::with_capacity(points + 3);
+        all.resize(before, DVec4::ZERO);
+        all.extend(kept().map(value));
+        if all.len() == before + 1 {
+            let p = all[before];
+            all.push(p + DVec4::new(1e-6 * p.w.max(1e-12), 0.0, 0.0, 0.0));
         }
-        let n = n.max(2);
-        let mut points = Vec::with_capacity(n + 3);
-        if curve.closed && n >= 3 {
-            points.push(given[n - 1]);
-            points.extend(&given);
-            points.extend([given[0], given[1]]);
+        let (first, second) = (all[before], all[before + 1]);
+        let (last, last_but_one) = (all[all.len() - 1], all[all.len() - 2]);
+        if closed {
+            all[0] = last;
+            all.extend([first, second]);
         } else if curve.basis == Basis::BSpline {
-            points.extend(&given);
-            while points.len() < 4 {
-                points.insert(0, given[0]);
-                points.push(given[n - 1]);
+            while all.len() < 4 {
+                all.insert(0, first);
+                all.push(last);
             }
         } else {
             let beyond = |end: DVec4, next: DVec4| (2.0 * end - next).truncate().extend(end.w);
-            points.push(beyond(given[0], given[1]));
-            points.extend(&given);
-            points.push(beyond(given[n - 1], given[n - 2]));
+            all[0] = beyond(first, second);
+            all.push(beyond(last, last_but_one));
         }
-        Self { basis: curve.basis, points }
+        Self { basis: curve.basis, points: all }
     }
 
     pub(crate) fn segments(&self) -> usize {

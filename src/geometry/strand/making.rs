@@ -187,33 +187,34 @@ fn pressed_along(curve: &Curve, vectors: &[Vec3], knots: Option<&[(usize, f64)]>
     // An axis has no sign: each points to the side of the one before. Its direction and its ratio make a chain of their
     // own, which has its knots where the curve has them.
     let mut axis = DVec3::ZERO;
-    let axes: Vec<DVec3> = vectors
-        .iter()
-        .map(|v| {
-            let v = v.as_dvec3().try_normalize().unwrap_or(axis);
-            axis = if v.dot(axis) < 0.0 { -v } else { v };
-            axis
-        })
-        .collect();
-    let ratios: Vec<f64> = vectors.iter().map(|v| f64::from(v.length())).collect();
-    let chain = Chain::at_time(curve, &ratios, &axes);
-    let ends = || (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]);
-    let at: Vec<(usize, f64)> = knots.map_or_else(|| ends().collect(), <[_]>::to_vec);
-    at.iter().map(|&(segment, u)| chain.at(segment, u).at).collect()
+    let chain = Chain::of_values(curve, |i| {
+        let v = vectors[i].as_dvec3().try_normalize().unwrap_or(axis);
+        axis = if v.dot(axis) < 0.0 { -v } else { v };
+        axis.extend(f64::from(vectors[i].length()))
+    });
+    let at = |(segment, u): (usize, f64)| chain.at(segment, u).at;
+    match knots {
+        Some(knots) => knots.iter().copied().map(at).collect(),
+        None => (0..chain.segments()).map(|i| (i, 0.0)).chain([(chain.segments() - 1, 1.0)]).map(at).collect(),
+    }
 }
 
 /// The same in the frame of each point of the chain: it moves with that frame.
 fn flattening_along(pressed: &[DVec4], wound: &Winding) -> Vec<Vec2> {
     let mut before = DVec2::ZERO;
-    let made = pressed.iter().zip(&wound.knots).map(|(place, knot)| {
+    // The first and the last knot stand for the points beyond them too.
+    let mut made = Vec::with_capacity(pressed.len() + 2);
+    made.push(ROUND);
+    made.extend(pressed.iter().zip(&wound.knots).map(|(place, knot)| {
         let axis = place.truncate();
         let across = DVec2::new(axis.dot(knot.normal), axis.dot(knot.tangent.cross(knot.normal)));
         let across = across.try_normalize().unwrap_or(DVec2::X) * place.w.clamp(FLATTEST, 1.0);
         before = if across.dot(before) < 0.0 { -across } else { across };
         before.as_vec2()
-    });
-    let made: Vec<Vec2> = made.collect();
-    std::iter::once(made[0]).chain(made.iter().copied()).chain([made[made.len() - 1]]).collect()
+    }));
+    made[0] = made[1];
+    made.push(made[made.len() - 1]);
+    made
 }
 
 /// Yarns one behind the other.

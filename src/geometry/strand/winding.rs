@@ -56,6 +56,11 @@ pub(super) struct Knot {
     along: f64,
 }
 
+impl Knot {
+    /// Of which nothing is known yet.
+    const START: Self = Self { tangent: DVec3::X, normal: DVec3::Y, along: 0.0 };
+}
+
 /// Segments along which a normal is carried in one go; longer chains are cut, whatever the number of threads.
 const STRETCH: usize = 16_384;
 
@@ -63,25 +68,24 @@ impl Winding {
     /// Carries the normal along the chain and integrates the phase of the plies. `pressed` are the directions of the sections'
     /// short axes at the ends of its segments, with the ratio of both axes.
     pub(super) fn new(chain: &Chain, pressed: Option<&[DVec4]>, options: &StrandOptions) -> Self {
-        let segments = chain.segments();
-        let starts: Vec<usize> = (0..segments.max(1)).step_by(STRETCH).collect();
-        let stretches: Vec<_> =
-            starts.into_par_iter().map(|start| carry(chain, pressed, start, (start + STRETCH).min(segments))).collect();
+        let mut knots = vec![Knot::START; chain.segments() + 1];
+        let stretches = knots[1..].par_chunks_mut(STRETCH).enumerate();
+        let firsts: Vec<(Knot, Option<Tight>)> =
+            stretches.map(|(i, after)| carry(chain, pressed, i * STRETCH, after)).collect();
         // Each stretch began with a normal of its own: turned as a whole, it goes on where the one before ends.
-        let mut knots: Vec<Knot> = Vec::with_capacity(segments + 1);
         let mut tight: Option<Tight> = None;
-        for (mut stretch, its_tight) in stretches {
-            if let Some(end) = knots.pop() {
-                let first = stretch[0];
+        for (i, (first, its_tight)) in firsts.into_iter().enumerate() {
+            let start = i * STRETCH;
+            let end = std::mem::replace(&mut knots[start], first);
+            if i > 0 {
                 let (sin, cos) = (end.normal.dot(first.tangent.cross(first.normal)), end.normal.dot(first.normal));
                 let size = sin.hypot(cos);
                 let (sin, cos) = if size > 0.0 { (sin / size, cos / size) } else { (0.0, 1.0) };
-                for knot in &mut stretch {
+                for knot in knots[start..].iter_mut().take(STRETCH + 1) {
                     knot.normal = cos * knot.normal + sin * knot.tangent.cross(knot.normal);
                     knot.along += end.along;
                 }
             }
-            knots.append(&mut stretch);
             tight = tight.into_iter().chain(its_tight).reduce(Tight::and);
         }
         let (start, end) = (knots[0].normal, knots[knots.len() - 1]);
@@ -125,9 +129,9 @@ impl Winding {
     }
 }
 
-/// Carries a normal, whichever is easy to find at their start, along the segments from `start` to `end` of a chain: the
-/// knots from there to there, and the tightest bend.
-fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> (Vec<Knot>, Option<Tight>) {
+/// Carries a normal, whichever is easy to find at their start, along segments of a chain, `start` the first: fills in the knots
+/// where each ends, and returns the one where they start, and the tightest bend.
+fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, knots: &mut [Knot]) -> (Knot, Option<Tight>) {
     let [a, b, c, d] = GAUSS_LEGENDRE_4;
     let nodes = [a, b, c, d, (1.0, 0.0)].map(|(u, weight)| (u, Weights::new(chain.basis, u), weight));
     let tangent_of = |p: &SplinePoint, fallback: DVec3| p.d1.truncate().try_normalize().unwrap_or(fallback);
@@ -139,9 +143,8 @@ fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> 
     let mut normal = if tangent.z.abs() < 0.999 { across(DVec3::Z) } else { across(DVec3::X) }.unwrap_or(DVec3::Y);
     let mut along = 0.0;
     let (mut fold, mut tight): (f64, Option<Tight>) = (0.0, None);
-    let mut knots = Vec::with_capacity(end - start + 1);
-    knots.push(Knot { tangent, normal, along });
-    for segment in start..end {
+    let first = Knot { tangent, normal, along };
+    for (segment, knot) in (start..).zip(knots) {
         let points = chain.points_of(segment);
         let axes = pressed.map(|pressed| [pressed[segment], pressed[segment + 1]]);
         for (u, weights, weight) in &nodes {
@@ -171,9 +174,9 @@ fn carry(chain: &Chain, pressed: Option<&[DVec4]>, start: usize, end: usize) -> 
         }
         // Rounding must not accumulate over thousands of segments.
         normal = (normal - normal.dot(tangent) * tangent).try_normalize().unwrap_or(normal);
-        knots.push(Knot { tangent, normal, along });
+        *knot = Knot { tangent, normal, along };
     }
-    (knots, tight)
+    (first, tight)
 }
 
 /// How far a section reaches in a direction, of half its long axis: `axis` is its short axis and the ratio of both.

@@ -121,7 +121,7 @@ pub(super) fn solve(
         met.extend([start; DIRECTIONS]);
     }
     // Of light that goes on from there in one.
-    let onward = |ways: &Ways, met: &[f32x8]| -> Vec<f32x8> {
+    let onward = |ways: &Ways, met: &[f32x8], onward: &mut Vec<f32x8>| {
         let ways = ways.escape.iter().zip(&ways.next).enumerate();
         let of = ways.map(|(i, (escape, next))| {
             let direction = i % DIRECTIONS;
@@ -130,10 +130,13 @@ pub(super) fn solve(
                 sum + met[usize::from(*cell) * DIRECTIONS + direction] * f32x8::splat(*chance)
             })
         });
-        of.collect()
+        onward.clear();
+        onward.extend(of);
     };
+    let [mut around, mut on] = [const { Vec::new() }; 2];
     for _ in 0..FOLLOWED {
-        let [around, on] = [&flights.even, &flights.chain].map(|ways| onward(ways, &met));
+        onward(&flights.even, &met, &mut around);
+        onward(&flights.chain, &met, &mut on);
         let of_cells = around.chunks_exact(DIRECTIONS).zip(on.chunks_exact(DIRECTIONS));
         for (met, (around, on)) in met.chunks_exact_mut(DIRECTIONS).zip(of_cells) {
             let around = around.iter().fold(f32x8::ZERO, |sum, of| sum + *of) * even;
@@ -144,7 +147,8 @@ pub(super) fn solve(
         }
     }
     // Light goes on evenly around from where the tables begin.
-    let mean: Vec<[f32; 8]> = onward(&flights.even, &met)
+    onward(&flights.even, &met, &mut around);
+    let mean: Vec<[f32; 8]> = around
         .chunks_exact(DIRECTIONS)
         .map(|onward| {
             (onward.iter().fold(f32x8::ZERO, |sum, of| sum + *of) / f32x8::splat(DIRECTIONS as f32)).to_array()
