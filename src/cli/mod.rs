@@ -398,11 +398,12 @@ fn folds_in_words(scene: &Scene, fabric: &Fabric, folds: &Folds, yarns: usize) -
     let Folds { worst, places, .. } = folds;
     let at = folds.at + scene.middle;
     format!(
-        "{}: {} of {yarns} yarns bend so tightly at {} that they fold into themselves and their plies break; the \
-         worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
+        "{}: {} of {yarns} yarns bend so tightly at {} (one in {:.0} diameters of yarn) that they fold into themselves and \
+         their plies break; the worst is yarn {} at segment {}{} ([{:.1}, {:.1}, {:.1}] mm), whose inner side runs backwards by {:.1} of its radius{}",
         fabric.origin,
         folds.yarns,
         counted(*places, "place"),
+        folds.length / (*places).max(1) as f64,
         worst.yarn,
         worst.segment,
         fabric.panel_of(worst.yarn).map_or(String::new(), |name| format!(" of panel `{name}`")),
