@@ -41,8 +41,8 @@ pub(super) struct Cell {
     /// How wide and high it is.
     pub(super) period: DVec2,
     pub(super) rods: Rods,
-    /// Whether its wales lean, so that rows wave.
-    pub(super) waves: bool,
+    /// Whether its wales lean, so that rows wave, or cross.
+    pub(super) leans: bool,
     /// How firmly it is pressed flat while it relaxes.
     press: f64,
     /// Pull on it across and along while it relaxes.
@@ -96,16 +96,16 @@ impl Cell {
             count as f64 / f64::from((wide * high).max(1))
         };
         let held = share(&|act| matches!(act, Act::Tuck | Act::Pass { .. }));
-        let waves = loops.has_waves();
         let crosses = rows.iter().flatten().any(|s| s.layer != 0);
+        let leans = loops.has_waves() || crosses;
         let pull = BLOCKING + DRAWN_UP * held + OPENED * share(&|act| act == Act::Over);
         let mut cell = Self {
             wide,
             high,
             period,
             rods: Rods { period: Some(period), ..Rods::default() },
-            waves,
-            press: if waves || crosses { PRESSED } else { 0.0 },
+            leans,
+            press: if leans { PRESSED } else { 0.0 },
             pull: pull.max(DVec2::ZERO),
             visits: Vec::new(),
             grid: Vec::new(),

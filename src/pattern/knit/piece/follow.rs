@@ -86,8 +86,8 @@ impl<'a> Laying<'a> {
         match self.surface {
             // Layers that are bound off together lean to each other.
             Surface::Plane { .. } => (self.even && (side == 0.0 || self.plain(own))).then_some(cell),
-            // Where wales lean nothing is as it would be in even rows: all of a repeat is taken as it is.
-            Surface::Round { .. } | Surface::Bent(_) => (cell.0.waves || self.plain(own)).then_some(cell),
+            // Where wales lean or cross nothing is as it would be in even rows: all of a repeat is taken as it is.
+            Surface::Round { .. } | Surface::Bent(_) => (cell.0.leans || self.plain(own)).then_some(cell),
         }
     }
 
@@ -124,7 +124,7 @@ impl<'a> Laying<'a> {
         let row = f64::from(course.row);
         let out = p.z + self.loops.layer_of(&course.visits[k].1);
         match (self.surface, course.visits[k].1) {
-            (Surface::Round { .. }, _) if cell.waves => {
+            (Surface::Round { .. }, _) if cell.leans => {
                 let at = p.x / width / self.loops.wide as f64;
                 Place { at, up: row + p.y / height - r as f64, out }
             }
