@@ -185,6 +185,9 @@ impl UnitCell {
     /// Share of the plane that no yarn covers, seen along the normal of the cloth.
     pub(super) fn see_through(&self) -> f64 {
         const CELLS: usize = 24;
+        const GOLDEN: f64 = 0.618_033_988_749_895;
+        // Where a row or column of samples begins: else the edge of a straight yarn would lie alike in all of them.
+        let begin = |step: usize| ((step as f64 + 0.5) * GOLDEN).fract();
         let count = [self.yarns[0].len(), self.yarns[1].len()];
         let size = [count[0] * CELLS, count[1] * CELLS];
         let mut covered = vec![false; size[0] * size[1]];
@@ -200,9 +203,9 @@ impl UnitCell {
                     let mix = |p: f64, q: f64| p + share * (q - p);
                     let middle = index as f64 + mix(a.aside, b.aside) / self.spacing[side];
                     let half = mix(a.axes[0], b.axes[0]) / self.spacing[side];
-                    // A cell's middle is at (c + 1/2) / CELLS.
-                    let first = ((middle - half) * CELLS as f64 - 0.5).ceil() as i64;
-                    let last = ((middle + half) * CELLS as f64 - 0.5).floor() as i64;
+                    // A sample is at (c + begin) / CELLS.
+                    let first = ((middle - half) * CELLS as f64 - begin(step)).ceil() as i64;
+                    let last = ((middle + half) * CELLS as f64 - begin(step)).floor() as i64;
                     for c in first..=last.min(first + size[side] as i64) {
                         let across = c.rem_euclid(size[side] as i64) as usize;
                         let cell = if side == 0 { step * size[0] + across } else { across * size[0] + step };
