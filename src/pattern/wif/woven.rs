@@ -85,6 +85,12 @@ impl Wif {
             let why = if drawn { "as thick as they are apart, which is how they are drawn" } else { "of no thickness" };
             notes.push(format!("threads are {why}: the yarn is woven as close as it goes"));
         }
+        for (threads, setting) in threads.iter_mut().zip(setting) {
+            // Yarn as close as it goes has no room to give: none lies nearer to its neighbour than others.
+            if setting.is_none() {
+                threads.spacing.clear();
+            }
+        }
         let draft = Draft::repeat_of(&self.warp_over, &mut threads)?;
         let colors = sides.map(|side| if take.colors { side.colors.clone() } else { Vec::new() });
         let count = sides.map(|side| side.count as u32);
@@ -126,6 +132,8 @@ mod tests {
         let cloth = woven(&half);
         assert_eq!((cloth.radius, cloth.spacing), ([None, Some(0.25)], [None, Some(2.0)]));
         assert!(cloth.notes[0].contains("of no thickness"), "{:?}", cloth.notes);
+        let uneven = woven(&format!("{half}[WARP SPACING]\n1=0.25\n[WEFT SPACING]\n1=1\n"));
+        assert_eq!(uneven.threads.map(|t| t.spacing), [vec![], vec![2.0 / 3.0, 4.0 / 3.0]]);
         // Who leaves the thickness aside takes the spacing for the yarn's own.
         let file = super::super::parse(half.as_bytes()).unwrap();
         let cloth = file.woven(WifUse { thickness: false, ..WifUse::default() }).unwrap();
