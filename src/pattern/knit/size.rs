@@ -308,7 +308,7 @@ pub fn fits_stitch(width: f64, height: f64, yarn: &Thickness) -> Result<(), Misf
         height * d,
         length * yarn.unit()
     );
-    let hint = format!("at most {:.1} x {:.1}, or yarn of a radius of {radius:.3}", across / by, up / by);
+    let hint = format!("at most {:.1} x {:.1}, or yarn of a radius of {radius:.3} mm", across / by, up / by);
     Err(Misfit { key: None, problem, hint })
 }
 
