@@ -481,4 +481,9 @@ fn info_and_render_warn_alike_and_once() {
     for warning in told {
         assert!(rendered.contains(&format!("warning: {warning}\n")) && !warning.contains("warning"), "{rendered}");
     }
+    let made = yarnray(d, &["make", "weave", "--draft", "##.", "--draft", "##.", "-o", "w.bcc"]).good().stderr;
+    assert!(
+        made.contains("note: this draft does not interlace: warp 1, 2, 3 of each 3 x 2 never change sides"),
+        "{made}"
+    );
 }

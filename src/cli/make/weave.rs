@@ -137,6 +137,9 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     drop(working);
     args.output.hold(cloth.least_points())?;
+    if let Some(problem) = piece.draft.loose_in_words().filter(|_| !args.output.quiet) {
+        log::say(&format!("note: {problem}; warps count from the left, wefts from the bottom"));
+    }
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {

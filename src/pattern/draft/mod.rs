@@ -215,6 +215,21 @@ impl Draft {
             (0..wefts).filter(|&i| one_side(Box::new((0..warps).map(move |j| self.warp_over(i, j))))).collect(),
         ]
     }
+
+    /// Which yarns hold nothing, counted from 1 and in words, if any do.
+    pub fn loose_in_words(&self) -> Option<String> {
+        const TOLD: usize = 8;
+        let told = |(side, places): (&str, &Vec<usize>)| {
+            let list: Vec<String> = places.iter().take(TOLD).map(|p| (p + 1).to_string()).collect();
+            let more = if places.len() > TOLD { ", ..." } else { "" };
+            (!places.is_empty()).then(|| format!("{side} {}{more}", list.join(", ")))
+        };
+        let loose: Vec<String> = ["warp", "weft"].into_iter().zip(&self.loose()).filter_map(told).collect();
+        (!loose.is_empty()).then(|| {
+            let (yarns, warps, wefts) = (loose.join(" and "), self.warps(), self.wefts());
+            format!("this draft does not interlace: {yarns} of each {warps} x {wefts} never change sides")
+        })
+    }
 }
 
 #[cfg(test)]

@@ -289,25 +289,8 @@ fn in_turns(entry: &str) -> Vec<String> {
 
 /// Yarns that always stay on one side are held by nothing.
 fn warn_about_loose(table: &Reader<'_>, draft: &Draft) {
-    let loose = draft.loose();
-    let told: Vec<String> = ["warp", "weft"]
-        .iter()
-        .zip(&loose)
-        .filter(|(_, places)| !places.is_empty())
-        .map(|(side, places)| {
-            let list: Vec<String> = places.iter().take(8).map(|p| (p + 1).to_string()).collect();
-            let more = if places.len() > 8 { ", ..." } else { "" };
-            format!("{side} {}{more}", list.join(", "))
-        })
-        .collect();
-    if !told.is_empty() {
-        let message = format!(
-            "this draft does not interlace: {} of each {} x {} never change sides",
-            told.join(" and "),
-            draft.warps(),
-            draft.wefts()
-        );
-        table.warning_at("draft", message, Some("warps count from the left, wefts from the bottom"));
+    if let Some(problem) = draft.loose_in_words() {
+        table.warning_at("draft", problem, Some("warps count from the left, wefts from the bottom"));
     }
 }
 
