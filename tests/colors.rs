@@ -185,7 +185,7 @@ fn rows_and_columns_of_a_weave_are_its_wefts_and_warps() {
         "render = {{ width = 48, height = 48, spp = 24, max_bounces = 8 }}\n\
          camera = {{ type = \"frame\", projection = \"orthographic\", margin = -0.01 }}\n{YARNS}\
          [[fabric]]\nyarn = \"white\"\nsource = {{ type = \"weave\", warps = 6, wefts = 6, edges = \"live\" }}\n\
-         rows = [\"red\", \"red\", \"red\", \"white\", \"white\", \"white\"]\n\
+         rows = [\"3 red\", \"white\", \"2 white\"]\n\
          columns = [\"blue\", \"blue\", \"blue\", \"white\", \"white\", \"white\"]\n"
     );
     let picture = render(&scene, &[]);

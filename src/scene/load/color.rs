@@ -60,12 +60,16 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
         context.check_yarn(span, name, library);
     };
     let names = |key: &str| -> Vec<String> {
-        let names = table.strings(key);
-        names.iter().for_each(|(name, span)| known(name, *span));
-        if names.is_empty() && table.has(key) {
+        let entries = table.strings(key);
+        if entries.is_empty() && table.has(key) {
             table.error_at(key, format!("`{key}` names no yarn"), None);
         }
-        names.into_iter().map(|(name, _)| name.to_owned()).collect()
+        let turns = entries.into_iter().flat_map(|(entry, span)| {
+            let names = in_turns(entry);
+            names.first().inspect(|name| known(name, span));
+            names
+        });
+        turns.collect()
     };
     let layout = Layout {
         rows: names("rows"),
@@ -83,6 +87,15 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
         Variation { seed, radius, phase, color, tension }
     });
     ColorPlan { layout, tint, variation, header: table.header() }
+}
+
+/// `"navy"`, or `"4 navy"` for four of them.
+pub(super) fn in_turns(entry: &str) -> Vec<String> {
+    let counted = entry.split_once(' ').and_then(|(count, name)| Some((count.parse::<usize>().ok()?, name.trim())));
+    match counted {
+        Some((count @ 1..=10_000, name)) => vec![name.to_owned(); count],
+        _ => vec![entry.to_owned()],
+    }
 }
 
 const SAME_BUILD: &str = "yarns that take turns within a fabric differ in their fibres only";

@@ -2,7 +2,7 @@
 
 use super::{
     Context, Range, Reader,
-    color::{ColorPlan, FabricCoordinates},
+    color::{ColorPlan, FabricCoordinates, in_turns},
     draft_picture, gauge,
     known_yarns::KnownYarns,
 };
@@ -276,15 +276,6 @@ fn edges(table: &Reader<'_>, context: &Context<'_>, half_room: f64, drafted: Opt
         table.error_at(at, problem, Some(&format!("edges = \"{}\"", instead.name())));
     }
     edges
-}
-
-/// `"navy"`, or `"4 navy"` for four of them.
-fn in_turns(entry: &str) -> Vec<String> {
-    let counted = entry.split_once(' ').and_then(|(count, name)| Some((count.parse::<usize>().ok()?, name.trim())));
-    match counted {
-        Some((count @ 1..=10_000, name)) => vec![name.to_owned(); count],
-        _ => vec![entry.to_owned()],
-    }
 }
 
 /// Yarns that always stay on one side are held by nothing.
