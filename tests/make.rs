@@ -390,6 +390,18 @@ fn make_garment_writes_the_yarns_of_any_scene() {
     let run = yarnray(d, &["make", "garment", "s.toml", "-o", "y.txt"]).good();
     assert!(run.stderr.contains("1 yarn, ") && !run.stderr.contains("stitch"), "{}", run.stderr);
     assert!(!curve_file::read(&d.join("y.txt"), &ReadOptions::default()).unwrap().curves.is_empty());
+    // What a format does not say is said, and only there.
+    let told = "y.txt: its points are those of B-splines, which its format does not say";
+    assert!(run.stderr.contains(told), "{}", run.stderr);
+    let run = yarnray(d, &["make", "garment", "s.toml", "-o", "y.bcc", "-o", "y.usda"]).good();
+    assert!(!run.stderr.contains("B-splines"), "{}", run.stderr);
+    // The scene and its files tell one length of yarn.
+    let told = |file: &str| -> serde_json::Value {
+        serde_json::from_str(&yarnray(d, &["info", file, "--json"]).good().stdout).unwrap()
+    };
+    let lengths = ["y.bcc", "y.usda"].map(|file| told(file)["length"].as_f64().unwrap());
+    let of_scene = told("s.toml")["fabrics"][0]["length_mm"].as_f64().unwrap();
+    assert!(lengths.iter().all(|l| (l / of_scene - 1.0).abs() < 1e-4), "{lengths:?} {of_scene}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     Failure,
-    curve_files::{refuse_unknown, write_curves},
+    curve_files::{abilities, refuse_unknown, write_curves},
     files::Files,
     level::LevelArgs,
     log, positive,
@@ -14,7 +14,6 @@ use super::{
 use crate::{
     files::{
         curve_file::{self, ReadOptions, SOME_RADIUS},
-        extension,
         stage::PrimPattern,
     },
     geometry::{
@@ -78,35 +77,6 @@ fn counts(text: &str) -> Result<[u32; 2], String> {
 /// Millimetres of a unit by its name, which clap has checked.
 fn millimetres(unit: &str) -> f64 {
     UNITS.iter().find(|(name, _)| *name == unit).map_or(1.0, |(_, mm)| *mm)
-}
-
-/// What a format can say.
-struct Abilities {
-    radii: bool,
-    /// Whether radii change along a curve.
-    varying: bool,
-    /// Whether it has a unit; such a format needs radii as well.
-    unit: bool,
-    colors: bool,
-    ids: bool,
-    bases: &'static [Basis],
-}
-
-/// By the extension of a file that can be written.
-fn abilities(path: &Path) -> Abilities {
-    let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
-    let least = Abilities { radii: true, varying: true, unit: false, colors: false, ids: false, bases: &[] };
-    let extension = extension(path);
-    match extension.as_deref() {
-        Some("bcc") => Abilities { radii: false, bases: all, ..least },
-        Some("hair") => Abilities { bases: &[Basis::CatmullRom], ..least },
-        Some("obj") => Abilities { radii: false, ..least },
-        Some("yarns") => {
-            Abilities { varying: false, colors: true, bases: &[Basis::CatmullRom, Basis::BSpline], ..least }
-        }
-        Some("usd" | "usda" | "usdc") => Abilities { unit: true, colors: true, ids: true, bases: all, ..least },
-        _ => least,
-    }
 }
 
 /// What is lost on the way to a file, and what it needs and was not given, one line each.

@@ -3,7 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::{Failure, files::Attempts, log, working::Working};
-use crate::{files::curve_file, geometry::curve::CurveSet, image::whole_file, math::words::counted};
+use crate::{
+    files::{curve_file, extension},
+    geometry::curve::{Basis, CurveSet},
+    image::whole_file,
+    math::words::counted,
+};
 
 /// Refuses names of files whose format is not written.
 pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
@@ -16,6 +21,41 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
     }
 }
 
+/// What a format can say.
+pub(super) struct Abilities {
+    pub(super) radii: bool,
+    /// Whether radii change along a curve.
+    pub(super) varying: bool,
+    /// Whether it has a unit; such a format needs radii as well.
+    pub(super) unit: bool,
+    pub(super) colors: bool,
+    pub(super) ids: bool,
+    pub(super) bases: &'static [Basis],
+}
+
+/// By the extension of a file that can be written.
+pub(super) fn abilities(path: &Path) -> Abilities {
+    let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
+    let least = Abilities { radii: true, varying: true, unit: false, colors: false, ids: false, bases: &[] };
+    let extension = extension(path);
+    match extension.as_deref() {
+        Some("bcc") => Abilities { radii: false, bases: all, ..least },
+        Some("hair") => Abilities { bases: &[Basis::CatmullRom], ..least },
+        Some("obj") => Abilities { radii: false, ..least },
+        Some("yarns") => {
+            Abilities { varying: false, colors: true, bases: &[Basis::CatmullRom, Basis::BSpline], ..least }
+        }
+        Some("usd" | "usda" | "usdc") => Abilities { unit: true, colors: true, ids: true, bases: all, ..least },
+        _ => least,
+    }
+}
+
+/// Whether a file would be read as other curves than B-splines that go into it.
+fn leaves_out_splines(path: &Path, set: &CurveSet) -> bool {
+    let can = abilities(path);
+    set.curves.iter().any(|c| c.basis == Basis::BSpline && !can.bases.contains(&c.basis))
+}
+
 /// Writes curves to every file that can be written, and says what they hold.
 pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Result<(), Failure> {
     let mut attempts = Attempts::default();
@@ -23,6 +63,13 @@ pub(super) fn write_all(paths: &[PathBuf], set: &CurveSet, quiet: bool) -> Resul
         let _working = Working::on(format!("writing {}", path.display()), quiet);
         if attempts.note(write_curves(path, set)) && !quiet {
             log::say(&format!("wrote {}", path.display()));
+            if leaves_out_splines(path, set) {
+                let hint = "give `basis = \"b-spline\"` where it is read";
+                log::say(&format!(
+                    "{}: its points are those of B-splines, which its format does not say: {hint}",
+                    path.display()
+                ));
+            }
         }
     }
     if !quiet {

@@ -20,6 +20,7 @@ use crate::{
     },
     geometry::{
         curve::{Basis, Curve, CurveSet},
+        length::length,
         overlap::{Overlap, TOLERATED, overlap, overlap_of_plied},
         proposal::{self, Proposal},
         strand::Folds,
@@ -186,7 +187,7 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     let low = all().copied().reduce(DVec3::min).unwrap_or_default();
     let high = all().copied().reduce(DVec3::max).unwrap_or_default();
     // A sum of nothing is -0.
-    let length = set.curves.iter().map(Curve::polygon_length).fold(0.0, |a, b| a + b);
+    let length = set.curves.iter().map(length).fold(0.0, |a, b| a + b);
     let basis = match set.curves.first().map(|c| c.basis) {
         Some(Basis::CatmullRom) => "catmull-rom",
         Some(Basis::BSpline) => "b-spline",
@@ -259,9 +260,9 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     (report, text)
 }
 
-/// Length of a fabric's curves, millimetres, from point to point.
-fn length(fabric: &Fabric) -> f64 {
-    fabric.curves.iter().map(|(c, _)| c.polygon_length()).sum()
+/// Length of a fabric's curves, millimetres.
+fn length_of(fabric: &Fabric) -> f64 {
+    fabric.curves.iter().map(|(c, _)| length(c)).sum()
 }
 
 /// A garment for programs: all that is known of it.
@@ -387,7 +388,7 @@ impl<'a> SceneFacts<'a> {
             };
             json!({
                 "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
-                "segments": estimate.segments, "length_mm": length(f), "tight_bends": estimate.tight_bends,
+                "segments": estimate.segments, "length_mm": length_of(f), "tight_bends": estimate.tight_bends,
             })
         });
         let fabrics: Vec<Value> = fabrics.collect();
@@ -490,7 +491,7 @@ fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
         "  fabric    {}: {} {of}, {:.1} m, {} given, {} to make\n",
         fabric.origin,
         counted(fabric.curves.len() - fabric.tufts.strands.len(), noun),
-        length(fabric) / 1000.0,
+        length_of(fabric) / 1000.0,
         counted(fabric.control_points(), "point"),
         counted(estimate.segments, "segment")
     )

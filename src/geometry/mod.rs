@@ -8,6 +8,7 @@ pub mod curve;
 pub(crate) mod density;
 pub mod fiber;
 pub(crate) mod gaps;
+pub mod length;
 pub mod material_indices;
 pub mod mesh;
 pub(crate) mod occluder;
