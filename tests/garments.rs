@@ -284,8 +284,27 @@ fn cloth_that_has_no_room_is_an_error() {
     write(d, "s.toml", scene("path = \"g.obj\", scale = 0.02", "", STILL));
     let run = yarnray(d, &["make", "garment", "s.toml", "-o", "y.txt"]);
     assert_eq!(run.status, Some(2), "{}", run.stderr);
-    assert!(run.stderr.contains("no panel has room for a stitch of 4.000 x 3.000 mm"), "{}", run.stderr);
+    // Each panel is 80 x 80 mm without the scale.
+    let told = "no panel has room for a stitch of 4.000 x 3.000 mm: the largest has an area of 2.560 mm2";
+    assert!(run.stderr.contains(told), "{}", run.stderr);
     assert!(!d.join("y.txt").exists());
+}
+
+#[test]
+fn info_says_which_panels_stand_on_their_heads() {
+    let folder = directory();
+    let d = folder.path();
+    let down = |at: &dyn Fn(f64, f64) -> Point, fabric: &str| {
+        write(d, "g.obj", mesh(at));
+        write(d, "s.toml", scene("path = \"g.obj\"", fabric, STILL));
+        let told = yarnray(d, &["info", "s.toml"]).good().stdout;
+        told.lines().find(|l| l.contains("go down")).map(str::to_owned)
+    };
+    let told = down(&|u, v| [-u, -v, 0.0], "").unwrap();
+    assert!(told.contains("2 panels with wales that go down") && told.contains("`left`"), "{told}");
+    assert_eq!(down(&|u, v| [-u, -v, 0.0], "grain = 180"), None);
+    assert_eq!(down(&flat, ""), None);
+    assert_eq!(down(&|u, v| [u, 0.0, -v], ""), None);
 }
 
 /// `info` lays nothing, but reads the body: one that is not there is an error, one with a rim a warning, in words of its own.

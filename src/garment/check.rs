@@ -49,7 +49,7 @@ pub(super) fn upright(
 }
 
 /// A garment without a single stitch.
-pub(super) fn has_room(lattices: &[Lattice], options: &Options) -> Result<(), GarmentError> {
+pub(super) fn has_room(lattices: &[Lattice], panels: &[Panel], options: &Options) -> Result<(), GarmentError> {
     if lattices.iter().any(|l| l.stitches > 0) {
         return Ok(());
     }
@@ -58,7 +58,11 @@ pub(super) fn has_room(lattices: &[Lattice], options: &Options) -> Result<(), Ga
         return Err(GarmentError::new(problem, "a place on the cloth in its first frame, or a larger radius"));
     }
     let stitch = options.cloths[0].tile.stitch();
-    let problem = format!("no panel has room for a stitch of {:.3} x {:.3} mm", stitch.x, stitch.y);
+    let largest = panels.iter().map(|p| p.area).fold(0.0, f64::max);
+    let problem = format!(
+        "no panel has room for a stitch of {:.3} x {:.3} mm: the largest has an area of {largest:.3} mm2",
+        stitch.x, stitch.y
+    );
     Err(GarmentError::new(problem, "a finer gauge, another `unit`, or is the mesh cut short?"))
 }
 

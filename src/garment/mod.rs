@@ -109,7 +109,7 @@ impl Garment {
             .enumerate()
             .map(|(panel, border)| Lattice::new(&grounds[panel], panel as u32, border, &sewing.division(panel), &lays))
             .collect();
-        check::has_room(&lattices, &options)?;
+        check::has_room(&lattices, &panels.panels, &options)?;
         check::flat(&lattices, &panels.panels)?;
         let mut edgings = sewing.edgings(&pose, &borders, &lattices);
         edgings.retain(|e| e.way.vertices.iter().any(|&v| wanted(pose.vertex(v).0)));

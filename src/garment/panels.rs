@@ -139,6 +139,28 @@ impl Panels {
         all.into_iter().map(of_kind).collect()
     }
 
+    /// Says which panels have wales that go down, for v of texture coordinates is upwards on the body; `points` are welded, mm.
+    pub(super) fn note_upside_down(&self, points: &[DVec3], notes: &mut Vec<String>) {
+        // Share of a wale's way, in the mean, that goes down: sleeves go aside, and what lies flat forwards.
+        const DOWN: f64 = 0.5;
+        let mut ways = vec![(DVec3::ZERO, 0.0); self.panels.len()];
+        for (i, panel) in self.of_face.iter().enumerate() {
+            let corners = self.sewn[i].map(|p| points[p as usize]);
+            let [_, up] = axes(corners, self.cut[i].map(|c| self.uvs[c as usize]));
+            let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+            let (way, all) = &mut ways[*panel as usize];
+            *way += area * up.normalize_or_zero();
+            *all += area;
+        }
+        let mut down = Counted::default();
+        for (panel, (way, all)) in self.panels.iter().zip(ways) {
+            if way.y < -DOWN * all {
+                down.add(&panel.group, panel.line);
+            }
+        }
+        down.note("panel", "with wales that go down, so that stitches stand on their heads; `grain` turns them", notes);
+    }
+
     /// Welded points of a frame, mm.
     pub(super) fn points(&self, mesh: &GarmentMesh, unit_mm: f64) -> Vec<DVec3> {
         self.welded.iter().map(|&i| mesh.points[i as usize] * unit_mm).collect()

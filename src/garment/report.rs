@@ -47,6 +47,7 @@ impl Report {
         options: &Options,
     ) -> Self {
         let mut notes = panels.notes.clone();
+        panels.note_upside_down(points, &mut notes);
         for (lattice, panel) in lattices.iter().zip(&panels.panels) {
             if lattice.stitches == 0 && options.near.is_none() {
                 notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
