@@ -248,17 +248,23 @@ fn wild_loop(stream: &mut Stream, tightest: f64) -> Strands {
     let n = 200;
     let points: Vec<DVec3> = (0..n).map(|i| size * raw(TAU * f64::from(i) / f64::from(n))).collect();
     let curve = Curve { basis: Basis::CatmullRom, closed: true, points, radii: None, flattening: None };
-    let options = StrandOptions {
-        basis: Basis::BSpline,
-        tolerance: 0.005,
-        longest_segment: 1.5,
-        ply_rate: 0.6,
-        symmetry: TAU / 3.0,
+    let basis = Basis::BSpline;
+    let options = StrandOptions { tolerance: 0.005, longest_segment: 1.5, ..strand_options(basis, 0.6, TAU / 3.0) };
+    Strands::new(&[(curve, vec![1.0; n as usize])], &options)
+}
+
+/// Through a curve's own points.
+fn strand_options(basis: Basis, ply_rate: f64, symmetry: f64) -> StrandOptions {
+    StrandOptions {
+        basis,
+        tolerance: 0.0,
+        longest_segment: f64::INFINITY,
+        ply_rate,
+        symmetry,
         phases: vec![0.4],
         distances: false,
         unevenness: None,
-    };
-    Strands::new(&[(curve, vec![1.0; n as usize])], &options)
+    }
 }
 
 #[test]
@@ -721,16 +727,7 @@ fn dive(shape: &YarnShape, bend: f64) -> Strands {
     let short = |i: u32| (0.5 * DVec3::new(0.0, -STEEP * (rate * place(i)).cos(), 1.0).normalize()).as_vec3();
     let flattening = Some((0..count).map(short).collect());
     let curve = Curve { basis: Basis::CatmullRom, closed: false, points, radii: None, flattening };
-    let options = StrandOptions {
-        basis: Basis::CatmullRom,
-        tolerance: 0.0,
-        longest_segment: f64::INFINITY,
-        ply_rate: f64::from(shape.ply_rate),
-        symmetry: shape.symmetry,
-        phases: vec![0.4],
-        distances: false,
-        unevenness: None,
-    };
+    let options = strand_options(Basis::CatmullRom, f64::from(shape.ply_rate), shape.symmetry);
     Strands::new(&[(curve, vec![1.0; count as usize])], &options)
 }
 

@@ -11,9 +11,9 @@ use super::{
     CellOptions,
     beside::Beside,
     energy::{Energy, HELD, PER_NODE, SEARCH, Scratch, minimize_alike},
+    parts::Part,
     precondition::{Preconditioner, Stretch},
 };
-use crate::pattern::draft::Draft;
 
 /// About how many warps and wefts a block has.
 const BLOCK: usize = 40;
@@ -119,7 +119,7 @@ impl Whole<'_> {
         self.kinds.iter().for_each(|kind| *often.entry(*kind).or_default() += 1);
         let mut alike: HashMap<[usize; 4], Vec<usize>> = HashMap::new();
         for_nodes(&self.energy, |side, yarn, node| {
-            let kinds = self.between(side, yarn, node).map(|crossing| self.kinds[crossing]);
+            let kinds = self.energy.between(side, yarn, node).map(|crossing| self.kinds[crossing]);
             if !self.stays(side, yarn, node) && kinds.iter().all(|kind| often[kind] > 1) {
                 let key = [side, node % self.energy.nodes, kinds[0], kinds[1]];
                 alike.entry(key).or_default().push(self.energy.at(side, yarn, node));
@@ -136,8 +136,8 @@ impl Whole<'_> {
     /// The force on each spacing, for each crossing.
     pub(super) fn forces(&self) -> [f64; 2] {
         let force = |block: &Block| {
-            let draft = self.energy.draft.part(block.first, block.count);
-            let mut energy = self.energy_of(block, &draft);
+            let part = Part::of(&self.energy, block.first, block.count);
+            let mut energy = self.energy_of(&part);
             let crossings = (0..block.count[1]).flat_map(|weft| (0..block.count[0]).map(move |warp| [warp, weft]));
             energy.counted = crossings.map(|at| block.owns(at)).collect();
             let x = self.variables(block, &energy);
@@ -151,8 +151,8 @@ impl Whole<'_> {
 
     /// Where in the whole the free nodes of a block are, and what they came to.
     fn relax_block(&self, block: &Block, lines: &[Vec<f64>; 2], most: usize) -> Vec<(usize, [f64; PER_NODE])> {
-        let draft = self.energy.draft.part(block.first, block.count);
-        let mut energy = self.energy_of(block, &draft);
+        let part = Part::of(&self.energy, block.first, block.count);
+        let mut energy = self.energy_of(&part);
         let Free { nodes, crossings, stretches } = self.free(block, &energy);
         if nodes.is_empty() {
             return Vec::new();
@@ -174,14 +174,10 @@ impl Whole<'_> {
         nodes.into_iter().map(|(at, there)| (there, std::array::from_fn(|c| x[at + c]))).collect()
     }
 
-    fn energy_of<'b>(&self, block: &Block, draft: &'b Draft) -> Energy<'b> {
+    /// That of a block, at the spacings of the whole.
+    fn energy_of<'b>(&self, part: &'b Part) -> Energy<'b> {
         let spacing = self.energy.spacing(&self.x).map(|s| Some(s * self.options.unit()));
-        let thickness = [0, 1].map(|side| {
-            let of = |yarn: usize| self.energy.thickness[side][(block.first[side] + yarn) % self.energy.count[side]];
-            (0..block.count[side]).map(of).collect()
-        });
-        let options = CellOptions { spacing, thickness, ..self.options.clone() };
-        Energy::new(draft, &options, self.options.unit())
+        part.energy(&CellOptions { spacing, ..self.options.clone() })
     }
 
     /// Where in the whole a node of a block is.
@@ -224,17 +220,9 @@ impl Whole<'_> {
         free
     }
 
-    /// The crossings, by their numbers, that a node of a yarn is at or between.
-    pub(super) fn between(&self, side: usize, yarn: usize, node: usize) -> [usize; 2] {
-        let (nodes, along) = (self.energy.nodes, self.energy.count[1 - side]);
-        let here = node / nodes;
-        let next = if node.is_multiple_of(nodes) { here } else { (here + 1) % along };
-        [here, next].map(|c| if side == 0 { c * self.energy.count[0] + yarn } else { yarn * self.energy.count[0] + c })
-    }
-
     /// Whether a node stays as it is.
     pub(super) fn stays(&self, side: usize, yarn: usize, node: usize) -> bool {
-        self.between(side, yarn, node).into_iter().all(|crossing| self.stays[crossing])
+        self.energy.between(side, yarn, node).into_iter().all(|crossing| self.stays[crossing])
     }
 
     fn beside(&self, block: &Block, energy: &Energy<'_>, x: &[f64], lines: &[Vec<f64>; 2]) -> Beside {

@@ -108,7 +108,7 @@ impl Whole<'_> {
                     }
                     let at = self.energy.at(side, yarn, node);
                     let begun = [self.x[at], self.x[at + 1], self.energy.rest[side]];
-                    let [here, next] = self.between(side, yarn, node).map(|crossing| nearest[crossing]);
+                    let [here, next] = self.energy.between(side, yarn, node).map(|crossing| nearest[crossing]);
                     let of = |place: Option<Place>, step: usize, back: usize| {
                         place.map_or(begun, |place| in_part(parts, place, side, step, back))
                     };

@@ -31,6 +31,12 @@ impl Part {
         });
         Self { draft: whole.draft.part(first, count), thickness, share: 1.0 }
     }
+
+    /// What it is relaxed by as a repeat; spacings are those of `options`.
+    pub(super) fn energy(&self, options: &CellOptions) -> Energy<'_> {
+        let options = CellOptions { thickness: self.thickness.clone(), ..options.clone() };
+        Energy::new(&self.draft, &options, options.unit())
+    }
 }
 
 /// Parts of a cloth, each with what it is relaxed by and its variables.
@@ -45,11 +51,7 @@ pub(super) struct Parts<'a> {
 impl<'a> Parts<'a> {
     /// Parts in an open cloth.
     pub(super) fn new(parts: &'a [Part], options: &CellOptions) -> Self {
-        let unit = options.unit();
-        let energy = |part: &'a Part| {
-            Energy::new(&part.draft, &CellOptions { thickness: part.thickness.clone(), ..options.clone() }, unit)
-        };
-        let mut energies: Vec<Energy<'a>> = parts.iter().map(energy).collect();
+        let mut energies: Vec<Energy<'a>> = parts.iter().map(|part| part.energy(options)).collect();
         let crossings = |energy: &Energy<'_>| (energy.count[0] * energy.count[1]) as f64;
         let all: f64 = energies.iter().map(crossings).sum();
         let weights =
@@ -107,34 +109,22 @@ impl<'a> Parts<'a> {
         let mut scratch: Vec<Scratch> = self.x.iter().map(|_| Scratch::default()).collect();
         let (energies, weights, own) = (&self.energies, &self.weights, &mut self.x);
         let value = |x: &[f64], g: &mut [f64]| {
-            let (nodes, spacing) = x.split_at(x.len() - 2);
-            let (mut sum, mut first) = (0.0, 0);
-            g[nodes.len()..].fill(0.0);
-            let rooms = own.iter_mut().zip(&mut gradients).zip(&mut scratch);
+            hand_out(x, own);
+            let (mut sum, mut nodes) = (0.0, g);
+            let spacing = nodes.split_off_mut(x.len() - 2..).expect("spacings are last");
+            spacing.fill(0.0);
+            let rooms = own.iter().zip(&mut gradients).zip(&mut scratch);
             for ((energy, weight), ((own, gradient), scratch)) in energies.iter().zip(weights).zip(rooms) {
-                let count = own.len() - 2;
-                own[..count].copy_from_slice(&nodes[first..first + count]);
-                own[count..].copy_from_slice(spacing);
                 sum += weight * energy.value(own, gradient, scratch);
-                for (g, by) in g[first..first + count].iter_mut().zip(&gradient[..count]) {
-                    *g = weight * by;
-                }
-                for (g, by) in g[nodes.len()..].iter_mut().zip(&gradient[count..]) {
-                    *g += weight * by;
-                }
-                first += count;
+                let (by_nodes, by_spacing) = gradient.split_at(own.len() - 2);
+                let of_part = nodes.split_off_mut(..by_nodes.len()).expect("every part has its nodes");
+                of_part.iter_mut().zip(by_nodes).for_each(|(g, by)| *g = weight * by);
+                spacing.iter_mut().zip(by_spacing).for_each(|(g, by)| *g += weight * by);
             }
             sum
         };
         minimize_alike(&mut x, &follows, value, Search { most, ..SEARCH }, None);
-        let (nodes, spacing) = x.split_at(x.len() - 2);
-        let mut first = 0;
-        for own in &mut self.x {
-            let count = own.len() - 2;
-            own[..count].copy_from_slice(&nodes[first..first + count]);
-            own[count..].copy_from_slice(spacing);
-            first += count;
-        }
+        hand_out(&x, &mut self.x);
     }
 
     /// The force on each spacing, for each crossing of the cloth.
@@ -163,5 +153,16 @@ impl<'a> Parts<'a> {
         let columns = directions.iter().map(column).collect();
         self.relax_at(spacing, 0);
         columns
+    }
+}
+
+/// Gives each part its own of the variables of all: nodes of one part after the other, then the spacings of all.
+fn hand_out(x: &[f64], parts: &mut [Vec<f64>]) {
+    let (mut nodes, spacing) = x.split_at(x.len() - 2);
+    for own in parts {
+        let (of_part, rest) = nodes.split_at(own.len() - 2);
+        own[..of_part.len()].copy_from_slice(of_part);
+        own[of_part.len()..].copy_from_slice(spacing);
+        nodes = rest;
     }
 }

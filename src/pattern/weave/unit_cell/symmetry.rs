@@ -22,10 +22,8 @@ impl Energy<'_> {
         for side in 0..2 {
             let nodes = (0..self.count[side]).flat_map(|yarn| (0..self.length(side)).map(move |k| (yarn, k)));
             for (yarn, k) in nodes {
-                let (crossing, between) = (k / self.nodes, k % self.nodes);
-                let next = if between == 0 { crossing } else { (crossing + 1) % self.count[1 - side] };
-                let of = |c: usize| if side == 0 { around[c][yarn] } else { around[yarn][c] };
-                let node = number(&mut numbers, (side, between, of(crossing), of(next)));
+                let [here, next] = self.between(side, yarn, k).map(|c| around[c / self.count[0]][c % self.count[0]]);
+                let node = number(&mut numbers, (side, k % self.nodes, here, next));
                 alike.extend((0..PER_NODE).map(|c| PER_NODE * node + c));
             }
         }
@@ -33,6 +31,13 @@ impl Energy<'_> {
         let nodes = PER_NODE * numbers.len();
         alike.extend([nodes, nodes + 1]);
         alike
+    }
+
+    /// The crossings that a node of a yarn is at or between, by their numbers, those of the lowest weft first.
+    pub(super) fn between(&self, side: usize, yarn: usize, node: usize) -> [usize; 2] {
+        let here = node / self.nodes;
+        let next = if node.is_multiple_of(self.nodes) { here } else { (here + 1) % self.count[1 - side] };
+        [here, next].map(|c| if side == 0 { c * self.count[0] + yarn } else { yarn * self.count[0] + c })
     }
 }
 
