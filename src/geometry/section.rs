@@ -268,9 +268,10 @@ impl<'a> Section<'a> {
                 return;
             }
             let passage = passing.as_it_goes(ply.core_radius);
-            let Passage { enter, exit, offset, .. } = passage;
+            let Passage { enter, exit, offset, stretched, .. } = passage;
             let length = passage.speed / self.cos;
-            let chord = ply.chord(passage.offset, length, self.thinness(), self.squeeze() / self.rounded());
+            let wide = self.squeeze() / (self.rounded() * stretched);
+            let chord = ply.chord(passage.offset, length, self.thinness(), wide);
             let gaps = PlyGaps::new(ply.dead_zone(&chord, passage.offset, length));
             let fibers =
                 chord.total() * passage.share / self.cos * self.fibers_over_chord(shape, index, &way, &enter, &exit);
@@ -305,8 +306,9 @@ impl<'a> Section<'a> {
         let mut pass = |way: &[Station]| {
             // Measured of pressed yarns alone: of round ones light from behind, which is too little, became less.
             let bent = from.pressed.is_some() && way::is_bent(way);
-            let mut ahead = |ply: usize, Passage { offset, foot, speed, .. }: Passage| {
-                visit(PlyAhead { ply, offset, foot: foot * cos, length: speed / cos, way, start, bent, cos });
+            let mut ahead = |ply: usize, Passage { offset, foot, speed, stretched, .. }: Passage| {
+                let (foot, length) = (foot * cos, speed / cos);
+                visit(PlyAhead { ply, offset, foot, length, stretched, way, start, bent, cos });
             };
             if bent {
                 return way::bent_passages(way, &shape.plies, &shape.fours, &mut ahead);

@@ -55,6 +55,9 @@ pub(crate) struct Passage {
     pub offset: f32,
     /// Length in that circle of one unit of depth: in the mean of the passage.
     pub speed: f32,
+    /// How much longer a step of the way is in that circle than in the round yarn's section, where it is nearest to the axis: 1 if the ply is
+    /// round.
+    pub stretched: f32,
     /// The share of the chord through the core that the way has: less than 1 where it begins or ends inside.
     pub share: f32,
 }
@@ -337,7 +340,8 @@ pub(super) struct Passing {
 impl Passing {
     #[inline]
     fn at(a: &Station) -> Self {
-        let passage = Passage { enter: *a, exit: *a, foot: a.depth, offset: 0.0, speed: 0.0, share: 1.0 };
+        let passage =
+            Passage { enter: *a, exit: *a, foot: a.depth, offset: 0.0, speed: 0.0, stretched: 1.0, share: 1.0 };
         Self { nearest: f32::INFINITY, depth: a.depth, passage, core: false, whole: [false; 2] }
     }
 
@@ -360,6 +364,9 @@ impl Passing {
             let ahead = length * (u - outward / curve);
             passage.foot = a.depth + ahead.clamp(-FARTHEST_FOOT, FARTHEST_FOOT);
             passage.speed = curve.sqrt() / length;
+            if ply.stretch.x != 1.0 {
+                passage.stretched = (square / way.slope_at(u).length_squared().max(1e-24)).sqrt();
+            }
             if ENDS && !self.core {
                 passage.enter = way.station(a, b, u);
                 passage.exit = passage.enter;

@@ -97,6 +97,8 @@ pub struct PlyAhead<'w> {
     pub foot: f32,
     /// Length in the circle of one unit of that distance.
     pub length: f32,
+    /// How much longer a step there is in the circle than in the round yarn: 1 if the ply is round.
+    pub stretched: f32,
     /// The whole way, from `start` in the section's frame.
     pub(super) way: &'w [Station],
     pub(super) start: Vec3A,

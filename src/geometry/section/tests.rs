@@ -1,4 +1,4 @@
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
@@ -47,6 +47,40 @@ fn ray(theta: f32, phi: f32, h: f32) -> (Vec3A, Vec3A) {
 fn section_of(place: &YarnFrame, theta: f32, phi: f32, h: f32) -> Section<'static> {
     let (origin, direction) = ray(theta, phi, h);
     Section::new(place, origin, direction, true)
+}
+
+#[test]
+fn fibers_of_an_elliptical_ply_keep_their_width_along_both_axes() {
+    let ply = PlyParameters {
+        radius: 0.6,
+        aspect: 0.5,
+        distance: 0.0,
+        angle: 0.0,
+        fibers: 20,
+        fiber_radius: 0.09,
+        fiber_twist: 0.0,
+    };
+    let shape = YarnShape::new(std::slice::from_ref(&ply), 0.0, true);
+    let straight = YarnFrame { phase: 0.0, ..place() };
+    const RAYS: i32 = 4000;
+    for (phi, reach) in [(0.0, ply.long_axis()), (FRAC_PI_2, ply.short_axis())] {
+        let (mut all, mut moment) = (0.0, 0.0);
+        for i in 0..RAYS {
+            let h = 2.0 * (f64::from(i) + 0.5) / f64::from(RAYS) - 1.0;
+            let section = section_of(&straight, 0.0, phi as f32, h as f32);
+            let mut crossings = Crossings::new();
+            section.crossings(&shape, &mut crossings);
+            let fibers: f64 = crossings.iter().map(|c| f64::from(c.fibers)).sum();
+            all += fibers;
+            moment += fibers * h * h;
+        }
+        let width = all * 2.0 / f64::from(RAYS);
+        let want = 2.0 * ply.fiber_radius * f64::from(ply.fibers);
+        assert!((width / want - 1.0).abs() < 2e-3, "{phi}: {width} {want}");
+        // Centres are even within the ellipse that leaves the fibres inside.
+        let want = (reach - ply.fiber_radius).powi(2) / 4.0 + ply.fiber_radius.powi(2) / 3.0;
+        assert!((moment / all / want - 1.0).abs() < 4e-3, "{phi}: {} {want}", moment / all);
+    }
 }
 
 /// The stretches of a ray inside each ply, by steps of `step` in depth until it leaves the yarn: `unwound` says where
@@ -671,7 +705,8 @@ fn light_that_goes_straight_on_meets_the_fibers_that_the_camera_has_not_met() {
                     let mut ahead = 0.0;
                     section.plies_ahead(&shape, &from, Vec3A::ZERO, w, |way| {
                         if way.ply == c.ply {
-                            let chord = shape.plies[c.ply].chord(way.offset, way.length, 1.0, from.wide(w));
+                            let chord =
+                                shape.plies[c.ply].chord(way.offset, way.length, 1.0, from.wide(w) / way.stretched);
                             ahead += way.tilt(&shape, &section, &from, w, &chord) * chord.ahead(-way.foot);
                         }
                     });
@@ -763,8 +798,8 @@ fn light_along_a_sharp_bend_meets_the_fibers_that_are_there() {
                 let (inside, w) = (section.inside(&shape, section.point(0.0), 0.0), section.to_local(w));
                 let mut fibers = 0.0;
                 section.plies_ahead(&shape, &inside, Vec3A::ZERO, w, |ahead| {
-                    let chord =
-                        shape.plies[ahead.ply].chord(ahead.offset, ahead.length, section.thinness(), inside.wide(w));
+                    let wide = inside.wide(w) / ahead.stretched;
+                    let chord = shape.plies[ahead.ply].chord(ahead.offset, ahead.length, section.thinness(), wide);
                     fibers += ahead.tilt(&shape, &section, &inside, w, &chord) * chord.ahead(-ahead.foot);
                 });
                 clear += f64::from(u8::from(!met));

@@ -93,8 +93,8 @@ pub(super) fn plies_ahead(
     let mut plies = PliesAhead::new();
     view.section.plies_ahead(shape, from, shift, w, |ahead| {
         let Some(free) = (if ahead.ply == spot.ply { own } else { Some(free) }) else { return };
-        let PlyAhead { ply, foot, offset, length, .. } = ahead;
-        let chord = shape.plies[ply].chord(offset, length, thin, wide);
+        let PlyAhead { ply, foot, offset, length, stretched, .. } = ahead;
+        let chord = shape.plies[ply].chord(offset, length, thin, wide / stretched);
         let tilt = ahead.tilt(shape, view.section, from, w, &chord);
         let fibers = FibersAhead { ply, offset, foot, tilt, chord, expected: tilt * chord.ahead(free - foot) };
         let _ = plies.try_push(fibers);

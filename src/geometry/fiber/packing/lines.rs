@@ -24,6 +24,32 @@ pub(super) struct Lines {
     pub(super) slopes: Slopes,
 }
 
+/// Fibres that a line meets, or many do.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Met {
+    pub(super) fibers: f64,
+    /// The sum of their widths across the line, over those that they had if they did not lean.
+    widths: f64,
+}
+
+impl Met {
+    fn add(&mut self, other: Self) {
+        self.fibers += other.fibers;
+        self.widths += other.widths;
+    }
+
+    /// The mean width.
+    fn width(self) -> f64 {
+        if self.fibers == 0.0 { 1.0 } else { self.widths / self.fibers }
+    }
+
+    /// As many fibres that do not lean, of which a line meets fewer by as much as they are thinner. By the rim these are more than would
+    /// be met if the fibres stood upright where they are: fibres that lean reach farther out.
+    fn across(self) -> f64 {
+        self.fibers / self.width()
+    }
+}
+
 /// Directions of lines. In an ellipse those of one quarter are like those of another; in a circle all are alike.
 const ANGLES: usize = 64;
 const QUARTER: usize = ANGLES / 4 + 1;
@@ -85,22 +111,21 @@ impl Lines {
         f64::from(chord.total()) * self.stretch.sqrt()
     }
 
-    /// Looks at lines at some distances in all directions: tells the direction's kind, and for each line how many discs of a section
-    /// it meets, as circles and as the ellipses of fibres that lean.
-    pub(super) fn look(&self, sections: &[Vec<DVec2>], offsets: &[f64], mut tell: impl FnMut(usize, &[[u32; 2]])) {
-        let mut met = vec![[0; 2]; offsets.len()];
+    /// Looks at lines at some distances in all directions: tells the direction's kind, and what each line meets of a section.
+    pub(super) fn look(&self, sections: &[Vec<DVec2>], offsets: &[f64], mut tell: impl FnMut(usize, &[Met])) {
+        let mut met = vec![Met::default(); offsets.len()];
         for angle in 0..ANGLES {
             let (across, kind) = (Self::across(angle), self.kind(angle));
             let reach = self.reach(across);
             for discs in sections {
-                met.fill([0; 2]);
+                met.fill(Met::default());
                 for disc in discs {
                     let at = disc.dot(across);
-                    let half_width = self.radius * self.slopes.half_width(*disc, across);
-                    for (offset, [circles, ellipses]) in offsets.iter().zip(&mut met) {
-                        let off = (at - reach * offset).abs();
-                        *circles += u32::from(off < self.radius);
-                        *ellipses += u32::from(off < half_width);
+                    let width = self.slopes.half_width(*disc, across);
+                    for (offset, met) in offsets.iter().zip(&mut met) {
+                        if (at - reach * offset).abs() < self.radius * width {
+                            met.add(Met { fibers: 1.0, widths: width });
+                        }
                     }
                 }
                 tell(kind, &met);
@@ -117,15 +142,15 @@ impl Lines {
         const DEPTH_STEP: f64 = 0.05;
         const MOST: f64 = 0.6;
         let offsets: [f64; LINES] = std::array::from_fn(|line| 1.0 + self.radius * (1.0 - STEP * (line as f64 + 0.5)));
-        let mut met = [[0u64; LINES]; QUARTER];
+        let mut met = [[Met::default(); LINES]; QUARTER];
         self.look(sections, &offsets, |kind, counts| {
-            met[kind].iter_mut().zip(counts).for_each(|(sum, [circles, _])| *sum += u64::from(*circles));
+            met[kind].iter_mut().zip(counts).for_each(|(sum, met)| sum.add(*met));
         });
         let mut error = |crowding: f64, depth: f64| -> f64 {
             (ply.crowding, ply.depth) = (crowding as f32, depth as f32);
             self.squares(sections, LINES, |kind, line, looks| {
                 let found = self.met(&self.chord(ply, kind, offsets[line]).0);
-                (-found).exp() - (-(met[kind][line] as f64) / looks).exp()
+                (-found).exp() - (-met[kind][line].across() / looks).exp()
             })
         };
         let mut best = (f64::INFINITY, 0.0, 0.0);
@@ -200,23 +225,21 @@ impl Lines {
         const LINES: usize = 24;
         let offsets: [f64; LINES] =
             std::array::from_fn(|line| (1.0 + self.radius) * (line as f64 + 0.5) / LINES as f64);
-        // How often a line is clear, and how many discs it meets, as circles and as ellipses.
+        // How often a line is clear, and what it meets.
         let mut clear = [[0u32; LINES]; QUARTER];
-        let mut met = [[[0u64; 2]; LINES]; QUARTER];
+        let mut met = [[Met::default(); LINES]; QUARTER];
         self.look(sections, &offsets, |kind, counts| {
-            for ((clear, met), [circles, ellipses]) in clear[kind].iter_mut().zip(&mut met[kind]).zip(counts) {
-                *clear += u32::from(*ellipses == 0);
-                met[0] += u64::from(*circles);
-                met[1] += u64::from(*ellipses);
+            for ((clear, sum), met) in clear[kind].iter_mut().zip(&mut met[kind]).zip(counts) {
+                *clear += u32::from(met.fibers == 0.0);
+                sum.add(*met);
             }
         });
-        let wider = |[circles, ellipses]: [u64; 2]| if circles == 0 { 1.0 } else { ellipses as f64 / circles as f64 };
         let mut error = |rim: f64| -> f64 {
             ply.rim = rim as f32;
             self.squares(sections, LINES, |kind, line, looks| {
                 let (chord, length) = self.chord(ply, kind, offsets[line]);
                 let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));
-                let passes = gaps.unscattered((self.met(&chord) * wider(met[kind][line])) as f32);
+                let passes = gaps.unscattered((self.met(&chord) * met[kind][line].width()) as f32);
                 f64::from(passes).sqrt() - (f64::from(clear[kind][line]) / looks).sqrt()
             })
         };

@@ -89,9 +89,9 @@ fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
         let (mut met, mut clear, mut looks) = (vec![0.0; 15], vec![0.0; 15], 0.0);
         lines.look(&packings, &offsets, |_, counts| {
             looks += 1.0;
-            for (k, [count, _]) in counts.iter().enumerate() {
-                met[k] += f64::from(*count);
-                clear[k] += f64::from(u8::from(*count == 0));
+            for (k, count) in counts.iter().enumerate() {
+                met[k] += count.fibers;
+                clear[k] += f64::from(u8::from(count.fibers == 0.0));
             }
         });
         let (mut off, mut passed, mut found, mut want) = (0.0, 0.0, 0.0, 0.0);
