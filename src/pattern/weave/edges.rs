@@ -101,14 +101,19 @@ pub(super) fn between(a: Point, b: Point, share: f64) -> Point {
     (a.0.lerp(b.0, share), a.1 + share * (b.1 - a.1), a.2.lerp(b.2, share as f32), coordinates)
 }
 
-/// Whether hems at both ends of cloth so high do not reach each other.
-pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
-    2.0 * HEM[0] * FOLDED * thickness < height
+/// How far cloth that is folded bulges beyond where it begins to turn.
+fn bulge(thickness: f64) -> f64 {
+    (FOLDED + 0.5) * thickness
 }
 
-/// Wefts that a hem takes at each end.
+/// Whether hems at both ends of cloth that is so high when it is hemmed do not reach each other.
+pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
+    2.0 * (HEM[0] * FOLDED * thickness + bulge(thickness)) < height
+}
+
+/// Wefts that a hem takes at each end, beside those of cloth as high as it is when it is hemmed.
 pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
-    let length = FOLDED * thickness * (HEM[0] + HEM[1] + PI + 0.5 * PI);
+    let length = FOLDED * thickness * (HEM[0] + HEM[1] + PI + 0.5 * PI) - bulge(thickness);
     (length / spacing).floor() as u32
 }
 
@@ -145,9 +150,9 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
     }
 }
 
-/// Folds everything beyond `half` the height to the back, twice.
-pub(super) fn hem(strands: &mut [PatternStrand], half: f64, thickness: f64) {
-    let fold = Fold { half, thickness: FOLDED * thickness };
+/// Folds both ends to the back, twice, so that what is left is so high.
+pub(super) fn hem(strands: &mut [PatternStrand], height: f64, thickness: f64) {
+    let fold = Fold { half: 0.5 * height - bulge(thickness), thickness: FOLDED * thickness };
     for strand in strands {
         let flattening = strand.curve.flattening.as_mut();
         if let Some(axes) = flattening {
@@ -163,6 +168,7 @@ pub(super) fn hem(strands: &mut [PatternStrand], half: f64, thickness: f64) {
 
 /// The way of a hem in the plane of y and z.
 struct Fold {
+    /// Where it begins to turn, from the middle of the cloth.
     half: f64,
     thickness: f64,
 }

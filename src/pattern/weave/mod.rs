@@ -461,7 +461,7 @@ impl Cloth<'_> {
             edges::fringe(self, &mut strands, length);
         }
         if edges == Edges::Finished {
-            edges::hem(&mut strands, 0.5 * size[1], thickness);
+            edges::hem(&mut strands, size[1], thickness);
         }
         self.widened(strands)
     }

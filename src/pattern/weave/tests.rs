@@ -435,7 +435,8 @@ fn hems_hide_the_ends_of_warps() {
             assert!(end.y.abs() < 0.5 * size[1] && end.z < 0.0 && end.z > -2.6 * thickness, "{end}");
         }
         let outermost = points.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
-        assert!((outermost - 0.5 * size[1] - 1.5 * thickness).abs() < 0.3 * thickness, "{outermost} {size:?}");
+        // The cloth is as high as it was asked to be, with its folds.
+        assert!((outermost - 0.5 * size[1] + 0.25 * thickness).abs() < 0.3 * thickness, "{outermost} {size:?}");
         let lengths = points.windows(2).map(|w| w[0].distance(w[1]));
         assert!(lengths.fold(0.0, f64::max) < 2.0, "points stay together");
     }
