@@ -29,7 +29,7 @@ pub(super) struct KnitArgs {
     /// A pattern with a name.
     #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
     pattern: Option<String>,
-    /// A row of a chart, from the cast-on edge, as in 'k2 p2', '12: k' or 'k3 mb k3' (repeatable); the README lists the steps.
+    /// A row of a chart, from the cast-on edge, as in 'k2 p2', '12: k' or 'k3 mb k3' (repeatable); docs/scenes.md lists the steps.
     #[arg(long, value_name = "ROW")]
     chart: Vec<String>,
     /// Written instructions, as in 'Row 1 (RS): *k2, p2; rep from * to end.', over the stitches cast on; lines, or `@FILE`.
