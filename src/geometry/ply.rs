@@ -106,9 +106,40 @@ impl PlyShape {
     /// are made equal.
     #[inline]
     pub(super) fn in_circle(&self, at: Vec2) -> Vec2 {
-        let from = at - self.distance * self.direction;
-        let (along, across) = (from.dot(self.direction), self.direction.perp_dot(from));
-        self.stretch.x * along * self.direction + self.stretch.y * across * self.direction.perp()
+        self.as_in_circle(at - self.distance * self.direction)
+    }
+
+    /// A vector of the unwound yarn's section in that circle.
+    #[inline]
+    pub(super) fn as_in_circle(&self, v: Vec2) -> Vec2 {
+        self.stretched(v, self.stretch)
+    }
+
+    /// A vector of that circle in the unwound yarn's section.
+    #[inline]
+    pub(super) fn as_in_section(&self, v: Vec2) -> Vec2 {
+        self.stretched(v, self.stretch.recip())
+    }
+
+    #[inline]
+    fn stretched(&self, v: Vec2, by: Vec2) -> Vec2 {
+        if !self.is_elliptical() {
+            return v;
+        }
+        let (along, across) = (v.dot(self.direction), self.direction.perp_dot(v));
+        by.x * along * self.direction + by.y * across * self.direction.perp()
+    }
+
+    /// Whether its section is not a circle.
+    #[inline]
+    pub fn is_elliptical(&self) -> bool {
+        self.stretch.x != 1.0
+    }
+
+    /// Long over short axis of its section in a yarn that is pressed to axes of `pressed` : 1: the mean over all turns of the ply, of half
+    /// the trace of what the square of the circle becomes, (s + 1/s) / 2 for each.
+    pub(crate) fn stretch_of_both(&self, pressed: f64) -> f64 {
+        stretch_of_both(pressed, f64::from(self.stretch.x / self.stretch.y))
     }
 
     /// The same in radii of the circle within which the centres of its fibres lie.
@@ -116,6 +147,15 @@ impl PlyShape {
     pub(super) fn in_core(&self, at: Vec2) -> Vec2 {
         self.in_circle(at) / self.core_radius
     }
+}
+
+/// Long over short axis of a circle that is pressed twice, to axes of `a` : 1 and `b` : 1: as [`PlyShape::stretch_of_both`].
+pub(super) fn stretch_of_both(a: f64, b: f64) -> f64 {
+    if b == 1.0 {
+        return a;
+    }
+    let half_trace = 0.25 * (a + a.recip()) * (b + b.recip());
+    half_trace + (half_trace * half_trace - 1.0).max(0.0).sqrt()
 }
 
 /// The tangent of a fibre, not of unit length (its z, along the yarn, is 1): a fibre at `at` in a ply with centre

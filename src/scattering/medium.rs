@@ -218,7 +218,11 @@ impl PlyOptics {
             single_tt: rgb(&|c| c.single(c.tt_out)),
             albedo: rgb(&|c| c.albedo()),
             leaves_yarn: rgb(&|c| c.closure(c.escape_yarn())),
-            leaving: Arc::new(Leaving::new(&channels.each_ref().map(Channel::medium), stretch, solutions)),
+            leaving: Arc::new(Leaving::new(
+                &channels.each_ref().map(Channel::medium),
+                ply.stretch_of_both(stretch),
+                solutions,
+            )),
             slope,
             turns: calibrated::SWIRL * kept * slope / (1.0 + slope * slope),
             mirrored,

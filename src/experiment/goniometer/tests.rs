@@ -312,3 +312,37 @@ fn white_fibers_return_all_light_whatever_their_packing() {
     let all = m.unscattered.mean + total(&m)[0];
     assert!((all - 1.0).abs() < 1e-4, "{all}");
 }
+
+/// Light that wanders about in an elliptical ply leaves it across its flat sides, whichever way these lie.
+#[test]
+fn elliptical_plies_send_light_where_their_fibers_do() {
+    let definitions = library(&[]);
+    let mut yarn = ply_alone(definitions.yarn("rayon1").unwrap(), 0);
+    for (_, fiber) in &mut yarn.fibers {
+        (fiber.r, fiber.tt, fiber.d) = ([0.0; 3], [0.0; 3], [0.97, 0.95, 0.9]);
+    }
+    for phase in [0.0, 0.5 * PI] {
+        let view = View { phase: Some(phase), ..View::default() };
+        let ours = measure(&Specimen::Yarn(&yarn, Model::Aggregated), &view, Effort { paths: 80_000, seed: 8 });
+        let fibers = truth(&yarn, &view, Effort { paths: 80_000, seed: 8 }).unwrap();
+        let [got, want] = [&ours, &fibers].map(|m| by_azimuth(&m.distribution));
+        for (sector, (got, want)) in got.iter().zip(&want).enumerate() {
+            for c in 0..3 {
+                // As circles they were .86 to 1.13 of it.
+                let off = (got[c] / want[c]).ln().abs();
+                assert!(off < 0.08, "phase {phase}, sector {sector}, channel {c}: {got:?}, not {want:?}");
+            }
+        }
+    }
+}
+
+/// What goes straight on, to the sides and back, each a third of the azimuths from one to the other.
+fn by_azimuth(distribution: &Distribution) -> [[f64; 3]; 3] {
+    let mut sums = [[0.0; 3]; 3];
+    for (cell, energy) in distribution.energy.iter().enumerate() {
+        let from_back = ((cell % COLUMNS) as f64 + 0.5) / COLUMNS as f64 * 2.0 - 1.0;
+        let sector = (3.0 * (1.0 - from_back.abs())) as usize;
+        (0..3).for_each(|c| sums[sector.min(2)][c] += energy[c]);
+    }
+    sums
+}

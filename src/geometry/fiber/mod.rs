@@ -25,7 +25,7 @@ use super::{
     curve::{Basis, Curve},
     density::{KnownPacking, PlyPacking},
     material_indices::MaterialIndices,
-    ply::{PlyParameters, PlyShape},
+    ply::{PlyParameters, PlyShape, stretch_of_both},
     segment_uvs::SegmentUvs,
     strand::Strands,
     tube::{Tubes, spline_through},
@@ -476,16 +476,6 @@ impl Placement {
             after: measured.after,
         }
     }
-}
-
-/// Long over short axis of a circle that is pressed twice, to these: the mean over all angles between, of half the trace of what
-/// the square of the circle becomes, (s + 1/s) / 2 for each.
-fn stretch_of_both(a: f64, b: f64) -> f64 {
-    if b == 1.0 {
-        return a;
-    }
-    let half_trace = 0.25 * (a + a.recip()) * (b + b.recip());
-    half_trace + (half_trace * half_trace - 1.0).max(0.0).sqrt()
 }
 
 impl Distribution {

@@ -62,19 +62,32 @@ impl Inside {
         self.point + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
     }
 
-    /// Unit vector square to the rim of a ply where that faces the direction `w` of the section's frame most, in the axes of [`Self::in_ply`].
+    /// The direction from a ply's axis, in the axes of [`Self::in_ply`], about which its rim is seen from the direction `w` of the section's frame:
+    /// by the cosine.
     #[inline]
-    pub fn facing(&self, w: Vec3A) -> Vec2 {
-        let across = self.across(w);
-        self.pressed.map_or(across, |pressed| pressed.round(across)).normalize_or(Vec2::X)
+    pub fn facing(&self, shape: &YarnShape, ply: usize, w: Vec3A) -> Vec2 {
+        self.as_in_circle(shape, ply, self.across(w)).normalize_or(Vec2::X)
+    }
+
+    /// A vector across the yarn there, in its unwound axes, in the circle that a ply's section becomes when its axes are made equal.
+    #[inline]
+    fn as_in_circle(&self, shape: &YarnShape, ply: usize, v: Vec2) -> Vec2 {
+        shape.plies[ply].as_in_circle(self.pressed.map_or(v, |pressed| pressed.round(v)))
+    }
+
+    /// The other way.
+    #[inline]
+    fn as_in_section(&self, shape: &YarnShape, ply: usize, v: Vec2) -> Vec2 {
+        let round = shape.plies[ply].as_in_section(v);
+        self.pressed.map_or(round, |pressed| pressed.real(round))
     }
 
     /// The point of a ply's outline abreast of this one, by its direction from the ply's axis in the axes of [`Self::in_ply`], in the section's
     /// frame.
     #[inline]
     pub fn outline(&self, shape: &YarnShape, ply: usize, direction: Vec2) -> Vec3A {
-        let off = shape.plies[ply].radius * direction;
-        self.axis_of(shape, ply) + self.out_of(self.pressed.map_or(off, |pressed| pressed.real(off)))
+        let off = self.as_in_section(shape, ply, shape.plies[ply].radius * direction);
+        self.axis_of(shape, ply) + self.out_of(off)
     }
 
     /// The same so far along the yarn from there, in yarn radii: on the outline's part that has the same place in the frame of
@@ -89,24 +102,40 @@ impl Inside {
         travel: f32,
     ) -> Vec3A {
         let of = &shape.plies[ply];
-        let direction = unrotate(direction, angle(self.turn * travel));
-        section.point_at(shape, of.distance * of.direction + of.radius * direction, self.travel + travel)
+        let mut off = unrotate(of.as_in_section(direction), angle(self.turn * travel));
+        if of.is_elliptical() {
+            off = of.as_in_section(of.as_in_circle(off).normalize_or(Vec2::X));
+        }
+        section.point_at(shape, of.distance * of.direction + of.radius * off, self.travel + travel)
     }
 
-    /// The short axis of the section there, as a unit vector of the unwound yarn; any where it is round.
+    /// The short axis of a ply's section there, as a unit vector in its circle and one across the unwound yarn; any where it is a circle.
     #[inline]
-    pub fn short_axis_within(&self) -> Vec2 {
-        self.pressed.map_or(Vec2::X, |pressed| pressed.axis)
+    pub fn short_axis(&self, shape: &YarnShape, ply: usize) -> [Vec2; 2] {
+        let of = &shape.plies[ply];
+        match self.pressed {
+            _ if of.is_elliptical() => {
+                // Of the map from the circle to the section, the direction that it shortens most.
+                let [x, y] = [Vec2::X, Vec2::Y].map(|axis| self.as_in_section(shape, ply, axis));
+                let long = 0.5 * (2.0 * x.dot(y)).atan2(x.length_squared() - y.length_squared());
+                let short = Vec2::from_angle(long).perp();
+                [short, (short.x * x + short.y * y).normalize_or(short)]
+            }
+            Some(pressed) => [pressed.axis; 2],
+            None => [Vec2::X; 2],
+        }
     }
 
-    /// How much a direction of the section's frame is along the short axis of the section there: the square of a cosine, and a half where that is
-    /// round.
+    /// How much a direction of the section's frame is along the short axis of a ply's section there: the square of a cosine, and a half where
+    /// that is a circle.
     #[inline]
-    pub fn along_short_axis(&self, w: Vec3A) -> f32 {
-        self.pressed.map_or(0.5, |pressed| {
-            let across = self.across(w);
-            across.dot(pressed.axis).powi(2) / across.length_squared().max(1e-12)
-        })
+    pub fn along_short_axis(&self, shape: &YarnShape, ply: usize, w: Vec3A) -> f32 {
+        if self.pressed.is_none() && !shape.plies[ply].is_elliptical() {
+            return 0.5;
+        }
+        let [_, short] = self.short_axis(shape, ply);
+        let across = self.across(w);
+        across.dot(short).powi(2) / across.length_squared().max(1e-12)
     }
 
     /// A vector across the unwound yarn in the section's frame.

@@ -443,8 +443,9 @@ fn others_past(view: &View<'_>, spot: &Spot, (shift, w): (Vec3A, Vec3A), stream:
 #[inline]
 fn outline(view: &View<'_>, spot: &Spot, w: Vec3A) -> (Vec2, f32x8) {
     let PlyOptics { mean_way, fading, .. } = view.yarn.plies[spot.ply];
-    let facing = spot.inside.facing(w);
-    let at = spot.inside.in_ply(view.yarn.occluder().shape(), spot.ply);
+    let shape = view.yarn.occluder().shape();
+    let facing = spot.inside.facing(shape, spot.ply, w);
+    let at = spot.inside.in_ply(shape, spot.ply);
     let [ahead, beside] = [at.dot(facing), facing.perp_dot(at)].map(f32x8::splat);
     let [cos, sin] = OUTLINE.map(f32x8::new);
     let (x, y) = (cos - ahead, sin - beside);

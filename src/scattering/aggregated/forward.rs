@@ -348,7 +348,9 @@ impl Fiber {
     #[inline]
     fn way<'a>(&self, view: &View<'a>, w: Vec3A, later: bool) -> Way<'a> {
         let Turned { cos: turn, shift, free, .. } = self.spot.turned(view, self.back, w);
-        let after = view.yarn.plies[self.spot.ply].after.turned(later, turn, self.spot.inside.along_short_axis(w));
+        let Spot { ply, inside, .. } = &self.spot;
+        let short = inside.along_short_axis(view.yarn.occluder().shape(), *ply, w);
+        let after = view.yarn.plies[*ply].after.turned(later, turn, short);
         Way { w, shift, free, after }
     }
 

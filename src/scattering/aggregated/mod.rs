@@ -162,8 +162,11 @@ impl Spot {
     /// The same of a point of the ply.
     #[inline]
     fn placed(&self, view: &View<'_>, at: Vec2) -> (Place, [Vec3A; 2]) {
-        let (place, axes) = view.yarn.plies[self.ply].leaving.place(at, self.inside.short_axis_within());
-        (place, axes.map(|axis| self.inside.out_of(axis)))
+        let [in_circle, within] = self.inside.short_axis(view.yarn.occluder().shape(), self.ply);
+        let (place, axes) = view.yarn.plies[self.ply].leaving.place(at, in_circle);
+        // From the axes of the circle to those of the section: where both are pressed, one is turned against the other.
+        let turned = Vec2::new(in_circle.dot(within), in_circle.perp_dot(within));
+        (place, axes.map(|axis| self.inside.out_of(turned.rotate(axis))))
     }
 
     /// How much of a vector is along the fibre, for each unit of the fibre's own part along the yarn.

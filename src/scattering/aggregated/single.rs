@@ -259,7 +259,7 @@ impl Node {
         let later = self.before > 0.0;
         let width = 2.0 * view.section.thinness() * beside * shape.plies[spot.ply].fiber_radius;
         let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
-        let short = spot.inside.along_short_axis(w);
+        let short = spot.inside.along_short_axis(shape, spot.ply, w);
         let direct = (strip(turn), optics.after.turned(later, turn, short));
         let cosine = optics.tt.cosine;
         // A mean over the directions from which TT bends light into this one.
