@@ -72,8 +72,12 @@ impl Edges {
 /// Depth of a hem, in thicknesses of the cloth, and that of the part folded in.
 const HEM: [f64; 2] = [4.0, 3.0];
 
-/// How much thicker cloth counts where it is folded: yarns inside of a fold are pushed together, and would else lie in each other.
-const FOLDED: f64 = 1.3;
+/// How far apart layers of folded cloth lie, in thicknesses of it, so that what stands out of them does not meet.
+const FOLDED: f64 = 1.2;
+
+/// Where folded cloth keeps its length, in its thicknesses from its middle to the inside of the fold: about where its inner
+/// wefts lie, which have no room to come closer together. Those outside part.
+const NEUTRAL: f64 = 0.25;
 
 /// A point of a yarn: where it is, half its width, its flattening, and its place in the cloth.
 pub(super) type Point = (DVec3, f64, Vec3, [f32; 2]);
@@ -113,7 +117,8 @@ pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
 
 /// Wefts that a hem takes at each end, beside those of cloth as high as it is when it is hemmed.
 pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
-    let length = FOLDED * thickness * (HEM[0] + HEM[1] + PI + 0.5 * PI) - bulge(thickness);
+    let fold = Fold::new(0.0, thickness);
+    let length = fold.first() + fold.second() + (HEM[0] + HEM[1]) * fold.layers - bulge(thickness);
     (length / spacing).floor() as u32
 }
 
@@ -152,7 +157,7 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
 
 /// Folds both ends to the back, twice, so that what is left is so high.
 pub(super) fn hem(strands: &mut [PatternStrand], height: f64, thickness: f64) {
-    let fold = Fold { half: 0.5 * height - bulge(thickness), thickness: FOLDED * thickness };
+    let fold = Fold::new(0.5 * height - bulge(thickness), thickness);
     for strand in strands {
         let flattening = strand.curve.flattening.as_mut();
         if let Some(axes) = flattening {
@@ -170,17 +175,34 @@ pub(super) fn hem(strands: &mut [PatternStrand], height: f64, thickness: f64) {
 struct Fold {
     /// Where it begins to turn, from the middle of the cloth.
     half: f64,
-    thickness: f64,
+    /// Distance of its layers.
+    layers: f64,
+    /// Depth of what keeps its length below the middle of the cloth.
+    neutral: f64,
 }
 
 impl Fold {
+    fn new(half: f64, thickness: f64) -> Self {
+        Self { half, layers: FOLDED * thickness, neutral: NEUTRAL * thickness }
+    }
+
+    /// Length of cloth in the fold at the end of the hemmed cloth, of which the third layer lies between the other two.
+    fn first(&self) -> f64 {
+        PI * (self.layers - self.neutral)
+    }
+
+    /// Length of cloth in the fold inside of the hem.
+    fn second(&self) -> f64 {
+        PI * (0.5 * self.layers - self.neutral)
+    }
+
     /// At a distance beyond the edge: y beyond it, z, and how far the cloth has turned.
     fn at(&self, s: f64) -> (f64, f64, f64) {
-        let t = self.thickness;
-        let [back, _] = HEM.map(|h| h * t);
-        let (first, second) = (PI * t, PI * 0.5 * t);
+        let t = self.layers;
+        let back = HEM[0] * t;
+        let (first, second) = (self.first(), self.second());
         if s <= first {
-            let angle = s / t;
+            let angle = PI * s / first;
             return (t * angle.sin(), -t * (1.0 - angle.cos()), angle);
         }
         let s = s - first;
@@ -189,7 +211,7 @@ impl Fold {
         }
         let s = s - back;
         if s <= second {
-            let angle = s / (0.5 * t);
+            let angle = PI * s / second;
             return (-back - 0.5 * t * angle.sin(), -2.0 * t + 0.5 * t * (1.0 - angle.cos()), PI + angle);
         }
         (-back + (s - second), -t, 2.0 * PI)
