@@ -176,6 +176,7 @@ fn plies_are_continuous_along_a_yarn_and_across_its_seam() {
                 phases: vec![start],
                 distances: false,
                 unevenness: None,
+                tube: 1.0,
             };
             let strands = Strands::new(&[(curve, radii)], &options);
             let count = strands.segments().len() as u32;
@@ -211,6 +212,7 @@ fn plies_turn_evenly_between_points() {
         phases: vec![],
         distances: false,
         unevenness: None,
+        tube: 1.0,
     };
     let strands = Strands::new(&[(curve, radii)], &options);
     let mut total = 0.0;

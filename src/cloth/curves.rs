@@ -38,8 +38,17 @@ struct Prepared<'a> {
 }
 
 enum Of<'a> {
-    Yarns { yarn: &'a Yarn, shape: Box<YarnShape>, strands: Strands },
-    Fibers { curves: Given<'a>, material: FiberBcsdf },
+    /// The plies and the section are in radii of the tube that holds them.
+    Yarns {
+        yarn: &'a Yarn,
+        plies: Vec<PlyParameters>,
+        shape: Box<YarnShape>,
+        strands: Strands,
+    },
+    Fibers {
+        curves: Given<'a>,
+        material: FiberBcsdf,
+    },
 }
 
 /// The curves of a fabric: the scene's, or taken out of it.
@@ -134,7 +143,7 @@ impl<'a> Prepared<'a> {
                 let yarn = &scene.yarns[yarn];
                 let shape = Box::new(yarn.shape());
                 let strands = strands(fabric, curves, yarn, &shape);
-                Of::Yarns { yarn, shape, strands }
+                Of::Yarns { yarn, plies: yarn.plies_in_tube(), shape, strands }
             }
             CurveKind::Fiber(fiber) => Of::Fibers { curves, material: FiberBcsdf::new(&scene.fibers[fiber].1) },
         };
@@ -150,9 +159,9 @@ impl<'a> Prepared<'a> {
                 let points: u64 = curves.iter().map(|(c, _)| c.points.len() as u64).sum();
                 estimate.add(points, points, false, compact);
             }
-            Of::Yarns { yarn, shape, strands } => {
+            Of::Yarns { yarn, plies, shape, strands } => {
                 estimate.tight_bends = strands.tight_bends().len();
-                let plies = plies(self.fabric, yarn, shape, strands);
+                let plies = wound(self.fabric, yarn, plies, shape, strands);
                 match mode {
                     Mode::Yarn => {
                         let (points, segments) = (strands.points().len(), strands.segments().len());
@@ -177,8 +186,8 @@ impl<'a> Prepared<'a> {
                 if self.fabric.shows_fibers {
                     estimate.geometry_bytes += estimate.points * DISTANCE_BYTES;
                 }
-                if let Some(flyaways) = &yarn.flyaways {
-                    let (points, segments) = plies.flyaway_counts(flyaways);
+                if let Some(flyaways) = yarn.flyaways_in_tube() {
+                    let (points, segments) = plies.flyaway_counts(&flyaways);
                     estimate.add(points, segments, false, compact);
                 }
             }
@@ -199,21 +208,22 @@ impl<'a> Prepared<'a> {
 
     fn pieces(self, mode: Mode, shared: &Shared<'_>) -> Vec<Piece> {
         let (index, fabric) = (self.index, self.fabric);
-        let (yarn, shape, strands) = match self.of {
-            Of::Yarns { yarn, shape, strands } => (yarn, shape, strands),
+        let (yarn, of_tube, shape, strands) = match self.of {
+            Of::Yarns { yarn, plies, shape, strands } => (yarn, plies, shape, strands),
             Of::Fibers { curves, material } => return vec![Piece::of_lone_fibers(index, &curves, material)],
         };
-        let plies = plies(fabric, yarn, &shape, &strands);
+        let plies = wound(fabric, yarn, &of_tube, &shape, &strands);
         let (variants, shows_fibers) = (&fabric.variants[..], fabric.shows_fibers);
-        let wound = Wound { index, yarn, variants, shape: &shape, strands: &strands, plies, shows_fibers };
+        let wound =
+            Wound { index, yarn, variants, of_tube: &of_tube, shape: &shape, strands: &strands, plies, shows_fibers };
         let slots = 0..yarn.plies.len();
         let mut all: Vec<Piece> = match mode {
             Mode::Yarn => Vec::new(),
             Mode::Ply => slots.clone().map(|ply| wound.ply(ply, shared)).collect(),
             Mode::Fiber => slots.clone().map(|ply| wound.fibers(ply)).collect(),
         };
-        if let Some(flyaways) = &yarn.flyaways {
-            all.extend(slots.map(|ply| wound.flyaways(ply, flyaways)));
+        if let Some(flyaways) = yarn.flyaways_in_tube() {
+            all.extend(slots.map(|ply| wound.flyaways(ply, &flyaways)));
         }
         if mode == Mode::Yarn {
             let scatterers = shared.of_yarns(yarn, &fabric.variants, stretch(strands.mean_flattening()));
@@ -256,6 +266,8 @@ struct Wound<'a> {
     index: usize,
     yarn: &'a Yarn,
     variants: &'a [Yarn],
+    /// Its plies, lengths in radii of the tube that holds them.
+    of_tube: &'a [PlyParameters],
     shape: &'a YarnShape,
     strands: &'a Strands,
     plies: Plies<'a>,
@@ -265,7 +277,7 @@ struct Wound<'a> {
 impl Wound<'_> {
     /// One ply of all yarns, each as a yarn of its own.
     fn ply(&self, ply: usize, shared: &Shared<'_>) -> Piece {
-        let (mut strands, alone) = ply_strands(&self.plies, &self.yarn.plies[ply], self.shape, ply, self.shows_fibers);
+        let (mut strands, alone) = ply_strands(&self.plies, &self.of_tube[ply], self.shape, ply, self.shows_fibers);
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
         let alone = (alone, stretch(self.plies.mean_flattening()));
@@ -306,11 +318,18 @@ impl Wound<'_> {
     }
 }
 
-fn plies<'a>(fabric: &Fabric, yarn: &'a Yarn, shape: &'a YarnShape, strands: &'a Strands) -> Plies<'a> {
-    let plies = Plies::new(strands, &yarn.plies, shape, fabric.seed);
+/// The plies of a yarn, of which lengths are in radii of the tube that holds them, wound around its strands.
+fn wound<'a>(
+    fabric: &Fabric,
+    yarn: &Yarn,
+    plies: &'a [PlyParameters],
+    shape: &'a YarnShape,
+    strands: &'a Strands,
+) -> Plies<'a> {
+    let plies = Plies::new(strands, plies, shape, fabric.seed);
     match &fabric.tufts {
         Tufts { yarns: 0, .. } => plies,
-        Tufts { yarns, strands } => plies.with_opened(yarn.radius, strands.len() as f64 / *yarns as f64),
+        Tufts { yarns, strands } => plies.with_opened(yarn.radius * yarn.tube(), strands.len() as f64 / *yarns as f64),
     }
 }
 
@@ -328,6 +347,7 @@ fn strands(fabric: &Fabric, curves: Given<'_>, yarn: &Yarn, shape: &YarnShape) -
             phases: fabric.phases.clone(),
             distances: fabric.shows_fibers,
             unevenness: (yarn.unevenness > 0.0).then_some(Unevenness { spread: yarn.unevenness, seed: fabric.seed }),
+            tube: yarn.tube(),
         },
     )
 }
@@ -351,6 +371,7 @@ fn ply_strands(
             phases: vec![0.0],
             distances,
             unevenness: None,
+            tube: 1.0,
         },
     );
     let (wp, wf) = (f64::from(of.ply_rate), f64::from(of.plies[slot].fiber_rate));

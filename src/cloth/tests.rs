@@ -69,6 +69,40 @@ fn what_rays_pass_is_what_the_model_of_each_yarn_says() {
     }
 }
 
+/// Elliptical plies that touch the yarn's outline with the middle of their outer sides stand out beyond it with their shoulders.
+#[test]
+fn shoulders_of_elliptical_plies_are_seen_beyond_the_radius() {
+    let met = |mode: &str| {
+        let text = format!(
+            "[render]\nmode = \"{mode}\"\n[fiber.f]\nr = 0.2\ntt = 0.3\nd = 0.1\n\
+             [yarn.a]\nradius = 0.5\nplies = 2\nply_twist = 20\nply_radius = 0.35\nply_aspect = 0.5\nfibers = 300\n\
+             density = 0.5\nfiber = \"f\"\n\
+             [[fabric]]\nyarn = \"a\"\nsource = {{ type = \"straight\", count = 1, length = 20 }}\n\
+             [[light]]\ntype = \"environment\"\nradiance = 1\n"
+        );
+        let scene = parse("a test", &text, &LoadOptions::default()).unwrap();
+        let tube = scene.yarns[0].tube();
+        assert!((tube - 1.1489).abs() < 1e-3, "{tube}");
+        let (cloth, _) = Cloth::new(&scene, 1).unwrap();
+        let (points, mut stream) = (&scene.fabrics[0].curves[0].0.points, Stream::new(4));
+        let (from, to) = (points[1], points[points.len() - 2]);
+        let across = (to - from).cross(DVec3::Z).normalize();
+        let ray = |offset: f64, along: f64| {
+            Ray::new((from.lerp(to, along) + offset * across + 50.0 * DVec3::Z).as_vec3a(), Vec3A::NEG_Z)
+        };
+        // Beyond the radius, and just beyond the tube.
+        [0.503, 0.54, 0.58].map(|offset| {
+            (0..4000).filter(|_| cloth.world().intersect(&ray(offset, stream.next().into())).is_some()).count()
+        })
+    };
+    let [yarn, fiber] = ["yarn", "fiber"].map(met);
+    assert_eq!([yarn[2], fiber[2]], [0, 0]);
+    // Of 4000 rays, those that slip between the fibres of a rim are missing.
+    for (yarn, fiber) in yarn.into_iter().zip(fiber).take(2) {
+        assert!(fiber > 1500 && fiber <= yarn && yarn as f64 * 0.9 < fiber as f64, "{yarn} {fiber}");
+    }
+}
+
 #[test]
 fn fabrics_of_yarns_that_differ_in_colour_only_share_one_shape() {
     let shares = |more: &str| {

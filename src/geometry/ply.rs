@@ -36,16 +36,29 @@ impl PlyParameters {
         self.radius * self.aspect.sqrt()
     }
 
-    /// The same ply as the only one of a yarn that is as wide as it: lengths in units of its longer semi-axis.
-    pub fn alone(&self) -> Self {
-        let unit = self.long_axis();
+    /// How far it reaches from the yarn's axis: the shoulders of an ellipse stand out beyond the middle of its outer side.
+    pub fn reach(&self) -> f64 {
+        let (short, long) = (self.short_axis(), self.long_axis());
+        let (along, across) = (short * short, long * long);
+        // Where the outline is farthest, as the cosine of its parameter: at the middle unless the ellipse is flat enough.
+        let cos = (self.distance * short / (across - along).max(1e-12)).min(1.0);
+        let sin2 = 1.0 - cos * cos;
+        (self.distance + short * cos).hypot(long * sin2.sqrt())
+    }
+
+    /// The same ply with its lengths in another unit, which is so many of the old ones.
+    pub fn in_units_of(&self, unit: f64) -> Self {
         Self {
             radius: self.radius / unit,
-            distance: 0.0,
-            angle: 0.0,
+            distance: self.distance / unit,
             fiber_radius: self.fiber_radius / unit,
             ..self.clone()
         }
+    }
+
+    /// The same ply as the only one of a yarn that is as wide as it: lengths in units of its longer semi-axis.
+    pub fn alone(&self) -> Self {
+        Self { distance: 0.0, angle: 0.0, ..self.in_units_of(self.long_axis()) }
     }
 }
 
@@ -180,6 +193,31 @@ pub fn fiber_tangent(ply: &PlyShape, ply_rate: f32, centre: Vec2, axis: Vec2, at
 mod tests {
     use super::*;
     use crate::geometry::yarn::tests::touching_yarn;
+
+    #[test]
+    fn plies_reach_as_far_as_the_farthest_point_of_their_outline() {
+        for (aspect, distance) in [(1.0, 0.5), (0.9, 0.5), (0.67, 0.42), (0.4, 0.3), (0.7, 0.0), (1.0, 0.0), (1.4, 0.2)]
+        {
+            let ply = PlyParameters {
+                radius: 0.5,
+                aspect,
+                distance,
+                angle: 1.0,
+                fibers: 10,
+                fiber_radius: 0.01,
+                fiber_twist: 0.0,
+            };
+            let (short, long) = (ply.short_axis(), ply.long_axis());
+            let at = |k: u32| {
+                let (sin, cos) = (1e-3 * f64::from(k)).sin_cos();
+                (distance + short * cos).hypot(long * sin)
+            };
+            let farthest = (0..6284).map(at).fold(0.0, f64::max);
+            assert!((ply.reach() - farthest).abs() < 1e-6, "{aspect} {distance}: {} {farthest}", ply.reach());
+            let halved = ply.in_units_of(2.0);
+            assert!((halved.reach() - 0.5 * farthest).abs() < 1e-6 && halved.fiber_radius == 0.005);
+        }
+    }
 
     #[test]
     fn elliptical_tangents_reduce_to_round_ones() {

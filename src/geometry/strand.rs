@@ -44,6 +44,8 @@ pub struct StrandOptions {
     pub distances: bool,
     /// How the thickness of yarns changes along them, if it does.
     pub unevenness: Option<Unevenness>,
+    /// Radius of the tube that holds all plies, over the yarn's. Tolerance, longest segment and rate are in radii of the tube.
+    pub tube: f64,
 }
 
 /// A bend whose radius of curvature is so much smaller than the yarn's radius that the tube folds into itself, and plies

@@ -206,7 +206,7 @@ pub struct Yarn {
     pub placement: Placement,
     /// How they lie, where that is known and not to be measured from `placement`.
     pub known_packing: KnownPacking,
-    /// Fibres that leave the plies.
+    /// Fibres that leave the plies, lengths in yarn radii.
     pub flyaways: Option<Flyaways>,
     /// Standard deviation of its radius along it, relative; 0 for a yarn that is even.
     pub unevenness: f64,
@@ -246,19 +246,39 @@ impl Yarn {
         mean_half_width(&self.plies)
     }
 
-    /// The cross-section, ready for rays.
+    /// Radius of the tube that holds all of its plies, over its own: 1, or more where elliptical plies have shoulders that stand out
+    /// beyond it.
+    pub fn tube(&self) -> f64 {
+        // Round plies that touch the outline do so but for rounding.
+        const ROUNDED: f64 = 1.0 + 1e-6;
+        let reach = self.plies.iter().map(PlyParameters::reach).fold(1.0, f64::max);
+        if reach > ROUNDED { reach } else { 1.0 }
+    }
+
+    /// The plies, lengths in radii of the tube that holds them.
+    pub fn plies_in_tube(&self) -> Vec<PlyParameters> {
+        let tube = self.tube();
+        self.plies.iter().map(|ply| ply.in_units_of(tube)).collect()
+    }
+
+    /// The fly-aways, lengths in radii of that tube.
+    pub fn flyaways_in_tube(&self) -> Option<Flyaways> {
+        self.flyaways.map(|flyaways| flyaways.in_units_of(self.tube()))
+    }
+
+    /// The cross-section, ready for rays: lengths in radii of the tube that holds the plies.
     pub fn shape(&self) -> YarnShape {
-        YarnShape::new(&self.plies, self.ply_twist, self.tilted)
+        YarnShape::new(&self.plies_in_tube(), self.ply_twist, self.tilted)
     }
 
     /// How the fibres of each ply lie where the yarn's section is pressed to axes of `stretch` : 1. Measured from fibres placed for
     /// it: some milliseconds.
     pub fn packings(&self, stretch: f64) -> Vec<PlyPacking> {
         let mut packings: Vec<PlyPacking> = Vec::with_capacity(self.plies.len());
-        let shape = self.shape();
-        for (k, ply) in self.plies.iter().enumerate() {
+        let (shape, plies) = (self.shape(), self.plies_in_tube());
+        for (k, ply) in plies.iter().enumerate() {
             let alike = |p: &PlyParameters| PlyParameters { angle: ply.angle, ..p.clone() } == *ply;
-            let packing = match self.plies[..k].iter().position(alike) {
+            let packing = match plies[..k].iter().position(alike) {
                 Some(same) => packings[same],
                 None => {
                     let twist = Twist::of(&shape.plies[k], shape.ply_rate);

@@ -58,7 +58,7 @@ struct Sample<'a> {
 /// # Errors
 /// What Embree says, mostly that memory is short.
 pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, BuildError> {
-    let shape = yarn.shape();
+    let (shape, in_tube) = (yarn.shape(), yarn.plies_in_tube());
     let points = 2 * (HALF_LENGTH / 2.0) as usize;
     let at = |i: usize| DVec3::new(0.0, 0.0, HALF_LENGTH * (2.0 * i as f64 / points as f64 - 1.0));
     let curve = Curve {
@@ -78,6 +78,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         phases: Vec::new(),
         distances: false,
         unevenness: None,
+        tube: 1.0,
     };
     let curves = [(curve, radii)];
     let mut tallies = Vec::new();
@@ -86,7 +87,7 @@ pub fn truth(yarn: &Yarn, view: &View, effort: Effort) -> Result<Measurement, Bu
         // A round yarn is looked at from all sides; one that is pressed from one side, at plies that lie anyhow.
         let phase = if view.flatten > 1.0 { TAU * f64::from(Stream::new(seed).next()) } else { 0.0 };
         let strands = Strands::new(&curves, &StrandOptions { phases: vec![phase], ..options.clone() });
-        let plies = Plies::new(&strands, &yarn.plies, &shape, seed);
+        let plies = Plies::new(&strands, &in_tube, &shape, seed);
         let (geometries, fibers) = (0..yarn.plies.len())
             .filter(|&ply| yarn.plies[ply].fibers > 0)
             .map(|ply| {

@@ -43,6 +43,22 @@ pub struct Flyaways {
     pub loop_turns: f64,
 }
 
+impl Flyaways {
+    /// The same with lengths in another unit, which is so many of the old ones.
+    pub fn in_units_of(self, unit: f64) -> Self {
+        let lengths = |spread: Spread| spread.map(|length| length / unit);
+        Self {
+            hair_density: self.hair_density * unit,
+            hair_start: lengths(self.hair_start),
+            hair_rise: lengths(self.hair_rise),
+            hair_length: lengths(self.hair_length),
+            loop_density: self.loop_density * unit,
+            loop_height: lengths(self.loop_height),
+            ..self
+        }
+    }
+}
+
 /// Points of a hair: it is nearly straight.
 const HAIR_POINTS: usize = 9;
 fn loop_points(of: &Flyaways) -> usize {

@@ -25,6 +25,7 @@ fn arch(shape: &YarnShape) -> Strands {
         phases: vec![0.3],
         distances: false,
         unevenness: None,
+        tube: 1.0,
     };
     Strands::new(&[(curve, vec![0.5; 40])], &options)
 }
@@ -43,6 +44,7 @@ fn pressed(shape: &YarnShape, ratio: f64) -> Strands {
         phases: vec![0.0],
         distances: false,
         unevenness: None,
+        tube: 1.0,
     };
     Strands::new(&[(curve, vec![1.0; 30])], &options)
 }

@@ -102,6 +102,7 @@ fn searched(curves: &[(Curve, Vec<f64>)], diameter: f64, around: usize) -> [f64;
         phases: vec![0.0],
         distances: false,
         unevenness: None,
+        tube: 1.0,
     };
     let strands = Strands::new(curves, &options);
     let section = |segment: u32, k: usize| {

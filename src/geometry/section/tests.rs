@@ -298,6 +298,7 @@ fn strand_options(basis: Basis, ply_rate: f64, symmetry: f64) -> StrandOptions {
         phases: vec![0.4],
         distances: false,
         unevenness: None,
+        tube: 1.0,
     }
 }
 

@@ -106,6 +106,11 @@ impl Strand {
             Some(uneven) => (uneven.radii.as_slice(), &uneven.flattening),
             None => (radii, &curve.flattening),
         };
+        let tubes: Cow<'_, [f64]> = match options.tube {
+            1.0 => radii.into(),
+            tube => radii.iter().map(|radius| tube * radius).collect(),
+        };
+        let radii = &*tubes;
         let chain = Chain::new(curve, radii);
         let lengths = chain.lengths();
         let total = lengths[lengths.len() - 1];

@@ -13,6 +13,7 @@ fn options(basis: Basis) -> StrandOptions {
         phases: vec![0.7],
         distances: true,
         unevenness: None,
+        tube: 1.0,
     }
 }
 
