@@ -6,6 +6,7 @@
 
 use std::cell::Cell;
 
+use super::text::{Kind, pieces};
 use crate::files::stage::Problem;
 
 const MAGIC: &[u8] = b"PXR-USDC";
@@ -388,52 +389,27 @@ fn offset(bytes: &[u8], at: usize) -> Result<usize, Problem> {
 /// are looked at as well.
 fn text(bytes: &[u8]) -> Result<(), Problem> {
     const MOST: usize = 1000;
-    let (mut depth, mut deepest, mut i) = (0usize, 0, 0);
+    let (mut depth, mut deepest) = (0usize, 0);
     // Whether `def`, `over` or `class` came before, with at most a type between.
     let mut declares = false;
-    while i < bytes.len() {
-        match bytes[i] {
-            b'{' | b'[' | b'(' => {
+    for piece in pieces(bytes, 0) {
+        match piece.kind {
+            Kind::Mark(b'{' | b'[' | b'(') => {
                 depth += 1;
                 deepest = deepest.max(depth);
                 declares = false;
             }
-            b'}' | b']' | b')' | b'=' => {
-                depth = depth.saturating_sub(usize::from(bytes[i] != b'='));
+            Kind::Mark(mark @ (b'}' | b']' | b')' | b'=')) => {
+                depth = depth.saturating_sub(usize::from(mark != b'='));
                 declares = false;
             }
-            b'#' => i += bytes[i..].iter().position(|&b| b == b'\n').unwrap_or(bytes.len() - i - 1),
-            quote @ (b'"' | b'\'') => {
-                let long = bytes[i..].starts_with(&[quote; 3]);
-                let end: &[u8] = if long { &[quote; 3] } else { &[quote; 1] };
-                i += end.len();
-                let first = i;
-                while i < bytes.len() && !bytes[i..].starts_with(end) {
-                    i += if bytes[i] == b'\\' { 2 } else { 1 };
-                }
-                if std::mem::take(&mut declares) {
-                    identifier(&bytes[first..i.min(bytes.len())], first)?;
-                }
-                i += end.len() - 1;
+            Kind::Quoted if std::mem::take(&mut declares) => {
+                identifier(&bytes[piece.inner.clone()], piece.inner.start)?
             }
-            b'@' => {
-                let end: &[u8] = if bytes[i..].starts_with(b"@@@") { b"@@@" } else { b"@" };
-                i += end.len();
-                i += bytes[i.min(bytes.len())..].windows(end.len()).position(|w| w == end).unwrap_or(0) + end.len() - 1;
-            }
-            b'<' => {
-                let length = bytes[i..].iter().position(|&b| b == b'>').unwrap_or(bytes.len() - i);
-                path(&bytes[i + 1..(i + length).max(i + 1)], i)?;
-                i += length;
-            }
-            letter if letter.is_ascii_alphabetic() => {
-                let length = bytes[i..].iter().position(|b| !b.is_ascii_alphanumeric()).unwrap_or(bytes.len() - i);
-                declares |= matches!(&bytes[i..i + length], b"def" | b"over" | b"class");
-                i += length - 1;
-            }
+            Kind::Path => path(&bytes[piece.inner], piece.all.start)?,
+            Kind::Word => declares |= matches!(&bytes[piece.all], b"def" | b"over" | b"class"),
             _ => {}
         }
-        i += 1;
     }
     if deepest > MOST {
         return Err(Problem::new(format!("brackets lie {deepest} deep in one another, at most {MOST} are read")));

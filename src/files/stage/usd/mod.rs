@@ -9,6 +9,7 @@ mod mesh;
 mod resolver;
 #[cfg(test)]
 mod tests;
+mod text;
 mod value;
 pub(super) mod write;
 

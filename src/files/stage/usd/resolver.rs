@@ -1,4 +1,5 @@
-//! Opens what a stage refers to: every layer is looked over before the reader sees it, not only the first.
+//! Opens what a stage refers to: every layer is looked over before the reader sees it, not only the first, and text is
+//! written as the reader takes it.
 
 use std::{
     fs, io,
@@ -8,7 +9,7 @@ use std::{
 
 use openusd::ar::{Asset, DefaultResolver, ResolvedPath, Resolver};
 
-use super::check;
+use super::{check, text::with_even_samples};
 
 /// The default resolver, with a look at each file.
 pub(super) struct LookingResolver {
@@ -46,11 +47,11 @@ impl Resolver for LookingResolver {
 
     fn open_asset(&self, resolved_path: &ResolvedPath) -> io::Result<Box<dyn Asset>> {
         if let Some(bytes) = self.take_first(resolved_path) {
-            return Ok(Box::new(io::Cursor::new(bytes)));
+            return Ok(Box::new(io::Cursor::new(with_even_samples(bytes))));
         }
         let bytes = self.files.open_asset(resolved_path)?.read_all()?;
         check::look_over(&bytes).map_err(|p| io::Error::other(p.text))?;
-        Ok(Box::new(io::Cursor::new(bytes)))
+        Ok(Box::new(io::Cursor::new(with_even_samples(bytes))))
     }
 
     fn identity(&self) -> String {

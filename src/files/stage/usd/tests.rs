@@ -241,6 +241,24 @@ fn prims_are_chosen_by_path_and_material_and_times_by_frame() {
     assert_eq!([None, Some(1.0), Some(5.5), Some(10.0), Some(99.0)].map(height), [0.0, 0.0, 5.0, 10.0, 10.0]);
 }
 
+/// usd-core writes whole numbers without a point, and takes samples in any order.
+#[test]
+fn samples_written_as_whole_numbers_go_evenly() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shot.usda");
+    let text = "#usda 1.0\ndef Xform \"rig\" {\ndouble xformOp:rotateY.timeSamples = { 11: 90, 1: 0 }\n\
+                uniform token[] xformOpOrder = [\"xformOp:rotateY\"]\n\
+                def Camera \"camera\" {\nfloat focalLength.timeSamples = { 1: 35, 11: 70.5 }\n}\n}\n";
+    std::fs::write(&path, text).unwrap();
+    let stage = Stage::open(&path).unwrap();
+    for (frame, focal_length, angle) in [(0.0, 35.0, 0.0), (1.0, 35.0, 0.0), (3.0, 42.1, 18.0), (99.0, 70.5, 90.0)] {
+        let camera = stage.camera("/rig/camera", Some(frame)).unwrap();
+        assert!((camera.focal_length.unwrap() - focal_length).abs() < 1e-5, "{frame}: {:?}", camera.focal_length);
+        let want = DMat4::from_rotation_y(f64::to_radians(angle));
+        assert!(camera.to_stage.abs_diff_eq(want, 1e-6), "{frame}: {:?}", camera.to_stage);
+    }
+}
+
 #[test]
 fn cameras_stand_where_they_are() {
     let stage = open("scene.usda");
