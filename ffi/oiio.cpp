@@ -191,22 +191,31 @@ OIIO::TextureSystem &textures() {
 
 float linear(float x) { return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f); }
 
-// A copy that the texture system can filter: three linear channels in tiles, with all smaller levels.
+// A copy that the texture system can filter: three linear channels in tiles, with all smaller levels. What is transparent
+// is white there: a texture multiplies, and leaves as it is what nobody has drawn on.
 bool make_texture(const std::string &path, const std::string &copy, std::string &why) {
-    OIIO::ImageBuf picture(path);
+    OIIO::ImageSpec as_stored;
+    as_stored.attribute("oiio:UnassociatedAlpha", 1);
+    OIIO::ImageBuf picture(path, 0, 0, nullptr, &as_stored);
     if (!picture.read(0, 0, true, OIIO::TypeDesc::FLOAT)) {
         why = reason(picture.geterror(), "the pixels cannot be read");
         return false;
     }
     const bool encoded = is_srgb_encoded(picture.nativespec());
+    const int alpha = picture.spec().alpha_channel;
+    const bool associated = !picture.spec().get_int_attribute("oiio:UnassociatedAlpha");
     const bool grey = picture.nchannels() < 3;
     const int order[3] = {0, grey ? 0 : 1, grey ? 0 : 2};
     OIIO::ImageBuf colours = OIIO::ImageBufAlgo::channels(picture, 3, order, {}, {"R", "G", "B"});
-    for (OIIO::ImageBuf::Iterator<float> pixel(colours); !pixel.done(); ++pixel)
+    OIIO::ImageBuf::ConstIterator<float> stored(picture);
+    for (OIIO::ImageBuf::Iterator<float> pixel(colours); !pixel.done(); ++pixel, ++stored) {
+        const float cover = alpha < 0 ? 1.0f : std::min(std::max(float(stored[alpha]), 0.0f), 1.0f);
         for (int c = 0; c < 3; ++c) {
             const float value = encoded ? linear(pixel[c]) : float(pixel[c]);
-            pixel[c] = std::isfinite(value) ? value : 0.0f;
+            const float own = std::isfinite(value) ? value : 0.0f;
+            pixel[c] = (associated ? own : own * cover) + (1.0f - cover);
         }
+    }
     OIIO::ImageSpec config;
     config.format = OIIO::TypeDesc::HALF;
     config.attribute("oiio:ColorSpace", "Linear");
@@ -243,7 +252,8 @@ FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, Yarnr
         const bool levels = input->seek_subimage(0, 1);
         input->close();
         OIIO::geterror(); // a file without a second level is no error
-        const bool ready = levels && spec.tile_width > 0 && spec.nchannels >= 3 && !is_srgb_encoded(spec);
+        const bool ready = levels && spec.tile_width > 0 && spec.nchannels >= 3 && spec.alpha_channel < 0
+                           && !is_srgb_encoded(spec);
         if (!ready) {
             if (!make_texture(file, copy, why)) {
                 say(message, message_size, why);

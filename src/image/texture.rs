@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::ImageError;
 
-/// A texture of linear colours. (0, 0) is the lower left corner of the picture, which repeats beyond 0 to 1.
+/// A texture of linear colours. (0, 0) is the lower left corner of the picture, which repeats beyond 0 to 1; what is
+/// transparent is white.
 #[derive(Debug)]
 pub struct Texture {
     #[cfg(feature = "oiio")]
@@ -28,7 +29,7 @@ impl Texture {
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         use crate::ffi::oiio::{OiioError, TextureFile};
         // What is no file at all is told in the words of every other picture.
-        let bytes = std::fs::read(path).map_err(|e| ImageError::unreadable(path, &e))?;
+        let bytes = std::fs::read(path).map_err(|e| unreadable(path, &e))?;
         let hash = twox_hash::XxHash3_128::oneshot(&bytes);
         drop(bytes);
         let failed = |reason: String| ImageError::Read { path: path.into(), reason };
@@ -88,6 +89,21 @@ impl Texture {
     }
 }
 
+/// Why a picture cannot be read; of a set of tiles, that one of them is meant.
+#[cfg(feature = "oiio")]
+fn unreadable(path: &Path, error: &std::io::Error) -> ImageError {
+    const TILES: [&str; 3] = ["<UDIM>", "<UVTILE>", "%(UDIM)d"];
+    let name = path.to_string_lossy();
+    match TILES.iter().find(|mark| name.contains(**mark)) {
+        Some(mark) => {
+            let reason =
+                format!("a set of tiles is not read; name one of them, such as {}", name.replace(mark, "1001"));
+            ImageError::Unsupported { path: path.into(), reason }
+        }
+        None => ImageError::unreadable(path, error),
+    }
+}
+
 /// Most bytes of all textures together that are kept in memory, as `ffi/oiio.cpp` sets it.
 pub(crate) const CACHE_BYTES: u64 = 1024 << 20;
 
@@ -132,6 +148,23 @@ mod tests {
         close([1.75, -0.75], [0.503, 0.503, 0.503]);
     }
 
+    /// A texture multiplies: where a picture is transparent it leaves what is there.
+    #[test]
+    fn what_is_transparent_is_white() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.png");
+        let file = std::fs::File::create(&path).unwrap();
+        let mut encoder = png::Encoder::new(file, 3, 1);
+        encoder.set_color(png::ColorType::Rgba);
+        let bytes = [255, 0, 0, 255, 0, 0, 0, 0, 188, 0, 0, 128];
+        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        let texture = Texture::open(&path).unwrap();
+        for (u, want) in [(1.0 / 6.0, [1.0, 0.0, 0.0]), (0.5, [1.0; 3]), (5.0 / 6.0, [0.750, 0.498, 0.498])] {
+            let got = texture.sample(u, 0.5, 0.0);
+            assert!(got.iter().zip(want).all(|(g, w)| (g - w).abs() < 3e-3), "{u}: {got:?}, not {want:?}");
+        }
+    }
+
     #[test]
     fn wide_lookups_are_means_of_light() {
         let row: Vec<[u8; 3]> = (0..64).map(|x| if x % 2 == 0 { [255; 3] } else { [0; 3] }).collect();
@@ -152,5 +185,7 @@ mod tests {
         std::fs::write(&path, b"not a picture at all").unwrap();
         assert!(Texture::open(&path).is_err());
         assert!(Texture::open(&folder.path().join("absent.png")).unwrap_err().to_string().contains("no such file"));
+        let tiles = Texture::open(Path::new("skin.<UDIM>.exr")).unwrap_err().to_string();
+        assert!(tiles.contains("skin.1001.exr"), "{tiles}");
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use crate::{image, math::srgb::srgb_to_linear};
+use super::palette::{self, hex};
 
 /// Whether a picture is drawn once over the whole fabric, not a pixel for each stitch, by its name.
 pub(crate) const FITS: [(&str, bool); 2] = [("stitch", false), ("fabric", true)];
@@ -32,13 +32,6 @@ pub(crate) enum Cells {
     /// Rows of signs, the top one first.
     Signs(Vec<String>),
     Picture(PathBuf),
-}
-
-/// `#rrggbb`, as sRGB.
-pub(crate) fn hex(text: &str) -> Option<[f32; 3]> {
-    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii())?;
-    let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f32::from(v) / 255.0);
-    Some([channel(0)?, channel(1)?, channel(2)?])
 }
 
 /// What is wrong with what stands for a yarn, in a picture or in rows of signs.
@@ -136,18 +129,14 @@ impl Motif {
 
     /// A cell for each pixel, or for each stitch the mean of the pixels over it; the yarn of the nearest colour.
     fn picture(&self, path: &Path, extent: [f32; 2], yarns: &[usize], ground: usize) -> Result<CellMap, String> {
-        let picture = image::read(path).map_err(|e| e.to_string())?;
-        let [r, g, b] = picture.rgb().ok_or_else(|| format!("{}: no colour channels", path.display()))?;
-        let (w, h) = (picture.width, picture.height);
+        let (w, pixels) = palette::on_paper(path)?;
+        let h = pixels.len() / w;
         let (width, height) = if self.stretched {
             (extent[0].ceil().max(1.0) as usize, extent[1].ceil().max(1.0) as usize)
         } else {
             (w, h)
         };
-        // Distances are in the square root of light, as eyes nearly see it.
-        let seen = |c: [f32; 3]| Vec3::from(c.map(|v| v.max(0.0).sqrt()));
-        let colors: Vec<Vec3> =
-            self.signs.iter().map(|sign| seen(hex(sign).unwrap_or_default().map(srgb_to_linear))).collect();
+        let colors: Vec<Vec3> = self.signs.iter().map(|sign| palette::color(sign).unwrap_or_default()).collect();
         let mut cells = Vec::with_capacity(width * height);
         for y in 0..height {
             for x in 0..width {
@@ -159,12 +148,10 @@ impl Motif {
                 let (columns, rows) = (span(x, width, w), span(height - 1 - y, height, h));
                 let mut sum = [0f32; 3];
                 for i in rows.clone().flat_map(|row| columns.clone().map(move |column| row * w + column)) {
-                    sum = [sum[0] + r[i], sum[1] + g[i], sum[2] + b[i]];
+                    sum = [0, 1, 2].map(|k| sum[k] + pixels[i][k]);
                 }
-                let mean = seen(sum.map(|s| s / (rows.len() * columns.len()) as f32));
-                let nearest = (0..colors.len())
-                    .min_by(|&i, &j| mean.distance_squared(colors[i]).total_cmp(&mean.distance_squared(colors[j])));
-                cells.push(yarns[nearest.unwrap_or(0)]);
+                let mean = palette::seen(sum.map(|s| s / (rows.len() * columns.len()) as f32));
+                cells.push(yarns[palette::nearest(mean, &colors)]);
             }
         }
         Ok(CellMap { width, height, cells, offset: self.offset, again: self.again, ground })

@@ -8,7 +8,10 @@ use crate::{
     cli::{Failure, named, two},
     math::srgb::srgb_to_linear,
     pattern::knit::{CARRY_ROWS, CATCH_FLOATS, Colors, Knit, Work},
-    scene::motif::{Cells, FITS, Motif, REPEATS, WrongRow, hex, wrong_row, wrong_sign},
+    scene::{
+        motif::{Cells, FITS, Motif, REPEATS, WrongRow, wrong_row, wrong_sign},
+        palette::hex,
+    },
 };
 
 #[derive(Args, Debug)]

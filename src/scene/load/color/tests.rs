@@ -4,7 +4,10 @@ use super::{
 };
 use crate::{
     input::diagnostic::{SourceId, Sources},
-    scene::motif::{Cells, Motif, hex},
+    scene::{
+        motif::{Cells, Motif},
+        palette::hex,
+    },
 };
 
 fn span() -> Span {
