@@ -105,6 +105,36 @@ fn positions_fall_on_their_pixels_by_the_matrices_of_the_file() {
     }
 }
 
+/// Still or on its way, the picture of a USD camera lies where `horizontalApertureOffset` and its like put it.
+#[test]
+fn the_film_of_a_camera_may_lie_beside_its_view() {
+    let folder = directory();
+    for way in ["= (0, 0, 400)", ".timeSamples = { 0: (0, 0, 400), 1: (8, 0, 400) }"] {
+        let camera = format!(
+            "#usda 1.0\n(\nmetersPerUnit = 0.001\n)\ndef Camera \"shot\" {{\nfloat horizontalAperture = 36\n\
+             float verticalAperture = 24\nfloat horizontalApertureOffset = 9\nfloat verticalApertureOffset = -6\n\
+             float focalLength = 200\ndouble3 xformOp:translate{way}\n\
+             uniform token[] xformOpOrder = [\"xformOp:translate\"]\n}}\n"
+        );
+        write(folder.path(), "shot.usda", camera);
+        let source = "type = \"straight\", count = 3, length = 40, spacing = 3";
+        let text = scene("type = \"usd\"\npath = \"shot.usda\"", "[\"position\"]", source);
+        write(folder.path(), "s.toml", text);
+        let picture = read(folder.path(), &["--frames", "0"]);
+        let to_ndc = matrix(&picture, "worldToNDC");
+        let [x, y, _, w] = apply(&to_ndc, [0.0; 3]);
+        assert!((x / w - 0.25).abs() < 1e-5 && (y / w - 0.25).abs() < 1e-5, "{way}: {} {}", x / w, y / w);
+        let alpha = picture.channel("A").unwrap();
+        let covered: Vec<usize> = (0..60 * 40).filter(|&i| alpha[i] >= 1.0).collect();
+        assert!(covered.len() > 50, "{way}: {} pixels are covered", covered.len());
+        for i in covered {
+            let [x, y, _, w] = apply(&to_ndc, triple(&picture, ["P.X", "P.Y", "P.Z"], i));
+            let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+            assert!(off.iter().all(|o| o.abs() < 0.5), "{way}, pixel {i}: {off:?} pixels off");
+        }
+    }
+}
+
 #[test]
 fn an_exr_names_its_colours_and_its_rate() {
     let picture = render(&scene(VIEWS[0], "[]", "type = \"straight\", count = 1, length = 40"), &[]).image;

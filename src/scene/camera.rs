@@ -53,6 +53,8 @@ pub struct Camera {
     pub projection: Projection,
     /// The lens; `None` for a pinhole, which sees everything sharply.
     pub lens: Option<Lens>,
+    /// How far the picture's middle lies beside the view, to the right and up, in heights of the picture.
+    pub shift: DVec2,
 }
 
 impl Camera {
@@ -60,7 +62,7 @@ impl Camera {
     pub fn looking_at(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Option<Self> {
         let back = (position - target).try_normalize()?;
         let right = up.cross(back).try_normalize()?;
-        Some(Self { position, right, up: back.cross(right), back, projection, lens: None })
+        Some(Self { position, right, up: back.cross(right), back, projection, lens: None, shift: DVec2::ZERO })
     }
 
     /// Moves the camera so that all of `points` (position and radius) are in a picture of the given aspect (width over
@@ -124,6 +126,7 @@ impl Camera {
         Self::looking_at(self.position + normal, self.position, up, self.projection).map_or(*self, |camera| Self {
             position: self.position,
             lens: self.lens,
+            shift: self.shift,
             ..camera
         })
     }
@@ -158,6 +161,7 @@ impl Camera {
             back,
             projection: self.projection.with(opening + s * (later.projection.opening() - opening)),
             lens,
+            shift: self.shift.lerp(later.shift, s),
         }
     }
 
@@ -166,8 +170,8 @@ impl Camera {
     #[inline]
     pub fn ray(&self, point: Vec2, lens: Vec2, width: u32, height: u32) -> Ray {
         let (w, h) = (f64::from(width), f64::from(height));
-        let x = (2.0 * f64::from(point.x) - w) / h;
-        let y = 1.0 - 2.0 * f64::from(point.y) / h;
+        let x = (2.0 * f64::from(point.x) - w) / h + 2.0 * self.shift.x;
+        let y = 1.0 - 2.0 * f64::from(point.y) / h + 2.0 * self.shift.y;
         let (origin, direction) = match self.projection {
             Projection::Perspective(angle) => {
                 let slope = (0.5 * angle).tan();
@@ -205,7 +209,8 @@ impl Camera {
         };
         let (w, h) = (f64::from(width), f64::from(height));
         let pixel = 0.5 * h / half;
-        Some(DVec2::new(0.5 * w + pixel * q.dot(self.right), 0.5 * h - pixel * q.dot(self.up)))
+        let middle = DVec2::new(0.5 * w - h * self.shift.x, 0.5 * h + h * self.shift.y);
+        Some(middle + pixel * DVec2::new(q.dot(self.right), -q.dot(self.up)))
     }
 
     /// From the world, whose origin is at `-middle` of this camera's, to the camera: x to the right, y up, -z ahead.
@@ -218,6 +223,7 @@ impl Camera {
     /// From the same world to a picture of the given aspect (width over height), whose upper left corner is (0, 0) and
     /// lower right (1, 1), after a division by w; z grows with depth.
     pub fn world_to_ndc(&self, middle: DVec3, aspect: f64) -> DMat4 {
+        let middle_of_view = DVec2::new(0.5 - self.shift.x / aspect, 0.5 + self.shift.y);
         let to_picture = match self.projection {
             Projection::Perspective(angle) => {
                 let scale = 0.5 / (0.5 * angle).tan();
@@ -225,7 +231,7 @@ impl Camera {
                     DVec4::new(scale / aspect, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, -scale, 0.0, 0.0),
                     // w is the depth, -z; z / w is 0 a millimetre ahead and 1 far away.
-                    DVec4::new(-0.5, -0.5, -1.0, -1.0),
+                    DVec4::new(-middle_of_view.x, -middle_of_view.y, -1.0, -1.0),
                     DVec4::new(0.0, 0.0, -1.0, 0.0),
                 )
             }
@@ -233,7 +239,7 @@ impl Camera {
                 DVec4::new(1.0 / (size * aspect), 0.0, 0.0, 0.0),
                 DVec4::new(0.0, -1.0 / size, 0.0, 0.0),
                 DVec4::new(0.0, 0.0, -1.0, 0.0),
-                DVec4::new(0.5, 0.5, 0.0, 1.0),
+                DVec4::new(middle_of_view.x, middle_of_view.y, 0.0, 1.0),
             ),
         };
         to_picture * self.world_to_camera(middle)
@@ -348,14 +354,20 @@ mod tests {
         let corner = camera.ray(Vec2::ZERO, Vec2::ZERO, 100, 50).direction;
         assert!(corner.x < 0.0 && corner.y > 0.0, "the first pixel is at the upper left");
         assert!((corner.y / -corner.z - 0.5f32.tan()).abs() < 1e-5);
+        // A picture that lies to the right and up of the view has the view's middle at its lower left.
+        let shifted = Camera { shift: DVec2::new(1.0, 0.5), ..camera };
+        let ahead = shifted.ray(Vec2::new(0.0, 50.0), Vec2::ZERO, 100, 50);
+        assert!((ahead.direction - Vec3A::NEG_Z).length() < 1e-6);
         assert!(Camera::looking_at(DVec3::ZERO, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
         assert!(Camera::looking_at(DVec3::Y, DVec3::ZERO, DVec3::Y, Projection::Perspective(1.0)).is_none());
     }
 
     #[test]
     fn what_a_ray_sees_is_projected_to_where_the_ray_began() {
-        for projection in [Projection::Perspective(0.7), Projection::Orthographic(25.0)] {
+        let of_both = |shift| [(Projection::Perspective(0.7), shift), (Projection::Orthographic(25.0), shift)];
+        for (projection, shift) in of_both(DVec2::ZERO).into_iter().chain(of_both(DVec2::new(0.3, -0.1))) {
             let camera = Camera::looking_at(DVec3::new(7.0, -4.0, 30.0), DVec3::ONE, DVec3::Y, projection).unwrap();
+            let camera = Camera { shift, ..camera };
             let middle = DVec3::new(100.0, 20.0, -5.0);
             let (to_camera, to_ndc) = (camera.world_to_camera(middle), camera.world_to_ndc(middle, 64.0 / 48.0));
             for (pixel, distance) in [(Vec2::new(3.25, 40.5), 20.0), (Vec2::new(60.0, 5.0), 47.0)] {

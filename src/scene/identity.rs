@@ -5,7 +5,7 @@
 
 use std::fmt::{Debug, Write as _};
 
-use glam::{DVec3, Vec2};
+use glam::{DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
@@ -51,7 +51,7 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
     } = scene;
     let mut keys = Keys::default();
     of_settings(render, &mut keys);
-    let Camera { position, right, up, back, projection, lens } = camera;
+    let Camera { position, right, up, back, projection, lens, shift } = camera;
     keys.add("camera.shutter", camera_path);
     if let Some(flow) = camera_flow {
         keys.add("camera.flow", flow);
@@ -60,6 +60,9 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
     keys.add("camera.direction", &[right, up, back]);
     keys.add("camera.projection", projection);
     keys.add("camera.lens", lens);
+    if *shift != DVec2::ZERO {
+        keys.add("camera.shift", shift);
+    }
     for yarn in yarns {
         of_yarn(yarn, &mut keys);
     }

@@ -62,7 +62,8 @@ impl CameraMotion {
             let projection = self.opening.as_ref().map_or(still.projection, |t| still.projection.with(t.at(time).x));
             // Where position and target meet, the camera keeps its directions.
             let fallback = Camera { position, projection, ..*still };
-            camera = Camera::looking_at(position, target, aim.up, projection).unwrap_or(fallback);
+            let turned = Camera::looking_at(position, target, aim.up, projection);
+            camera = turned.map_or(fallback, |turned| Camera { shift: still.shift, ..turned });
         }
         if let Some(table) = &self.turntable {
             let pivot = aim.map_or(DVec3::ZERO, |a| self.target.as_ref().map_or(a.target, |t| t.at(time)) - middle);

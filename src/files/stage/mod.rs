@@ -88,6 +88,8 @@ pub struct StageCamera {
     /// Width and height of the film: of the picture itself, in stage units, for orthographic cameras, else of the film
     /// behind the lens, in the unit of `focal_length`.
     pub aperture: [f64; 2],
+    /// How far the film's middle lies beside the view, to the right and up, in the unit of `aperture`.
+    pub offset: [f64; 2],
     /// Focal length; `None` for orthographic cameras.
     pub focal_length: Option<f64>,
     /// Length of a unit of `aperture` and `focal_length` in stage units.

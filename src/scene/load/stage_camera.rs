@@ -1,6 +1,6 @@
 //! `camera = { type = "usd", path, prim }`: the camera of a stage, with its lens and its way in time.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec2, DVec3};
 
 use super::{
     super::{
@@ -22,6 +22,8 @@ struct Pose {
     aim: Aim,
     projection: Projection,
     lens: Option<LensSetup>,
+    /// In heights of the picture, as of a [`Camera`](super::super::camera::Camera).
+    shift: DVec2,
 }
 
 impl Pose {
@@ -35,6 +37,7 @@ impl Pose {
         // What it looks at is what is sharp, or somewhere ahead.
         let distance = if camera.focus_distance > 0.0 { camera.focus_distance * unit } else { 1000.0 };
         let [_, height] = camera.aperture;
+        let shift = DVec2::from(camera.offset) / height;
         let projection = match camera.focal_length {
             Some(focal) => Projection::Perspective(2.0 * (0.5 * height / focal).atan()),
             None => Projection::Orthographic(height * unit),
@@ -45,6 +48,7 @@ impl Pose {
             aim: Aim { position, target: position - distance * back, up },
             projection,
             lens: lens.map(|diameter| LensSetup { radius: 0.5 * diameter, focus: Focus::Distance(distance) }),
+            shift,
         }
     }
 }
@@ -52,19 +56,24 @@ impl Pose {
 /// Reads the keys of such a camera and its stage.
 pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> Option<CameraSetup> {
     let path = table.required_string("path").map(|p| context.resolve(p, table.span("path").unwrap_or(table.header())));
-    let prim = table.required_string("prim").map(str::to_owned);
+    let prim = table.string("prim").map(str::to_owned);
     let fallback = Projection::Perspective(defaults::FIELD_OF_VIEW.to_radians());
     let own_motion = motion::read(table, context, None, fallback);
-    let (path, prim) = (path?, prim?);
+    let path = path?;
     let [open, close] = own_motion.shutter.unwrap_or_default();
-    let stage = context.stages.open(&path);
-    match stage.and_then(|stage| poses(&stage, &prim, f64::from(frame), [open, close])) {
+    let stage = context.stages.open(&path).map_err(|error| table.error_at("path", error.to_string(), None)).ok()?;
+    let prim = match prim {
+        Some(prim) => prim,
+        None => only_camera(&stage, table)?,
+    };
+    match poses(&stage, &prim, f64::from(frame), [open, close]) {
         Ok((own, around)) => {
             let Some(mut setup) = CameraSetup::aimed(own.aim, own.projection) else {
                 table.error_at("prim", "the camera has no direction", None);
                 return None;
             };
             setup.lens = own.lens;
+            setup.camera.shift = own.shift;
             setup.motion = own_motion;
             if around.len() > 1 {
                 let track =
@@ -84,7 +93,25 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
     }
 }
 
-/// The camera at a frame, and at the frames around the shutter's time if the stage has times.
+/// The camera of a stage that has one.
+fn only_camera(stage: &Stage, table: &Reader<'_>) -> Option<String> {
+    let cameras = stage.contents().map_err(|error| table.error_at("path", error.to_string(), None)).ok()?.cameras;
+    match <[String; 1]>::try_from(cameras) {
+        Ok([only]) => Some(only),
+        Err(none) if none.is_empty() => {
+            table.error_at("path", format!("{}: there is no camera in it", stage.path().display()), None);
+            None
+        }
+        Err(several) => {
+            let hint = format!("prim = {:?}; cameras here: {}", several[0], several.join(", "));
+            table.error("missing key `prim`: which camera of the stage it is", Some(&hint));
+            None
+        }
+    }
+}
+
+/// The camera at a frame, and at the frames around the shutter's time if it moves. Stages may have samples without telling
+/// a range of times.
 fn poses(
     stage: &Stage,
     prim: &str,
@@ -95,9 +122,6 @@ fn poses(
     let z_up = stage.up_axis() == Some(2);
     let at = |frame: f64| stage.camera(prim, Some(frame)).map(|camera| Pose::new(&camera, unit, z_up));
     let own = at(frame)?;
-    if stage.frames().is_none_or(|[first, last]| last <= first) {
-        return Ok((own, Vec::new()));
-    }
     let first = (frame + open).floor() as i64 - FRAMES_AROUND;
     let last = (frame + close).ceil() as i64 + FRAMES_AROUND;
     let around = (first..=last).map(|f| Ok((f as f64, at(f as f64)?))).collect::<Result<Vec<_>, StageError>>()?;

@@ -162,6 +162,7 @@ impl Format for UsdStage {
             })
         })
     }
+            let offset = [number("horizontalApertureOffset", 0.0)?, number("verticalApertureOffset", 0.0)?];
 }
 
 impl UsdStage {
@@ -173,6 +174,7 @@ impl UsdStage {
             let path = sdf::Path::abs_root().append_path(name.as_str())?;
             walk.prim(&path, DMat4::IDENTITY, false, 0, visit)?;
         }
+                offset: if orthographic { offset.map(|a| 0.1 * a) } else { offset },
         Ok(())
     }
 }

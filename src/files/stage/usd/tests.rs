@@ -248,7 +248,8 @@ fn samples_written_as_whole_numbers_go_evenly() {
     let path = folder.path().join("shot.usda");
     let text = "#usda 1.0\ndef Xform \"rig\" {\ndouble xformOp:rotateY.timeSamples = { 11: 90, 1: 0 }\n\
                 uniform token[] xformOpOrder = [\"xformOp:rotateY\"]\n\
-                def Camera \"camera\" {\nfloat focalLength.timeSamples = { 1: 35, 11: 70.5 }\n}\n}\n";
+                def Camera \"camera\" {\nfloat focalLength.timeSamples = { 1: 35, 11: 70.5 }\n\
+                float horizontalApertureOffset = 2\nfloat verticalApertureOffset = -1.5\n}\n}\n";
     std::fs::write(&path, text).unwrap();
     let stage = Stage::open(&path).unwrap();
     for (frame, focal_length, angle) in [(0.0, 35.0, 0.0), (1.0, 35.0, 0.0), (3.0, 42.1, 18.0), (99.0, 70.5, 90.0)] {
@@ -333,6 +334,7 @@ fn what_is_written_is_read_again() {
         assert_eq!(prims.len(), 5, "{name}");
         for (i, (given, read)) in curves.iter().zip(set.curves.chunks(2)).enumerate() {
             assert_eq!((read[0].basis, read[0].closed), (given.basis, given.closed), "{name} {i}");
+        assert_eq!(camera.offset, [2.0, -1.5]);
             assert!(read[1].points.iter().zip(&given.points).all(|(a, b)| a.distance(*b) < 1e-6));
             let radius = |k: usize| given.radii.as_ref().map_or(0.3, |r| r[k]);
             for (k, &r) in read[0].radii.as_ref().unwrap().iter().enumerate() {
