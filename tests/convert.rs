@@ -75,6 +75,56 @@ fn scenes_take_curves_meshes_and_cameras_of_stages() {
     assert_eq!(stats["curves"]["yarns"], 9);
 }
 
+/// Of a stage without a range of times, whose camera moves: its shutter is open meanwhile.
+#[test]
+fn the_only_camera_of_a_stage_is_taken_and_moves() {
+    let folder = directory();
+    let at = folder.path();
+    let camera = |name: &str| {
+        format!(
+            "def Camera \"{name}\" {{\nfloat focalLength = 35\n\
+             double3 xformOp:translate.timeSamples = {{ 1: (0, 0, 40), 2: (2, 0, 40) }}\n\
+             uniform token[] xformOpOrder = [\"xformOp:translate\"]\n}}\n"
+        )
+    };
+    let stage = |cameras: &str| write(at, "shot.usda", format!("#usda 1.0\n(\nmetersPerUnit = 0.001\n)\n{cameras}"));
+    let scene = "[render]\nwidth = 16\nheight = 12\nspp = 1\n[camera]\ntype = \"usd\"\npath = \"shot.usda\"\n\
+                 shutter = [0, 1]\n[[fabric]]\nyarn = \"wool\"\nsource = { type = \"straight\", length = 20 }\n";
+    write(at, "s.toml", scene);
+    stage(&camera("shot"));
+    yarnray(at, &["render", "s.toml", "-o", "s.exr", "-q", "--frames", "1", "--stats", "s.json"]).good();
+    let stats = read_json(&at.join("s.json"));
+    assert!(stats["used"].as_array().unwrap().iter().any(|n| n == "camera_motion"), "{}", stats["used"]);
+    stage(&(camera("left") + &camera("right")));
+    let several = yarnray(at, &["info", "s.toml"]);
+    assert_eq!(several.status, Some(2));
+    let hint = "prim = \"/left\"; cameras here: /left, /right";
+    assert!(several.stderr.contains("missing key `prim`") && several.stderr.contains(hint), "{}", several.stderr);
+    stage("def Xform \"empty\" {\n}\n");
+    let none = yarnray(at, &["info", "s.toml"]);
+    assert!(none.stderr.contains("shot.usda: there is no camera in it"), "{}", none.stderr);
+}
+
+/// What is not as it was meant is said in a render, for meshes as for curves, once for all frames.
+#[test]
+fn meshes_of_stages_tell_what_is_missing() {
+    let folder = directory();
+    let at = folder.path();
+    write(
+        at,
+        "body.usda",
+        "#usda 1.0\ndef Mesh \"body\" {\nint[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n\
+         point3f[] points.timeSamples = { 1: [(0,0,0), (1,0,0), (0,1,0)], 9: [(1,0,0), (2,0,0), (1,1,0)] }\n\
+         int[] primvars:skel:jointIndices = [0, 0, 0]\n}\ndef \"hat\" (\nreferences = @hat.usda@\n) {\n}\n",
+    );
+    let scene = "[render]\nwidth = 8\nheight = 8\nspp = 1\n[output]\nlayers = [\"motion\"]\n[[mesh]]\n\
+                 path = \"body.usda\"\n[[fabric]]\nyarn = \"wool\"\nsource = { type = \"straight\", length = 20 }\n";
+    write(at, "s.toml", scene);
+    let told = yarnray(at, &["render", "s.toml", "-o", "s.exr"]).good().stderr;
+    assert_eq!(told.matches("/body is as modelled, in no pose").count(), 1, "{told}");
+    assert!(told.contains("hat.usda"), "{told}");
+}
+
 #[test]
 fn shells_and_manuals_know_every_command() {
     let folder = directory();

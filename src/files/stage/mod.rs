@@ -240,7 +240,7 @@ impl Stage {
             Ok(())
         };
         let notes = self.format.visit(pattern, frame, &mut Take::Meshes(&mut add));
-        all.notes.extend(notes.map_err(|p| p.in_file(&self.path))?);
+        all.warnings.extend(notes.map_err(|p| p.in_file(&self.path))?);
         Ok(all)
     }
 

@@ -35,12 +35,20 @@ pub struct PolygonMesh {
     pub groups: Vec<FaceGroup>,
     /// What was left aside, one line each.
     pub notes: Vec<String>,
+    /// What makes it other than it is meant, one line each.
+    pub warnings: Vec<String>,
 }
 
 /// Values at the corners of faces: values and, where they are shared, which corner has which.
 pub(super) struct AtCorners<T> {
     pub(super) values: Vec<T>,
     pub(super) indices: Option<Vec<u32>>,
+}
+
+/// Leaves those that are kept, of a list that may be missing.
+fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    list.retain(|_| kept.next().is_some_and(|k| *k));
 }
 
 impl PolygonMesh {
@@ -156,6 +164,35 @@ impl PolygonMesh {
         Ok(())
     }
 
+    /// Takes faces away that are holes.
+    pub(super) fn cut_out(&mut self, holes: &[i64]) -> Result<(), Problem> {
+        let count = self.counts.len();
+        let mut kept = vec![true; count];
+        for &hole in holes {
+            let face = usize::try_from(hole).ok().and_then(|f| kept.get_mut(f));
+            *face.ok_or_else(|| Problem::new(format!("hole {hole} is no face of {count}")))? = false;
+        }
+        let of_corners: Vec<bool> =
+            kept.iter().zip(&self.counts).flat_map(|(&k, &n)| std::iter::repeat_n(k, n as usize)).collect();
+        let mut before = 0;
+        let number = |&k: &bool| {
+            let own = before;
+            before += u32::from(k);
+            own
+        };
+        let moved: Vec<u32> = kept.iter().map(number).collect();
+        keep(&mut self.corners, &of_corners);
+        keep(&mut self.uv_corners, &of_corners);
+        keep(&mut self.normals, &of_corners);
+        keep(&mut self.counts, &kept);
+        for group in &mut self.groups {
+            group.faces.retain(|&f| kept[f as usize]);
+            group.faces.iter_mut().for_each(|f| *f = moved[*f as usize]);
+        }
+        self.groups.retain(|group| !group.faces.is_empty());
+        Ok(())
+    }
+
     /// Adds another one. Where one of them has no texture coordinates its own are zero; normals are kept where both have
     /// them.
     pub(super) fn append(&mut self, mut other: Self) {
@@ -186,6 +223,7 @@ impl PolygonMesh {
             self.groups.push(group);
         }
         self.notes.extend(other.notes);
+        self.warnings.extend(other.warnings);
     }
 
     /// The same as triangles whose corners have a point, a normal and a texture coordinate each.

@@ -199,6 +199,14 @@ impl Diagnostics {
         self.list.borrow_mut().push(diagnostic);
     }
 
+    /// Adds one, unless the same was said there already.
+    pub(crate) fn push_once(&self, diagnostic: Diagnostic) {
+        let mut list = self.list.borrow_mut();
+        if !list.iter().any(|d| d.message == diagnostic.message && d.span == diagnostic.span) {
+            list.push(diagnostic);
+        }
+    }
+
     /// Remembers which keys a table knows.
     pub(crate) fn add_table(&self, name: &str, keys: Vec<String>) {
         self.tables.borrow_mut().push((name.to_owned(), keys));

@@ -11,7 +11,6 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::{
     super::{AlbedoTexture, Material, Object, animation::numbered, defaults},
     Context, Range, Reader, UNITS, Y_UP, placement,
-    stages::Stages,
 };
 use crate::{
     files::{
@@ -239,13 +238,14 @@ fn profile(table: &Reader<'_>, context: &Context<'_>) -> Option<Vec<DVec2>> {
 
 /// Meshes of a stage as one, millimetres of its unit and the axis that points up.
 fn of_stage(
-    stages: &Stages,
+    (context, span): (&Context<'_>, Span),
     path: &Path,
     prim: Option<&PrimPattern>,
     frame: f64,
 ) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
-    let stage = stages.open(path).map_err(|e| e.to_string())?;
+    let stage = context.stages.open(path).map_err(|e| e.to_string())?;
     let mesh = polygons(&stage, path, prim, Some(frame))?;
+    warn(&mesh, path, (context, span));
     Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
 }
 
@@ -263,6 +263,13 @@ pub(super) fn polygons(
         return Err(format!("{}: no visible mesh is chosen; meshes here: {known}", path.display()));
     }
     Ok(mesh)
+}
+
+/// Says once what makes a mesh of this file other than it is meant.
+pub(super) fn warn(mesh: &PolygonMesh, path: &Path, (context, span): (&Context<'_>, Span)) {
+    for warning in &mesh.warnings {
+        context.warning_once(span, format!("{}: {warning}", path.display()));
+    }
 }
 
 /// `prim`, or another key: which objects of a stage.
@@ -328,7 +335,7 @@ impl MeshFile {
     fn read(&self, frame: u32, context: &Context<'_>) -> Option<(PathBuf, Mesh)> {
         let path = self.of_frame(frame);
         let read = if stage::is_stage(&path) {
-            of_stage(&context.stages, &path, self.prim.as_ref(), f64::from(frame))
+            of_stage((context, self.span), &path, self.prim.as_ref(), f64::from(frame))
         } else {
             obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
         };

@@ -189,6 +189,11 @@ impl Context<'_> {
         self.diagnostics.push(Diagnostic::warning(message).at(span));
     }
 
+    /// Of what is read for several frames: the same is said once.
+    fn warning_once(&self, span: Span, message: impl Into<String>) {
+        self.diagnostics.push_once(Diagnostic::warning(message).at(span));
+    }
+
     /// A vector in the scene's unit, as millimetres.
     fn position(&self, v: [f64; 3]) -> DVec3 {
         DVec3::from(v) * self.unit

@@ -2,7 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{super::animation::Files, Context, Y_UP, cloth::Detail, mesh::polygons, sequence::Times};
+use super::{
+    super::animation::Files,
+    Context, Y_UP,
+    cloth::Detail,
+    mesh::{polygons, warn},
+    sequence::Times,
+};
 use crate::{
     files::{
         obj,
@@ -10,6 +16,7 @@ use crate::{
     },
     garment::{GarmentError, GarmentMesh},
     geometry::mesh::Mesh,
+    input::diagnostic::Span,
 };
 
 /// A mesh between two frames.
@@ -41,7 +48,7 @@ impl Moment {
         &self,
         prim: Option<&PrimPattern>,
         z_up: Option<bool>,
-        context: &Context<'_>,
+        at: (&Context<'_>, Span),
     ) -> Result<(GarmentMesh, Option<f64>), GarmentError> {
         if !stage::is_stage(&self.path) {
             let mut mesh = GarmentMesh::read(&self.path)?;
@@ -50,8 +57,10 @@ impl Moment {
             }
             return Ok((mesh, None));
         }
-        let fail = |problem: String| GarmentError::new(problem, "a mesh with texture coordinates; `prim` chooses one");
-        let (mesh, unit) = self.of_stage(prim, z_up, context).map_err(fail)?;
+        let opens = at.0.stages.open(&self.path).is_ok();
+        let hint = if opens { "a mesh with texture coordinates; `prim` chooses one" } else { "" };
+        let fail = |problem: String| GarmentError::new(problem, hint);
+        let (mesh, unit) = self.of_stage(prim, z_up, at).map_err(fail)?;
         Ok((GarmentMesh::from_polygons(&mesh).map_err(|e| e.of(&self.path))?, unit))
     }
 
@@ -60,7 +69,7 @@ impl Moment {
         &self,
         prim: Option<&PrimPattern>,
         z_up: Option<bool>,
-        context: &Context<'_>,
+        at: (&Context<'_>, Span),
     ) -> Result<(Mesh, Option<f64>), String> {
         if !stage::is_stage(&self.path) {
             let mut mesh = obj::read(&self.path).map_err(|e| e.to_string())?;
@@ -69,7 +78,7 @@ impl Moment {
             }
             return Ok((mesh, None));
         }
-        let (mesh, unit) = self.of_stage(prim, z_up, context)?;
+        let (mesh, unit) = self.of_stage(prim, z_up, at)?;
         Ok((mesh.to_mesh(), unit))
     }
 
@@ -77,10 +86,11 @@ impl Moment {
         &self,
         prim: Option<&PrimPattern>,
         z_up: Option<bool>,
-        context: &Context<'_>,
+        at: (&Context<'_>, Span),
     ) -> Result<(PolygonMesh, Option<f64>), String> {
-        let stage = context.stages.open(&self.path).map_err(|e| e.to_string())?;
+        let stage = at.0.stages.open(&self.path).map_err(|e| e.to_string())?;
         let mut mesh = polygons(&stage, &self.path, prim, self.frame.map(f64::from_bits))?;
+        warn(&mesh, &self.path, at);
         if z_up.unwrap_or(stage.up_axis() == Some(2)) {
             mesh.points.iter_mut().chain(&mut mesh.normals).for_each(upright);
         }

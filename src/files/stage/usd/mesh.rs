@@ -40,6 +40,9 @@ pub(super) fn read(values: &Values<'_>, to_stage: &DMat4) -> Result<PolygonMesh,
         }
     }
     mesh.group_the_rest(name_of(values.prim));
+    if let Some(holes) = values.integers("holeIndices")?.filter(|holes| !holes.is_empty()) {
+        mesh.cut_out(&holes).map_err(|p| Problem::new(format!("`holeIndices`: {}", p.text)))?;
+    }
     if values.token("subdivisionScheme")?.is_none_or(|s| s != "none") && mesh.normals.is_empty() {
         mesh.notes.push(format!("{}: a subdivision surface is taken as its control mesh", values.prim.path().as_str()));
     }

@@ -112,15 +112,27 @@ impl Format for UsdStage {
 
     fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem> {
         guarded(|| {
+            let mut at_rest = Vec::new();
             self.walk(pattern, frame, &mut |prim, to_stage, values| {
                 let at = |p: Problem| p.at(&prim.path);
                 match (&mut *take, prim.kind.as_str()) {
-                    (Take::Curves(add), "BasisCurves") => add(&prim.path, batch(values).map_err(at)?, to_stage),
-                    (Take::Meshes(add), "Mesh") => add(&prim.path, mesh::read(values, to_stage).map_err(at)?),
-                    _ => Ok(()),
+                    (Take::Curves(add), "BasisCurves") => add(&prim.path, batch(values).map_err(at)?, to_stage)?,
+                    (Take::Meshes(add), "Mesh") => add(&prim.path, mesh::read(values, to_stage).map_err(at)?)?,
+                    _ => return Ok(()),
                 }
+                if deformed(values).map_err(at)? {
+                    at_rest.push(prim.path.clone());
+                }
+                Ok(())
             })?;
-            Ok(self.notes())
+            let mut notes = self.notes();
+            if !at_rest.is_empty() {
+                notes.push(format!(
+                    "{} is as modelled, in no pose: skeletons and blend shapes are not applied; bake them into `points`",
+                    at_rest.join(", ")
+                ));
+            }
+            Ok(notes)
         })
     }
 
@@ -147,7 +159,11 @@ impl Format for UsdStage {
             let number = |name, otherwise| values.number(name).map(|v| v.unwrap_or(otherwise));
             let orthographic = values.token("projection")?.is_some_and(|p| p == "orthographic");
             let aperture = [number("horizontalAperture", 20.955)?, number("verticalAperture", 15.2908)?];
+            let offset = [number("horizontalApertureOffset", 0.0)?, number("verticalApertureOffset", 0.0)?];
             let focal_length = number("focalLength", 50.0)?;
+            if offset.iter().any(|v| !v.is_finite()) {
+                return Err(Problem::new("expected finite offsets of the aperture").at(path));
+            }
             if aperture.iter().chain([&focal_length]).any(|v| !v.is_finite() || *v <= 0.0) {
                 return Err(Problem::new("expected apertures and a focal length above 0").at(path));
             }
@@ -155,6 +171,7 @@ impl Format for UsdStage {
             Ok(StageCamera {
                 to_stage,
                 aperture: if orthographic { aperture.map(|a| 0.1 * a) } else { aperture },
+                offset: if orthographic { offset.map(|a| 0.1 * a) } else { offset },
                 focal_length: (!orthographic).then_some(focal_length),
                 film_unit: 0.1,
                 f_stop: number("fStop", 0.0)?.max(0.0),
@@ -162,7 +179,6 @@ impl Format for UsdStage {
             })
         })
     }
-            let offset = [number("horizontalApertureOffset", 0.0)?, number("verticalApertureOffset", 0.0)?];
 }
 
 impl UsdStage {
@@ -172,9 +188,8 @@ impl UsdStage {
         let roots = self.stage.root_prims()?;
         for name in roots {
             let path = sdf::Path::abs_root().append_path(name.as_str())?;
-            walk.prim(&path, DMat4::IDENTITY, false, 0, visit)?;
+            walk.prim(&path, Above::default(), visit)?;
         }
-                offset: if orthographic { offset.map(|a| 0.1 * a) } else { offset },
         Ok(())
     }
 }
@@ -193,68 +208,74 @@ struct Walk<'a> {
     pattern: &'a PrimPattern,
 }
 
+/// What a prim has from those above it.
+#[derive(Clone, Copy, Default)]
+struct Above {
+    to_parent: DMat4,
+    /// Whether the path of one of them is chosen.
+    chosen: bool,
+    /// Whether the material that the nearest of them has bound is chosen.
+    material: bool,
+    /// Whether they are stand-ins and helpers, which are not what is rendered.
+    helper: bool,
+    /// Whether they are repeated by an instancer: what is kept as `over` or `class` is meant then.
+    prototype: bool,
+    depth: usize,
+}
+
 impl Walk<'_> {
-    /// A prim and all below it. `chosen` where a prim above is.
-    fn prim(
-        &self,
-        path: &sdf::Path,
-        to_parent: DMat4,
-        chosen: bool,
-        depth: usize,
-        visit: &mut Visit<'_>,
-    ) -> Result<(), Problem> {
-        if depth > MAX_DEPTH {
+    /// A prim and all below it.
+    fn prim(&self, path: &sdf::Path, above: Above, visit: &mut Visit<'_>) -> Result<(), Problem> {
+        if above.depth > MAX_DEPTH {
             return Err(Problem::new(format!("prims lie more than {MAX_DEPTH} deep")).at(path.as_str()));
         }
         let prim = self.stage.prim(path.clone());
-        if !prim.is_active()? || !prim.is_loaded()? || !prim.is_defined()? || prim.is_abstract()? {
+        if !prim.is_active()? || !prim.is_loaded()? {
+            return Ok(());
+        }
+        if !above.prototype && (!prim.is_defined()? || prim.is_abstract()?) {
             return Ok(());
         }
         let values = Values { prim: &prim, time: self.time };
         if values.token("visibility")?.is_some_and(|v| v == "invisible") {
             return Ok(());
         }
-        // Stand-ins and helpers are not what is rendered.
-        if values.token("purpose")?.is_some_and(|p| p == "proxy" || p == "guide") {
-            return Ok(());
-        }
+        let helper = values.token("purpose")?.map_or(above.helper, |p| p == "proxy" || p == "guide");
         let (local, alone) = placed(&prim, self.time).map_err(|p| p.at(path.as_str()))?;
-        let to_stage = if alone { local } else { to_parent * local };
         let name = PrimName {
             path: path.as_str().to_owned(),
             kind: prim.type_name()?.map_or(String::new(), |t| t.as_str().to_owned()),
         };
-        let chosen = chosen || self.pattern.matches(&name.path) || self.bound_material_matches(&prim)?;
+        let own = Above {
+            to_parent: if alone { local } else { above.to_parent * local },
+            chosen: above.chosen || self.pattern.matches(&name.path),
+            material: self.bound_material_matches(&prim)?.unwrap_or(above.material),
+            helper,
+            depth: above.depth + 1,
+            ..above
+        };
         if name.kind == "PointInstancer" {
-            return self.instances(&prim, &name, to_stage, chosen, depth, visit);
+            return self.instances(&prim, &name, own, visit);
         }
-        if chosen {
-            visit(&name, &to_stage, &values)?;
+        if (own.chosen || own.material) && !helper {
+            visit(&name, &own.to_parent, &values)?;
         }
         for child in prim.child_names()? {
-            self.prim(&path.append_path(child.as_str())?, to_stage, chosen, depth + 1, visit)?;
+            self.prim(&path.append_path(child.as_str())?, own, visit)?;
         }
         Ok(())
     }
 
-    /// Whether the pattern chooses the material that is bound to the prim itself.
-    fn bound_material_matches(&self, prim: &Prim) -> Result<bool, Problem> {
+    /// Whether the pattern chooses the material that is bound to the prim itself; none where none is.
+    fn bound_material_matches(&self, prim: &Prim) -> Result<Option<bool>, Problem> {
         if !self.pattern.names_materials() {
-            return Ok(false);
+            return Ok(None);
         }
         let targets = prim.relationship("material:binding").targets()?;
-        Ok(targets.iter().any(|t| self.pattern.matches_material(t.as_str())))
+        Ok(targets.first().map(|t| self.pattern.matches_material(t.as_str())))
     }
 
-    fn instances(
-        &self,
-        prim: &Prim,
-        name: &PrimName,
-        to_stage: DMat4,
-        chosen: bool,
-        depth: usize,
-        visit: &mut Visit<'_>,
-    ) -> Result<(), Problem> {
+    fn instances(&self, prim: &Prim, name: &PrimName, own: Above, visit: &mut Visit<'_>) -> Result<(), Problem> {
         let values = Values { prim, time: self.time };
         let prototypes = prim.relationship("prototypes").targets()?;
         let indices = values.integers("protoIndices")?.unwrap_or_default();
@@ -287,10 +308,16 @@ impl Walk<'_> {
                 turns.get(i).copied().unwrap_or_default(),
                 positions[i],
             );
-            self.prim(prototype, to_stage * placed, chosen, depth + 1, visit)?;
+            self.prim(prototype, Above { to_parent: own.to_parent * placed, prototype: true, ..own }, visit)?;
         }
         Ok(())
     }
+}
+
+/// Whether a skeleton or blend shapes move its points.
+fn deformed(values: &Values<'_>) -> Result<bool, Problem> {
+    let listed = |name: &str| Ok::<_, Problem>(values.value(name)?.is_some());
+    Ok(listed("primvars:skel:jointIndices")? || listed("skel:blendShapes")?)
 }
 
 /// The curves of a prim.

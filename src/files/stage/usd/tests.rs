@@ -230,6 +230,85 @@ fn instances_are_hidden_by_their_ids() {
     assert_eq!(seen("by_id.usda", "int64[] ids = [7, 8, 9]\n", "int64[] invisibleIds = [1, 7]\n"), [10.0, 20.0]);
 }
 
+/// A stage of this text.
+fn of_text(text: &str) -> Stage {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stage.usda");
+    std::fs::write(&path, format!("#usda 1.0\n{text}")).unwrap();
+    Stage::open(&path).unwrap()
+}
+
+/// A curve, and what else stands in its prim.
+fn line(name: &str, own: &str) -> String {
+    format!(
+        "def BasisCurves \"{name}\" {{\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+         point3f[] points = [(0,0,0), (0,1,0)]\nfloat[] widths = [0.1, 0.1]\n{own}\n}}\n"
+    )
+}
+
+/// Prototypes are kept where nobody draws them: below an `over`, which declares nothing, or a `class`.
+#[test]
+fn prototypes_may_be_overs_and_classes() {
+    for kept in ["over \"kept\"", "class \"kept\"", "def Scope \"kept\""] {
+        let stage = of_text(&format!(
+            "def PointInstancer \"many\" {{\nrel prototypes = </kept/a>\nint[] protoIndices = [0, 0]\n\
+             point3f[] positions = [(1,0,0), (2,0,0)]\n}}\n{kept} {{\ndef Xform \"a\" {{\n{}}}\n}}\n",
+            line("c", "")
+        ));
+        let (set, _) = curves(&stage, "/many", None);
+        let x: Vec<f64> = set.curves.iter().map(|curve| curve.points[0].x).collect();
+        assert_eq!(x, [1.0, 2.0], "{kept}");
+    }
+}
+
+/// A prim's own purpose and binding win over those from above, as `ComputePurpose` and `ComputeBoundMaterial` have it.
+#[test]
+fn purpose_and_material_are_the_nearest_ones() {
+    let prims = |stage: &Stage, pattern: &str| -> Vec<String> {
+        curves(stage, pattern, None).1.into_iter().map(|(name, _)| name).collect()
+    };
+    let purpose = |p: &str| format!("uniform token purpose = \"{p}\"");
+    let stage = of_text(&format!(
+        "def Xform \"g\" {{\n{}\n{}{}{}}}\n{}",
+        purpose("proxy"),
+        line("inherits", ""),
+        line("render", &purpose("render")),
+        line("usual", &purpose("default")),
+        line("guide", &purpose("guide"))
+    ));
+    assert_eq!(prims(&stage, "/"), ["/g/render", "/g/usual"]);
+    let bound = |m: &str| format!("rel material:binding = </looks/{m}>");
+    let stage = of_text(&format!(
+        "def Xform \"g\" {{\n{}\n{}{}}}\n{}def Scope \"looks\" {{\ndef Material \"wool\" {{\n}}\n\
+         def Material \"silk\" {{\n}}\n}}\n",
+        bound("wool"),
+        line("inherits", ""),
+        line("silken", &bound("silk")),
+        line("other", &bound("silk"))
+    ));
+    assert_eq!(prims(&stage, "material:/looks/wool"), ["/g/inherits"]);
+    assert_eq!(prims(&stage, "material:/looks/silk"), ["/g/silken", "/other"]);
+    assert_eq!(prims(&stage, "/g material:/looks/silk"), ["/g/inherits", "/g/silken", "/other"]);
+}
+
+#[test]
+fn holes_are_no_faces_and_skeletons_are_told() {
+    let stage = of_text(
+        "def Mesh \"m\" {\nint[] faceVertexCounts = [3, 4, 3]\n\
+         int[] faceVertexIndices = [0, 1, 2, 0, 2, 3, 4, 0, 4, 1]\nint[] holeIndices = [1]\n\
+         point3f[] points = [(0,0,0), (1,0,0), (1,1,0), (0,1,0), (-1,0,1)]\n\
+         texCoord2f[] primvars:st = [(0,0), (1,0), (2,0), (3,0), (4,0), (5,0), (6,0), (7,0), (8,0), (9,0)] (\n\
+         interpolation = \"faceVarying\"\n)\nint[] primvars:skel:jointIndices = [0, 0, 0, 0, 0]\n\
+         def GeomSubset \"a\" {\nint[] indices = [0, 1]\n}\ndef GeomSubset \"b\" {\nint[] indices = [1]\n}\n}\n",
+    );
+    let mesh = stage.mesh(&PrimPattern::all(), None).unwrap();
+    assert_eq!((mesh.counts.as_slice(), mesh.corners.as_slice()), ([3, 3].as_slice(), [0, 1, 2, 0, 4, 1].as_slice()));
+    assert_eq!(mesh.uvs[mesh.uv_corners[3] as usize].x, 7.0);
+    let groups: Vec<(&str, &[u32])> = mesh.groups.iter().map(|g| (g.name.as_str(), g.faces.as_slice())).collect();
+    assert_eq!(groups, [("a", [0].as_slice()), ("m", [1].as_slice())]);
+    assert!(mesh.warnings.len() == 1 && mesh.warnings[0].starts_with("/m is as modelled"), "{:?}", mesh.warnings);
+}
+
 #[test]
 fn prims_are_chosen_by_path_and_material_and_times_by_frame() {
     let stage = open("scene.usda");
@@ -255,6 +334,7 @@ fn samples_written_as_whole_numbers_go_evenly() {
     for (frame, focal_length, angle) in [(0.0, 35.0, 0.0), (1.0, 35.0, 0.0), (3.0, 42.1, 18.0), (99.0, 70.5, 90.0)] {
         let camera = stage.camera("/rig/camera", Some(frame)).unwrap();
         assert!((camera.focal_length.unwrap() - focal_length).abs() < 1e-5, "{frame}: {:?}", camera.focal_length);
+        assert_eq!(camera.offset, [2.0, -1.5]);
         let want = DMat4::from_rotation_y(f64::to_radians(angle));
         assert!(camera.to_stage.abs_diff_eq(want, 1e-6), "{frame}: {:?}", camera.to_stage);
     }
@@ -334,7 +414,6 @@ fn what_is_written_is_read_again() {
         assert_eq!(prims.len(), 5, "{name}");
         for (i, (given, read)) in curves.iter().zip(set.curves.chunks(2)).enumerate() {
             assert_eq!((read[0].basis, read[0].closed), (given.basis, given.closed), "{name} {i}");
-        assert_eq!(camera.offset, [2.0, -1.5]);
             assert!(read[1].points.iter().zip(&given.points).all(|(a, b)| a.distance(*b) < 1e-6));
             let radius = |k: usize| given.radii.as_ref().map_or(0.3, |r| r[k]);
             for (k, &r) in read[0].radii.as_ref().unwrap().iter().enumerate() {
