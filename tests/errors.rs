@@ -55,6 +55,52 @@ fn refused_with(folder: &Path, args: &[&str], parts: &[&str]) {
     assert_eq!(listing(folder), before, "{args:?}");
 }
 
+/// What other programs keep for themselves is told by its name, wherever it is named, with what to export instead.
+#[test]
+fn files_of_other_programs_are_told_by_their_names() {
+    let folder = directory();
+    let at = folder.path();
+    write(at, "shirt.fbx", "Kaydara FBX Binary");
+    write(at, "shirt.glb", "glTF");
+    write(
+        at,
+        "g.toml",
+        "[[fabric]]\nyarn = \"wool\"\nsource = { type = \"garment\", path = \"shirt.fbx\", cloth = { type = \"knit\" } }\n",
+    );
+    write(
+        at,
+        "m.toml",
+        "[[mesh]]\npath = \"shirt.glb\"\n[[fabric]]\nyarn = \"wool\"\nsource = { type = \"straight\" }\n",
+    );
+    let fbx = "shirt.fbx: FBX files are not read";
+    refused_with(at, &["info", "g.toml"], &[fbx, "export it as USD, Alembic or OBJ, with its texture coordinates"]);
+    refused_with(at, &["info", "m.toml"], &["m.toml:2:8: error: shirt.glb: glTF files are not read; export it as USD"]);
+    refused_with(at, &["info", "shirt.fbx"], &[fbx, "export it as USD, Alembic or OBJ"]);
+}
+
+/// A stage tells the line at which its text breaks off, and what it refers to and cannot find where nothing is left.
+#[test]
+fn stages_tell_their_line_and_what_is_missing() {
+    let folder = directory();
+    let at = folder.path();
+    let scene = |path: &str| {
+        format!(
+            "[[fabric]]\nyarn = \"wool\"\nsource = {{ type = \"garment\", path = \"{path}\", cloth = {{ type = \"knit\" }} }}\n"
+        )
+    };
+    write(at, "cut.usda", "#usda 1.0\ndef Mesh \"m\" {\n    int[] faceVertexCounts = [3\n");
+    write(at, "cut.toml", scene("cut.usda"));
+    refused_with(at, &["info", "cut.toml"], &["cut.toml:3:37: error: cut.usda: line "]);
+    write(at, "shot.usda", "#usda 1.0\ndef \"hero\" (\n    payload = @hero.usda@\n) {\n}\n");
+    write(at, "shot.toml", scene("shot.usda"));
+    refused_with(
+        at,
+        &["info", "shot.toml"],
+        &["shot.usda: no visible mesh is chosen; meshes here: none; ", "hero.usda"],
+    );
+    refused_with(at, &["convert", "shot.usda", "o.txt"], &["shot.usda: there are no curves in it; ", "hero.usda"]);
+}
+
 #[test]
 fn damaged_curve_files_name_the_byte() {
     let directory = directory();

@@ -14,6 +14,28 @@ pub(crate) fn extension(path: &Path) -> Option<String> {
     path.extension().map(|extension| extension.to_string_lossy().to_lowercase())
 }
 
+/// What to do with a file that [`foreign`] knows.
+pub(crate) const EXPORT: &str = "export it as USD, Alembic or OBJ";
+
+/// The format of meshes and scenes that a file's name tells and that is not read, by its usual name.
+pub(crate) fn foreign(path: &Path) -> Option<&'static str> {
+    Some(match extension(path)?.as_str() {
+        "fbx" => "FBX",
+        "gltf" | "glb" => "glTF",
+        "stl" => "STL",
+        "ply" => "PLY",
+        "dae" => "Collada",
+        "3ds" | "max" => "3ds Max",
+        "ma" | "mb" => "Maya",
+        "blend" => "Blender",
+        "c4d" => "Cinema 4D",
+        "hip" | "hiplc" | "hipnc" | "bgeo" | "geo" => "Houdini",
+        "zprj" | "zpac" => "CLO and Marvelous Designer",
+        "vdb" => "OpenVDB",
+        _ => return None,
+    })
+}
+
 /// Whether a file's name ends in this, in letters of any size.
 pub(crate) fn has_extension(path: &Path, wanted: &str) -> bool {
     extension(path).is_some_and(|extension| extension == wanted)

@@ -11,6 +11,7 @@ use std::{
 use glam::{DVec2, DVec3};
 use tobj::LoadError;
 
+use super::{EXPORT, foreign};
 use crate::{geometry::mesh::Mesh, input::system::in_words};
 
 /// The largest file that is read.
@@ -79,6 +80,9 @@ pub(crate) fn read_grouped(path: &Path) -> Result<(Mesh, Vec<String>), MeshError
     let meta = file.metadata().map_err(|e| fail(0, in_words(&e)))?;
     if !meta.is_file() {
         return Err(fail(0, "not a file".to_owned()));
+    }
+    if let Some(format) = foreign(path) {
+        return Err(fail(0, format!("{format} files are not read; {EXPORT}")));
     }
     if meta.len() > MAX_BYTES {
         return Err(fail(0, format!("{} bytes; at most {MAX_BYTES} are read", meta.len())));

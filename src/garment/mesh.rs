@@ -12,7 +12,11 @@ use std::{
 
 use glam::{DVec2, DVec3};
 
-use crate::{files::stage::PolygonMesh, input::system::in_words, math::words::counted};
+use crate::{
+    files::{EXPORT, foreign, stage::PolygonMesh},
+    input::system::in_words,
+    math::words::counted,
+};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 30;
@@ -24,6 +28,8 @@ pub(crate) struct GarmentError {
     pub path: Option<PathBuf>,
     /// Counted from 1; 0 where no line is at fault.
     pub line: usize,
+    /// The number of the cloth that asks for what cannot be, if one does.
+    pub cloth: Option<usize>,
     /// What is wrong.
     pub problem: String,
     /// What to do.
@@ -33,11 +39,11 @@ pub(crate) struct GarmentError {
 impl GarmentError {
     /// Something that is wrong with the scene's numbers, not with the file.
     pub(crate) fn new(problem: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { path: None, line: 0, problem: problem.into(), hint: hint.into() }
+        Self::at(0, problem, hint)
     }
 
     pub(super) fn at(line: usize, problem: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { path: None, line, problem: problem.into(), hint: hint.into() }
+        Self { path: None, line, cloth: None, problem: problem.into(), hint: hint.into() }
     }
 
     /// The same, of a file.
@@ -108,6 +114,10 @@ impl GarmentMesh {
         let meta = std::fs::metadata(path).map_err(|e| fail(in_words(&e)))?;
         if !meta.is_file() {
             return Err(fail("not a file".to_owned()));
+        }
+        if let Some(format) = foreign(path) {
+            let hint = format!("{EXPORT}, with its texture coordinates");
+            return Err(GarmentError::new(format!("{format} files are not read"), hint).of(path));
         }
         if meta.len() > MAX_BYTES {
             return Err(fail(format!("{} bytes; at most {MAX_BYTES} are read", meta.len())));

@@ -268,7 +268,8 @@ fn choose(panels: &[Panel], cloths: &[Cloth]) -> Result<Vec<usize>, GarmentError
             } else {
                 format!("it has: {}", names.join(", "))
             };
-            return Err(GarmentError::new(format!("no group or material of the mesh is called \"{group}\""), hint));
+            let problem = format!("no group or material of the mesh is called \"{group}\"");
+            return Err(GarmentError { cloth: Some(i), ..GarmentError::new(problem, hint) });
         }
         debug_assert!(i > 0, "the first cloth is for the rest");
     }

@@ -31,7 +31,7 @@ use glam::DVec3;
 
 use crate::{
     files::{
-        extension, has_extension,
+        EXPORT, extension, foreign, has_extension,
         stage::{self, PrimPattern, Stage},
     },
     geometry::curve::{Basis, CurveSet},
@@ -228,6 +228,9 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     }
     let bytes = read_bytes(path)?;
     let format = recognise(&bytes, path).ok_or_else(|| {
+        if let Some(format) = foreign(path) {
+            return CurveFileError::new(FileLocation::File, format!("{format} files are not read")).hint(EXPORT);
+        }
         CurveFileError::new(
             FileLocation::File,
             "expected a curve file, found neither the letters BCC or HAIR nor a known extension",

@@ -42,7 +42,9 @@ pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet
                 ("no visible curves are chosen".to_owned(), format!("curves here: {}{dots}", shown.join(", ")))
             }
         };
-        return Err(CurveFileError::new(FileLocation::File, problem).hint(hint));
+        // What could not be composed may be what was meant.
+        let missing: String = set.notes.iter().map(|note| format!("; {note}")).collect();
+        return Err(CurveFileError::new(FileLocation::File, problem + &missing).hint(hint));
     }
     let points: u64 = set.curves.iter().map(|c| c.points.len() as u64).sum();
     if points > options.max_points {

@@ -260,7 +260,9 @@ pub(super) fn polygons(
     if mesh.counts.is_empty() {
         let known = stage.contents().map_err(|e| e.to_string())?.meshes;
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-        return Err(format!("{}: no visible mesh is chosen; meshes here: {known}", path.display()));
+        // What could not be composed may be what was meant.
+        let missing: String = mesh.warnings.iter().map(|warning| format!("; {warning}")).collect();
+        return Err(format!("{}: no visible mesh is chosen; meshes here: {known}{missing}", path.display()));
     }
     Ok(mesh)
 }

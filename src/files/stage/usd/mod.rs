@@ -56,10 +56,13 @@ impl UsdStage {
     /// Opens the layer of these bytes at a path, and all that it refers to.
     pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<Self, Problem> {
         check::look_over(&bytes)?;
-        guarded(|| {
-            let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
-            Ok(Self { stage: usd::Stage::builder().resolver(LookingResolver::new(path, bytes)).open(name)? })
-        })
+        let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
+        let open = || Ok(usd::Stage::builder().resolver(LookingResolver::new(path, bytes)).open(name)?);
+        let stage = guarded(open).map_err(|problem| match text::broken_line(path) {
+            Some(line) => Problem::new(format!("line {line}: {}", problem.text)),
+            None => problem,
+        });
+        Ok(Self { stage: stage? })
     }
 
     /// What could not be composed, one line each.

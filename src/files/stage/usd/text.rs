@@ -4,7 +4,9 @@
 //! `0.5` is not. Between whole ones, or one of each, it does not go evenly but stands still, and usd-core writes whole
 //! numbers without a point. And it takes samples for sorted, which USD does not ask for. Both are put right in the text.
 
-use std::{borrow::Cow, ops::Range};
+use std::{borrow::Cow, fs, ops::Range, path::Path};
+
+use openusd::usda::parser::Parser;
 
 /// What text is made of, for those who look for words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +73,14 @@ fn closed(text: &[u8], quotes: usize, escapes: bool) -> usize {
 
 fn of_a_word(b: u8) -> bool {
     b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'+' | b'-') || b >= 0x80
+}
+
+/// The line at which a file of text cannot be read on; none of what is no text, or sound.
+pub(super) fn broken_line(path: &Path) -> Option<usize> {
+    let text = fs::read_to_string(path).ok().filter(|text| text.trim_start().starts_with("#usda"))?;
+    let mut parser = Parser::new(&text);
+    parser.parse().err()?;
+    parser.last_error_highlight().map(|place| place.line)
 }
 
 /// The same layer with samples of numbers written as fractions, and all samples in the order of time.

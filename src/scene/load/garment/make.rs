@@ -175,7 +175,8 @@ impl GarmentPlan {
         let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
         let unnamed = error.line > 0 && error.path.is_none();
         let error = if unnamed { GarmentError { path: Some(self.path.clone()), ..error } } else { error };
-        context.error(self.span, error.to_string(), hint);
+        let rule = error.cloth.and_then(|i| self.rules.get(i));
+        context.error(rule.map_or(self.span, |rule| rule.span), error.to_string(), hint);
     }
 
     /// For each rule whose colours are yarns of their own where they are, and the yarns in the library; `None` and nothing

@@ -64,6 +64,8 @@ struct ClothPlan {
 /// A panel's own cloth, or the fabric's.
 struct Rule {
     group: Option<String>,
+    /// Where that stands; of the fabric's own cloth, where the mesh is named.
+    span: Span,
     cloth: ClothPlan,
     /// Width and height of a stitch, mm.
     stitch: Option<DVec2>,
@@ -177,6 +179,7 @@ pub(super) fn garment(
     let grain = grain(fabric);
     let rule = |cloth| Rule {
         group: None,
+        span,
         cloth,
         stitch: gauge,
         grain,
@@ -209,6 +212,7 @@ pub(super) fn garment(
             let hem = own_hem.hem(&table, Some(hem_keys));
             let rule = Rule {
                 group: Some(group?),
+                span: table.span("group").unwrap_or(table.header()),
                 stitch: stitch(&table, Some(per)).or(gauge),
                 grain: if table.has("grain") { self::grain(&table) } else { grain },
                 cloth: match own_cloth {
