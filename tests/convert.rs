@@ -75,6 +75,32 @@ fn scenes_take_curves_meshes_and_cameras_of_stages() {
     assert_eq!(stats["curves"]["yarns"], 9);
 }
 
+/// What a stage holds is told with the names by which a scene chooses it; that it moves is no warning of a render.
+#[test]
+fn stages_tell_what_they_hold() {
+    let folder = directory();
+    let at = folder.path();
+    write(
+        at,
+        "shot.usda",
+        "#usda 1.0\n(\nstartTimeCode = 1\nendTimeCode = 3\nmetersPerUnit = 0.001\n)\ndef BasisCurves \"yarn\" {\n\
+         uniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+         point3f[] points.timeSamples = { 1: [(0,0,0), (20,0,0)], 3: [(0,2,0), (20,2,0)] }\n}\n\
+         def Camera \"shot\" {\n}\ndef DistantLight \"key\" {\n}\ndef DomeLight_1 \"sky\" {\n}\n",
+    );
+    let told = yarnray(at, &["info", "shot.usda"]).good().stdout;
+    for line in ["frames    1 to 3", "curves in /yarn", "cameras   /shot", "lights    /key and /sky; not read"] {
+        assert!(told.contains(line), "{line}: {told}");
+    }
+    let scene = "[render]\nwidth = 8\nheight = 8\nspp = 1\n[[fabric]]\nyarn = \"wool\"\n\
+                 source = { type = \"file\", path = \"shot.usda\" }\n";
+    write(at, "s.toml", scene);
+    let render = yarnray(at, &["render", "s.toml", "-o", "s.####.exr", "--frames", "2..3"]).good().stderr;
+    assert!(!render.contains("earliest"), "{render}");
+    let convert = yarnray(at, &["convert", "shot.usda", "o.txt"]).good().stderr;
+    assert!(convert.contains("frames 1 to 3 are in it: the curves are those of the earliest"), "{convert}");
+}
+
 /// Of a stage without a range of times, whose camera moves: its shutter is open meanwhile.
 #[test]
 fn the_only_camera_of_a_stage_is_taken_and_moves() {

@@ -16,7 +16,7 @@ use crate::{
         curve_file::{self, ReadOptions},
         has_extension,
         mesh_file::MeshFacts,
-        stage,
+        stage::{self, Stage},
     },
     geometry::{
         curve::{Basis, Curve, CurveSet},
@@ -83,10 +83,41 @@ fn file_report(path: &Path, radius: Option<f64>) -> Result<(Value, String), Fail
         && may_be_mesh
         && let Ok(Some(facts)) = MeshFacts::read(path)
     {
-        return Ok(mesh_report(path, &facts));
+        return Ok(with_stage(path, mesh_report(path, &facts)));
     }
     let set = read.map_err(|e| Failure::Input(format!("error: {e}")))?;
-    Ok(curves_report(path, &set, radius))
+    Ok(with_stage(path, curves_report(path, &set, radius)))
+}
+
+/// What else is in a stage, for those who name it in a scene.
+fn with_stage(path: &Path, (mut report, mut text): (Value, String)) -> (Value, String) {
+    const MOST: usize = 8;
+    let Some(stage) = Some(path).filter(|p| stage::is_stage(p)).and_then(|p| Stage::open(p).ok()) else {
+        return (report, text);
+    };
+    let Ok(contents) = stage.contents() else { return (report, text) };
+    let frames = stage.frames().filter(|[first, last]| first < last);
+    if let Some([first, last]) = frames {
+        text += &format!("  frames    {first} to {last}\n");
+    }
+    report["frames"] = json!(frames);
+    let of_kinds = [
+        ("curve_prims", "curves in", &contents.curves, ""),
+        ("mesh_prims", "meshes", &contents.meshes, ""),
+        ("cameras", "cameras", &contents.cameras, ""),
+        ("lights", "lights", &contents.lights, "; not read: a scene has its own"),
+    ];
+    for (key, word, prims, more) in of_kinds {
+        report[key] = json!(prims);
+        let mut shown: Vec<String> = prims.iter().take(MOST).cloned().collect();
+        if prims.len() > MOST {
+            shown.push(counted((prims.len() - MOST) as u64, "other"));
+        }
+        if !shown.is_empty() {
+            text += &format!("  {word:<9} {}{more}\n", listed(shown.into_iter(), "and"));
+        }
+    }
+    (report, text)
 }
 
 fn mesh_report(path: &Path, facts: &MeshFacts) -> (Value, String) {

@@ -19,7 +19,12 @@ impl From<StageError> for CurveFileError {
 }
 
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
-    read_open(&Stage::open(path)?, options)
+    let stage = Stage::open(path)?;
+    let mut set = read_open(&stage, options)?;
+    if let (None, Some([first, last])) = (options.frame, stage.frames().filter(|[first, last]| first < last)) {
+        set.notes.push(format!("frames {first} to {last} are in it: the curves are those of the earliest"));
+    }
+    Ok(set)
 }
 
 pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
@@ -49,9 +54,6 @@ pub(super) fn read_open(stage: &Stage, options: &ReadOptions) -> Result<CurveSet
     let points: u64 = set.curves.iter().map(|c| c.points.len() as u64).sum();
     if points > options.max_points {
         return Err(CurveFileError::too_many_points(FileLocation::File, points, options));
-    }
-    if let (None, Some([first, last])) = (options.frame, stage.frames().filter(|[first, last]| first < last)) {
-        set.notes.push(format!("frames {first} to {last} are in it: the curves are those of the earliest"));
     }
     if options.basis.is_some() {
         set.notes.push("the basis asked for was ignored: stages know their own".into());

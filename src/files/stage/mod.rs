@@ -109,6 +109,8 @@ pub struct Contents {
     pub meshes: Vec<String>,
     /// Cameras.
     pub cameras: Vec<String>,
+    /// Lights, which are not read; of Alembic, which has its own way of each program for them, none.
+    pub lights: Vec<String>,
 }
 
 /// A stage that is open. It can be asked at any number of times.

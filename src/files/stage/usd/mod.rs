@@ -105,6 +105,8 @@ impl Format for UsdStage {
                     Some("BasisCurves") => &mut contents.curves,
                     Some("Mesh") => &mut contents.meshes,
                     Some("Camera") => &mut contents.cameras,
+                    // Those of UsdLux, and of renderers that name theirs after them.
+                    Some(kind) if kind.ends_with("Light") || kind.starts_with("DomeLight") => &mut contents.lights,
                     _ => return,
                 };
                 list.push(path.as_str().to_owned());
