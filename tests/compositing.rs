@@ -160,6 +160,29 @@ fn matte(picture: &Picture, layer: &str) -> Matte {
     Matte { names, pixels }
 }
 
+/// Panels that a table names are a matte of that name; others are the garment's.
+#[test]
+fn mattes_tell_panels_apart_by_their_names() {
+    let folder = directory();
+    let panel = |x: u32| {
+        let corners = [(x, 0), (x + 4, 0), (x + 4, 4), (x, 4)];
+        let places: String = corners.map(|(x, y)| format!("v {x} {y} 0\n")).concat();
+        let flat: String = corners.map(|(x, y)| format!("vt {x} {y}\n")).concat();
+        places + &flat
+    };
+    let faces = "g body\nf 1/1 2/2 3/3 4/4\ng rib\nf 5/5 6/6 7/7 8/8\ng cuff\nf 9/9 10/10 11/11 12/12\n";
+    write(folder.path(), "g.obj", panel(0) + &panel(6) + &panel(12) + faces);
+    let scene = "[render]\nwidth = 48\nheight = 16\nspp = 4\n[output]\nlayers = [\"cryptomatte\"]\n[[fabric]]\nname = \"shirt\"\n\
+                 yarn = \"wool\"\nsource = { type = \"garment\", path = \"g.obj\", unit = \"cm\", cloth = { type = \"knit\" } }\n\
+                 [[fabric.panel]]\ngroup = \"rib\"\nname = \"ribs\"\n[[fabric.panel]]\ngroup = \"cuff\"\n";
+    write(folder.path(), "s.toml", scene);
+    yarnray(folder.path(), &["render", "s.toml", "-q", "-o", "s.exr"]).good();
+    let image = image::read(&folder.path().join("s.exr")).unwrap();
+    let picture = Picture { image, stats: serde_json::Value::Null };
+    let names: std::collections::BTreeSet<String> = matte(&picture, "CryptoFabric").names.into_values().collect();
+    assert_eq!(names, ["shirt", "ribs", "shirt_2"].map(String::from).into());
+}
+
 #[test]
 fn mattes_tell_fabrics_yarns_and_plies_apart() {
     let scene = SWATCH.replace("yarn = \"wool3\"\n", "name = \"front\"\nyarn = \"wool3\"\n")

@@ -14,7 +14,8 @@ const STEPS: &str = "steps are k, p, k4, p2, ktbl, ptbl, yo, k2tog, ssk, p2tog, 
 pub(super) fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartError> {
     let mut steps = Vec::new();
     for token in text.split([' ', ',', '\t']).filter(|t| !t.is_empty()) {
-        let (count, step) = parse_step(token).ok_or_else(|| {
+        // Books write `K2 P2` and `C4F`.
+        let (count, step) = parse_step(&token.to_ascii_lowercase()).ok_or_else(|| {
             let shown: String = token.chars().take(20).collect();
             ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), STEPS)
         })?;

@@ -56,6 +56,14 @@ fn cables_cross_halves() {
     assert_eq!(worked(&["k4", "c4b"], 4, 2)[1][0].layer, -1);
 }
 
+#[test]
+fn steps_may_be_written_in_capital_letters() {
+    let (books, small) = (["2: K2, P2 C4F 2/1LC SSK"], ["2: k2, p2 c4f 2/1lc ssk"]);
+    let [books, small] = [books, small].map(|lines| Chart::parse(&lines).unwrap());
+    assert!(books.rows.iter().zip(&small.rows).all(|(a, b)| a.steps == b.steps));
+    assert!(Chart::parse(&["K2 Q2"]).unwrap_err().problem.contains("\"Q2\""));
+}
+
 /// Else a line of 13 characters asks for 20,000 rows of 20,000 steps.
 #[test]
 fn rows_of_one_line_share_their_steps() {

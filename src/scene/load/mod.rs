@@ -52,6 +52,7 @@ use crate::input::{
     reader::{Range, Reader},
     system::in_words,
 };
+use crate::math::words::counted;
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -147,7 +148,9 @@ impl Context<'_> {
             if let [first, others @ ..] = missing.as_slice() {
                 let more = match others.len() {
                     0 => String::new(),
-                    count => format!(", and {count} others of frames {} to {}", frames.start(), frames.end()),
+                    count => {
+                        format!(", and {} of frames {} to {}", counted(count, "other"), frames.start(), frames.end())
+                    }
                 };
                 self.error(*span, format!("{}: no such file{more}", first.display()), None);
             }

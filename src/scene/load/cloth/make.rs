@@ -34,6 +34,8 @@ const COLUMNS: f32 = 256.0;
 /// Curves of one kind of yarn, before they are moved to their place.
 struct Made {
     origin: String,
+    /// What mattes call it, if not as the fabric.
+    name: Option<String>,
     /// The first yarn of each panel of a garment, and its name.
     panels: Vec<(usize, String)>,
     from_file: bool,
@@ -63,6 +65,7 @@ impl Made {
     ) -> Self {
         Self {
             origin,
+            name: None,
             panels: Vec::new(),
             from_file: false,
             kind,
@@ -102,7 +105,7 @@ impl FabricPlan {
                         let kind = base.named_or_own(panel.yarn.as_deref())?;
                         let made = Made::new(panel.origin, kind, panel.curves, Some(panel.coordinates));
                         let (color, motion, panels) = (panel.color, panel.motion, panel.panels);
-                        Some(Made { color, motion, panels, taken: panel.taken, exact: true, ..made })
+                        Some(Made { name: panel.name, color, motion, panels, taken: panel.taken, exact: true, ..made })
                     })
                     .collect::<Option<Vec<Made>>>()?
             }
@@ -231,8 +234,21 @@ impl Made {
         context: &Context<'_>,
         library: &Library,
     ) -> Option<Fabric> {
-        let Self { origin, panels, from_file, kind, tufts, curves, taken, coordinates, color, dyes, motion, exact } =
-            self;
+        let Self {
+            origin,
+            name,
+            panels,
+            from_file,
+            kind,
+            tufts,
+            curves,
+            taken,
+            coordinates,
+            color,
+            dyes,
+            motion,
+            exact,
+        } = self;
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -241,7 +257,7 @@ impl Made {
             _ => Basis::CatmullRom,
         };
         let mut fabric = Fabric {
-            name: keys.name.clone().unwrap_or_else(|| keys.kind.name().to_owned()),
+            name: name.or_else(|| keys.name.clone()).unwrap_or_else(|| keys.kind.name().to_owned()),
             origin,
             panels,
             from_file,

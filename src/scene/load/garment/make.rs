@@ -31,6 +31,8 @@ type StrandedRules = (Vec<Option<Stranded>>, Vec<Vec<usize>>);
 /// What a rule has become: curves of one kind of yarn.
 pub(in crate::scene::load) struct MadePanels {
     pub(in crate::scene::load) origin: String,
+    /// What mattes call it, if not as the fabric.
+    pub(in crate::scene::load) name: Option<String>,
     /// The yarn's name, if it is not the fabric's.
     pub(in crate::scene::load) yarn: Option<String>,
     pub(in crate::scene::load) color: Option<ColorPlan>,
@@ -274,6 +276,7 @@ impl GarmentPlan {
             let (extent, stitch) = (extent(garment, i), sizes[i].as_vec2().to_array());
             out.push(MadePanels {
                 origin: rule.origin(&self.path),
+                name: rule.name,
                 yarn: rule.yarn,
                 color: rule.color,
                 curves: Vec::new(),
@@ -325,6 +328,7 @@ impl GarmentPlan {
                 .unzip();
             out.push(MadePanels {
                 origin: rule.origin(&self.path),
+                name: rule.name,
                 yarn: rule.yarn,
                 color: rule.color,
                 curves,

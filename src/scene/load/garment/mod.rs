@@ -64,6 +64,8 @@ struct ClothPlan {
 /// A panel's own cloth, or the fabric's.
 struct Rule {
     group: Option<String>,
+    /// What mattes call it, if not as the fabric.
+    name: Option<String>,
     /// Where that stands; of the fabric's own cloth, where the mesh is named.
     span: Span,
     cloth: ClothPlan,
@@ -179,6 +181,7 @@ pub(super) fn garment(
     let grain = grain(fabric);
     let rule = |cloth| Rule {
         group: None,
+        name: None,
         span,
         cloth,
         stitch: gauge,
@@ -198,6 +201,10 @@ pub(super) fn garment(
                 table.error("missing key `group`: which panels these are", Some("group = \"rib_*\""));
             }
             let group = table.string("group").map(str::to_owned);
+            let name = table.string("name").map(str::to_owned);
+            if name.as_ref().is_some_and(String::is_empty) {
+                table.error_at("name", "the name of a panel cannot be empty", None);
+            }
             let own_cloth = table.table("cloth").map(|t| cloth(t, context));
             let yarn = table.string("yarn").map(str::to_owned);
             if let Some(name) = &yarn {
@@ -212,6 +219,7 @@ pub(super) fn garment(
             let hem = own_hem.hem(&table, Some(hem_keys));
             let rule = Rule {
                 group: Some(group?),
+                name,
                 span: table.span("group").unwrap_or(table.header()),
                 stitch: stitch(&table, Some(per)).or(gauge),
                 grain: if table.has("grain") { self::grain(&table) } else { grain },
