@@ -404,6 +404,32 @@ fn make_garment_writes_the_yarns_of_any_scene() {
     assert!(lengths.iter().all(|l| (l / of_scene - 1.0).abs() < 1e-4), "{lengths:?} {of_scene}");
 }
 
+/// "Until piece measures" is how high the piece is, whatever a row of the yarn is, unless rows or a height are asked for.
+#[test]
+fn pieces_measure_what_their_instructions_say() {
+    let folder = directory();
+    let d = folder.path();
+    let text = "Cast on 8 sts\\nRow 1: knit\\nRow 2: purl\\nRep rows 1-2 until piece measures 3 cm\\nBind off";
+    let of_lines = text.replace("\\n", "\n");
+    let high = |more: &[&str]| -> f64 {
+        let say =
+            yarnray(d, &[&["make", "knit", "--instructions", &of_lines, "-o", "a.bcc"], more].concat()).good().stderr;
+        let number = say.split(" high").next().and_then(|s| s.rsplit(' ').next());
+        number.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{say}"))
+    };
+    assert!((high(&["--yarn", "wool"]) - 30.0).abs() < 1.5, "{}", high(&["--yarn", "wool"]));
+    assert!((high(&["--radius", "0.2"]) - 30.0).abs() < 0.6, "{}", high(&["--radius", "0.2"]));
+    assert!(high(&["--yarn", "wool", "--rows", "4"]) < 15.0);
+    let scene = format!("[[fabric]]\nyarn = \"wool\"\nsource = {{ type = \"knit\", instructions = \"{text}\" }}\n");
+    write(d, "s.toml", &scene);
+    let told = yarnray(d, &["info", "s.toml"]).good().stdout;
+    // Rows of about 2.8 mm.
+    assert!(["8 x 10,", "8 x 11,"].iter().any(|size| told.contains(size)), "{told}");
+    write(d, "s.toml", scene.replace("type = \"knit\"", "type = \"knit\", height = 60"));
+    let told = yarnray(d, &["info", "s.toml"]).good().stdout;
+    assert!(["8 x 21,", "8 x 22,"].iter().any(|size| told.contains(size)), "{told}");
+}
+
 #[test]
 fn written_instructions_are_knitted_from_the_command_line_and_from_a_file() {
     let folder = directory();

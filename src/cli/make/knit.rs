@@ -126,16 +126,21 @@ fn wrong(error: &dyn std::fmt::Display) -> Failure {
     Failure::Input(format!("error: {error}"))
 }
 
+/// Rows of a height are counted when its stitches are known: so many are enough.
+const MANY: u32 = 2000;
+
 /// A chart, and the stitches and rows that are knitted of it unless asked otherwise.
 struct Charted {
     chart: Chart,
     stitches: u32,
     rows: u32,
+    /// How high the piece is to be by its instructions, mm.
+    height: Option<f64>,
 }
 
 /// The chart of written instructions, or of those in a file whose name stands behind `@`, over so many stitches or as many as
-/// they cast on; what they repeat without an end, for at least so many rows.
-fn written(text: &str, stitches: Option<u32>, least: u32) -> Result<Charted, Failure> {
+/// they cast on; what they repeat without an end, for at least so many rows, or as far as it may have to go.
+fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Charted, Failure> {
     let (text, name) = match text.strip_prefix('@') {
         None => (text.to_owned(), "--instructions".to_owned()),
         Some(path) => {
@@ -149,22 +154,22 @@ fn written(text: &str, stitches: Option<u32>, least: u32) -> Result<Charted, Fai
     };
     let read = Instructions::read(&text).map_err(told)?;
     let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
+    let height = read.height();
+    let least = least.unwrap_or(if height.is_some() { MANY } else { knit::COUNT });
     let worked = read.work(stitches, least as usize).map_err(told)?;
     let rows = if worked.whole { worked.rows.len() as u32 } else { knit::COUNT };
     let parsed = Chart::parse(&worked.rows);
     let chart = parsed.map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))?;
-    Ok(Charted { chart, stitches, rows })
+    Ok(Charted { chart, stitches, rows, height })
 }
 
 impl KnitArgs {
     /// What is to be knitted, of yarn of a thickness.
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
-        // Rows of a height are counted when its stitches are known: so many are enough.
-        const MANY: u32 = 2000;
-        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT };
-        let Charted { chart, stitches, rows } = if let Some(text) = &self.instructions {
-            let least = if self.size.height.is_some() { MANY } else { knit::COUNT };
-            written(text, self.stitches, self.rows.unwrap_or(least))?
+        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT, height: None };
+        let Charted { chart, stitches, rows, height } = if let Some(text) = &self.instructions {
+            let least = self.rows.or(self.size.height.map(|_| MANY));
+            written(text, self.stitches, least)?
         } else if self.chart.is_empty() {
             let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
             by_itself(chart.ok_or_else(|| wrong(&"unknown pattern"))?)
@@ -192,7 +197,8 @@ impl KnitArgs {
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
-        let piece = self.sized(&piece, yarn)?;
+        let height = height.filter(|_| self.rows.is_none() && !self.tile && !matches!(piece.form, Form::Revolution(_)));
+        let piece = self.sized(&piece, yarn, height)?;
         piece.check_counts().map_err(told)?;
         Ok(piece)
     }
@@ -206,14 +212,14 @@ impl KnitArgs {
         Ok(self.form.clone())
     }
 
-    /// The piece in the size that is asked for.
-    fn sized(&self, piece: &Knit, yarn: &Thickness) -> Result<Knit, Failure> {
+    /// The piece in the size that is asked for, or as high as its instructions say.
+    fn sized(&self, piece: &Knit, yarn: &Thickness, by_text: Option<f64>) -> Result<Knit, Failure> {
         let SizeArgs { gauge, width, height, circumference } = self.size;
         let sizes = Sizes {
             stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
             width,
             circumference,
-            height,
+            height: height.or(by_text),
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
         };
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());

@@ -60,10 +60,12 @@ pub(super) enum Often {
 }
 
 /// "Rep rows 1-4 three times more."
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Copies {
     pub(super) which: Which,
     pub(super) often: Often,
+    /// How high the piece is then, if that is said, mm.
+    pub(super) height: Option<f64>,
 }
 
 /// A number in digits or as a word; also as in "1st" or "first".
@@ -444,7 +446,7 @@ impl Copies {
             ("work", Often::More(n)) if !rest.contains(&"more") => Often::InAll(n),
             (_, often) => often,
         };
-        Ok(Some(Self { which, often }))
+        Ok(Some(Self { which, often, height: measure(text) }))
     }
 }
 
@@ -508,6 +510,48 @@ fn often(words: &[&str]) -> Option<Often> {
         }
     }
     None
+}
+
+/// The first length of a text, mm: "10 cm", "4.5in", "4 1/2 inches", "25 cm [10 in]".
+fn measure(text: &str) -> Option<f64> {
+    let lower = text.to_lowercase();
+    let words: Vec<&str> =
+        lower.split(|c: char| c.is_whitespace() || "()[],;:*".contains(c)).filter(|w| !w.is_empty()).collect();
+    words.iter().enumerate().find_map(|(i, word)| {
+        let digits = |c: char| c.is_ascii_digit() || "./\u{bc}\u{bd}\u{be}".contains(c);
+        let (figure, behind) = word.split_at(word.find(|c| !digits(c)).unwrap_or(word.len()));
+        let unit = if behind.is_empty() { words.get(i + 1)? } else { behind };
+        let unit = match unit.trim_end_matches('.') {
+            "mm" => 1.0,
+            "cm" | "cms" | "centimetres" | "centimeters" => 10.0,
+            "in" | "ins" | "inch" | "inches" | "\"" | "\u{201d}" => 25.4,
+            _ => return None,
+        };
+        let own = amount(figure)?;
+        // "4 1/2 in"
+        let before = i.checked_sub(1).filter(|_| figure.contains('/')).and_then(|i| words[i].parse::<u32>().ok());
+        Some((own + before.map_or(0.0, f64::from)) * unit).filter(|mm| mm.is_finite() && *mm > 0.0)
+    })
+}
+
+/// "4", "4.5", "1/2", "4\u{bd}".
+fn amount(figure: &str) -> Option<f64> {
+    if let Some((above, below)) = figure.split_once('/') {
+        return Some(above.parse::<f64>().ok()? / below.parse::<f64>().ok()?);
+    }
+    let part = |sign| match sign {
+        '\u{bc}' => Some(0.25),
+        '\u{bd}' => Some(0.5),
+        '\u{be}' => Some(0.75),
+        _ => None,
+    };
+    match figure.chars().next_back().and_then(part) {
+        Some(part) => {
+            let whole = figure.trim_end_matches(|c: char| !c.is_ascii());
+            Some(part + if whole.is_empty() { 0.0 } else { whole.parse().ok()? })
+        }
+        None => figure.parse().ok(),
+    }
 }
 
 /// The rows that "as row 1" or "repeat rows 1 and 2 twice" in the place of a row names.

@@ -68,6 +68,7 @@ pub struct Instructions {
     set_up: usize,
     again: Option<Again>,
     cast_on: Option<u32>,
+    height: Option<f64>,
     ends: bool,
 }
 
@@ -100,6 +101,11 @@ impl Instructions {
     /// How many stitches they say to cast on, if they do.
     pub fn cast_on(&self) -> Option<u32> {
         self.cast_on
+    }
+
+    /// How high the piece is to be, mm, if they repeat rows until it measures so much.
+    pub fn height(&self) -> Option<f64> {
+        self.height.filter(|_| self.again.as_ref().is_some_and(|again| again.until == Until::Open))
     }
 
     /// Works them over so many stitches. What they tell to repeat without an end, and does not repeat from the first row on

@@ -39,6 +39,8 @@ struct Reading {
     round: bool,
     again: Option<Again>,
     cast_on: Option<u32>,
+    /// How high the piece is when repeats without an end are done, mm.
+    height: Option<f64>,
     ends: bool,
 }
 
@@ -54,6 +56,7 @@ pub(super) fn written(text: &str) -> Result<Instructions> {
         round: false,
         again: None,
         cast_on: None,
+        height: None,
         ends: false,
     };
     // A row may go on in the next lines.
@@ -203,6 +206,9 @@ impl Reading {
 
     /// Repeats rows after the last one.
     fn again(&mut self, line: usize, copies: &Copies) -> Result<()> {
+        if copies.often == Often::Open {
+            self.height = copies.height.or(self.height);
+        }
         if self.again.is_some() {
             // "These 4 rows form the pattern. Cont in patt until ..."
             if copies.often == Often::Open {
@@ -286,6 +292,7 @@ impl Reading {
             rows,
             again: self.again,
             cast_on: self.cast_on,
+            height: self.height,
             ends: self.ends,
         })
     }

@@ -167,6 +167,24 @@ fn stitches_are_written_in_many_ways() {
 }
 
 #[test]
+fn lengths_are_read_in_all_units() {
+    for (more, height) in [
+        ("Rep rows 1-2 until piece measures 10 cm.", Some(100.0)),
+        ("Rep rows 1-2 for 10.5cm, ending with a WS row", Some(105.0)),
+        ("These 2 rows form the pattern. Cont in patt until work measures 4 1/2 in.", Some(114.3)),
+        ("Repeat rows 1 and 2 until it measures 4\u{bd}\" [11.5 cm]. Bind off.", Some(114.3)),
+        ("Continue in pattern until piece measures 25 cm [10 in]\nBind off.", Some(250.0)),
+        ("Rep rows 1-2.", None),
+        ("Rep rows 1-2 3 times more (10 cm).", None),
+        ("Rep rows 1-2 until 5 sts remain (10 cm).", None),
+    ] {
+        let found = Instructions::read(&format!("Row 1: k1, p1\nRow 2: k2\n{more}")).unwrap().height();
+        let same = found.zip(height).map_or(found == height, |(a, b)| (a - b).abs() < 1e-9);
+        assert!(same, "{more}: {found:?}");
+    }
+}
+
+#[test]
 fn rows_are_repeated_as_they_are_told() {
     let work = |text: &str, stitches, least| Instructions::read(text).unwrap().work(stitches, least).unwrap();
     let two = "Row 1: k1, p1\nRow 2: k2\n";

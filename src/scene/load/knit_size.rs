@@ -43,6 +43,13 @@ impl GivenSizes {
         Self { sizes, stitches, rows }
     }
 
+    /// The height that written instructions say, mm, where no key says one or counts rows.
+    pub(super) fn written_height(&mut self, height: Option<f64>) {
+        if self.sizes.height.is_none() && !self.sizes.counted[1] {
+            self.sizes.height = height;
+        }
+    }
+
     /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.
     pub(super) fn apply(&self, knit: &Knit, yarn: &Thickness, context: &Context<'_>) -> Option<Knit> {
         let sized = self.sizes.apply(knit, yarn);

@@ -179,11 +179,13 @@ pub(super) struct Charted {
     /// Stitches to cast on and rows to knit unless asked otherwise.
     stitches: u32,
     rows: u32,
+    /// How high the piece is to be by its instructions, mm.
+    height: Option<f64>,
 }
 
 impl Charted {
     fn new(name: &str, chart: Option<Chart>) -> Self {
-        Self { name: name.to_owned(), chart, lines: Vec::new(), stitches: knit::COUNT, rows: knit::COUNT }
+        Self { name: name.to_owned(), chart, lines: Vec::new(), stitches: knit::COUNT, rows: knit::COUNT, height: None }
     }
 }
 
@@ -271,7 +273,8 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     let Ok(read) = Instructions::read(text).map_err(told) else { return charted };
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
-    let least = if table.has("height") { MANY } else { charted.rows };
+    charted.height = read.height();
+    let least = if table.has("height") || charted.height.is_some() { MANY } else { charted.rows };
     let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
     let Ok(worked) = read.work(stitches, least).map_err(told) else { return charted };
     if worked.whole {
@@ -304,7 +307,10 @@ pub(super) fn knit(
         Some(chart) if lines_are_all(&form, &charted.lines) => chart.rows(),
         _ => charted.rows,
     };
-    let sizes = GivenSizes::read(table, Some(fabric), context, &form);
+    let mut sizes = GivenSizes::read(table, Some(fabric), context, &form);
+    if matches!(form, Some(Form::Flat | Form::Tube)) && !table.has("tile") {
+        sizes.written_height(charted.height);
+    }
     counted(table, yarns, Charted { rows, ..charted }, form, sizes)
 }
 
@@ -353,7 +359,7 @@ pub(super) fn work_of_tile(table: &Reader<'_>) -> Option<Stranding> {
 fn counted(
     table: &Reader<'_>,
     yarns: &KnownYarns<'_>,
-    Charted { name, chart, lines, stitches, rows }: Charted,
+    Charted { name, chart, lines, stitches, rows, .. }: Charted,
     form: Option<Form>,
     sizes: GivenSizes,
 ) -> Option<KnitPlan> {
