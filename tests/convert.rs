@@ -75,6 +75,44 @@ fn scenes_take_curves_meshes_and_cameras_of_stages() {
     assert_eq!(stats["curves"]["yarns"], 9);
 }
 
+/// Programs bind materials to subsets of their own, which lie across those of the panels: both name panels.
+#[test]
+fn panels_are_named_by_subsets_of_any_family() {
+    let folder = directory();
+    let at = folder.path();
+    let subset = |name: &str, family: &str, faces: &str| {
+        format!(
+            "def GeomSubset \"{name}\" {{\nuniform token familyName = \"{family}\"\nint[] indices = [{faces}]\n}}\n"
+        )
+    };
+    let subsets = [("body", "panel", "0"), ("rib", "panel", "1"), ("cuff", "panel", "2")]
+        .map(|(name, family, faces)| subset(name, family, faces))
+        .concat()
+        + &subset("wool", "materialBind", "0, 1")
+        + &subset("silk", "materialBind", "2");
+    let points = "(0,0,0), (4,0,0), (4,4,0), (0,4,0), (6,0,0), (10,0,0), (10,4,0), (6,4,0), (12,0,0), (16,0,0), (16,4,0), (12,4,0)";
+    let flat = points.replace(",0)", ")");
+    write(
+        at,
+        "g.usda",
+        format!(
+            "#usda 1.0\ndef Mesh \"m\" {{\nint[] faceVertexCounts = [4, 4, 4]\n\
+             int[] faceVertexIndices = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]\npoint3f[] points = [{points}]\n\
+             texCoord2f[] primvars:st = [{flat}] (\ninterpolation = \"vertex\"\n)\n{subsets}}}\n"
+        ),
+    );
+    let panels = |group: &str| {
+        let scene = "[[fabric]]\nyarn = \"wool\"\nsource = { type = \"garment\", path = \"g.usda\", cloth = { type = \"knit\" } }\n";
+        write(at, "s.toml", format!("{scene}[[fabric.panel]]\ngroup = \"{group}\"\nname = \"own\"\n"));
+        yarnray(at, &["info", "s.toml"])
+    };
+    for group in ["body", "rib", "cuff", "wool", "silk"] {
+        panels(group).good();
+    }
+    let none = panels("linen").stderr;
+    assert!(none.contains("it has: body, cuff, rib, silk, wool"), "{none}");
+}
+
 /// What a stage holds is told with the names by which a scene chooses it; that it moves is no warning of a render.
 #[test]
 fn stages_tell_what_they_hold() {

@@ -136,6 +136,19 @@ impl GarmentMesh {
             return Err(GarmentError::at(0, "a mesh without texture coordinates", hint));
         }
         let mut mesh = Self { points: given.points.clone(), notes: given.notes.clone(), ..Self::default() };
+        // Which group and which material's subset each face is in, from 1.
+        let mut names = vec![[0; 2]; given.counts.len()];
+        for (group, number) in given.groups.iter().zip(1..) {
+            group.faces.iter().for_each(|&f| names[f as usize][usize::from(group.of_material)] = number);
+        }
+        let name = |number: usize| given.groups.get(number.wrapping_sub(1)).map_or("", |group| &group.name);
+        let mut parts: HashMap<[usize; 2], u32> = HashMap::new();
+        let mut part = |own: &[usize; 2]| {
+            *parts.entry(*own).or_insert_with(|| {
+                mesh.part(&Part { group: name(own[0]).to_owned(), material: name(own[1]).to_owned() })
+            })
+        };
+        let part_of_face: Vec<u32> = names.iter().map(&mut part).collect();
         // Corners that have the same point and value are one, however the file shares them.
         let mut known: HashMap<(u32, [u64; 2]), u32> = HashMap::new();
         let mut uv = |corner: usize| {
@@ -145,15 +158,6 @@ impl GarmentMesh {
                 mesh.uvs.len() as u32 - 1
             })
         };
-        let mut part_of_face = vec![0; given.counts.len()];
-        for group in &given.groups {
-            let part = Part { group: group.name.clone(), material: String::new() };
-            let own = mesh.parts.iter().position(|p| *p == part).unwrap_or_else(|| {
-                mesh.parts.push(part);
-                mesh.parts.len() - 1
-            });
-            group.faces.iter().for_each(|&f| part_of_face[f as usize] = own as u32);
-        }
         let faces = given.counts.iter().zip(&part_of_face).flat_map(|(&count, &part)| vec![part; count as usize - 2]);
         let triangles = given.triangles().zip(faces);
         mesh.faces = triangles

@@ -14,6 +14,8 @@ pub struct FaceGroup {
     pub name: String,
     /// Indices of faces.
     pub faces: Vec<u32>,
+    /// Whether it is there for a material to be bound to: the same faces may be in another group as well.
+    pub of_material: bool,
 }
 
 /// Polygons, in the space of the stage.
@@ -145,22 +147,23 @@ impl PolygonMesh {
     /// Puts faces of no group into one of this name.
     pub(super) fn group_the_rest(&mut self, name: &str) {
         let mut taken = vec![false; self.counts.len()];
-        self.groups.iter().flat_map(|g| &g.faces).for_each(|&f| taken[f as usize] = true);
+        let own = self.groups.iter().filter(|group| !group.of_material);
+        own.flat_map(|group| &group.faces).for_each(|&f| taken[f as usize] = true);
         let rest: Vec<u32> = (0..self.counts.len() as u32).filter(|&f| !taken[f as usize]).collect();
         if !rest.is_empty() {
-            self.groups.push(FaceGroup { name: name.to_owned(), faces: rest });
+            self.groups.push(FaceGroup { name: name.to_owned(), faces: rest, of_material: false });
         }
     }
 
-    /// Adds a group of these faces.
-    pub(super) fn add_group(&mut self, name: &str, faces: &[i64]) -> Result<(), Problem> {
+    /// Adds a group of these faces, or one `of_material`.
+    pub(super) fn add_group(&mut self, name: &str, faces: &[i64], of_material: bool) -> Result<(), Problem> {
         let count = self.counts.len();
         let known = |&face: &i64| {
             let face = usize::try_from(face).ok().filter(|&f| f < count).map(|f| f as u32);
             face.ok_or_else(|| Problem::new(format!("subset {name} names a face that is none of {count}")))
         };
         let faces = faces.iter().map(known).collect::<Result<_, _>>()?;
-        self.groups.push(FaceGroup { name: name.to_owned(), faces });
+        self.groups.push(FaceGroup { name: name.to_owned(), faces, of_material });
         Ok(())
     }
 
@@ -298,7 +301,7 @@ mod tests {
         all.append(bare);
         assert_eq!((all.points.len(), all.corners[4], all.uv_corners.len()), (8, 4, 8));
         assert_eq!(all.uvs[all.uv_corners[7] as usize], DVec2::ZERO);
-        assert_eq!(all.groups[1], FaceGroup { name: "b".into(), faces: vec![1] });
+        assert_eq!(all.groups[1], FaceGroup { name: "b".into(), faces: vec![1], of_material: false });
     }
 
     #[test]
@@ -308,6 +311,6 @@ mod tests {
         assert!(refused(&[2], &[0, 1]) && refused(&[3], &[0, 1]) && refused(&[3], &[0, 1, 3]));
         assert!(refused(&[3], &[0, 1, -1]) && refused(&[i64::MAX, i64::MAX], &[]));
         assert!(PolygonMesh::new(vec![DVec3::NAN], &[], &[]).is_err());
-        assert!(quad().add_group("x", &[1]).is_err() && quad().add_group("x", &[-1]).is_err());
+        assert!(quad().add_group("x", &[1], false).is_err() && quad().add_group("x", &[-1], true).is_err());
     }
 }

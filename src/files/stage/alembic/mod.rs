@@ -222,7 +222,7 @@ impl Archive {
                 let own = properties.as_ref().map(|p| p.compound(".faceset", &self.metadata)).transpose()?.flatten();
                 let faces = own.map(|own| own.at(".faces", time, &self.samplings)).transpose()?.flatten();
                 if let Some(faces) = faces {
-                    mesh.add_group(name, &faces.before.integers(".faces")?)?;
+                    mesh.add_group(name, &faces.before.integers(".faces")?, false)?;
                 }
             }
         }

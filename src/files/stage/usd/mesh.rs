@@ -36,7 +36,8 @@ pub(super) fn read(values: &Values<'_>, to_stage: &DMat4) -> Result<PolygonMesh,
         let own = Values { prim: &child, time: values.time };
         let is_subset = child.type_name()?.is_some_and(|t| t == "GeomSubset");
         if is_subset && own.token("elementType")?.is_none_or(|e| e == "face") {
-            mesh.add_group(name_of(&child), &own.integers("indices")?.unwrap_or_default())?;
+            let of_material = own.token("familyName")?.is_some_and(|family| family == "materialBind");
+            mesh.add_group(name_of(&child), &own.integers("indices")?.unwrap_or_default(), of_material)?;
         }
     }
     mesh.group_the_rest(name_of(values.prim));
