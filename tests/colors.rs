@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Picture, directory, mean, render, render_file, write};
+use crate::support::{Picture, directory, mean, render, render_file, write, yarnray};
 
 /// Fibres and yarns of three colours, and even light.
 const YARNS: &str = "[fiber.white]\nr = 0.05\ntt = 0.35\nd = 0.5\n\
@@ -33,6 +33,20 @@ fn cell(picture: &Picture, at: [usize; 2], columns: usize, rows: usize) -> [f64;
         off(x, at[0], w) && off(y, at[1], h)
     };
     mean(&(0..w * h).filter(inside).map(|i| colors[i]).collect::<Vec<_>>())
+}
+
+/// `"2 brown_wool"` is a yarn of the built-in library, as `"brown_wool"` is.
+#[test]
+fn counted_yarns_of_the_library_are_known() {
+    let folder = directory();
+    for (fabric, source) in [
+        ("rows = [\"4 wool\", \"2 brown_wool\"]", "type = \"knit\", pattern = \"garter\", stitches = 6, rows = 8"),
+        ("columns = [\"2 grey_wool\", \"wool\"]", "type = \"weave\", draft = \"plain\", warps = 6, wefts = 6"),
+        ("", "type = \"weave\", draft = \"plain\", warps = 6, wefts = 6, warp_order = [\"3 brown_wool\", \"3 wool\"]"),
+    ] {
+        write(folder.path(), "s.toml", format!("[[fabric]]\nyarn = \"wool\"\n{fabric}\nsource = {{ {source} }}\n"));
+        yarnray(folder.path(), &["info", "s.toml"]).good();
+    }
 }
 
 #[test]

@@ -91,11 +91,14 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
 
 /// `"navy"`, or `"4 navy"` for four of them.
 pub(super) fn in_turns(entry: &str) -> Vec<String> {
+    let (count, name) = turn(entry);
+    vec![name.to_owned(); count]
+}
+
+/// How many of which yarn `"4 navy"` is; one of what has no count.
+pub(super) fn turn(entry: &str) -> (usize, &str) {
     let counted = entry.split_once(' ').and_then(|(count, name)| Some((count.parse::<usize>().ok()?, name.trim())));
-    match counted {
-        Some((count @ 1..=10_000, name)) => vec![name.to_owned(); count],
-        _ => vec![entry.to_owned()],
-    }
+    counted.filter(|(count, _)| (1..=10_000).contains(count)).unwrap_or((1, entry))
 }
 
 const SAME_BUILD: &str = "yarns that take turns within a fabric differ in their fibres only";

@@ -2,7 +2,9 @@
 
 use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
-use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, merge_libraries, read_text, yarns, yarns::Library};
+use super::{
+    super::Yarn, Context, LoadError, LoadOptions, UNITS, color, merge_libraries, read_text, yarns, yarns::Library,
+};
 use crate::{
     input::{
         diagnostic::{Diagnostics, Sources, hinted, unknown_name},
@@ -82,6 +84,8 @@ pub(super) fn built_in_fiber(name: &str) -> Option<FiberMaterial> {
 pub(super) fn add_built_in(library: &mut Library, fabrics: Option<&Node>, tilted: bool) {
     let mut named = Vec::new();
     texts(fabrics, &mut named);
+    // Yarns that take turns may be counted.
+    named.iter_mut().for_each(|name| *name = color::turn(name).1);
     let unknown = |names: &[String], name: &str| !names.iter().any(|n| n == name);
     named.retain(|name| unknown(&library.yarn_names, name) || unknown(&library.fiber_names, name));
     let defines = |name: &str| ["yarn", "fiber"].iter().any(|kind| built_in_names(kind).any(|of| of == name));
