@@ -129,6 +129,9 @@ fn keys_move_the_camera_and_a_turntable_turns_it() {
     write(d, "s.toml", scene(stands, source));
     let there = render(d, &["--frames", "5"]);
     assert!(difference(&at_key, &there, "A") < 1e-3, "{}", difference(&at_key, &there, "A"));
+    // Whoever says where it stands need not name its type.
+    write(d, "s.toml", scene(&stands.replace("type = \"perspective\"\n", ""), source));
+    assert_eq!(difference(&render(d, &["--frames", "5"]), &there, "A"), 0.0);
     // Most of a quarter of a turn later, the camera looks nearly along the yarn.
     let turning = "direction = [0, 0, 1]\n[camera.turntable]\nframes = 20\n";
     write(d, "s.toml", scene(turning, source));

@@ -60,7 +60,10 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u3
         ("orthographic", CameraKind::Orthographic),
         ("usd", CameraKind::Stage),
     ];
-    let Some(kind) = table.kind_or("type", CameraKind::Frame, &kinds) else {
+    // Who says where it stands has no framing in mind.
+    let stands = table.keys().any(|key| key == "position");
+    let unsaid = if stands { CameraKind::Perspective } else { CameraKind::Frame };
+    let Some(kind) = table.kind_or("type", unsaid, &kinds) else {
         table.finish();
         return None;
     };
