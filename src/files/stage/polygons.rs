@@ -48,6 +48,7 @@ pub(super) struct AtCorners<T> {
 }
 
 /// Leaves those that are kept, of a list that may be missing.
+#[cfg_attr(not(feature = "usd"), allow(dead_code, reason = "Alembic has no holes"))]
 fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
     let mut kept = kept.iter();
     list.retain(|_| kept.next().is_some_and(|k| *k));
@@ -168,6 +169,7 @@ impl PolygonMesh {
     }
 
     /// Takes faces away that are holes.
+    #[cfg_attr(not(feature = "usd"), allow(dead_code, reason = "Alembic has no holes"))]
     pub(super) fn cut_out(&mut self, holes: &[i64]) -> Result<(), Problem> {
         let count = self.counts.len();
         let mut kept = vec![true; count];
