@@ -1,6 +1,9 @@
 //! Helpers of the tests: cloth, data of the project, and data that lies beside it and is not part of it.
 
-use std::{io::Write as _, path::PathBuf};
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
 
 use crate::pattern::{
     chart::Chart,
@@ -40,6 +43,15 @@ pub(crate) fn pressed_stockinette() -> Tile {
 pub(crate) fn data(name: &str) -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Writes a PNG of 8 bits a channel, the top row first.
+pub(crate) fn write_png(path: &Path, width: usize, color: png::ColorType, bytes: &[u8]) {
+    let height = bytes.len() / (width * color.samples());
+    let file = std::fs::File::create(path).unwrap();
+    let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+    encoder.set_color(color);
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
 }
 
 /// Says what is not tested, past the harness, which would show it for failed tests only.

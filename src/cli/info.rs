@@ -78,23 +78,26 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
 fn file_report(path: &Path, radius: Option<f64>) -> Result<(Value, String), Failure> {
     let read = curve_file::read(path, &ReadOptions::default());
     let has_curves = read.as_ref().is_ok_and(|set| !set.curves.is_empty());
-    let may_be_mesh = stage::is_stage(path) || has_extension(path, "obj");
-    if !has_curves
-        && may_be_mesh
-        && let Ok(Some(facts)) = MeshFacts::read(path)
-    {
-        return Ok(with_stage(path, mesh_report(path, &facts)));
-    }
-    let set = read.map_err(|e| Failure::Input(format!("error: {e}")))?;
-    Ok(with_stage(path, curves_report(path, &set, radius)))
+    let stage = if stage::is_stage(path) { Stage::open(path).ok() } else { None };
+    let facts = match &stage {
+        _ if has_curves => None,
+        Some(stage) => MeshFacts::of_stage(stage).ok().flatten(),
+        None if has_extension(path, "obj") => MeshFacts::read(path).ok().flatten(),
+        None => None,
+    };
+    let own = match facts {
+        Some(facts) => mesh_report(path, &facts),
+        None => curves_report(path, &read.map_err(|e| Failure::Input(format!("error: {e}")))?, radius),
+    };
+    Ok(match &stage {
+        Some(stage) => with_stage(stage, own),
+        None => own,
+    })
 }
 
 /// What else is in a stage, for those who name it in a scene.
-fn with_stage(path: &Path, (mut report, mut text): (Value, String)) -> (Value, String) {
+fn with_stage(stage: &Stage, (mut report, mut text): (Value, String)) -> (Value, String) {
     const MOST: usize = 8;
-    let Some(stage) = Some(path).filter(|p| stage::is_stage(p)).and_then(|p| Stage::open(p).ok()) else {
-        return (report, text);
-    };
     let Ok(contents) = stage.contents() else { return (report, text) };
     let frames = stage.frames().filter(|[first, last]| first < last);
     if let Some([first, last]) = frames {

@@ -161,7 +161,7 @@ impl<'a> Prepared<'a> {
             }
             Of::Yarns { yarn, plies, shape, strands } => {
                 estimate.tight_bends = strands.tight_bends().len();
-                let plies = wound(self.fabric, yarn, plies, shape, strands);
+                let plies = plies_of(self.fabric, yarn, plies, shape, strands);
                 match mode {
                     Mode::Yarn => {
                         let (points, segments) = (strands.points().len(), strands.segments().len());
@@ -208,14 +208,13 @@ impl<'a> Prepared<'a> {
 
     fn pieces(self, mode: Mode, shared: &Shared<'_>) -> Vec<Piece> {
         let (index, fabric) = (self.index, self.fabric);
-        let (yarn, of_tube, shape, strands) = match self.of {
+        let (yarn, in_tube, shape, strands) = match self.of {
             Of::Yarns { yarn, plies, shape, strands } => (yarn, plies, shape, strands),
             Of::Fibers { curves, material } => return vec![Piece::of_lone_fibers(index, &curves, material)],
         };
-        let plies = wound(fabric, yarn, &of_tube, &shape, &strands);
+        let plies = plies_of(fabric, yarn, &in_tube, &shape, &strands);
         let (variants, shows_fibers) = (&fabric.variants[..], fabric.shows_fibers);
-        let wound =
-            Wound { index, yarn, variants, of_tube: &of_tube, shape: &shape, strands: &strands, plies, shows_fibers };
+        let wound = Wound { index, yarn, variants, shape: &shape, strands: &strands, plies, shows_fibers };
         let slots = 0..yarn.plies.len();
         let mut all: Vec<Piece> = match mode {
             Mode::Yarn => Vec::new(),
@@ -266,8 +265,6 @@ struct Wound<'a> {
     index: usize,
     yarn: &'a Yarn,
     variants: &'a [Yarn],
-    /// Its plies, lengths in radii of the tube that holds them.
-    of_tube: &'a [PlyParameters],
     shape: &'a YarnShape,
     strands: &'a Strands,
     plies: Plies<'a>,
@@ -277,7 +274,7 @@ struct Wound<'a> {
 impl Wound<'_> {
     /// One ply of all yarns, each as a yarn of its own.
     fn ply(&self, ply: usize, shared: &Shared<'_>) -> Piece {
-        let (mut strands, alone) = ply_strands(&self.plies, &self.of_tube[ply], self.shape, ply, self.shows_fibers);
+        let (mut strands, alone) = ply_strands(&self.plies, self.shape, ply, self.shows_fibers);
         strands.set_material_indices(self.plies.material_indices_along(1));
         strands.set_uvs(self.plies.uvs_along(1));
         let alone = (alone, stretch(self.plies.mean_flattening()));
@@ -319,7 +316,7 @@ impl Wound<'_> {
 }
 
 /// The plies of a yarn, of which lengths are in radii of the tube that holds them, wound around its strands.
-fn wound<'a>(
+fn plies_of<'a>(
     fabric: &Fabric,
     yarn: &Yarn,
     plies: &'a [PlyParameters],
@@ -353,13 +350,8 @@ fn strands(fabric: &Fabric, curves: Given<'_>, yarn: &Yarn, shape: &YarnShape) -
 }
 
 /// One ply of all yarns as yarns of their own, and the section of such a yarn: one ply that fills it.
-fn ply_strands(
-    plies: &Plies<'_>,
-    ply: &PlyParameters,
-    of: &YarnShape,
-    slot: usize,
-    distances: bool,
-) -> (Strands, YarnShape) {
+fn ply_strands(plies: &Plies<'_>, of: &YarnShape, slot: usize, distances: bool) -> (Strands, YarnShape) {
+    let ply = plies.parameters(slot);
     let strands = Strands::new(
         plies.ply_curves(slot),
         &StrandOptions {

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     obj,
-    stage::{PrimPattern, Stage, is_stage},
+    stage::{PrimPattern, Stage},
 };
 use crate::geometry::mesh::Mesh;
 
@@ -25,26 +25,32 @@ pub(crate) struct MeshFacts {
 }
 
 impl MeshFacts {
-    /// Reads an OBJ file or the visible meshes of a stage; `None` where there is no face in it.
+    /// Reads an OBJ file; `None` where there is no face in it.
     ///
     /// # Errors
     /// What is wrong with the file.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>, String> {
-        let (mesh, mut groups, unit_mm) = if is_stage(path) {
-            let stage = Stage::open(path).map_err(|e| e.to_string())?;
-            let polygons = stage.mesh(&PrimPattern::all(), None).map_err(|e| e.to_string())?;
-            let groups = polygons.groups.iter().map(|group| group.name.clone()).collect();
-            (polygons.to_mesh(), groups, stage.unit_mm())
-        } else {
-            let (mesh, groups) = obj::read_grouped(path).map_err(|e| e.to_string())?;
-            (mesh, groups, None)
-        };
-        let Some(bounds) = mesh.bounds() else { return Ok(None) };
+        let (mesh, groups) = obj::read_grouped(path).map_err(|e| e.to_string())?;
+        Ok(Self::of(&mesh, groups, None))
+    }
+
+    /// Reads the visible meshes of a stage, likewise.
+    ///
+    /// # Errors
+    /// What is wrong with the stage.
+    pub(crate) fn of_stage(stage: &Stage) -> Result<Option<Self>, String> {
+        let polygons = stage.mesh(&PrimPattern::all(), None).map_err(|e| e.to_string())?;
+        let groups = polygons.groups.iter().map(|group| group.name.clone()).collect();
+        Ok(Self::of(&polygons.to_mesh(), groups, stage.unit_mm()))
+    }
+
+    fn of(mesh: &Mesh, mut groups: Vec<String>, unit_mm: Option<f64>) -> Option<Self> {
+        let bounds = mesh.bounds()?;
         groups.sort();
         groups.dedup();
         let uvs = mesh.uvs.iter().map(|&uv| (uv, uv)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let (vertices, open_edges) = border(&mesh);
-        Ok(Some(Self { vertices, triangles: mesh.triangles.len(), open_edges, groups, bounds, uvs, unit_mm }))
+        let (vertices, open_edges) = border(mesh);
+        Some(Self { vertices, triangles: mesh.triangles.len(), open_edges, groups, bounds, uvs, unit_mm })
     }
 }
 

@@ -118,16 +118,14 @@ pub(crate) fn bytes() -> u64 {
 #[cfg(all(test, feature = "oiio"))]
 mod tests {
     use super::*;
+    use crate::testing::write_png;
 
     /// A PNG of 8-bit RGB rows, the top one first.
-    fn picture(width: u32, rows: &[&[[u8; 3]]]) -> (tempfile::TempDir, std::path::PathBuf) {
+    fn picture(width: usize, rows: &[&[[u8; 3]]]) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.png");
-        let file = std::fs::File::create(&path).unwrap();
-        let mut encoder = png::Encoder::new(file, width, rows.len() as u32);
-        encoder.set_color(png::ColorType::Rgb);
         let bytes: Vec<u8> = rows.iter().flat_map(|r| r.iter().flatten().copied()).collect();
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        write_png(&path, width, png::ColorType::Rgb, &bytes);
         (folder, path)
     }
 
@@ -153,11 +151,7 @@ mod tests {
     fn what_is_transparent_is_white() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.png");
-        let file = std::fs::File::create(&path).unwrap();
-        let mut encoder = png::Encoder::new(file, 3, 1);
-        encoder.set_color(png::ColorType::Rgba);
-        let bytes = [255, 0, 0, 255, 0, 0, 0, 0, 188, 0, 0, 128];
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        write_png(&path, 3, png::ColorType::Rgba, &[255, 0, 0, 255, 0, 0, 0, 0, 188, 0, 0, 128]);
         let texture = Texture::open(&path).unwrap();
         for (u, want) in [(1.0 / 6.0, [1.0, 0.0, 0.0]), (0.5, [1.0; 3]), (5.0 / 6.0, [0.750, 0.498, 0.498])] {
             let got = texture.sample(u, 0.5, 0.0);

@@ -63,17 +63,15 @@ impl Legend {
 #[cfg(test)]
 mod tests {
     use super::{super::palette::color, *};
+    use crate::testing::write_png;
 
     /// A picture of rows of signs, the top one first, not quite in the colours of its palette.
     fn picture(rows: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("draft.png");
-        let file = std::fs::File::create(&path).unwrap();
-        let mut encoder = png::Encoder::new(file, rows[0].len() as u32, rows.len() as u32);
-        encoder.set_color(png::ColorType::Rgb);
         let pixel = |c: char| if c == '#' { [180, 30, 36] } else { [250, 252, 249] };
         let bytes: Vec<u8> = rows.iter().flat_map(|row| row.chars().flat_map(pixel)).collect();
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        write_png(&path, rows[0].len(), png::ColorType::Rgb, &bytes);
         (folder, path)
     }
 

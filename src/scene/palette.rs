@@ -96,16 +96,13 @@ pub(crate) fn nearest(color: Vec3, palette: &[Vec3]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::write_png;
 
     #[test]
     fn what_is_transparent_is_white_paper() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.png");
-        let file = std::fs::File::create(&path).unwrap();
-        let mut encoder = png::Encoder::new(file, 3, 1);
-        encoder.set_color(png::ColorType::Rgba);
-        let bytes = [200, 30, 30, 255, 0, 0, 0, 0, 200, 30, 30, 0];
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        write_png(&path, 3, png::ColorType::Rgba, &[200, 30, 30, 255, 0, 0, 0, 0, 200, 30, 30, 0]);
         let palette = ["#000000", "#c81e1e", "#ffffff"].map(|sign| color(sign).unwrap());
         assert_eq!(Pixels::read(&path, &palette).unwrap().row(0), [1, 2, 2]);
     }

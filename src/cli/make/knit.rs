@@ -16,7 +16,7 @@ use crate::{
         PatternStrand,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
-        knitspeak::{Instructions, KnitSpeakError},
+        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS},
     },
     scene::{Yarn, load::read_text},
 };
@@ -126,9 +126,6 @@ fn wrong(error: &dyn std::fmt::Display) -> Failure {
     Failure::Input(format!("error: {error}"))
 }
 
-/// Rows of a height are counted when its stitches are known: so many are enough.
-const MANY: u32 = 2000;
-
 /// A chart, and the stitches and rows that are knitted of it unless asked otherwise.
 struct Charted {
     chart: Chart,
@@ -155,7 +152,7 @@ fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Char
     let read = Instructions::read(&text).map_err(told)?;
     let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
     let height = read.height();
-    let least = least.unwrap_or(if height.is_some() { MANY } else { knit::COUNT });
+    let least = least.unwrap_or(if height.is_some() { MANY_ROWS } else { knit::COUNT });
     let worked = read.work(stitches, least as usize).map_err(told)?;
     let rows = if worked.whole { worked.rows.len() as u32 } else { knit::COUNT };
     let parsed = Chart::parse(&worked.rows);
@@ -168,7 +165,7 @@ impl KnitArgs {
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
         let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT, height: None };
         let Charted { chart, stitches, rows, height } = if let Some(text) = &self.instructions {
-            let least = self.rows.or(self.size.height.map(|_| MANY));
+            let least = self.rows.or(self.size.height.map(|_| MANY_ROWS));
             written(text, self.stitches, least)?
         } else if self.chart.is_empty() {
             let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
@@ -197,7 +194,6 @@ impl KnitArgs {
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
-        let height = height.filter(|_| self.rows.is_none() && !self.tile && !matches!(piece.form, Form::Revolution(_)));
         let piece = self.sized(&piece, yarn, height)?;
         piece.check_counts().map_err(told)?;
         Ok(piece)
@@ -215,13 +211,14 @@ impl KnitArgs {
     /// The piece in the size that is asked for, or as high as its instructions say.
     fn sized(&self, piece: &Knit, yarn: &Thickness, by_text: Option<f64>) -> Result<Knit, Failure> {
         let SizeArgs { gauge, width, height, circumference } = self.size;
-        let sizes = Sizes {
+        let mut sizes = Sizes {
             stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
             width,
             circumference,
-            height: height.or(by_text),
+            height,
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
         };
+        sizes.or_written_height(by_text, Some(&piece.form), self.tile);
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
         let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {

@@ -183,6 +183,11 @@ impl<'a> Plies<'a> {
         Self { strands, plies, shape, longest_step, steps: OnceLock::new(), opened: None, seed }
     }
 
+    /// What one of the plies was made from.
+    pub fn parameters(&self, ply: usize) -> &'a PlyParameters {
+        &self.plies[ply]
+    }
+
     /// Of yarns of this radius, some of which have opened into so many strands each, a curve for each strand.
     #[must_use]
     pub fn with_opened(self, radius: f64, strands: f64) -> Self {

@@ -93,6 +93,14 @@ const FIRM: f64 = 14.0;
 const MOST: f64 = 1e6;
 
 impl Sizes {
+    /// As high as written instructions say, mm, where nothing else says how many rows there are: neither a height, nor a count, nor a
+    /// profile, nor a tile.
+    pub fn or_written_height(&mut self, height: Option<f64>, form: Option<&Form>, tile: bool) {
+        if !self.counted[1] && !tile && matches!(form, Some(Form::Flat | Form::Tube)) {
+            self.height = self.height.or(height);
+        }
+    }
+
     /// What is given twice, or is no size of such a form. `measured` says whether the width and the height of a stitch are
     /// given in yarn diameters, `spelled` how an option is named.
     pub fn clashes(

@@ -89,6 +89,9 @@ pub fn chart_rows(text: &str, cast_on: u32) -> Result<Vec<String>> {
     Ok(Instructions::read(text)?.work(cast_on, 0)?.rows)
 }
 
+/// Rows that are worked where a height says how many of them are kept, which is known when stitches have a size: so many are enough.
+pub const MANY_ROWS: u32 = 2000;
+
 impl Instructions {
     /// Reads instructions.
     ///

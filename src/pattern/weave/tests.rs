@@ -10,11 +10,19 @@ use super::{
     super::{bend::folded, draft::NAMES},
     *,
 };
-use crate::geometry::{curve::Curve, overlap::overlap};
+use crate::geometry::{
+    curve::Curve,
+    overlap::{Overlap, overlap},
+};
 
 fn weave(draft: &str) -> Weave {
     let (warps, wefts) = (Extent::Yarns(12), Extent::Yarns(10));
     Weave { warps, wefts, ..Weave::of(Draft::named(draft).unwrap(), 1.0) }
+}
+
+/// How far yarns whose sections are known lie in each other.
+pub(super) fn overlap_of(strands: &[PatternStrand]) -> Overlap {
+    overlap(strands.iter().map(|s| (&s.curve, s.curve.radii.as_deref().unwrap()))).unwrap()
 }
 
 /// What several tests look at, made once by the first that asks for it.
@@ -376,9 +384,7 @@ fn yarns_have_room_at_selvedges() {
     for (name, order) in one.into_iter().chain(several) {
         let (warps, wefts) = (Extent::Yarns(20), Extent::Yarns(24));
         let weave = Weave { edges: Edges::Selvedge, shuttles: order.to_vec(), warps, wefts, ..weave(name) };
-        let strands = weave.strands().unwrap();
-        let curves = strands.iter().map(|s| (&s.curve, s.curve.radii.as_deref().unwrap()));
-        let measured = overlap(curves).unwrap();
+        let measured = overlap_of(&weave.strands().unwrap());
         let (share, deepest) = match (name, order) {
             ("double cloth", []) => (0.05, 0.3),
             ("double cloth", _) => (0.09, 1.0),
@@ -595,10 +601,8 @@ fn hems_have_room_or_are_left_out() {
         let sides = [Extent::Yarns(12), Extent::Yarns(wefts)];
         let weave = Weave { edges: Edges::Finished, warps: sides[0], wefts: sides[1], flatten: 1.5, ..weave(draft) };
         let strands = weave.relax().unwrap().strands();
-        let curves: Vec<(Curve, Vec<f64>)> =
-            strands.into_iter().map(|s| (s.curve.radii.clone().unwrap(), s.curve)).map(|(r, c)| (c, r)).collect();
-        let low = curves.iter().flat_map(|(c, _)| &c.points).map(|p| p.z).fold(0.0, f64::min);
-        (overlap(curves.iter().map(|(c, r)| (c, r.as_slice()))).unwrap(), low)
+        let low = strands.iter().flat_map(|s| &s.curve.points).map(|p| p.z).fold(0.0, f64::min);
+        (overlap_of(&strands), low)
     };
     for draft in ["plain", "twill 2/2", "satin 5", "basket 2", "herringbone 2/2 8", "huck"] {
         let (found, folded) = made(draft, 40);

@@ -130,9 +130,6 @@ mod tests {
     fn drawn(rows: &[&str]) -> Result<Vec<String>, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("chart.png");
-        let mut encoder =
-            png::Encoder::new(std::fs::File::create(&path).unwrap(), rows[0].len() as u32, rows.len() as u32);
-        encoder.set_color(png::ColorType::Rgb);
         // Not quite the colours of the palette.
         let color = |c: char| match c {
             'w' => [250, 252, 249],
@@ -142,7 +139,7 @@ mod tests {
             _ => [3, 250, 9],
         };
         let bytes: Vec<u8> = rows.iter().flat_map(|row| row.chars().flat_map(color)).collect();
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        crate::testing::write_png(&path, rows[0].len(), png::ColorType::Rgb, &bytes);
         read(&path, &symbols())
     }
 

@@ -43,11 +43,9 @@ impl GivenSizes {
         Self { sizes, stitches, rows }
     }
 
-    /// The height that written instructions say, mm, where no key says one or counts rows.
-    pub(super) fn written_height(&mut self, height: Option<f64>) {
-        if self.sizes.height.is_none() && !self.sizes.counted[1] {
-            self.sizes.height = height;
-        }
+    /// The height that written instructions say, mm, where no key says how many rows there are.
+    pub(super) fn or_written_height(&mut self, height: Option<f64>, form: Option<&Form>, tile: bool) {
+        self.sizes.or_written_height(height, form, tile);
     }
 
     /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.

@@ -17,7 +17,7 @@ use crate::{
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
-        knitspeak::{Instructions, KnitSpeakError},
+        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS},
     },
 };
 
@@ -258,8 +258,6 @@ fn drawn(table: &Reader<'_>, picture: Reader<'_>, context: &Context<'_>) -> Opti
 
 /// Written instructions over so many `stitches`, or as many as they cast on.
 fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
-    // Rows of a height are counted when its stitches are known: so many are enough.
-    const MANY: u32 = 2000;
     for other in ["pattern", "chart"].into_iter().filter(|key| table.has(key)) {
         table.error_at(other, format!("both `{other}` and `instructions` are given"), Some("keep one of them"));
     }
@@ -274,7 +272,7 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
     charted.height = read.height();
-    let least = if table.has("height") || charted.height.is_some() { MANY } else { charted.rows };
+    let least = if table.has("height") || charted.height.is_some() { MANY_ROWS } else { charted.rows };
     let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
     let Ok(worked) = read.work(stitches, least).map_err(told) else { return charted };
     if worked.whole {
@@ -308,9 +306,7 @@ pub(super) fn knit(
         _ => charted.rows,
     };
     let mut sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    if matches!(form, Some(Form::Flat | Form::Tube)) && !table.has("tile") {
-        sizes.written_height(charted.height);
-    }
+    sizes.or_written_height(charted.height, form.as_ref(), table.has("tile"));
     counted(table, yarns, Charted { rows, ..charted }, form, sizes)
 }
 

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     files::{
         obj,
-        stage::{self, PolygonMesh, PrimPattern},
+        stage::{self, PolygonMesh, PrimPattern, Stage},
     },
     garment::{GarmentError, GarmentMesh},
     geometry::mesh::Mesh,
@@ -57,10 +57,9 @@ impl Moment {
             }
             return Ok((mesh, None));
         }
-        let opens = at.0.stages.open(&self.path).is_ok();
-        let hint = if opens { "a mesh with texture coordinates; `prim` chooses one" } else { "" };
-        let fail = |problem: String| GarmentError::new(problem, hint);
-        let (mesh, unit) = self.of_stage(prim, z_up, at).map_err(fail)?;
+        let stage = at.0.stages.open(&self.path).map_err(|error| GarmentError::new(error.to_string(), ""))?;
+        let fail = |problem: String| GarmentError::new(problem, "a mesh with texture coordinates; `prim` chooses one");
+        let (mesh, unit) = self.of_stage(&stage, prim, z_up, at).map_err(fail)?;
         Ok((GarmentMesh::from_polygons(&mesh).map_err(|e| e.of(&self.path))?, unit))
     }
 
@@ -78,18 +77,19 @@ impl Moment {
             }
             return Ok((mesh, None));
         }
-        let (mesh, unit) = self.of_stage(prim, z_up, at)?;
+        let stage = at.0.stages.open(&self.path).map_err(|e| e.to_string())?;
+        let (mesh, unit) = self.of_stage(&stage, prim, z_up, at)?;
         Ok((mesh.to_mesh(), unit))
     }
 
     fn of_stage(
         &self,
+        stage: &Stage,
         prim: Option<&PrimPattern>,
         z_up: Option<bool>,
         at: (&Context<'_>, Span),
     ) -> Result<(PolygonMesh, Option<f64>), String> {
-        let stage = at.0.stages.open(&self.path).map_err(|e| e.to_string())?;
-        let mut mesh = polygons(&stage, &self.path, prim, self.frame.map(f64::from_bits))?;
+        let mut mesh = polygons(stage, &self.path, prim, self.frame.map(f64::from_bits))?;
         warn(&mesh, &self.path, at);
         if z_up.unwrap_or(stage.up_axis() == Some(2)) {
             mesh.points.iter_mut().chain(&mut mesh.normals).for_each(upright);

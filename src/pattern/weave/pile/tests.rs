@@ -1,10 +1,7 @@
 use glam::DVec2;
 
-use super::super::*;
-use crate::{
-    geometry::overlap::{Overlap, overlap},
-    pattern::draft::Draft,
-};
+use super::super::{tests::overlap_of, *};
+use crate::pattern::draft::Draft;
 
 /// A square piece of cloth with a pile of yarn of radius 1, cut all around.
 fn cloth(name: &str) -> (Weave, Vec<PatternStrand>) {
@@ -14,10 +11,6 @@ fn cloth(name: &str) -> (Weave, Vec<PatternStrand>) {
     let weave = Weave { warps: Extent::Yarns(yarns), wefts: Extent::Yarns(wefts), ..Weave::of(draft, 1.0) };
     let strands = weave.strands().unwrap();
     (weave, strands)
-}
-
-fn overlap_of(strands: &[PatternStrand]) -> Overlap {
-    overlap(strands.iter().map(|s| (&s.curve, s.curve.radii.as_deref().unwrap()))).unwrap()
 }
 
 /// Share of the plane well inside of a cloth that is hidden from above by what stands higher than `height`.

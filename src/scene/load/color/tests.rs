@@ -8,6 +8,7 @@ use crate::{
         motif::{Cells, Motif},
         palette::hex,
     },
+    testing::write_png,
 };
 
 fn span() -> Span {
@@ -50,8 +51,6 @@ fn an_image_stands_upright_and_is_averaged_where_it_is_finer_than_the_stitches()
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("letter.png");
     let (w, h) = (4u32, 5u32);
-    let mut encoder = png::Encoder::new(std::fs::File::create(&path).unwrap(), 3 * w, 3 * h);
-    encoder.set_color(png::ColorType::Rgb);
     let mut bytes = Vec::new();
     for y in 0..3 * h {
         for x in 0..3 * w {
@@ -61,7 +60,7 @@ fn an_image_stands_upright_and_is_averaged_where_it_is_finer_than_the_stitches()
             bytes.extend(if red { [190, 30, 30] } else { [250, 250, 240] });
         }
     }
-    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    write_png(&path, 3 * w as usize, png::ColorType::Rgb, &bytes);
     let stretched = motif(Cells::Picture(path.clone()), ["#ffffff", "#c02020"], true);
     let map = stretched.motif.cells([4.0, 5.0], &[0, 1], 0).unwrap();
     assert_eq!(drawn(&map, 4, 5), LETTER);
