@@ -10,10 +10,10 @@ pub struct AfterFiber {
     pub first: MissingFibers,
     /// Of light that goes on after another one.
     pub later: MissingFibers,
-    /// Of light that goes back after the first, where those in the [`ClearedStrip`](super::cleared_strip::ClearedStrip) are not expected. Below 0 where more are met than
+    /// Of light that goes back after the first, where those in a [`ClearedStrip`](super::cleared_strip::ClearedStrip) are not expected. Below 0 where more are met than
     /// expected.
     pub back: MissingFibers,
-    /// Of light that goes back after another one, where all are expected, and the one before is in its way.
+    /// Of light that goes back after another one, where those that it met before are left out as well.
     pub back_later: MissingFibers,
 }
 

@@ -2,29 +2,57 @@
 
 use super::density::ChordFibers;
 
-/// The strip as wide as a fibre that light has swept on its way to it, in which no other fibre can be, as a way back leaves it.
+/// The chance that a line misses a fibre that another line met, at any place of its width: the first line passes that place `aside`, in fibre
+/// radii, and makes an angle of the cosine `cos` with the second. 0 to 1.
+#[inline]
+pub(crate) fn misses(aside: f32, cos: f32) -> f32 {
+    let cos = cos.abs().max(1e-3);
+    ((aside.abs() - (1.0 - cos)) / (2.0 * cos)).clamp(0.0, 1.0)
+}
+
+/// A strip as wide as a fibre that light has swept on its way in, in which no other fibre can be, as a way back finds it: beside the way, by
+/// which a part of what the way meets has its middle in the strip.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClearedStrip {
-    /// The length after which the way has left the strip.
-    cleared: f32,
+    /// How far beside the strip's middle the way begins, in its widths.
+    aside: f32,
+    /// By how much that grows with each length of the way.
+    slope: f32,
+    /// The lengths of the way between which it is beside the strip.
+    from: f32,
+    to: f32,
 }
 
 impl ClearedStrip {
-    /// For light that is turned by an angle of a cosine.
+    /// Of a way that begins so far `aside` of the strip's middle, gets by `slope` farther aside with each length, and is beside it from one length
+    /// to another, all in the unit of `width`.
     #[inline]
-    pub(crate) fn new(width: f32, turn: f32) -> Self {
-        let aside = (1.0 - turn * turn).max(1e-12).sqrt();
-        Self { cleared: if turn < 0.0 { width / aside } else { width } }
+    pub(crate) fn new(width: f32, [aside, slope]: [f32; 2], [from, to]: [f32; 2]) -> Self {
+        Self { aside: aside / width, slope: slope / width, from, to }
     }
 
-    /// The length between two distances along the way, less what lies in the strip.
+    /// The length of the way between two distances along it that the strip takes away.
     #[inline]
     pub(crate) fn length(&self, from: f32, to: f32) -> f32 {
-        let outside = |t: f32| if t < self.cleared { 0.5 * t * t / self.cleared } else { t - 0.5 * self.cleared };
-        outside(to) - outside(from)
+        /// A way that turns less from the strip is taken to be as far beside it all along as in its middle.
+        const ALONG: f32 = 1e-3;
+        let (first, last) = (from.max(self.from), to.min(self.to));
+        if first >= last {
+            return 0.0;
+        }
+        let beside = |t: f32| self.aside + self.slope * t;
+        if (self.slope * (last - first)).abs() < ALONG {
+            return (1.0 - beside(0.5 * (first + last)).abs()).max(0.0) * (last - first);
+        }
+        // Of a distance in widths the part inside, from the strip's middle on.
+        let up_to = |u: f32| {
+            let u = u.clamp(-1.0, 1.0);
+            u - 0.5 * u * u.abs()
+        };
+        (up_to(beside(last)) - up_to(beside(first))) / self.slope
     }
 
-    /// The fibres on a chord ahead of where the way begins, less what lies in the strip; `foot` is the distance to the chord's middle.
+    /// The fibres on a chord ahead of where the way begins that would lie in the strip; `foot` is the distance to the chord's middle.
     #[inline]
     pub(crate) fn fibers(&self, chord: &ChordFibers, foot: f32) -> f32 {
         let (from, to) = ((foot - chord.half).max(0.0), foot + chord.half);

@@ -123,6 +123,8 @@ pub(crate) struct PlyOptics {
     pub density: f32,
     /// Weight that TT keeps on its way forward, at each fibre.
     pub chain: Rgb,
+    /// What goes straight on of it at each fibre on a way out.
+    pub straight: Rgb,
     /// Energy of single scattering by R, over what leaves the chain.
     pub single_r: Rgb,
     /// Energy of single scattering by D, over what leaves the chain.
@@ -213,6 +215,7 @@ impl PlyOptics {
             rho: rgb(&|c| c.rho().max(LEAST_RATE)),
             density: fibers.density as f32,
             chain: rgb(&|c| c.chain),
+            straight: rgb(&|c| c.straight),
             single_r: rgb(&|c| c.single(c.r)),
             single_d: rgb(&|c| c.single(c.d)),
             single_tt: rgb(&|c| c.single(c.tt_out)),

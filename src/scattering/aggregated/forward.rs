@@ -13,6 +13,7 @@ use super::{
     },
     Spot, Turned, View,
     ahead::{FibersAhead, STRETCHES, Stretch, nearest, plies_ahead},
+    way_in::{Place, WayIn},
 };
 use crate::{
     geometry::{
@@ -50,12 +51,10 @@ pub(super) struct Forward {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ChainEnd {
     pub(super) spot: Spot,
-    /// Where the light came from, across the fibre.
-    pub(super) back: Vec3A,
+    /// How the light came there.
+    pub(super) way_in: WayIn,
     /// The camera's ray in the ply, or in the first one if it does not meet this.
     pub(super) crossing: PlyCrossing,
-    /// Fibres that have passed it on before.
-    pub(super) before: f32,
     /// The camera's part along the first fibre of its ply that the light met, whose own part along the yarn is 1.
     pub(super) axial: f32,
     /// Its energy there over the chance that it was drawn.
@@ -76,6 +75,8 @@ pub(super) struct Fiber {
     width: TtWidth,
     /// Where the light came from, across the fibre.
     pub(super) back: Vec3A,
+    /// Whether it came from another fibre of the same ply.
+    later: bool,
 }
 
 /// A direction of F.
@@ -194,7 +195,7 @@ impl Forward {
         let crossed = crossings.iter().map(|crossing| Crossed(view, *crossing));
         let (Crossed(_, crossing), depth) = nearest(crossed, 1.0 - u_first * (1.0 - unscattered), stream)?;
         let spot = view.spot(&crossing, depth);
-        let fiber = Fiber::new(view, spot, view.camera, Rgb::ONE);
+        let fiber = Fiber::new(view, spot, (view.camera, false), Rgb::ONE);
         let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
         Some(Self::follow(view, fiber, weight, little, stream))
     }
@@ -221,7 +222,7 @@ impl Forward {
             }
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
-            let way = fiber.way(view, fiber.direction(stream), !forward.fibers.is_empty());
+            let way = fiber.way(view, fiber.direction(stream));
             let mut stretches = ArrayVec::<PlyOnWay, STRETCHES>::new();
             let through = if forward.fibers.len() == LAST {
                 1.0
@@ -266,7 +267,11 @@ impl Forward {
         let crossing = *crossings.iter().find(|crossing| crossing.ply == spot.ply).or(crossings.first())?;
         let first = &self.fibers[0].spot;
         let axial = if first.ply == spot.ply { first } else { &spot }.axial(view.camera);
-        Some(ChainEnd { spot, back, crossing, before: before as f32, axial, amplitude: ended * (total / energy) })
+        let amplitude = ended * (total / energy);
+        let of_ply = self.fibers[..before].iter().rev().take_while(|fiber| fiber.spot.ply == spot.ply);
+        let way_in =
+            WayIn::new(back, before, of_ply.map(|fiber| Place { at: fiber.spot.inside.point, back: fiber.back }));
+        Some(ChainEnd { spot, way_in, crossing, axial, amplitude })
     }
 
     /// F towards `w`: what leaves from the place of each of the fibres.
@@ -275,8 +280,7 @@ impl Forward {
         for (index, fiber) in self.fibers.iter().enumerate() {
             let lobe = fiber.lobe(w);
             if lobe.0 >= FORWARD_TAIL && fiber.passed != Rgb::ZERO {
-                let through =
-                    if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w, index > 0), |_| {}) };
+                let through = if index == LAST { 1.0 } else { fiber.follow_way(view, &fiber.way(view, w), |_| {}) };
                 visit(fiber, self.part(view, fiber, lobe, through));
             }
         }
@@ -307,9 +311,10 @@ impl Forward {
 }
 
 impl Fiber {
-    /// A fibre that light meets on its way against `from`, of which those before it have passed on a share.
+    /// A fibre that light meets on its way against `from`, of which those before it have passed on a share; `later` says whether it came from one of
+    /// the same ply.
     #[inline]
-    fn new(view: &View<'_>, spot: Spot, from: Vec3A, passed: Rgb) -> Self {
+    fn new(view: &View<'_>, spot: Spot, (from, later): (Vec3A, bool), passed: Rgb) -> Self {
         let optics = &view.yarn.plies[spot.ply];
         Self {
             spot,
@@ -318,6 +323,7 @@ impl Fiber {
             ended: passed * (Rgb::ONE - optics.chain),
             width: optics.tt,
             back: spot.across(from).normalize_or_zero(),
+            later,
         }
     }
 
@@ -346,11 +352,11 @@ impl Fiber {
 
     /// The way in the direction `w`.
     #[inline]
-    fn way<'a>(&self, view: &View<'a>, w: Vec3A, later: bool) -> Way<'a> {
+    fn way<'a>(&self, view: &View<'a>, w: Vec3A) -> Way<'a> {
         let Turned { cos: turn, shift, free, .. } = self.spot.turned(view, self.back, w);
         let Spot { ply, inside, .. } = &self.spot;
         let short = inside.along_short_axis(view.yarn.occluder().shape(), *ply, w);
-        let after = view.yarn.plies[*ply].after.turned(later, turn, short);
+        let after = view.yarn.plies[*ply].after.turned(self.later, turn, short);
         Way { w, shift, free, after }
     }
 
@@ -388,6 +394,7 @@ impl Fiber {
         let shape = view.yarn.occluder().shape();
         let inside = view.section.beyond(shape, &self.spot.inside, way.shift, way.w, distance);
         let spot = Spot::new(view, met.fibers.ply, inside);
-        Some(Self::new(view, spot, -way.w, self.passed))
+        let later = spot.ply == self.spot.ply;
+        Some(Self::new(view, spot, (-way.w, later), self.passed))
     }
 }

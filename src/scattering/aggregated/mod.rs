@@ -47,6 +47,7 @@ mod ahead;
 mod backward;
 mod forward;
 mod single;
+mod way_in;
 
 /// A yarn's shape and the optics of its plies.
 #[derive(Clone, Debug)]
@@ -304,7 +305,7 @@ impl<'a> Vertex<'a> {
             lobes.r = value.r * weight;
             lobes.tt = value.tt * weight;
             lobes.d = value.d * weight;
-            start.offer((lobes.r + lobes.tt + lobes.d).mean(), Leaves::At(node.spot, node.back));
+            start.offer((lobes.r + lobes.tt + lobes.d).mean(), Leaves::At(node.spot, node.way_in.back));
             let lobe = self.backward.of(&self.view, node);
             lobe.evaluate(&self.view, node, (w, light_pdf), value.open, at_node, |spot, value| {
                 start.offer(value.mean(), Leaves::Around(*spot, lobe));
@@ -351,7 +352,7 @@ impl<'a> Vertex<'a> {
             let (sum, shares) = node.drawn.value.lobes();
             let pdf = node.drawn.value.pdf * at_node * node.drawn.escape;
             let direction = node.drawn.direction;
-            let start = node.spot.leaves_from(&self.view, node.back, direction);
+            let start = node.spot.leaves_from(&self.view, node.way_in.back, direction);
             return (pdf > 0.0).then(|| Continuation { direction, weight: sum / pdf, pdf, shares, start });
         }
         let lobe = self.backward.of(&self.view, node);

@@ -18,9 +18,10 @@ use super::{
     Spot, Turned, View,
     ahead::{FibersAhead, plies_ahead},
     forward::ChainEnd,
+    way_in::{WayBack, WayIn},
 };
 use crate::{
-    geometry::{after_fiber::AfterTurn, cleared_strip::ClearedStrip, section::PlyCrossing},
+    geometry::{after_fiber::AfterTurn, section::PlyCrossing},
     math::{Rgb, sampler::Stream},
 };
 
@@ -39,10 +40,8 @@ pub(super) struct Node {
     /// Sine and cosine of its latitude against the fibre.
     sin: f32,
     cos: f32,
-    /// Where the light came from, across the fibre.
-    pub(super) back: Vec3A,
-    /// Fibres that have passed it on before the node.
-    before: f32,
+    /// How the light came here.
+    pub(super) way_in: WayIn,
     /// Weight of an event here, before any albedo.
     pub(super) amplitude: Rgb,
     /// For sampling: widths of R that met TT on its way and of R that did not, and of TT.
@@ -147,7 +146,8 @@ impl Node {
     /// The node at a chain's end, without a direction.
     #[inline]
     pub(super) fn at(view: &View<'_>, end: &ChainEnd, throughput: Rgb) -> Self {
-        let ChainEnd { spot, back, crossing, before, axial, amplitude } = *end;
+        let ChainEnd { spot, way_in, crossing, axial, amplitude } = *end;
+        let before = way_in.before;
         let optics = &view.yarn.plies[spot.ply];
         let sin = (axial * spot.inside.along(spot.tangent)).clamp(-1.0, 1.0);
         let weight = throughput * amplitude;
@@ -161,11 +161,10 @@ impl Node {
         Self {
             spot,
             crossing,
-            back,
+            way_in,
             axial,
             sin,
             cos: (1.0 - sin * sin).sqrt(),
-            before,
             amplitude,
             kappa: kappa_of_spread(Rgb::from([optics.spread_r + spread.max_channel(), optics.spread_r, once_more])),
             chance: normalised(lobes.map(|a| a.weighted_mean(weight))),
@@ -200,7 +199,7 @@ impl Node {
             open: (-way.others).exp(),
         };
         let mut r = Rgb::ZERO;
-        let (untouched, spread) = optics.touched(self.before, after, untouched);
+        let (untouched, spread) = optics.touched(self.way_in.before, after, untouched);
         if p_touched > 0.0 {
             r += (Rgb::ONE - untouched) * kernel(kappa_of_spread(spread + Rgb::splat(optics.spread_r)), at);
             value.pdf += p_touched * touched;
@@ -212,7 +211,7 @@ impl Node {
         value.r = optics.single_r * scale * r;
         if p_tt > 0.0 {
             let spread = optics.events * after * optics.spread_expected_tt;
-            let known = Rgb::splat((1.0 + self.before) * optics.spread_tt);
+            let known = Rgb::splat((1.0 + self.way_in.before) * optics.spread_tt);
             let m = kernel(kappa_of_spread(spread + known), at);
             value.tt = optics.single_tt * scale * m;
             value.pdf += p_tt * bent;
@@ -247,35 +246,33 @@ impl Node {
     /// What lies between the node and the outside in a direction of the section's frame; `other` is told of the fibres in each other ply.
     ///
     /// The way begins as that of F does, and no other fibre is met at once
-    /// ([`AfterFiber`](crate::geometry::after_fiber::AfterFiber)). Where it goes back the way that the light
-    /// came, it is in the strip that the light has swept, as wide as a fibre, which is clear: the "hot spot". What TT bends into that
-    /// direction set out in others about it.
+    /// ([`AfterFiber`](crate::geometry::after_fiber::AfterFiber)). Where it goes back the way that the light came, it finds what that left clear
+    /// ([`WayIn`]). What TT bends into that direction set out in others about it.
     #[inline]
     fn way_out(&self, view: &View<'_>, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> WayOut {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let optics = &yarn.plies[spot.ply];
-        let Turned { cos: turn, shift, free, beside } = spot.turned(view, self.back, w);
-        let later = self.before > 0.0;
-        let width = 2.0 * view.section.thinness() * beside * shape.plies[spot.ply].fiber_radius;
-        let strip = |turn: f32| (turn < 0.0 && !later).then(|| ClearedStrip::new(width, turn));
+        let Turned { cos: turn, shift, free, beside } = spot.turned(view, self.way_in.back, w);
+        let later = self.way_in.later();
         let short = spot.inside.along_short_axis(shape, spot.ply, w);
-        let direct = (strip(turn), optics.after.turned(later, turn, short));
+        let back = (turn < 0.0).then(|| self.way_in.seen(view, spot, (shift, w), beside));
+        let direct = (back.as_ref(), optics.after.turned(later, turn, short));
         let cosine = optics.tt.cosine;
         // A mean over the directions from which TT bends light into this one.
-        let bent = (turn < 0.0 && cosine < 1.0).then(|| {
-            let [turn, squared] = [turn * cosine, 0.5 + (turn * turn - 0.5) * cosine.powi(4)];
-            (strip(-squared.sqrt()), optics.after.turned(later, turn, short))
-        });
+        let from_around = back.as_ref().filter(|_| cosine < 1.0).map(|back| back.bent(cosine));
+        let bent = from_around.as_ref().map(|back| (Some(back), optics.after.turned(later, turn * cosine, short)));
         let ahead = plies_ahead(view, spot, (shift, w), Some(0.0), free);
-        let mut out = WayOut::default();
+        let open = |back: Option<&WayBack>| back.map_or(1.0, WayBack::passes);
+        let mut out = WayOut { open: [open(direct.0), open(from_around.as_ref())], ..WayOut::default() };
         for fibers in &ahead {
             if fibers.ply == spot.ply {
                 let by_rim = shape.plies[fibers.ply].by_rim(fibers.offset);
                 let uncovered = fibers.uncovered(view, &ahead);
-                let depth = |(strip, after): &(Option<ClearedStrip>, AfterTurn<'_>)| {
+                let depth = |(back, after): &(Option<&WayBack>, AfterTurn<'_>)| {
                     let FibersAhead { foot, tilt, ref chord, expected, .. } = *fibers;
-                    let ahead = strip.map_or(expected, |strip| tilt * strip.fibers(chord, foot));
+                    let cleared = back.map_or(0.0, |back| tilt * back.cleared(chord, foot));
+                    let ahead = (expected - cleared).max(0.0);
                     let [met, counted] = after.met_and_counted(ahead, by_rim);
                     optics.depth(met, counted * uncovered)
                 };
@@ -301,6 +298,8 @@ struct WayOut {
     bent: Option<Rgb>,
     /// In all other plies.
     others: Rgb,
+    /// What of the light of `own` and of `bent` meets none of the fibres that it met on its way in, which they leave out.
+    open: [f32; 2],
 }
 
 /// What of the light of a node gets out.
@@ -318,14 +317,16 @@ impl WayOut {
     fn passes(&self, optics: &PlyOptics) -> Passing {
         let depth = self.bent.unwrap_or(self.own) + self.others;
         let after = depth / optics.rho;
-        let clear = (-depth).exp();
+        let [open, open_bent] = self.open;
+        let past_known = Rgb::ONE - (Rgb::ONE - optics.straight) * (1.0 - open_bent);
+        let clear = (-depth).exp() * past_known;
         if self.bent.is_none() {
             return Passing { clear, after, untouched: None };
         }
         // Light that meets nothing is not bent.
         let unscattered = |fibers: Rgb| (-(fibers * optics.gaps.rate)).exp();
-        let straight = unscattered((self.own + self.others) / optics.rho);
-        let clear = (straight + (clear - unscattered(after)).max(Rgb::ZERO)).min(Rgb::ONE);
+        let straight = unscattered((self.own + self.others) / optics.rho) * open;
+        let clear = (straight + (clear - unscattered(after) * open_bent).max(Rgb::ZERO)).min(Rgb::ONE);
         Passing { clear, after, untouched: Some(straight / clear.max(Rgb::splat(1e-30))) }
     }
 }

@@ -69,7 +69,7 @@ fn light_leaves_as_high_as_fibers_are_met() {
                 let vertex = Vertex::new(&yarn, &section, &crossings, t0, Rgb::ONE, u, &mut stream);
                 let Some(node) = vertex.node.get(&vertex.view) else { continue };
                 // Sideways, so that how far it got does not count.
-                let start = node.spot.leaves_from(&vertex.view, node.back, Vec3A::Y);
+                let start = node.spot.leaves_from(&vertex.view, node.way_in.back, Vec3A::Y);
                 found += f64::from((1.0 - t0) * start.x);
                 drawn += f64::from(1.0 - t0);
             }

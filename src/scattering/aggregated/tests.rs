@@ -88,7 +88,8 @@ fn plain_lobes(view: &View<'_>, beta: [f64; 2], (spot, before): &(Spot, f32), w:
     let ply = &shape.plies[spot.ply];
     let out = Vec3A::new(w.x, w.y, 0.0).normalize_or_zero();
     let shift = optics.lead * (1.0 - SHRINK * ply.density() as f32).max(0.0) * (Vec3A::X + out);
-    let strip = ClearedStrip::new(2.0 * ply.fiber_radius, -out.x);
+    let sine = if out.x > 0.0 { out.y.abs() } else { 1.0 };
+    let strip = ClearedStrip::new(2.0 * ply.fiber_radius, [0.0, sine], [0.0, f32::INFINITY]);
     let mut depth = Rgb::ZERO;
     view.section.plies_ahead(shape, &spot.inside, shift, w, |way| {
         let ply = &shape.plies[way.ply];
@@ -96,8 +97,8 @@ fn plain_lobes(view: &View<'_>, beta: [f64; 2], (spot, before): &(Spot, f32), w:
         let half = (ply.core_radius * ply.core_radius - way.offset * way.offset).max(0.0).sqrt() / way.length;
         let (from, to) = ((way.foot - half).max(0.0), (way.foot + half).max(0.0));
         if half > 0.0 {
-            let length = strip.length(from + optics.lead, to + optics.lead);
-            depth += view.yarn.plies[way.ply].rho * (sigma * length);
+            let cleared = strip.length(from + optics.lead, to + optics.lead);
+            depth += view.yarn.plies[way.ply].rho * (sigma * (to - from - cleared));
         }
     });
     // Of the node's own fibre, for all of the way.

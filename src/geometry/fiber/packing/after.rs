@@ -9,7 +9,7 @@ use super::lines::Lines;
 use crate::{
     geometry::{
         after_fiber::{AfterFiber, AfterTurn, Missing, MissingFibers},
-        cleared_strip::ClearedStrip,
+        cleared_strip::{ClearedStrip, misses},
         ply::PlyShape,
     },
     math::sampler::Stream,
@@ -44,8 +44,11 @@ struct Way {
     expected: f32,
     /// How much it is by the rim.
     by_rim: f32,
-    /// How many it meets.
+    /// How many it meets; if it goes back, but for those that the light met before.
     met: u32,
+    /// The chance that it meets none of these, as far as their places tell, and whether it does not.
+    open: f32,
+    is_open: bool,
 }
 
 impl Way {
@@ -99,7 +102,7 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
             let Some((hit, weight)) = hit else { continue };
             for turn in 0..TURNS {
                 let turn = (turn as f64 + next()) / TURNS as f64 * TAU;
-                let way = line.turned(lines, ply, hit, later > 0, DVec2::from_angle(turn).rotate(along));
+                let way = line.turned(lines, ply, (hit, &hits), later > 0, DVec2::from_angle(turn).rotate(along));
                 ways.extend(way.map(|way| Way { weight, ..way }));
             }
         }
@@ -121,15 +124,28 @@ impl Line<'_> {
         self.discs.iter().enumerate().filter_map(hit).collect()
     }
 
-    /// The way of its light that is turned to a direction at one of them, the first or a later one. `None` if it begins outside of the ply.
-    fn turned(&self, lines: &Lines, ply: &PlyShape, hit: &Hit, later: bool, w: DVec2) -> Option<Way> {
+    /// The way of its light that is turned to a direction at one of them, the first or a `later` one. `None` if it begins outside of the ply.
+    fn turned(&self, lines: &Lines, ply: &PlyShape, (hit, hits): (&Hit, &[Hit]), later: bool, w: DVec2) -> Option<Way> {
         let (along, across) = (self.along, self.along.perp());
         let at = |distance: f64| distance * along + self.offset * across;
         let turn = w.dot(along);
         // As the model has it: abreast of the fibre's centre, and from where the light came.
         let from = at(hit.lies) + FRAC_PI_4 * lines.radius * (turn.max(0.0) * w - along);
-        let swept = (!later && turn < 0.0).then_some(turn as f32);
-        let (expected, offset) = ahead(lines, ply, from, w, swept)?;
+        let (expected, offset) = ahead(lines, ply, from, w, (turn < 0.0).then_some(turn))?;
+        let mut met = met(lines, self.discs, hit.fiber, at(hit.enter), w);
+        let (mut open, mut is_open) = (1.0, true);
+        if turn < 0.0 {
+            for before in hits.iter().filter(|of| of.enter < hit.enter) {
+                let way = at(before.lies) - from;
+                if way.dot(w) > 0.0 {
+                    open *= misses((way.dot(w.perp()) / lines.radius) as f32, turn as f32);
+                }
+                if let Some(at) = met.iter().position(|of| *of == before.fiber) {
+                    met.swap_remove(at);
+                    is_open = false;
+                }
+            }
+        }
         let tilt = lines.slopes.half_width(self.discs[hit.fiber], across);
         Some(Way {
             later,
@@ -138,25 +154,27 @@ impl Line<'_> {
             short: if lines.stretch == 1.0 { 0.5 } else { (w.y * w.y) as f32 },
             expected: (tilt * expected) as f32,
             by_rim: ply.by_rim(offset),
-            met: met(lines, self.discs, hit.fiber, at(hit.enter), w),
+            met: met.len() as u32,
+            open,
+            is_open,
         })
     }
 }
 
-/// How many others a way from a place on a fibre meets.
-fn met(lines: &Lines, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> u32 {
+/// The others that a way from a place on a fibre meets.
+fn met(lines: &Lines, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> Vec<usize> {
     let is_met = |(other, disc): &(usize, &DVec2)| {
         let way = **disc - from;
         *other != fiber
             && way.dot(w) >= 0.0
             && way.dot(w.perp()).abs() < lines.radius * lines.slopes.half_width(**disc, w.perp())
     };
-    discs.iter().enumerate().filter(is_met).count() as u32
+    discs.iter().enumerate().filter(is_met).map(|(other, _)| other).collect()
 }
 
 /// The fibres, as circles, that light is expected to meet from a place in a direction, less those in the strip that it has swept if it was
 /// turned `back` by an angle of a cosine; and the distance of its way from the ply's axis. `None` if the place is outside and there are none.
-fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f32>) -> Option<(f64, f32)> {
+fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>) -> Option<(f64, f32)> {
     let root = lines.stretch.sqrt();
     let (beside, reach) = (from.dot(w.perp()), lines.reach(w.perp()));
     if beside.abs() >= reach * (1.0 + lines.radius) {
@@ -167,10 +185,12 @@ fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f32>
     let foot = (-from.dot(to) / to.length_squared() / root) as f32;
     let [offset, length, thin, wide] = [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
     let chord = ply.chord(offset, length, thin, wide);
-    let ahead = match back {
-        Some(turn) => ClearedStrip::new(2.0 * thin * lines.radius as f32, turn).fibers(&chord, foot),
-        None => chord.ahead(-foot),
+    let swept = |turn: f64| {
+        let sine = (1.0 - turn * turn).max(0.0).sqrt() as f32;
+        let strip = ClearedStrip::new(2.0 * thin * lines.radius as f32, [0.0, sine], [0.0, f32::INFINITY]);
+        strip.fibers(&chord, foot)
     };
+    let ahead = (chord.ahead(-foot) - back.map_or(0.0, swept)).max(0.0);
     Some((root * f64::from(ahead), offset))
 }
 
@@ -232,14 +252,14 @@ enum Asked {
 impl Asked {
     fn counted(self, way: &Way) -> f32 {
         match self {
-            Self::Unscattered { .. } => f32::from(u8::from(way.met == 0)),
+            Self::Unscattered { .. } => f32::from(u8::from(way.is_open && way.met == 0)),
             Self::Counted => way.met as f32,
         }
     }
 
     fn fitted(self, way: &Way, law: &AfterTurn<'_>) -> f32 {
         match self {
-            Self::Unscattered { rate } => (-rate * law.met(way.expected, way.by_rim)).exp(),
+            Self::Unscattered { rate } => way.open * (-rate * law.met(way.expected, way.by_rim)).exp(),
             Self::Counted => law.counted(way.expected, way.by_rim),
         }
     }
