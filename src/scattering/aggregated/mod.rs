@@ -378,3 +378,5 @@ mod start_tests;
 mod swirl_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod way_in_tests;

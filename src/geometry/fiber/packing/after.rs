@@ -387,9 +387,7 @@ mod tests {
                 for (turn, [out, by_law, met, met_by_law, all]) in turns.iter().enumerate() {
                     let case = format!("{count} at {density}, {stretch}, later {later}, turn {turn}");
                     let (out, by_law) = (out / all, by_law / all);
-                    // After later fibres, where light goes back to the one before, in between turns by as much as they are apart.
-                    let may_be_off = if later == 0 { 0.01 + 0.04 * out } else { 0.015 + 0.1 * out };
-                    assert!((out - by_law).abs() < may_be_off, "{case}: {out} are out, {by_law} by the law");
+                    assert!((out - by_law).abs() < 0.01 + 0.04 * out, "{case}: {out} are out, {by_law} by the law");
                     let (met, met_by_law) = (met / all, met_by_law / all);
                     assert!(
                         (met - met_by_law).abs() < 0.02 + 0.05 * met,
