@@ -1,6 +1,6 @@
 //! The words of a chart's row.
 
-use super::{ChartError, Step, Top};
+use super::{ChartError, PATTERNS, Step, Top};
 
 /// Most steps of a row that a chart may have.
 const MOST_STEPS: usize = 20_000;
@@ -15,9 +15,16 @@ pub(super) fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartErr
     let mut steps = Vec::new();
     for token in text.split([' ', ',', '\t']).filter(|t| !t.is_empty()) {
         // Books write `K2 P2` and `C4F`.
-        let (count, step) = parse_step(&token.to_ascii_lowercase()).ok_or_else(|| {
+        let word = token.to_ascii_lowercase();
+        let (count, step) = parse_step(&word).ok_or_else(|| {
             let shown: String = token.chars().take(20).collect();
-            ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), STEPS)
+            let hint = match PATTERNS.iter().any(|(name, _)| *name == word) {
+                true => format!(
+                    "that is the name of a pattern: pattern = \"{word}\" in a scene, `--pattern {word}` of `make knit`"
+                ),
+                false => STEPS.to_owned(),
+            };
+            ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), hint)
         })?;
         if steps.len() + count > MOST_STEPS {
             return Err(ChartError::new(Some(line), format!("more than {MOST_STEPS} steps in a row"), "steps repeat"));

@@ -105,6 +105,9 @@ fn mistakes_are_explained() {
     ] {
         assert_eq!(Chart::parse(rows).unwrap_err().problem, problem);
     }
+    let named = Chart::parse(&["Stockinette"]).unwrap_err();
+    assert_eq!(named.problem, "unknown step \"Stockinette\"");
+    assert!(named.hint.contains("pattern = \"stockinette\""), "{}", named.hint);
     let grows = Chart::parse(&["kfb"]).unwrap().work(4, 60, 5000).unwrap_err();
     assert_eq!(grows.problem, "more than 5000 stitches by row 10");
 }
