@@ -1,4 +1,4 @@
-//! What light keeps clear of fibres on its way to one, as its way back finds it (docs/model.md, section 5).
+//! What light keeps clear of fibres on its way to one, as its way back finds it (docs/model.md, section 6).
 
 use super::density::ChordFibers;
 
@@ -61,5 +61,44 @@ impl ClearedStrip {
         }
         let ring = self.length((to - chord.zone).max(0.0), to) / chord.zone;
         chord.even * (self.length(from, to) / (2.0 * chord.half)) + 0.5 * chord.ring * ring
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_beside_a_strip_loses_what_it_shares_with_it() {
+        // Also nearly along it, and where it ends nowhere.
+        for (aside, slope) in [(0.0, 0.7), (0.03, 0.0), (-0.05, 0.4), (0.02, -0.01), (0.0, 1e-7), (0.3, 0.1)] {
+            for ends in [[0.0, f32::INFINITY], [0.2, 0.5]] {
+                let (width, steps) = (0.1f32, 20_000);
+                let strip = ClearedStrip::new(width, [aside, slope], ends);
+                let (from, to) = (0.1, 0.9);
+                let step = (to - from) / steps as f32;
+                let shared = |k: i32| {
+                    let t = from + (k as f32 + 0.5) * step;
+                    let inside = (1.0 - ((aside + slope * t) / width).abs()).max(0.0);
+                    if t > ends[0] && t < ends[1] { f64::from(inside * step) } else { 0.0 }
+                };
+                let want: f64 = (0..steps).map(shared).sum();
+                let found = f64::from(strip.length(from, to));
+                assert!((found - want).abs() < 1e-4, "{aside} {slope} {ends:?}: {found} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_misses_fibers_of_other_lines_as_often_as_thrown_ones() {
+        for (aside, cos) in [(0.0f32, 1.0f32), (0.4, 1.0), (1.5, 0.9), (0.9, -0.5), (1.2, 0.05), (3.0, 0.7)] {
+            // The fibre's middle is anywhere in its width, across the way of the first line.
+            let clear = (0..10_000).filter(|k| {
+                let off = 2.0 * (*k as f32 + 0.5) / 10_000.0 - 1.0;
+                (aside - off * cos).abs() > 1.0
+            });
+            let want = clear.count() as f32 / 10_000.0;
+            assert!((misses(aside, cos) - want).abs() < 1e-3, "{aside} {cos}: {} {want}", misses(aside, cos));
+        }
     }
 }

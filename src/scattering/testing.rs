@@ -1,6 +1,6 @@
 //! What the tests of the models share.
 
-use glam::Vec3A;
+use glam::{DVec2, Vec3A};
 
 use super::fiber::FiberMaterial;
 use crate::geometry::{
@@ -33,6 +33,24 @@ pub(super) fn packed_ply(fibers: u32, density: f64) -> YarnShape {
     let shape = touching_yarn(1, fibers, density, 0.0, 0.0);
     let radius = f64::from(shape.plies[0].fiber_radius / shape.plies[0].core_radius);
     shape.packed(&[measured(fibers, radius, Twist::NONE, 1.0)])
+}
+
+/// The first disc that a ray from a place meets, but for one, and where.
+pub(super) fn first_disc(
+    discs: &[DVec2],
+    radius: f64,
+    from: DVec2,
+    w: DVec2,
+    but: Option<usize>,
+) -> Option<(usize, DVec2)> {
+    let enters = |(i, disc): (usize, &DVec2)| {
+        let way = *disc - from;
+        let (along, off) = (way.dot(w), way.perp_dot(w));
+        let is_met = Some(i) != but && along > 0.0 && off.abs() < radius;
+        is_met.then(|| (along - (radius * radius - off * off).sqrt(), i))
+    };
+    let first = discs.iter().enumerate().filter_map(enters).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some((first.1, from + first.0 * w))
 }
 
 /// The section of a straight yarn along z, seen from latitude `theta` at azimuth 0.

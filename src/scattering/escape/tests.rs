@@ -7,7 +7,7 @@ use crate::{
     geometry::fiber::{packing::hard_discs, slopes::Twist},
     scattering::{
         medium::PlyOptics,
-        testing::{material, packed_ply},
+        testing::{first_disc, material, packed_ply},
     },
 };
 
@@ -200,18 +200,6 @@ fn light_that_tt_bends_leaves_towards_where_it_is_found_fiber_by_fiber() {
     }
 }
 
-/// The first disc that a ray from a place meets, but for one, and where.
-fn met(discs: &[DVec2], radius: f64, from: DVec2, w: DVec2, but: Option<usize>) -> Option<(usize, DVec2)> {
-    let enters = |(i, disc): (usize, &DVec2)| {
-        let way = *disc - from;
-        let (along, off) = (way.dot(w), way.perp_dot(w));
-        let is_met = Some(i) != but && along > 0.0 && off.abs() < radius;
-        is_met.then(|| (along - (radius * radius - off * off).sqrt(), i))
-    };
-    let first = discs.iter().enumerate().filter_map(enters).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some((first.1, from + first.0 * w))
-}
-
 /// Parallel light is followed through packings of discs that scatter it evenly around, from where it meets them: of what two and more
 /// did, the tables have as much, and as much of it on each side.
 #[test]
@@ -237,7 +225,7 @@ fn light_that_packings_scatter_on_leaves_as_the_tables_have_it() {
             let beside = (2.0 * f64::from(stream.next()) - 1.0) * (1.0 + radius);
             let (mut from, mut w, mut at, mut weight) = (DVec2::new(-3.0, beside), DVec2::X, None, 1.0);
             let mut first = None;
-            while let Some((disc, place)) = met(discs, radius, from, w, at) {
+            while let Some((disc, place)) = first_disc(discs, radius, from, w, at) {
                 if at.is_some() && first.is_none() {
                     first = at.map(|disc: usize| (discs[disc], weight));
                 }
