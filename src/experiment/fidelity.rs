@@ -1,6 +1,6 @@
 //! How faithful pictures are to explicit fibres: many fabrics under many lights, each rendered by every method with the same
-//! number of samples, twice, so that noise can be told from error, and of several packings of the fibres, since dark channels from behind
-//! differ by a tenth from packing to packing. Nothing is timed. Half of the fabrics may be held out of
+//! number of samples, in two halves, so that noise can be told from error, and of several packings of the fibres, since light from behind
+//! differs by a tenth from packing to packing: each half has packings of its own. Nothing is timed. Half of the fabrics may be held out of
 //! development; the table tells both halves apart.
 
 use std::path::Path;
@@ -64,15 +64,20 @@ fn measure(
     say: &mut impl FnMut(&str),
 ) -> Result<Row, BenchError> {
     let mut pictures = |method, set: &[String]| -> Result<Vec<Converged>, BenchError> {
-        let seeds = (1..=case.packings).map(|seed| (case.packings > 1).then(|| format!("fabric.0.seed={seed}")));
-        let mut of_packing = |seed: Option<String>| {
-            // What a way sets itself stands over the seed.
-            let set: Vec<String> = seed.into_iter().chain(set.iter().cloned()).collect();
-            let spp = suite.max_spp.div_ceil(case.packings);
-            let job = Job { case, method, set: &set, spp, noise: None, seed: 0, lobes: false };
-            Ok(converge(suite, &job, None, renderer, directory, say)?.0)
+        // Of several packings each is in one half, so that what lies between the halves is noise of packings too.
+        let several = case.packings > 1;
+        let spp = if several { (2 * suite.max_spp).div_ceil(case.packings) } else { suite.max_spp };
+        let mut of_two = |first: u32| {
+            let seeds = [first, first + 1];
+            // What a way sets itself stands over the packing.
+            let sets = seeds.map(|seed| -> Vec<String> {
+                several.then(|| format!("fabric.0.seed={seed}")).into_iter().chain(set.iter().cloned()).collect()
+            });
+            let job =
+                |half: usize| Job { case, method, set: &sets[half], spp, noise: None, seed: seeds[half], lobes: false };
+            Ok(converge(suite, [job(0), job(1)], None, renderer, directory, say)?.0)
         };
-        seeds.map(&mut of_packing).collect()
+        (1..=case.packings).step_by(2).map(&mut of_two).collect()
     };
     let references = pictures(suite.reference, &[])?;
     let reference = together(&references)?;
@@ -83,7 +88,7 @@ fn measure(
     let mut mean_error = None;
     for (name, method, set) in std::iter::once(tested).chain(others) {
         let found = pictures(method, set)?;
-        mean_error.get_or_insert_with(|| error_of_mean(&references, &found, &reference));
+        mean_error.get_or_insert_with(|| error_of_mean(case.packings, &references, &found, &reference));
         let found = together(&found)?;
         ways.push(Way {
             name,
@@ -106,12 +111,12 @@ fn measure(
     })
 }
 
-/// The mean of pictures of several packings: of their first halves, and of their second ones.
+/// The mean of several pictures: of their first halves, and of their second ones.
 fn together(pictures: &[Converged]) -> Result<Halves, BenchError> {
     let (first, others) = pictures.split_first().ok_or_else(|| BenchError::Case("no picture".to_owned()))?;
     let mut mean = first.halves.clone();
     if others.iter().any(|other| other.halves.alpha.len() != mean.alpha.len()) {
-        return Err(BenchError::Case("pictures of several packings differ in size".to_owned()));
+        return Err(BenchError::Case("pictures of one case differ in size".to_owned()));
     }
     let share = 1.0 / pictures.len() as f32;
     let average = |mean: &mut [f32], of: &dyn Fn(&Halves) -> &[f32]| {
@@ -127,15 +132,17 @@ fn together(pictures: &[Converged]) -> Result<Halves, BenchError> {
     Ok(mean)
 }
 
-/// By how much the reference's mean on the cloth may be off. Of one packing: half of what its halves are apart. Of several: the standard
-/// error over packings of what it is beside the tested picture's, in which plies lie alike.
-fn error_of_mean(references: &[Converged], found: &[Converged], all: &Halves) -> [f64; 3] {
-    let mean = |picture: &Converged| cloth_mean(&picture.halves.mean(), all);
-    if let [only] = references {
-        let [a, b] = only.halves.colors.each_ref().map(|half| cloth_mean(half, all));
-        return std::array::from_fn(|k| 0.5 * (a[k] - b[k]).abs());
+/// By how much the reference's mean on the cloth may be off. Of one packing: half of what its halves are apart. Of several, one in each half:
+/// the standard error over packings of what it is beside the tested picture's, in which plies lie alike.
+fn error_of_mean(packings: u32, references: &[Converged], found: &[Converged], all: &Halves) -> [f64; 3] {
+    let means = |pictures: &[Converged]| -> Vec<[f64; 3]> {
+        pictures.iter().flat_map(|picture| &picture.halves.colors).map(|half| cloth_mean(half, all)).collect()
+    };
+    let references = means(references);
+    if packings == 1 {
+        return std::array::from_fn(|k| 0.5 * (references[0][k] - references[1][k]).abs());
     }
-    let pairs: Vec<_> = references.iter().zip(found).map(|(reference, found)| (mean(reference), mean(found))).collect();
+    let pairs: Vec<_> = references.into_iter().zip(means(found)).collect();
     let of_all = cloth_mean(&all.mean(), all);
     std::array::from_fn(|k| {
         let beside: Vec<f64> = pairs.iter().map(|(reference, found)| reference[k] / found[k].max(1e-30)).collect();
@@ -208,15 +215,16 @@ mod tests {
             let halves = Halves { width: 8, colors, alpha: vec![values[0]; 64] };
             Converged { halves, spp: 8.0, sample_seconds: 1.0, lobes: None }
         };
-        let references = [picture([0.9, 0.9]), picture([1.1, 1.1])];
+        let references = [picture([0.9, 1.1]), picture([0.9, 1.1])];
         let all = together(&references).unwrap();
-        assert_eq!(all.colors[1][3], [1.0, 2.0, 4.0]);
-        assert_eq!(all.alpha[5], 1.0);
-        // Twice as bright as the second, and alike beside the first: ratios of 1 and .5 have a mean of .75 and an error of .25.
-        let found = [picture([0.9, 0.9]), picture([2.2, 2.2])];
-        let error = error_of_mean(&references, &found, &all);
-        assert!((error[0] - 0.25 / 0.75).abs() < 1e-6 && error[2] == 0.0, "{error:?}");
-        let halves = error_of_mean(&[picture([0.9, 1.1])], &found, &all);
+        assert_eq!(all.colors[1][3], [1.1, 2.2, 4.0]);
+        assert_eq!(all.alpha[5], 0.9);
+        // Twice as bright as the second of each, and alike beside the first: ratios of 1 and .5 have a mean of .75 and an error of
+        // .25 sqrt(4 / 3) / sqrt(4).
+        let found = [picture([0.9, 2.2]), picture([0.9, 2.2])];
+        let error = error_of_mean(4, &references, &found, &all);
+        assert!((error[0] - 0.25 / 0.75 / 3.0_f64.sqrt()).abs() < 1e-6 && error[2] == 0.0, "{error:?}");
+        let halves = error_of_mean(1, &[picture([0.9, 1.1])], &found, &all);
         assert!((halves[0] - 0.1).abs() < 1e-6, "{halves:?}");
         let mut small = picture([1.0, 1.0]);
         small.halves.alpha.pop();

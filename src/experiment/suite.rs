@@ -399,7 +399,11 @@ impl Quality {
 
 /// Over how many packings of fibres pictures are averaged, if a table says.
 fn packings(table: &Reader<'_>) -> Option<u32> {
-    table.u64("packings", 1..=1000).map(|count| count as u32)
+    let count = table.u64("packings", 1..=1000)?;
+    if count > 1 && count % 2 == 1 {
+        table.error_at("packings", "expected 1 or an even number: half of them for each half of a picture", None);
+    }
+    Some(count as u32)
 }
 
 fn method(table: &Reader<'_>, key: &str, default: &str) -> Option<Method> {
@@ -478,5 +482,8 @@ mod tests {
         assert_eq!(suite.cases.iter().map(|case| case.packings).collect::<Vec<_>>(), [4, 1]);
         std::fs::write(&path, format!("measure=\"fidelity\"\n{}", rows.replace("packings=1", "packings=0"))).unwrap();
         assert!(Suite::load(&path, false).is_err());
+        std::fs::write(&path, format!("measure=\"fidelity\"\npackings=3\n{rows}")).unwrap();
+        let error = Suite::load(&path, false).unwrap_err().to_string();
+        assert!(error.contains("1 or an even number"), "{error}");
     }
 }

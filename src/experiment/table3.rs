@@ -294,9 +294,10 @@ fn measure(
     say: &mut impl FnMut(&str),
 ) -> Result<Row, BenchError> {
     let mut converged = |renderer: &mut _, method, set: &[String], lobes| -> Result<(Converged, String), BenchError> {
+        let half = |seed| Job { case, method, set, spp: suite.max_spp, noise: None, seed, lobes };
         converge(
             suite,
-            &Job { case, method, set, spp: suite.max_spp, noise: None, seed: 0, lobes },
+            [half(1), half(2)],
             // The mean of two halves has half of the noise of one.
             Some(2.0 * suite.target / suite.converged),
             renderer,
@@ -402,35 +403,38 @@ fn summary(timed: &[(Figures, f64)], method: Method, truth: &Converged, target: 
     (run, time)
 }
 
-/// The picture that a job converges to, in two halves, from the cache or rendered and put there; and its file, from the
-/// directory of the table. It has as many samples as the job says, or fewer once the relMSE of a half is estimated to be below
-/// `limit`.
+/// The picture of two halves, a job each, from the cache or rendered and put there; and its file, from the directory of the table. It has
+/// as many samples as the jobs say, or fewer once the relMSE of the first half is estimated to be below `limit`.
 pub(super) fn converge(
     suite: &Suite,
-    job: &Job<'_>,
+    halves: [Job<'_>; 2],
     limit: Option<f64>,
     renderer: &mut impl Renderer,
     directory: &Path,
     say: &mut impl FnMut(&str),
 ) -> Result<(Converged, String), BenchError> {
-    let fingerprint = renderer.fingerprint(suite, job.case, job.method, job.set)?;
-    let settings = format!("{limit:?} {} {}", job.spp, job.lobes);
-    let path = converged::path(&directory.join("cache"), &[&fingerprint, &settings]);
+    let mut settings = vec![format!("{limit:?}")];
+    for job in &halves {
+        settings.push(renderer.fingerprint(suite, job.case, job.method, job.set)?);
+        settings.push(format!("{} {} {}", job.spp, job.seed, job.lobes));
+    }
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let path = converged::path(&directory.join("cache"), &settings);
     let name =
         format!("cache/{}", path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()));
     if let Some(found) = Converged::load(&path) {
         return Ok((found, name));
     }
-    let label =
-        if job.set.is_empty() { job.method.to_string() } else { format!("{} {}", job.method, job.set.join(" ")) };
-    let mut half = |number: u32, spp: u32, noise: Option<f64>| -> Result<Half, BenchError> {
-        say(&format!("{}: {label}, converged picture, half {number} of 2", job.case.name));
-        let done = renderer.render(suite, &Job { spp, noise, seed: number, ..job.clone() })?;
+    let mut half = |number: u32, job: Job<'_>| -> Result<Half, BenchError> {
+        let label: Vec<String> = std::iter::once(job.method.to_string()).chain(job.set.iter().cloned()).collect();
+        say(&format!("{}: {}, converged picture, half {number} of 2", job.case.name, label.join(" ")));
+        let done = renderer.render(suite, &job)?;
         let figures = Figures::of(&done.stats)?;
         Ok(Half { image: done.image, spp: figures.spp, seconds: figures.seconds })
     };
-    let first = half(1, job.spp, limit)?;
-    let second = half(2, first.spp.round() as u32, None)?;
+    let [first, second] = halves;
+    let first = half(1, Job { noise: limit, ..first })?;
+    let second = half(2, Job { spp: first.spp.round() as u32, ..second })?;
     let converged =
         Converged::new(&first, &second).ok_or_else(|| BenchError::Case("a picture without colours".to_owned()))?;
     converged.store(&path).map_err(|e| BenchError::Suite(format!("error: {e}")))?;

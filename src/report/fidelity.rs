@@ -40,7 +40,7 @@ pub(crate) struct Row {
     /// Its error: of several packings its standard error over them, of one half of the difference between two pictures with half of the
     /// samples.
     pub mean_error: [f64; 3],
-    /// What the reference's own noise is in the error of blocks.
+    /// What the reference's own noise is in the error of blocks: of samples, and of packings where there are several.
     pub block_noise: Option<f64>,
     /// What is tested, first, and others.
     pub ways: Vec<Way>,
