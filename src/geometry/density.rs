@@ -84,7 +84,10 @@ impl PlyShape {
         // of the core there, each counted as often as it is long.
         let [right, left, ..] = at.u.to_array();
         let squares = (right - left) * (1.0 - (right * right + right * left + left * left) / 3.0);
-        let mean = 2.0 * squares / (upper - lower).max(1e-20);
+        // No more than the longest of them: at the rim both vanish, and the areas' difference before the other.
+        let [of_right, of_left, ..] = at.cos.to_array();
+        let longest = if right * left < 0.0 { 1.0 } else { of_right.max(of_left) };
+        let mean = (2.0 * squares / (upper - lower).max(1e-20)).min(longest);
         let along = (self.radius - self.fiber_radius / wide).max(0.0);
         let half = (mean * along).max(0.5 * self.fiber_radius);
         let half = half / length;
@@ -248,6 +251,23 @@ mod tests {
             // The outermost fibres touch the rim, however wide they are.
             let at = |share: f32| ply.chord(ply.radius - share * wide * ply.fiber_radius, 1.0, 1.0, wide).total();
             assert!(at(0.0) < 1e-3 && at(0.5) > 0.3 * at(1.0) && at(1.0) > 0.5, "{} {} {}", at(0.0), at(0.5), at(1.0));
+        }
+    }
+
+    #[test]
+    fn chords_by_the_rim_are_no_longer_than_the_core() {
+        for (fibers, density) in [(60, 0.4), (150, 0.55), (300, 0.2)] {
+            let ply = ply(fibers, density, 0.05);
+            let core = ply.radius - ply.fiber_radius;
+            let least = 0.5 * ply.fiber_radius;
+            for i in 0..20_000 {
+                let offset = ply.radius - ply.fiber_radius * i as f32 * 1e-4;
+                // Of the chords in the strip the innermost is the longest.
+                let inner = (offset - ply.fiber_radius).min(core);
+                let longest = (core * core - inner * inner).sqrt().max(least);
+                let half = ply.chord(offset, 1.0, 1.0, 1.0).half;
+                assert!(half >= least && half <= longest + 1e-4, "{half} at {offset}, {longest}");
+            }
         }
     }
 
