@@ -82,6 +82,21 @@ impl CellMap {
         self.cells[(y.rem_euclid(h) * w + x.rem_euclid(w)) as usize]
     }
 
+    /// What to tell where rounds of so many stitches do not hold it a whole number of times, in the first row of two yarns.
+    pub(crate) fn breaks_in_rounds(&self, widths: &[u32]) -> Option<String> {
+        let wide = self.width as u32;
+        let breaks = |(row, count): (usize, &u32)| {
+            let at = |column: u32| self.at(column as f32 + 0.5, row as f32 + 0.5);
+            self.again[0] && count % wide != 0 && (1..wide).any(|column| at(column) != at(0))
+        };
+        let (row, count) = widths.iter().enumerate().find(|of| breaks(*of))?;
+        let fits = match count / wide * wide {
+            0 => format!("{wide} would hold it"),
+            fewer => format!("{fewer} or {} would hold it", fewer + wide),
+        };
+        Some(format!("the motif is {wide} stitches wide and breaks where round {} of {count} begins; {fits}", row + 1))
+    }
+
     /// The yarn of each stitch of rows of so many.
     fn of_stitches(&self, widths: &[u32]) -> Vec<Vec<usize>> {
         let of = |(row, width): (usize, &u32)| {

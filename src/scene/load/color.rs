@@ -150,16 +150,22 @@ impl ColorPlan {
         rows.is_empty() && columns.is_empty() && motif.is_none()
     }
 
-    /// Which yarn knits each stitch of a knit, by rows of so many stitches, and the yarns in the library.
+    /// Which yarn knits each stitch of a knit, by rows of so many stitches that may go round, and the yarns in the library.
     pub(super) fn stitches(
         &self,
-        widths: &[u32],
+        (widths, round): (&[u32], bool),
         base: usize,
         context: &Context<'_>,
         library: &Library,
     ) -> Option<StitchColors> {
         let widest = widths.iter().copied().max().unwrap_or(1);
         let cells = self.cells([widest as f32, widths.len() as f32], None, false, base, context, library)?;
+        if round
+            && let Some(motif) = &self.layout.motif
+            && let Some(problem) = cells.of_rows().breaks_in_rounds(widths)
+        {
+            context.warning_once(motif.span, problem);
+        }
         Some(cells.of_rows().colors(widths))
     }
 

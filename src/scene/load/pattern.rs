@@ -73,6 +73,11 @@ impl KnitPlan {
         Some(self)
     }
 
+    /// Whether its rows go round.
+    pub(super) fn is_round(&self) -> bool {
+        self.knit.form != Form::Flat
+    }
+
     /// Tells if yarns run into each other.
     pub(super) fn warn_of_overlap(&self, curves: &[(Curve, Vec<f64>)], warnings: &mut Vec<String>) {
         const MOST: f64 = 0.05;

@@ -151,7 +151,8 @@ impl<'a> Base<'a> {
         let plan = plan.sized(context, warnings)?;
         let colors = match kind {
             CurveKind::Yarn(base) if !color.is_plain() => {
-                let of_rows = |widths: &[u32]| color.stitches(widths, base, context, library);
+                let round = plan.is_round();
+                let of_rows = |widths: &[u32]| color.stitches((widths, round), base, context, library);
                 plan.colors(context, &of_rows, warnings)?
             }
             _ => Default::default(),

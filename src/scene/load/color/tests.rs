@@ -47,6 +47,23 @@ fn a_motif_stands_upright_and_repeats() {
 }
 
 #[test]
+fn a_motif_tells_where_it_breaks_in_rounds() {
+    let rows = LETTER.map(str::to_owned).to_vec();
+    let mut letter = motif(Cells::Signs(rows), [".", "#"], false);
+    let breaks = |letter: &NamedMotif, widths: &[u32]| {
+        letter.motif.cells([48.0, 8.0], &[0, 1], 0).unwrap().breaks_in_rounds(widths)
+    };
+    assert_eq!(breaks(&letter, &[48; 8]), None);
+    let told = breaks(&letter, &[48, 46]).expect("it breaks");
+    assert!(told.contains("4 stitches wide") && told.contains("round 2 of 46") && told.contains("44 or 48"), "{told}");
+    assert!(breaks(&letter, &[3]).expect("it is wider").ends_with("; 4 would hold it"));
+    // A round of one yarn does not show it, and what does not begin anew has no seam.
+    assert_eq!(breaks(&letter, &[48, 48, 48, 48, 46]), None);
+    letter.motif.again = [false, true];
+    assert_eq!(breaks(&letter, &[46; 8]), None);
+}
+
+#[test]
 fn an_image_stands_upright_and_is_averaged_where_it_is_finer_than_the_stitches() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("letter.png");
