@@ -169,8 +169,9 @@ impl Laying<'_> {
 
     /// Whether a field of a row begins beside another one, for a yarn that comes from the row below.
     fn is_inside(&self, row: i32, c: usize, backwards: bool) -> bool {
+        // Colours that are stranded go through all of a round.
         let all = self.courses_of(row);
-        if backwards { c + 1 < all.end } else { c > all.start }
+        !self.loops.border.turns && if backwards { c + 1 < all.end } else { c > all.start }
     }
 
     /// Whether the yarns of both layers go around each other before a row.

@@ -265,6 +265,10 @@ fn each_colour_is_a_yarn_whose_floats_are_on_the_back() {
         assert!(found.share <= 0.02, "{form:?}: {found:?}");
         let radius = 16.0 * made.gauge[0] / TAU;
         let depth = |p: &DVec3| if form == Form::Flat { p.z } else { p.x.hypot(p.z) - radius };
+        // From round to round no yarn crosses the inside of a tube.
+        let points = made.strands.iter().flat_map(|strand| &strand.curve.points);
+        let deepest = points.map(depth).fold(0.0, f64::min);
+        assert!(deepest > -5.0, "{form:?}: {deepest}");
         // Row 4 has one stitch of the second colour: what else that has in this row is a float.
         let (mut floats, mut loops) = (Vec::new(), Vec::new());
         for (strand, color) in made.strands.iter().zip(&made.colors) {
