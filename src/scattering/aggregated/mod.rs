@@ -380,3 +380,5 @@ mod swirl_tests;
 mod tests;
 #[cfg(test)]
 mod way_in_tests;
+#[cfg(test)]
+mod way_out_tests;
