@@ -273,14 +273,15 @@ impl<'a> Section<'a> {
             let wide = self.squeeze() / (self.rounded() * stretched);
             let chord = ply.chord(passage.offset, length, self.thinness(), wide);
             let gaps = PlyGaps::new(ply.dead_zone(&chord, passage.offset, length));
-            let fibers =
-                chord.total() * passage.share / self.cos * self.fibers_over_chord(shape, index, &way, &enter, &exit);
+            let (met, ends) = self.fibers_over_chord(shape, index, &way, &enter, &exit);
+            let fibers = chord.total() * passage.share / self.cos * met;
             let (from, to) = (enter.depth, exit.depth);
             let foot = 0.5 * (from + to);
             let travel = [enter.travel, exit.travel];
             // Signed as h is: seen from the camera, towards which x points.
             let offset = -offset;
-            let crossing = PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers, gaps };
+            let crossing =
+                PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers, ends, gaps };
             let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
             if out.is_full() {
                 // What lies deepest is seen least.

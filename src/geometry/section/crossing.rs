@@ -39,6 +39,9 @@ pub struct PlyCrossing {
     pub travel: [f32; 2],
     /// Expected number of fibres on the chord.
     pub fibers: f32,
+    /// How many more a unit of the chord meets where the ray comes in and where it goes out than on the mean, for the fibres' tilt
+    /// against the ray is not the same all along.
+    pub ends: [f32; 2],
     /// The gaps between them.
     pub gaps: PlyGaps,
 }
@@ -50,6 +53,32 @@ impl PlyCrossing {
         let length = self.exit - self.enter;
         let share = if length > 0.0 { (depth - self.enter) / length } else { 0.0 };
         self.travel[0] + share * (self.travel[1] - self.travel[0])
+    }
+
+    /// The share of the chord's [`chord`](Self::chord) before which so many of its fibres lie.
+    ///
+    /// The tilt of the fibres is taken to change along the chord as the parabola that has its mean and its values at both ends.
+    #[inline]
+    pub fn share_before(&self, fibers: f32) -> f32 {
+        /// Beyond, the parabola would have no fibres somewhere.
+        const MOST: f32 = 3.0;
+        const STEPS: usize = 4;
+        if self.fibers <= 0.0 {
+            return 0.0;
+        }
+        let wanted = fibers / self.fibers;
+        let [first, last] = self.ends.map(|end| end.min(MOST));
+        if (first - 1.0).abs().max((last - 1.0).abs()) < 1e-3 {
+            return wanted;
+        }
+        let (b, c) = (6.0 - 4.0 * first - 2.0 * last, 3.0 * (first + last) - 6.0);
+        let mut x = wanted;
+        for _ in 0..STEPS {
+            let before = x * (first + x * (0.5 * b + x * (c / 3.0)));
+            let slope = first + x * (b + x * c);
+            x = (x + (wanted - before) / slope.max(0.1)).clamp(0.0, 1.0);
+        }
+        x
     }
 
     /// Outward unit normal of the ply where the ray enters.
@@ -150,7 +179,7 @@ impl Section<'_> {
     /// Fibres that a unit of a chord's depth meets over those that it would meet across untwisted round plies: the mean
     /// from `enter` to `exit` of |w x t| for the unit vector w of the ray and the tangents t (of z = 1) of the fibres, times
     /// [`Self::squeeze`]. (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place for all: fibres near the ply's
-    /// axis are not tilted.)
+    /// axis are not tilted.) And how many times as many at both ends: [`PlyCrossing::ends`].
     #[inline]
     pub(super) fn fibers_over_chord(
         &self,
@@ -159,13 +188,13 @@ impl Section<'_> {
         way: &Way,
         enter: &Station,
         exit: &Station,
-    ) -> f32 {
+    ) -> (f32, [f32; 2]) {
         let of = &shape.plies[ply];
         let along = |at: &Station| if self.tilted { at.advance * at.straightness } else { -self.sin };
         if of.fiber_rate == 0.0 && shape.ply_rate == 0.0 && self.growth == SectionGrowth::default() {
             // Fibres along the yarn.
             let along = 0.5 * (along(enter) + along(exit));
-            return (1.0 - along * along).max(1e-6).sqrt() * self.squeeze();
+            return ((1.0 - along * along).max(1e-6).sqrt() * self.squeeze(), [1.0; 2]);
         }
         // Tangent and ray at both ends; between them both are linear, or the parabola through the middle where the ray is
         // seen to bend. The mean is by four-point Gauss-Legendre quadrature.
@@ -198,6 +227,11 @@ impl Section<'_> {
         let (cx, cy, cz) = (wy - wz * ty, wz * tx - wx, wx * ty - wy * tx);
         // Between two places where the unwound yarn's axes have turned, the straight line is shorter than w.
         let square = (cx * cx + cy * cy + cz * cz) / (wx * wx + wy * wy + wz * wz);
-        (square.sqrt() * weights).reduce_add() * self.squeeze()
+        let mean = (square.sqrt() * weights).reduce_add();
+        let at_end = |t: Vec2, w: Vec2, z: f32| {
+            let (w, t) = (w.extend(z), t.extend(1.0));
+            (w.cross(t).length_squared() / w.length_squared()).sqrt() / mean
+        };
+        (mean * self.squeeze(), [at_end(ta, wa, za), at_end(tb, wb, zb)])
     }
 }

@@ -495,6 +495,41 @@ fn fibers_on_a_ray_are_those_of_its_length_and_tilt() {
     }
 }
 
+/// Where a ray comes in along the fibres it meets few at first, and many where it comes in across them.
+#[test]
+fn fibers_on_a_ray_lie_where_they_are_tilted_against_it() {
+    let shape = touching_yarn(1, 400, 0.4, 0.0, 0.45);
+    let mut crossings = Crossings::new();
+    let (mut off, mut most, mut even) = (0.0f32, 0.0f32, 0.0f32);
+    let mut looks = 0.0;
+    for i in 0..200 {
+        let theta = 1.2 * (i as f32 / 200.0);
+        let section = section_of(&place(), theta, 0.1 * i as f32, 0.8 - 0.00789 * i as f32);
+        section.crossings(&shape, &mut crossings);
+        for c in &crossings {
+            const STEPS: usize = 400;
+            let direction = section.direction();
+            let tilt = |share: f32| {
+                let depth = c.enter + (c.exit - c.enter) * share;
+                direction.cross(section.fiber_tangent(&shape, c.ply, section.point(depth), c.travel_at(depth))).length()
+            };
+            let tilts: Vec<f32> = (0..STEPS).map(|k| tilt((k as f32 + 0.5) / STEPS as f32)).collect();
+            let all: f32 = tilts.iter().sum();
+            let mut before = 0.0;
+            for (k, tilt) in tilts.iter().enumerate() {
+                before += tilt;
+                let want = (k + 1) as f32 / STEPS as f32;
+                let error = (c.share_before(before / all * c.fibers) - want).abs();
+                off += error;
+                most = most.max(error);
+                even += (before / all - want).abs();
+                looks += 1.0;
+            }
+        }
+    }
+    assert!(looks > 50_000.0 && most < 0.08 && off < 0.2 * even, "{} {most}, evenly {}", off / looks, even / looks);
+}
+
 #[test]
 fn perpendicular_rays_see_the_same_with_and_without_tilt() {
     let shape = touching_yarn(3, 60, 0.4, 0.35, -0.4);

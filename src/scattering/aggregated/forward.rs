@@ -164,7 +164,7 @@ impl Stretch for Crossed<'_> {
     fn meets(&self, left: f32) -> f32 {
         let Self(view, crossing) = self;
         let met = crossing.gaps.fibers_passed(left).min(crossing.fibers);
-        view.depth(crossing, if crossing.fibers > 0.0 { met / crossing.fibers } else { 0.0 })
+        view.depth(crossing, crossing.share_before(met))
     }
 }
 
