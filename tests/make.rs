@@ -417,6 +417,12 @@ fn pieces_measure_what_their_instructions_say() {
         let number = say.split(" high").next().and_then(|s| s.rsplit(' ').next());
         number.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{say}"))
     };
+    let ends = |side: &str| {
+        let text = of_lines.replace("3 cm", &format!("3 cm, ending with a {side} row"));
+        let made = ["make", "knit", "--gauge", "25,40", "--instructions", &text, "-o", "a.bcc"];
+        yarnray(d, &made).good().stderr
+    };
+    assert!(ends("WS").contains("8 x 12, ") && ends("RS").contains("8 x 13, "), "{} {}", ends("WS"), ends("RS"));
     assert!((high(&["--yarn", "wool"]) - 30.0).abs() < 1.5, "{}", high(&["--yarn", "wool"]));
     assert!((high(&["--radius", "0.2"]) - 30.0).abs() < 0.6, "{}", high(&["--radius", "0.2"]));
     assert!(high(&["--yarn", "wool", "--rows", "4"]) < 15.0);

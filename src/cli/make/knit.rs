@@ -16,7 +16,7 @@ use crate::{
         PatternStrand,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
-        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS},
+        knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
     },
     scene::{Yarn, load::read_text},
 };
@@ -131,8 +131,8 @@ struct Charted {
     chart: Chart,
     stitches: u32,
     rows: u32,
-    /// How high the piece is to be by its instructions, mm.
-    height: Option<f64>,
+    /// How high the piece is to be by its instructions, mm, and after how many rows it may end.
+    written: (Option<f64>, Option<EveryFew>),
 }
 
 /// The chart of written instructions, or of those in a file whose name stands behind `@`, over so many stitches or as many as
@@ -151,20 +151,20 @@ fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Char
     };
     let read = Instructions::read(&text).map_err(told)?;
     let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
-    let height = read.height();
-    let least = least.unwrap_or(if height.is_some() { MANY_ROWS } else { knit::COUNT });
+    let count = read.ending().map_or(knit::COUNT, |ending| ending.from(knit::COUNT));
+    let least = least.unwrap_or(if read.height().is_some() { MANY_ROWS } else { count });
     let worked = read.work(stitches, least as usize).map_err(told)?;
-    let rows = if worked.whole { worked.rows.len() as u32 } else { knit::COUNT };
+    let rows = if worked.whole { worked.rows.len() as u32 } else { count };
     let parsed = Chart::parse(&worked.rows);
     let chart = parsed.map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))?;
-    Ok(Charted { chart, stitches, rows, height })
+    Ok(Charted { chart, stitches, rows, written: (read.height(), read.ending()) })
 }
 
 impl KnitArgs {
     /// What is to be knitted, of yarn of a thickness.
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
-        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT, height: None };
-        let Charted { chart, stitches, rows, height } = if let Some(text) = &self.instructions {
+        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT, written: (None, None) };
+        let Charted { chart, stitches, rows, written } = if let Some(text) = &self.instructions {
             let least = self.rows.or(self.size.height.map(|_| MANY_ROWS));
             written(text, self.stitches, least)?
         } else if self.chart.is_empty() {
@@ -194,7 +194,7 @@ impl KnitArgs {
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
-        let piece = self.sized(&piece, yarn, height)?;
+        let piece = self.sized(&piece, yarn, written)?;
         piece.check_counts().map_err(told)?;
         Ok(piece)
     }
@@ -209,7 +209,7 @@ impl KnitArgs {
     }
 
     /// The piece in the size that is asked for, or as high as its instructions say.
-    fn sized(&self, piece: &Knit, yarn: &Thickness, by_text: Option<f64>) -> Result<Knit, Failure> {
+    fn sized(&self, piece: &Knit, yarn: &Thickness, written: (Option<f64>, Option<EveryFew>)) -> Result<Knit, Failure> {
         let SizeArgs { gauge, width, height, circumference } = self.size;
         let mut sizes = Sizes {
             stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
@@ -217,8 +217,9 @@ impl KnitArgs {
             circumference,
             height,
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
+            ending: None,
         };
-        sizes.or_written_height(by_text, Some(&piece.form), self.tile);
+        sizes.or_written(written, Some(&piece.form), self.tile);
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
         let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
 use crate::{
     math::words,
-    pattern::{MAX_POINTS, revolution::Revolution},
+    pattern::{MAX_POINTS, knitspeak::EveryFew, revolution::Revolution},
 };
 
 /// Sizes that a knit was given, mm.
@@ -24,6 +24,8 @@ pub struct Sizes {
     pub height: Option<f64>,
     /// Whether stitches and rows are counted too.
     pub counted: [bool; 2],
+    /// After how many rows the piece may end, where a height counts them.
+    pub ending: Option<EveryFew>,
 }
 
 /// How thick a yarn is where stitches press on it.
@@ -94,10 +96,11 @@ const MOST: f64 = 1e6;
 
 impl Sizes {
     /// As high as written instructions say, mm, where nothing else says how many rows there are: neither a height, nor a count, nor a
-    /// profile, nor a tile.
-    pub fn or_written_height(&mut self, height: Option<f64>, form: Option<&Form>, tile: bool) {
+    /// profile, nor a tile; and with the row as the last that they say.
+    pub fn or_written(&mut self, (height, ending): (Option<f64>, Option<EveryFew>), form: Option<&Form>, tile: bool) {
         if !self.counted[1] && !tile && matches!(form, Some(Form::Flat | Form::Tube)) {
             self.height = self.height.or(height);
+            self.ending = ending;
         }
     }
 
@@ -200,6 +203,9 @@ impl Sizes {
             }
             if let Some(height) = open[1] {
                 knit.rows = count("height", height, stitch[1], high, 1)?;
+                if let Some(ending) = self.ending {
+                    knit.rows = ending.nearest((height / stitch[1]).min(MOST));
+                }
             }
         }
         Ok(knit)

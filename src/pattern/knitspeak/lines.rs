@@ -53,10 +53,23 @@ pub(super) enum Often {
     InAll(u32),
     /// For so many rows.
     Rows(usize),
+    /// Until there are so many rows in all.
+    RowsInAll(usize),
+    /// Through the row with this number.
+    Through(usize),
     /// Until so many stitches are left.
     Left(u32),
+    /// Until so many stitches are on the needle.
+    Have(u32),
     /// As long as the piece grows.
     Open,
+}
+
+/// The last row of those that are repeated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ending {
+    On(Side),
+    Row(usize),
 }
 
 /// "Rep rows 1-4 three times more."
@@ -66,6 +79,8 @@ pub(super) struct Copies {
     pub(super) often: Often,
     /// How high the piece is then, if that is said, mm.
     pub(super) height: Option<f64>,
+    /// Which row is the last, if that is said.
+    pub(super) ending: Option<Ending>,
 }
 
 /// A number in digits or as a word; also as in "1st" or "first".
@@ -441,12 +456,67 @@ impl Copies {
             let hint = "write rows that change their number of stitches out, as in Row 5: k1, k2tog, k to end";
             return error(line, format!("\"{}\" in rows that are repeated is not followed", short(word)), hint);
         }
-        let often = often(rest).unwrap_or(Often::Open);
-        let often = match (verb, often) {
-            ("work", Often::More(n)) if !rest.contains(&"more") => Often::InAll(n),
-            (_, often) => often,
+        // "Then bind off" goes without saying.
+        let bound = (0..rest.len()).find(|&at| binds_off(&rest[at..])).unwrap_or(rest.len());
+        let (rest, ending) = ending(&rest[..bound], line)?;
+        let height = measure(text);
+        let often = match (verb, often(rest)) {
+            ("work", Some(Often::More(n))) if !rest.contains(&"more") => Often::InAll(n),
+            (_, Some(often)) => often,
+            ("form", None) => Often::Open,
+            (_, None) if height.is_some() || goes_on(rest) => Often::Open,
+            (_, None) => return error(line, format!("\"{}\" says no end of the repeat", short(&rest.join(" "))), ENDS),
         };
-        Ok(Some(Self { which, often, height: measure(text) }))
+        Ok(Some(Self { which, often, height, ending }))
+    }
+}
+
+/// How repeats may end.
+const ENDS: &str = "3 times more, a total of 5 times, for 20 rows, until 30 rows have been worked, until 9 sts remain, until there are \
+                    9 sts and until piece measures 10 cm are known, and ending with a WS row behind them";
+
+/// Whether what stands behind rows that are repeated says that they go on without an end: "for pattern", "to desired length".
+fn goes_on(words: &[&str]) -> bool {
+    let filler = |w: &&str| {
+        matches!(
+            *w,
+            "for" | "in" | "as" | "to" | "until" | "the" | "of" | "this" | "set" | "established" | "manner" | "way"
+        ) || matches!(*w, "work" | "working" | "piece" | "end" | "rest" | "and" | "then" | "even")
+    };
+    let open = |w: &&str| {
+        matches!(*w, "throughout" | "length" | "desired" | "required" | "wanted" | "wished" | "like" | "wish" | "long")
+    };
+    let pattern = |w: &&str| matches!(*w, "patt" | "pattern" | "pat" | "rib" | "ribbing" | "st" | "stitch");
+    let is_until = |w: &&str| matches!(*w, "until" | "till" | "til");
+    words.iter().all(filler) || words.iter().any(open) || (words.iter().any(pattern) && !words.iter().any(is_until))
+}
+
+/// "Ending with a WS row", "end on row 4": the words without it, and what it says.
+fn ending<'a, 'w>(words: &'a [&'w str], line: usize) -> Result<(&'a [&'w str], Option<Ending>)> {
+    let ends = |pair: &[&str]| {
+        matches!(pair, ["end" | "ends" | "ending" | "finish" | "finishing", "with" | "after" | "on" | "by" | "having"])
+    };
+    let Some(at) = words.windows(2).position(ends) else { return Ok((words, None)) };
+    let tail = &words[at + 2..];
+    let named = match tail {
+        ["a" | "an" | "the", rest @ ..] => rest,
+        rest => rest,
+    };
+    let is_last = |row: &str, n: &str| is_row(row) && number(n).is_some();
+    let ending = match (side_of(&named.iter().take(2).copied().collect::<Vec<_>>().join(" ")), named) {
+        (Some(side), _) => Some(Ending::On(side)),
+        (None, [row, n, ..]) if is_last(row, n) => number(n).map(|n| Ending::Row(n as usize)),
+        // "Ending with the 4th row"
+        (None, [n, row, ..]) if is_last(row, n) => number(n).map(|n| Ending::Row(n as usize)),
+        _ => None,
+    };
+    match ending {
+        Some(_) => Ok((&words[..at], ending)),
+        None => error(
+            line,
+            format!("\"{}\" ends on no row", short(&words[at..].join(" "))),
+            "as in ending with a WS row, or ending with row 4",
+        ),
     }
 }
 
@@ -479,7 +549,8 @@ fn which<'a, 'w>(words: &'a [&'w str], text: &str, line: usize) -> Result<Option
     })
 }
 
-/// "twice more", "3 times", "until 5 sts remain", "for 20 rows".
+/// "twice more", "3 times", "a total of 3 times", "until 5 sts remain", "until there are 9 sts", "for 20 rows", "until 30 rows have been
+/// worked".
 fn often(words: &[&str]) -> Option<Often> {
     let times = |w: &str| match w {
         "once" => Some(1),
@@ -487,29 +558,55 @@ fn often(words: &[&str]) -> Option<Often> {
         "thrice" => Some(3),
         _ => None,
     };
+    let until = words.iter().position(|w| matches!(*w, "until" | "till" | "til"));
+    let in_all =
+        words.iter().any(|w| matches!(*w, "total" | "altogether")) || words.windows(2).any(|w| w == ["in", "all"]);
+    let repeats = |n: u32| if in_all { Often::InAll(n) } else { Often::More(n) };
     for (i, word) in words.iter().enumerate() {
         if let Some(n) = times(word) {
-            return Some(Often::More(n));
+            return Some(repeats(n));
         }
         let rest = &words[i + 1..];
+        // "until row 30 has been worked"
+        if let (true, [n, ..]) = (is_row(word), rest)
+            && let Some(n) = number(n)
+        {
+            return Some(Often::Through(n as usize));
+        }
         let n = number(word).or_else(|| number(word.trim_matches('x')));
         match (n, rest) {
-            (Some(n), ["times" | "time", ..] | ["more" | "further", "times" | "time", ..]) => {
-                return Some(Often::More(n));
+            (Some(n), ["times" | "time", ..] | ["more" | "further", "times" | "time", ..]) => return Some(repeats(n)),
+            (Some(n), ["rows" | "rnds" | "rounds", behind @ ..]) => {
+                let whole = in_all || (until.is_some_and(|u| u < i) && !behind.contains(&"more"));
+                return Some(if whole { Often::RowsInAll(n as usize) } else { Often::Rows(n as usize) });
             }
-            (Some(n), ["rows" | "rnds" | "rounds", ..] | ["more" | "further", "rows" | "rnds" | "rounds", ..]) => {
-                return Some(Often::Rows(n as usize));
+            (Some(n), ["more" | "further", "rows" | "rnds" | "rounds", ..]) => return Some(Often::Rows(n as usize)),
+            (Some(n), ["st" | "sts" | "stitch" | "stitches", behind @ ..]) => {
+                if let Some(often) = stitches(n, &words[..i], behind) {
+                    return Some(often);
+                }
             }
-            (Some(n), ["st" | "sts" | "stitch" | "stitches", left, ..])
-                if matches!(*left, "rem" | "remain" | "remains" | "left" | "remaining" | "are") =>
-            {
-                return Some(Often::Left(n));
-            }
-            (Some(n), []) if word.trim_matches('x').len() < word.len() => return Some(Often::More(n)),
+            (Some(n), []) if word.trim_matches('x').len() < word.len() => return Some(repeats(n)),
             _ => {}
         }
     }
     None
+}
+
+/// "Until 5 sts remain", "until there are 9 sts on the needle".
+fn stitches(n: u32, before: &[&str], behind: &[&str]) -> Option<Often> {
+    let remain = |w: &&str| matches!(*w, "rem" | "remain" | "remains" | "left" | "remaining");
+    if behind.iter().take(3).any(remain) || before.last().is_some_and(|w| matches!(*w, "only" | "just" | "last")) {
+        return Some(Often::Left(n));
+    }
+    let until = before.iter().any(|w| matches!(*w, "until" | "till" | "til" | "to"));
+    let counts = |w: &&str| {
+        matches!(
+            *w,
+            "are" | "on" | "in" | "the" | "your" | "needle" | "needles" | "total" | "all" | "altogether" | "each"
+        )
+    };
+    (until && behind.iter().all(counts)).then_some(Often::Have(n))
 }
 
 /// The first length of a text, mm: "10 cm", "4.5in", "4 1/2 inches", "25 cm [10 in]".

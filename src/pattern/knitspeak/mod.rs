@@ -16,6 +16,7 @@ mod words;
 
 use std::fmt;
 
+pub use rows::EveryFew;
 use rows::{Again, Until, written};
 
 use super::chart::{Act, Chart};
@@ -69,6 +70,7 @@ pub struct Instructions {
     again: Option<Again>,
     cast_on: Option<u32>,
     height: Option<f64>,
+    ending: Option<EveryFew>,
     ends: bool,
 }
 
@@ -111,6 +113,11 @@ impl Instructions {
         self.height.filter(|_| self.again.as_ref().is_some_and(|again| again.until == Until::Open))
     }
 
+    /// After how many rows repeats without an end may stop, if they say which row is the last.
+    pub fn ending(&self) -> Option<EveryFew> {
+        self.ending.filter(|_| self.again.as_ref().is_some_and(|again| again.until == Until::Open))
+    }
+
     /// Works them over so many stitches. What they tell to repeat without an end, and does not repeat from the first row on
     /// with as many stitches, is repeated for at least `least` rows.
     ///
@@ -136,59 +143,88 @@ impl Instructions {
             until: Until::Open,
             line: self.rows[self.set_up].line,
         };
-        let Some(Again { rows, until, line }) = &self.again.clone().or_else(|| goes_on.then(implied)) else {
+        let Some(again) = &self.again.clone().or_else(|| goes_on.then(implied)) else {
             return Ok(Worked { rows: needle.rows, whole: self.ends || shaped });
         };
-        let copy = |needle: &Needle, k: usize| {
-            let row = &self.rows[rows[k % rows.len()]];
-            // Rows go on by turns, whichever they repeat.
-            let side = if needle.rows.len().is_multiple_of(2) { self.rows[0].side } else { self.second_side() };
-            Written { line: *line, side, count: None, ..row.clone() }
-        };
-        match until {
-            Until::Left(left) => {
-                let mut at_last = u32::MAX;
-                for k in 0.. {
-                    if needle.found == *left {
-                        break;
-                    }
-                    if k % rows.len() == 0 && (needle.found == at_last || needle.rows.len() > MOST_ROWS)
-                        || needle.found < *left
-                    {
-                        let problem = format!(
-                            "{left} stitches never remain: {} do after row {}",
-                            needle.found,
-                            needle.rows.len()
-                        );
-                        return error(
-                            *line,
-                            problem,
-                            "another number of `stitches` fits, or rows that make fewer than they find",
-                        );
-                    }
-                    if k % rows.len() == 0 {
-                        at_last = needle.found;
-                    }
-                    needle.work(&copy(&needle, k))?;
-                }
-                Ok(Worked { rows: needle.rows, whole: true })
-            }
+        match again.until {
+            Until::Left(count) | Until::Have(count) => self.work_until(again, count, &mut needle)?,
             Until::Open => {
-                let all = rows.iter().copied().eq(0..self.rows.len());
+                let all = again.rows.iter().copied().eq(0..self.rows.len());
                 if all && !shaped && needle.behind == 0 {
                     // Over an odd number of rows the other side comes next.
                     if self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side() {
-                        (0..rows.len()).try_for_each(|k| needle.work(&copy(&needle, k)))?;
+                        (0..again.rows.len()).try_for_each(|k| needle.work(&self.copy(again, &needle, k)))?;
                     }
                     return Ok(Worked { rows: needle.rows, whole: self.ends });
                 }
+                let least = least.min(MOST_ROWS);
                 for k in 0.. {
-                    if needle.rows.len() >= least.min(MOST_ROWS) {
+                    let count = needle.rows.len();
+                    if count >= least && self.ending.is_none_or(|ending| ending.holds(count as u32)) {
                         break;
                     }
-                    needle.work(&copy(&needle, k))?;
+                    needle.work(&self.copy(again, &needle, k))?;
                 }
-                Ok(Worked { rows: needle.rows, whole: true })
+            }
+        }
+        Ok(Worked { rows: needle.rows, whole: true })
+    }
+
+    /// The row that is repeated as the `k`-th after those that are written.
+    fn copy(&self, again: &Again, needle: &Needle, k: usize) -> Written {
+        let row = &self.rows[again.rows[k % again.rows.len()]];
+        // Rows go on by turns, whichever they repeat.
+        let side = if needle.rows.len().is_multiple_of(2) { self.rows[0].side } else { self.second_side() };
+        Written { line: again.line, side, count: None, ..row.clone() }
+    }
+
+    /// Repeats rows until there are so many stitches.
+    fn work_until(&self, again: &Again, count: u32, needle: &mut Needle) -> Result<()> {
+        let is_past = |found: u32, begun: u32| if begun < count { found > count } else { found < count };
+        let begun = needle.found;
+        let mut at_last = None;
+        let mut next = 0;
+        while needle.found != count {
+            let is_whole = next % again.rows.len() == 0;
+            let stuck = is_whole && (at_last == Some(needle.found) || needle.rows.len() > MOST_ROWS);
+            if stuck || is_past(needle.found, begun) {
+                let (found, row) = (needle.found, needle.rows.len());
+                let problem = match again.until {
+                    Until::Left(_) => format!("{count} stitches never remain: {found} do after row {row}"),
+                    _ => format!("there are never {count} stitches: {found} are there after row {row}"),
+                };
+                let hint = "another number of `stitches` fits, or rows that make fewer or more than they find";
+                return error(again.line, problem, hint);
+            }
+            if is_whole {
+                at_last = Some(needle.found);
+            }
+            needle.work(&self.copy(again, needle, next))?;
+            next += 1;
+        }
+        // What remains is taken off at once. Else the repeat is worked to its end, if it keeps the stitches.
+        let is_last = |rows: usize, next: usize| match self.ending {
+            Some(ending) => ending.holds(rows as u32),
+            None => matches!(again.until, Until::Left(_)) || next.is_multiple_of(again.rows.len()),
+        };
+        let mut ahead = needle.clone();
+        for next in next..=next + again.rows.len() {
+            if is_last(ahead.rows.len(), next) {
+                *needle = ahead;
+                return Ok(());
+            }
+            if ahead.work(&self.copy(again, &ahead, next)).is_err() || ahead.found != count {
+                break;
+            }
+        }
+        match self.ending {
+            None => Ok(()),
+            Some(_) => {
+                let problem = format!(
+                    "the row with {count} stitches, row {}, is not the one it is to end with",
+                    needle.rows.len()
+                );
+                error(again.line, problem, "leave out what it ends with, or another number of stitches")
             }
         }
     }
@@ -204,6 +240,7 @@ impl Instructions {
 }
 
 /// The stitches on the needle, and the rows below them.
+#[derive(Clone)]
 struct Needle {
     found: u32,
     /// Those that the row before has left when it turned.

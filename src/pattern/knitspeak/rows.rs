@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     Instructions, KNOWN, KnitSpeakError, MOST_ROWS, Result, Side, Written, error,
-    lines::{self, Copies, Head, Line, Often, Which},
+    lines::{self, Copies, Ending, Head, Line, Often, Which},
     words::parse_body,
 };
 
@@ -21,8 +21,38 @@ pub(super) struct Again {
 pub(super) enum Until {
     /// Until so many stitches are left.
     Left(u32),
+    /// Until so many stitches are on the needle.
+    Have(u32),
     /// As long as the piece grows.
     Open,
+}
+
+/// After how many rows a piece may end: any number that leaves this rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EveryFew {
+    /// Rows from one such number to the next, at least 1.
+    pub apart: u32,
+    /// What these numbers leave, divided by it.
+    pub rest: u32,
+}
+
+impl EveryFew {
+    /// Whether a piece may end after so many rows.
+    pub fn holds(self, rows: u32) -> bool {
+        rows % self.apart == self.rest
+    }
+
+    /// So many rows, or as many more as it takes.
+    pub fn from(self, rows: u32) -> u32 {
+        rows + (self.rest + self.apart - rows % self.apart) % self.apart
+    }
+
+    /// The number that is nearest to so many, and at least 1.
+    pub fn nearest(self, rows: f64) -> u32 {
+        let (apart, rest) = (f64::from(self.apart), f64::from(self.rest));
+        let nearest = ((rows - rest) / apart).round().max(0.0) * apart + rest;
+        self.from((nearest as u32).max(1))
+    }
 }
 
 /// What has been read so far.
@@ -41,6 +71,8 @@ struct Reading {
     cast_on: Option<u32>,
     /// How high the piece is when repeats without an end are done, mm.
     height: Option<f64>,
+    /// Which row the repeats end with, and the line that says so.
+    ending: Option<(Ending, usize)>,
     ends: bool,
 }
 
@@ -57,6 +89,7 @@ pub(super) fn written(text: &str) -> Result<Instructions> {
         again: None,
         cast_on: None,
         height: None,
+        ending: None,
         ends: false,
     };
     // A row may go on in the next lines.
@@ -209,6 +242,7 @@ impl Reading {
         if copies.often == Often::Open {
             self.height = copies.height.or(self.height);
         }
+        self.ending = copies.ending.map(|ending| (ending, line)).or(self.ending);
         if self.again.is_some() {
             // "These 4 rows form the pattern. Cont in patt until ..."
             if copies.often == Often::Open {
@@ -246,12 +280,25 @@ impl Reading {
             // They were worked once where they are written.
             Often::InAll(times) => (times.saturating_sub(1) as usize).saturating_mul(rows.len()),
             Often::Rows(count) => count,
-            Often::Left(_) | Often::Open => {
-                let until = if let Often::Left(left) = copies.often { Until::Left(left) } else { Until::Open };
+            Often::RowsInAll(count) => self.up_to(count, line)?,
+            Often::Through(number) => self.up_to(self.place(number), line)?,
+            Often::Left(_) | Often::Have(_) | Often::Open => {
+                let until = match copies.often {
+                    Often::Left(left) => Until::Left(left),
+                    Often::Have(count) => Until::Have(count),
+                    _ => Until::Open,
+                };
                 self.again = Some(Again { rows: rows.iter().map(|row| row - 1).collect(), until, line });
                 return Ok(());
             }
         };
+        if let (Some(Ending::Row(number)), Some(at)) = (copies.ending, count.checked_sub(1)) {
+            let last = rows[at % rows.len()];
+            if last != self.place(number) {
+                let problem = format!("the repeats end with {}, and are to end with row {number}", self.name(last));
+                return error(line, problem, "another number of rows, or leave out what it ends with");
+            }
+        }
         if count > MOST_ROWS {
             return error(line, format!("{count} rows more are too many"), format!("at most {MOST_ROWS} are knitted"));
         }
@@ -261,6 +308,43 @@ impl Reading {
         }
         self.ends = true;
         Ok(())
+    }
+
+    /// How many rows are wanting to so many in all.
+    fn up_to(&self, count: usize, line: usize) -> Result<usize> {
+        let last = self.last();
+        let problem = || format!("{last} rows are written, and it is to end after {count}");
+        count.checked_sub(last).map_or_else(|| error(line, problem(), "at least as many as are written"), Ok)
+    }
+
+    /// After how many of the rows the piece may end, by what is said of its last row.
+    fn every_few(&self, rows: &[Written]) -> Result<Option<EveryFew>> {
+        let Some((ending, line)) = self.ending else { return Ok(None) };
+        let found = match ending {
+            Ending::On(Side::Right) if self.round => None,
+            Ending::On(Side::Wrong) if self.round => {
+                return error(line, "rounds have no wrong side to end with", "rows go back and forth: Row 1 (RS)");
+            }
+            Ending::On(side) => Some(EveryFew { apart: 2, rest: u32::from(side == rows[0].side) }),
+            Ending::Row(number) => {
+                let Some(Again { rows: repeated, .. }) = &self.again else { return Ok(None) };
+                let place = self.place(number).wrapping_sub(1);
+                let Some(at) = repeated.iter().position(|row| *row == place) else {
+                    let problem = format!("row {number} is to be the last, and is not repeated");
+                    return error(line, problem, "ending with one of the rows that are repeated");
+                };
+                // The repeat begins behind the rows that are written.
+                let apart = repeated.len();
+                Some(EveryFew { apart: apart as u32, rest: ((rows.len() + at + 1) % apart) as u32 })
+            }
+        };
+        let count = rows.len();
+        if self.again.is_none() && found.is_some_and(|ending| !ending.holds(count as u32)) {
+            let side = if rows[count - 1].side == Side::Right { "right" } else { "wrong" };
+            let problem = format!("row {count} is the last and on the {side} side");
+            return error(line, problem, "a row more or fewer, or leave out what it ends with");
+        }
+        Ok(found)
     }
 
     fn finish(mut self) -> Result<Instructions> {
@@ -289,6 +373,7 @@ impl Reading {
         }
         Ok(Instructions {
             set_up: self.set_up.min(rows.len()),
+            ending: self.every_few(&rows)?,
             rows,
             again: self.again,
             cast_on: self.cast_on,

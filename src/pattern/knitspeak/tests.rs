@@ -219,6 +219,85 @@ fn rows_are_repeated_as_they_are_told() {
 }
 
 #[test]
+fn repeats_end_where_they_are_told_to() {
+    let rows = |text: &str, stitches| {
+        let read = Instructions::read(text).map_err(|e| e.to_string())?;
+        read.work(stitches, 20).map(|worked| (worked.rows.len(), worked.whole)).map_err(|e| e.to_string())
+    };
+    // By stitches: the repeat is worked to its end where it keeps them, and what remains is taken off at once.
+    let wider = "Row 1 (RS): k1, m1l, k to last st, m1r, k1.\nRow 2: Purl.\nRep rows 1-2 ";
+    for end in
+        ["until you have 9 sts", "until there are 9 sts", "until 9 sts on needle", "till 9 sts are on the needles."]
+    {
+        assert_eq!(rows(&format!("{wider}{end}"), 3), Ok((6, true)), "{end}");
+    }
+    assert_eq!(rows(&format!("{wider}until you have 9 sts, ending with a RS row"), 3), Ok((5, true)));
+    assert_eq!(
+        rows("Row 1: m1l, k to end\nRow 2: m1p, p to end\nRep rows 1-2 until there are 6 sts", 3),
+        Ok((3, true))
+    );
+    let narrower = "Row 1 (RS): k1, k2tog, k to last 3 sts, ssk, k1\nRow 2: purl\nRep rows 1-2 until 5 sts remain";
+    assert_eq!(rows(narrower, 9), Ok((3, true)));
+    assert_eq!(rows(&format!("{narrower}, ending with a wrong side row"), 9), Ok((4, true)));
+    // By rows and times.
+    let two = "Row 1: knit. Row 2: purl. Rep last 2 rows ";
+    for (end, count) in [
+        ("until 30 rows have been worked", 30),
+        ("until row 30 has been worked", 30),
+        ("for a total of 30 rows", 30),
+        ("for 30 rows", 32),
+        ("a total of 5 times", 10),
+        ("5 times in all", 10),
+        ("5 times", 12),
+        ("5 more times, ending with a WS row", 12),
+        ("5 times more, ending with row 2. Bind off", 12),
+        ("twice more, then bind off all sts loosely", 6),
+    ] {
+        assert_eq!(rows(&format!("{two}{end}"), 4), Ok((count, true)), "{end}");
+    }
+    assert_eq!(rows("Row 1: knit. Row 2: purl. Rep these 2 rows a total of 5 times", 4), Ok((10, true)));
+    // Without an end.
+    for end in ["", "for pattern", "for the lace pattern", "throughout", "to desired length", "until it is long enough"]
+    {
+        assert_eq!(rows(&format!("{two}{end}"), 4), Ok((2, false)), "{end}");
+    }
+    for (end, problem) in [
+        ("until bananas", "\"until bananas\" says no end of the repeat"),
+        ("to the moon", "\"to the moon\" says no end"),
+        ("until 9 sts are decreased", "\"until 9 sts are decreased\""),
+        ("until it is time", "\"until it is time\""),
+        ("until 10 cm, ending with tea", "\"ending with tea\" ends on no row"),
+        ("5 times, ending with a RS row", "row 12 is the last and on the wrong side"),
+        ("5 times, ending with row 1", "the repeats end with row 2, and are to end with row 1"),
+        ("until 10 cm, ending with row 3", "row 3 is to be the last, and is not repeated"),
+        ("until row 1", "2 rows are written, and it is to end after 1"),
+        ("until there are 9 sts", "there are never 9 stitches: 4 are there after row 4"),
+    ] {
+        let told = rows(&format!("{two}{end}"), 4).unwrap_err();
+        assert!(told.contains(problem), "{end}: {told}");
+    }
+    let round = "Rnd 1: k. Rep rnd 1 until 5 cm, ending with a WS round";
+    assert!(rows(round, 4).unwrap_err().contains("rounds have no wrong side"));
+}
+
+#[test]
+fn a_height_ends_with_the_row_that_is_said() {
+    let ending = |text: &str| Instructions::read(text).unwrap().ending();
+    let four = "Row 1: k. Row 2: p. Row 3: k. Row 4: p. Rep rows 1-4 until 5 cm, ending ";
+    let every = |apart, rest| Some(EveryFew { apart, rest });
+    assert_eq!(ending(&format!("{four}with a WS row")), every(2, 0));
+    assert_eq!(ending(&format!("{four}after a RS row.")), every(2, 1));
+    assert_eq!(ending(&four.replace("Row 1", "Row 1 (WS)").replace("ending ", "ending with a WS row")), every(2, 1));
+    assert_eq!(ending(&format!("{four}on row 2 of pattern")), every(4, 2));
+    assert_eq!(ending("Set-up row: k. Row 1: k. Row 2: p. Rep rows 1-2 until 5 cm, ending with row 2"), every(2, 1));
+    assert_eq!(ending("Row 1: k. Rep row 1 until 5 cm"), None);
+    let [even, odd, fourth] = [(2, 0), (2, 1), (4, 2)].map(|(apart, rest)| EveryFew { apart, rest });
+    assert_eq!([even.nearest(20.9), even.nearest(21.1), even.nearest(0.2)], [20, 22, 2]);
+    assert_eq!([odd.nearest(20.9), odd.nearest(0.1), fourth.nearest(20.4)], [21, 1, 22]);
+    assert_eq!([even.from(20), odd.from(20), fourth.from(20)], [20, 21, 22]);
+}
+
+#[test]
 fn what_is_not_knitted_is_told_with_its_row_and_word() {
     for (text, problem, hint) in [
         ("Row 1: k1\nRow 2: k1, bind off sts", "row 2: \"bind\"", "by a line of its own"),

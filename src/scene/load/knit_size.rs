@@ -3,7 +3,10 @@
 use super::{Context, Range, Reader, gauge};
 use crate::{
     input::diagnostic::Span,
-    pattern::knit::{Form, Knit, Sizes, Thickness},
+    pattern::{
+        knit::{Form, Knit, Sizes, Thickness},
+        knitspeak::EveryFew,
+    },
 };
 
 /// Sizes with the places where stitches and rows were said to be so many or so large.
@@ -30,6 +33,7 @@ impl GivenSizes {
             circumference: mm("circumference"),
             height: mm("height"),
             counted: ["stitches", "rows"].map(|key| table.has(key)),
+            ending: None,
         };
         let measured = ["stitch_width", "row_height"].map(|key| table.has(key));
         for wrong in sizes.clashes(form.as_ref(), measured, |key| format!("`{key}`")) {
@@ -43,9 +47,9 @@ impl GivenSizes {
         Self { sizes, stitches, rows }
     }
 
-    /// The height that written instructions say, mm, where no key says how many rows there are.
-    pub(super) fn or_written_height(&mut self, height: Option<f64>, form: Option<&Form>, tile: bool) {
-        self.sizes.or_written_height(height, form, tile);
+    /// The height that written instructions say, mm, and after how many rows they may end, where no key says how many there are.
+    pub(super) fn or_written(&mut self, written: (Option<f64>, Option<EveryFew>), form: Option<&Form>, tile: bool) {
+        self.sizes.or_written(written, form, tile);
     }
 
     /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.

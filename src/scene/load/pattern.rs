@@ -17,7 +17,7 @@ use crate::{
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
-        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS},
+        knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
     },
 };
 
@@ -184,13 +184,20 @@ pub(super) struct Charted {
     /// Stitches to cast on and rows to knit unless asked otherwise.
     stitches: u32,
     rows: u32,
-    /// How high the piece is to be by its instructions, mm.
-    height: Option<f64>,
+    /// How high the piece is to be by its instructions, mm, and after how many rows it may end.
+    written: (Option<f64>, Option<EveryFew>),
 }
 
 impl Charted {
     fn new(name: &str, chart: Option<Chart>) -> Self {
-        Self { name: name.to_owned(), chart, lines: Vec::new(), stitches: knit::COUNT, rows: knit::COUNT, height: None }
+        Self {
+            name: name.to_owned(),
+            chart,
+            lines: Vec::new(),
+            stitches: knit::COUNT,
+            rows: knit::COUNT,
+            written: (None, None),
+        }
     }
 }
 
@@ -276,8 +283,9 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     let Ok(read) = Instructions::read(text).map_err(told) else { return charted };
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
-    charted.height = read.height();
-    let least = if table.has("height") || charted.height.is_some() { MANY_ROWS } else { charted.rows };
+    charted.written = (read.height(), read.ending());
+    charted.rows = read.ending().map_or(charted.rows, |ending| ending.from(charted.rows));
+    let least = if table.has("height") || read.height().is_some() { MANY_ROWS } else { charted.rows };
     let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
     let Ok(worked) = read.work(stitches, least).map_err(told) else { return charted };
     if worked.whole {
@@ -311,7 +319,7 @@ pub(super) fn knit(
         _ => charted.rows,
     };
     let mut sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    sizes.or_written_height(charted.height, form.as_ref(), table.has("tile"));
+    sizes.or_written(charted.written, form.as_ref(), table.has("tile"));
     counted(table, yarns, Charted { rows, ..charted }, form, sizes)
 }
 
