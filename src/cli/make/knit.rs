@@ -152,8 +152,12 @@ fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Char
     let read = Instructions::read(&text).map_err(told)?;
     let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
     let count = read.ending().map_or(knit::COUNT, |ending| ending.from(knit::COUNT));
-    let least = least.unwrap_or(if read.height().is_some() { MANY_ROWS } else { count });
-    let worked = read.work(stitches, least as usize).map_err(told)?;
+    let worked = match least {
+        Some(least) => read.work_rows(stitches, least as usize),
+        None if read.height().is_some() => read.work(stitches, MANY_ROWS as usize),
+        None => read.work(stitches, count as usize),
+    };
+    let worked = worked.map_err(told)?;
     let rows = if worked.whole { worked.rows.len() as u32 } else { count };
     let parsed = Chart::parse(&worked.rows);
     let chart = parsed.map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))?;

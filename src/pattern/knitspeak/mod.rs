@@ -124,6 +124,18 @@ impl Instructions {
     /// # Errors
     /// A row that does not fit the stitches it finds, or does not make as many as it says.
     pub fn work(&self, cast_on: u32, least: usize) -> Result<Worked> {
+        self.worked(cast_on, least, false)
+    }
+
+    /// As [`Self::work`], of text of which so many rows are asked for: where it says no end, shaped rows go on too.
+    ///
+    /// # Errors
+    /// As [`Self::work`].
+    pub fn work_rows(&self, cast_on: u32, rows: usize) -> Result<Worked> {
+        self.worked(cast_on, rows, true)
+    }
+
+    fn worked(&self, cast_on: u32, least: usize, asked: bool) -> Result<Worked> {
         let reads = |row: &Written| row.body.reads_the_row_below();
         let mut needle = Needle {
             found: cast_on,
@@ -136,8 +148,10 @@ impl Instructions {
         let begun = needle.found;
         pattern.iter().try_for_each(|row| needle.work(row))?;
         let shaped = needle.found != cast_on;
-        // What set-up rows are for is repeated, whether it is told or not.
-        let goes_on = !set_up.is_empty() && !pattern.is_empty() && !self.ends && needle.found == begun;
+        // What set-up rows are for is repeated, whether it is told or not; so is what is shaped, where more rows are asked for.
+        let goes_on = !pattern.is_empty()
+            && !self.ends
+            && if set_up.is_empty() { shaped && asked } else { needle.found == begun || asked };
         let implied = || Again {
             rows: (self.set_up..self.rows.len()).collect(),
             until: Until::Open,
@@ -163,7 +177,11 @@ impl Instructions {
                     if count >= least && self.ending.is_none_or(|ending| ending.holds(count as u32)) {
                         break;
                     }
-                    needle.work(&self.copy(again, &needle, k))?;
+                    match needle.work(&self.copy(again, &needle, k)) {
+                        // Of as many rows as a height may take the last ones are seldom wanted.
+                        Err(_) if least >= MANY_ROWS as usize => break,
+                        worked => worked?,
+                    }
                 }
             }
         }

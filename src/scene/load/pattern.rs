@@ -287,7 +287,9 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     charted.rows = read.ending().map_or(charted.rows, |ending| ending.from(charted.rows));
     let least = if table.has("height") || read.height().is_some() { MANY_ROWS } else { charted.rows };
     let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
-    let Ok(worked) = read.work(stitches, least).map_err(told) else { return charted };
+    let asked = table.has("rows") || table.has("height");
+    let worked = if asked { read.work_rows(stitches, least) } else { read.work(stitches, least) };
+    let Ok(worked) = worked.map_err(told) else { return charted };
     if worked.whole {
         charted.rows = worked.rows.len() as u32;
     }
