@@ -16,6 +16,11 @@ pub(crate) fn plural(noun: &str) -> String {
     }
 }
 
+/// What lies between two texts, or the one where they are the same: "13 to 122", "13".
+pub(crate) fn from_to([least, most]: [String; 2]) -> String {
+    if least == most { least } else { format!("{least} to {most}") }
+}
+
 /// A number of bytes in the unit in which it has some digits before the point.
 pub(crate) fn bytes_in_words(bytes: u64) -> String {
     let b = bytes as f64;
@@ -30,6 +35,12 @@ pub(crate) fn bytes_in_words(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_range_of_one_number_is_that_number() {
+        assert_eq!(from_to([13, 122].map(|n| n.to_string())), "13 to 122");
+        assert_eq!(from_to([13, 13].map(|n| n.to_string())), "13");
+    }
 
     #[test]
     fn one_of_a_thing_is_told_from_many() {

@@ -11,11 +11,11 @@ use super::{
 };
 use crate::{
     cli::{Failure, log, named, positive, two, working::Working},
-    math::words::counted,
+    math::words::{counted, from_to},
     pattern::{
         PatternStrand,
         chart::{Chart, PATTERNS},
-        knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
+        knit::{self, CastOn, Closing, Edges, Extent, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
         knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
     },
     scene::{Yarn, load::read_text},
@@ -253,15 +253,19 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     let color = |strand: &PatternStrand| palette.of(*colors.get(strand.index as usize)?);
     write(strands, &args.output, [radius; 2], yarn.as_ref(), color)?;
     if !args.output.quiet {
-        let Knit { stitches, rows, form, .. } = &piece;
+        let Knit { rows, form, .. } = &piece;
         let [width, height] = gauge;
-        let (across, up) = (f64::from(*stitches) * width, f64::from(*rows) * height);
+        let Extent { stitches, across, up } = piece.extent(gauge);
+        let (stitches, period) = (from_to(stitches.map(|n| n.to_string())), across[1]);
+        let across = from_to(across.map(|length| format!("{length:.3}")));
         log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));
         log::say(&match form {
-            Form::Flat if args.tile => format!("period {across:.6} across, {up:.6} up; {length:.1} of yarn"),
-            Form::Flat => format!("{stitches} x {rows}, {across:.3} wide, {up:.3} high; {length:.1} of yarn"),
-            Form::Tube => format!("{stitches} x {rows}, {across:.3} around, {up:.3} high; {length:.1} of yarn"),
-            Form::Revolution(_) => format!("{length:.1} of yarn"),
+            Form::Flat if args.tile => format!("period {period:.6} across, {up:.6} up; {length:.1} of yarn"),
+            Form::Flat => format!("{stitches} x {rows}, {across} wide, {up:.3} high; {length:.1} of yarn"),
+            Form::Tube => format!("{stitches} x {rows}, {across} around, {up:.3} high; {length:.1} of yarn"),
+            Form::Revolution(_) => {
+                format!("{stitches} x {rows}, {across} around, {up:.3} along the profile; {length:.1} of yarn")
+            }
         });
     }
     Ok(())

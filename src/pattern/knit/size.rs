@@ -28,6 +28,17 @@ pub struct Sizes {
     pub ending: Option<EveryFew>,
 }
 
+/// How large a piece is: its narrowest and its widest row, and its height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Stitches of the row that has the fewest, what is cast on among them, and of that which has the most.
+    pub stitches: [u32; 2],
+    /// Width of the narrowest and of the widest row, or the way round there.
+    pub across: [f64; 2],
+    /// Height of a piece, or the length of the profile.
+    pub up: f64,
+}
+
 /// How thick a yarn is where stitches press on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thickness {
@@ -277,6 +288,24 @@ impl Form {
 }
 
 impl Knit {
+    /// How large it is, where stitches have this width and rows this distance.
+    pub fn extent(&self, [width, height]: [f64; 2]) -> Extent {
+        let widths = self.widths().unwrap_or_default();
+        let [fewest, most] = widths.iter().fold([self.stitches; 2], |[a, b], &row| [a.min(row), b.max(row)]);
+        let (across, up) = match &self.form {
+            Form::Revolution(profile) => {
+                let surface = Revolution::new(profile);
+                let step = surface.length() / f64::from(self.rows);
+                let around = (0..self.rows).map(|row| TAU * surface.radius((f64::from(row) + 0.5) * step));
+                (around.fold([f64::MAX, 0.0], |[a, b], way| [a.min(way), b.max(way)]), surface.length())
+            }
+            Form::Flat | Form::Tube => {
+                ([fewest, most].map(|stitches| f64::from(stitches) * width), f64::from(self.rows) * height)
+            }
+        };
+        Extent { stitches: [fewest, most], across, up }
+    }
+
     /// Whether so many stitches and rows can be knitted in this form.
     ///
     /// # Errors

@@ -14,9 +14,10 @@ use crate::{
         diagnostic::{Span, unknown_name},
         document::Value,
     },
+    math::words::from_to,
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
-        knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Rims, Thickness, Work},
+        knit::{self, CastOn, Closing, Colors, Edges, Extent, Form, Knit, Knitted, Rims, Thickness, Work},
         knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
     },
 };
@@ -49,13 +50,15 @@ impl KnitPlan {
     /// What it is, with its gauge as knitters give it, stitches and rows in 10 cm, its size and its yarn.
     fn origin(&self, made: &Knitted) -> String {
         let [across, up] = made.gauge.map(|mm| 100.0 / mm);
-        let Knit { stitches, rows, form, .. } = &self.knit;
-        let (width, height) = (f64::from(*stitches) * made.gauge[0], f64::from(*rows) * made.gauge[1]);
+        let Knit { rows, form, .. } = &self.knit;
+        let Extent { stitches, across: size, up: height } = self.knit.extent(made.gauge);
+        let (stitches, width) = (from_to(stitches.map(|n| n.to_string())), from_to(size.map(|mm| format!("{mm:.0}"))));
         let size = match form {
-            Form::Flat if self.knit.edges == Edges::Tile => format!(", period {width:.4} x {height:.4} mm"),
-            Form::Flat => format!(", {width:.0} x {height:.0} mm"),
-            Form::Tube => format!(", {width:.0} mm around, {height:.0} mm high"),
-            Form::Revolution(_) => String::new(),
+            Form::Flat if self.knit.edges == Edges::Tile => format!(", period {:.4} x {height:.4} mm", size[1]),
+            Form::Flat if size[0] < size[1] => format!(", {width} mm wide, {height:.0} mm high"),
+            Form::Flat => format!(", {width} x {height:.0} mm"),
+            Form::Tube => format!(", {width} mm around, {height:.0} mm high"),
+            Form::Revolution(_) => format!(", {width} mm around, {height:.0} mm along the profile"),
         };
         let length: f64 = made.strands.iter().map(|s| s.curve.polygon_length()).sum();
         let yarn = format!("{:.2} m of yarn", 1e-3 * length);
