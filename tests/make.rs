@@ -404,6 +404,31 @@ fn make_garment_writes_the_yarns_of_any_scene() {
     assert!(lengths.iter().all(|l| (l / of_scene - 1.0).abs() < 1e-4), "{lengths:?} {of_scene}");
 }
 
+/// What a scene warns of, `make knit` tells too.
+#[test]
+fn make_knit_warns_as_a_scene_does() {
+    let folder = directory();
+    let d = folder.path();
+    let cable = "12/12lc";
+    let size = "stitch_width = 3, row_height = 2.2";
+    let source = format!("{{ type = \"knit\", stitches = 24, rows = 8, chart = [\"8: k24\", \"{cable}\"], {size} }}");
+    write(d, "s.toml", format!("[[fabric]]\nyarn = \"wool\"\nsource = {source}\n"));
+    let of_scene = yarnray(d, &["info", "s.toml"]).good().stdout;
+    let made = ["make", "knit", "--stitches", "24", "--chart", "8: k24", "--chart", cable, "-o", "a.bcc"];
+    let made = [&made[..], &["--stitch-width", "3", "--row-height", "2.2"]].concat();
+    let told = yarnray(d, &[&made[..], &["--rows", "8"]].concat()).good().stderr;
+    let cut_off = "8 rows are knitted of a chart of 9";
+    assert!(
+        told.contains(&format!("warning: {cut_off}\n")) && of_scene.contains(&format!("knit: {cut_off}\n")),
+        "{told}"
+    );
+    let told = yarnray(d, &[&made[..], &["--rows", "12"]].concat()).good().stderr;
+    assert!(told.contains("warning: ") && told.contains("% of the yarn overlaps, by up to"), "{told}");
+    assert!(told.contains("24 stitches change places in a row"), "{told}");
+    let quiet = yarnray(d, &[&made[..], &["--rows", "8", "--quiet"]].concat()).good().stderr;
+    assert!(quiet.is_empty(), "{quiet}");
+}
+
 /// "Until piece measures" is how high the piece is, whatever a row of the yarn is, unless rows or a height are asked for.
 #[test]
 fn pieces_measure_what_their_instructions_say() {

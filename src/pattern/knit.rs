@@ -9,6 +9,7 @@
 
 mod cell;
 mod colors;
+mod crowded;
 mod curl;
 mod gaps;
 mod kinds;
@@ -138,6 +139,12 @@ impl Knit {
     pub fn control_points(&self) -> u64 {
         self.layers()
             * (u64::from(self.stitches) * u64::from(self.rows) * u64::from(self.points) + u64::from(self.rows))
+    }
+
+    /// That a chart is cut off, if it is, for people.
+    pub(crate) fn cut_off(&self) -> Option<String> {
+        let (rows, all) = (self.rows, self.chart.rows());
+        (rows < all).then(|| format!("{rows} rows are knitted of a chart of {all}"))
     }
 
     fn size(&self) -> [Option<f64>; 2] {

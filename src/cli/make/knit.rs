@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     cli::{Failure, log, named, positive, two, working::Working},
+    geometry::curve::Curve,
     math::words::{counted, from_to},
     pattern::{
         PatternStrand,
@@ -225,12 +226,29 @@ impl KnitArgs {
         };
         sizes.or_written(written, Some(&piece.form), self.tile);
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
-        let spelled = |key: &str| format!("--{}", key.replace('_', "-"));
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {
             return Err(told(clash));
         }
         sizes.apply(piece, yarn).map_err(told)
     }
+
+    /// What a scene would warn of, of a piece that is knitted.
+    fn warn(&self, piece: &Knit, yarn: &Thickness, strands: &[PatternStrand]) {
+        let even = |curve: &Curve| vec![yarn.radius; curve.points.len()];
+        let evens: Vec<Vec<f64>> =
+            strands.iter().map(|s| s.curve.radii.clone().unwrap_or_else(|| even(&s.curve))).collect();
+        let curves: Vec<(&Curve, &[f64])> =
+            strands.iter().zip(&evens).map(|(s, radii)| (&s.curve, radii.as_slice())).collect();
+        let cut_off = piece.cut_off().filter(|_| !self.chart.is_empty());
+        for told in cut_off.into_iter().chain(piece.crowded(yarn, &curves, spelled)) {
+            log::say(&format!("warning: {told}"));
+        }
+    }
+}
+
+/// An option by the key of a scene.
+fn spelled(key: &str) -> String {
+    format!("--{}", key.replace('_', "-"))
 }
 
 pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
@@ -248,6 +266,9 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     let working = Working::on(task, args.output.quiet);
     let Knitted { strands, gauge, colors } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
     drop(working);
+    if !args.output.quiet {
+        args.warn(&piece, &thickness, &strands);
+    }
     let length: f64 = strands.iter().map(|s| s.curve.polygon_length()).sum();
     // Flat cloth lies in the plane z = 0, as the files of others do.
     let color = |strand: &PatternStrand| palette.of(*colors.get(strand.index as usize)?);

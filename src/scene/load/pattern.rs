@@ -9,7 +9,7 @@ use super::{
     known_yarns::KnownYarns,
 };
 use crate::{
-    geometry::{curve::Curve, overlap::sampled_overlap},
+    geometry::curve::Curve,
     input::{
         diagnostic::{Span, unknown_name},
         document::Value,
@@ -43,9 +43,6 @@ enum ColorWork {
     Printed,
 }
 
-/// So many stitches change places without running into each other.
-const EASY_CABLE: u32 = 10;
-
 impl KnitPlan {
     /// What it is, with its gauge as knitters give it, stitches and rows in 10 cm, its size and its yarn.
     fn origin(&self, made: &Knitted) -> String {
@@ -68,11 +65,9 @@ impl KnitPlan {
     /// The same with the counts that its sizes make; what cannot be knitted is told.
     pub(super) fn sized(mut self, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Self> {
         self.knit = self.sizes.apply(&self.knit, &self.yarn, context)?;
-        let Knit { chart, rows, .. } = &self.knit;
         self.told(self.knit.widths(), context)?;
-        if *rows < chart.rows() && !self.lines.is_empty() {
-            warnings.push(format!("{}: {rows} rows are knitted of a chart of {}", self.name, chart.rows()));
-        }
+        let cut_off = self.knit.cut_off().filter(|_| !self.lines.is_empty());
+        warnings.extend(cut_off.map(|told| format!("{}: {told}", self.name)));
         Some(self)
     }
 
@@ -83,50 +78,9 @@ impl KnitPlan {
 
     /// Tells if yarns run into each other.
     pub(super) fn warn_of_overlap(&self, curves: &[(Curve, Vec<f64>)], warnings: &mut Vec<String>) {
-        const MOST: f64 = 0.05;
-        /// Fewer places are not seen, where strands are as deep in each other as this.
-        const FEW: f64 = 0.002;
-        const DEEP: f64 = 0.5;
-        const ENOUGH: usize = 400_000;
-        let half_width = self.yarn.half_width;
-        let found = match curves {
-            // The first rows of one large piece are as the others.
-            [(curve, radii)] if radii.len() > ENOUGH => {
-                let first = Curve {
-                    basis: curve.basis,
-                    closed: false,
-                    points: curve.points[..ENOUGH].to_vec(),
-                    radii: None,
-                    flattening: curve.flattening.as_ref().map(|axes| axes[..ENOUGH].to_vec()),
-                };
-                sampled_overlap(std::iter::once((&first, &radii[..ENOUGH], half_width)))
-            }
-            _ => sampled_overlap(curves.iter().map(|(c, r)| (c, r.as_slice(), half_width))),
-        };
-        let Some(found) = found.filter(|o| o.share > MOST || (o.share > FEW && o.deepest > DEEP)) else { return };
-        let sized = self.knit.stitch_width.or(self.knit.row_height).or(self.knit.yarn_per_stitch).is_some();
-        let why = match self.knit.chart.widest_cable() {
-            Some(wide) if wide > EASY_CABLE => format!(
-                "{wide} stitches change places in a row, and more than {EASY_CABLE} press through each other; cables of up to \
-                 {EASY_CABLE} stitches cross freely"
-            ),
-            _ if sized || matches!(self.knit.form, Form::Revolution(_)) => {
-                let [across, up] = Knit { stitch_width: None, row_height: None, ..self.knit.clone() }.gauge();
-                let [own_across, own_up] = [across, up].map(|s| 100.0 / (s * self.yarn.pressed()));
-                format!(
-                    "too many stitches or rows for its size; this yarn knits to {own_across:.1} x {own_up:.1} in 10 cm by itself"
-                )
-            }
-            _ => "the stitches of the chart find no room beside each other; more plain rows between, or more yarn in a stitch by \
-                  `yarn_per_stitch`"
-                .to_owned(),
-        };
-        warnings.push(format!(
-            "{}: {:.1} % of the yarn overlaps, by up to {:.0} % of its diameter: {why}",
-            self.name,
-            100.0 * found.share,
-            100.0 * found.deepest
-        ));
+        let curves: Vec<(&Curve, &[f64])> = curves.iter().map(|(curve, radii)| (curve, radii.as_slice())).collect();
+        let told = self.knit.crowded(&self.yarn, &curves, |key| format!("`{key}`"));
+        warnings.extend(told.map(|told| format!("{}: {told}", self.name)));
     }
 
     /// The colours of the stitches, as `of_rows` says for rows of so many, and the yarns they are of; what is wrong with the
