@@ -404,6 +404,32 @@ fn make_garment_writes_the_yarns_of_any_scene() {
     assert!(lengths.iter().all(|l| (l / of_scene - 1.0).abs() < 1e-4), "{lengths:?} {of_scene}");
 }
 
+/// A chart that makes more or fewer stitches is knitted once, and its narrowest and widest rows are told.
+#[test]
+fn shaped_charts_are_knitted_once_and_tell_their_widths() {
+    let folder = directory();
+    let d = folder.path();
+    let said = |args: &[&str]| yarnray(d, &[&["make", "knit", "-o", "a.bcc"], args].concat()).stderr;
+    let bound = ["--chart", "6: k", "--chart", "bo4 k8", "--chart", "6: k", "--stitches", "12"];
+    let told = said(&bound);
+    assert!(told.contains("8 to 12 x 13, ") && !told.contains("warning"), "{told}");
+    let told = said(&[&bound[..], &["--rows", "20"]].concat());
+    assert!(told.contains("row 20 ") && told.contains("or knit 13 rows, the whole chart; up to 19 fit"), "{told}");
+    let wider = "Row 1 (RS): k1, m1l, k to last st, m1r, k1.\nRow 2: Purl.\nRep rows 1-2 until you have 9 sts.";
+    let told = said(&["--instructions", wider, "--stitches", "3", "--gauge", "25,40"]);
+    assert!(told.contains("3 to 9 x 6, 12.000 to 36.000 wide, 15.000 high; "), "{told}");
+    let told = said(&["--profile", "40,0", "--profile", "30,20", "--stitches", "60", "--rows", "10"]);
+    assert!(
+        told.contains("60 x 10, ") && told.contains(" around, ") && told.contains(" along the profile; "),
+        "{told}"
+    );
+    // A scene says the same.
+    let source = "{ type = \"knit\", stitches = 12, chart = [\"6: k\", \"bo4 k8\", \"6: k\"], gauge = [25, 40] }";
+    write(d, "s.toml", format!("[[fabric]]\nyarn = \"wool\"\nsource = {source}\n"));
+    let told = yarnray(d, &["info", "s.toml"]).good().stdout;
+    assert!(told.contains("8 to 12 x 13, ") && told.contains("32 to 48 mm wide, 32 mm high, "), "{told}");
+}
+
 /// What a scene warns of, `make knit` tells too.
 #[test]
 fn make_knit_warns_as_a_scene_does() {

@@ -319,6 +319,18 @@ impl Chart {
         Some(width)
     }
 
+    /// Whether a piece has more or fewer stitches when all rows are knitted once: it would grow or be knitted out if they were
+    /// repeated.
+    pub fn is_shaped(&self) -> bool {
+        let growth = |row: &Row| {
+            let (takes, makes) = row.takes_and_makes();
+            // Rows without the one or the other have no logarithm that could be made up for.
+            (f64::from(makes) / f64::from(takes)).ln()
+        };
+        let growth: f64 = self.rows.iter().map(growth).sum();
+        growth.is_nan() || growth.abs() >= 1e-9
+    }
+
     /// The line of the description that a row of the knit, from 0, came from.
     pub(super) fn line_of(&self, row: usize) -> usize {
         self.rows[row % self.rows.len()].line
@@ -376,6 +388,12 @@ impl Chart {
                 let problem = format!("row {} {does} {} stitches, but finds {found}", r + 1, fit.takes);
                 let counts = self.counts_that_fit(cast_on, rows);
                 let hint = if counts.is_empty() { hint.to_owned() } else { format!("{hint}: cast on {counts}") };
+                // It was knitted once from end to end, and was told to go on.
+                let hint = match self.rows() {
+                    whole if r == whole => format!("{hint}, or knit {whole} rows, the whole chart"),
+                    whole if r > whole => format!("{hint}, or knit {whole} rows, the whole chart; up to {r} fit"),
+                    _ => hint,
+                };
                 return Err(ChartError::new(Some(row.line), problem, hint));
             };
             total += made;

@@ -141,6 +141,12 @@ impl Knit {
             * (u64::from(self.stitches) * u64::from(self.rows) * u64::from(self.points) + u64::from(self.rows))
     }
 
+    /// Rows that are knitted unless rows or a height are asked for: those of a chart that is shaped, by itself or over a profile, once.
+    pub fn rows_of(chart: &Chart, form: &Form, written: bool) -> u32 {
+        let once = chart.is_shaped() || (written && matches!(form, Form::Revolution(_)));
+        if once { chart.rows() } else { COUNT }
+    }
+
     /// That a chart is cut off, if it is, for people.
     pub(crate) fn cut_off(&self) -> Option<String> {
         let (rows, all) = (self.rows, self.chart.rows());

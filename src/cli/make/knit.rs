@@ -39,7 +39,7 @@ pub(super) struct KnitArgs {
     /// Stitches cast on; 20, or as many as the width takes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     stitches: Option<u32>,
-    /// Rows; 20, or as many as the height takes, or those of a chart that is shaped over a profile.
+    /// Rows; 20, or as many as the height takes, or those of a chart that makes more or fewer stitches, or is knitted over a profile.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     rows: Option<u32>,
     #[command(flatten)]
@@ -168,7 +168,11 @@ fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Char
 impl KnitArgs {
     /// What is to be knitted, of yarn of a thickness.
     fn piece(&self, yarn: &Thickness) -> Result<Knit, Failure> {
-        let by_itself = |chart| Charted { chart, stitches: knit::COUNT, rows: knit::COUNT, written: (None, None) };
+        let form = self.form(yarn.radius)?;
+        let by_itself = |chart| {
+            let rows = Knit::rows_of(&chart, &form, !self.chart.is_empty());
+            Charted { chart, stitches: knit::COUNT, rows, written: (None, None) }
+        };
         let Charted { chart, stitches, rows, written } = if let Some(text) = &self.instructions {
             let least = self.rows.or(self.size.height.map(|_| MANY_ROWS));
             written(text, self.stitches, least)?
@@ -178,10 +182,6 @@ impl KnitArgs {
         } else {
             by_itself(Chart::parse(&self.chart).map_err(|e| wrong(&e))?)
         };
-        let form = self.form(yarn.radius)?;
-        // Shaped pieces are knitted once, from the first row of the chart to the last.
-        let all = matches!(form, Form::Revolution(_)) && !self.chart.is_empty();
-        let rows = if all { chart.rows() } else { rows };
         let piece = Knit {
             chart,
             stitches: self.stitches.unwrap_or(stitches),

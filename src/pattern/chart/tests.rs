@@ -40,6 +40,27 @@ fn a_hat_ends_with_few_stitches() {
 }
 
 #[test]
+fn charts_that_grow_or_shrink_are_told_from_those_that_repeat() {
+    let is_shaped = |rows: &[&str]| Chart::parse(rows).unwrap().is_shaped();
+    assert!(PATTERNS.iter().all(|(_, rows)| !is_shaped(rows)));
+    assert!(!is_shaped(&["k2 yo k2tog", "k k yo", "k k2tog"]) && !is_shaped(&["k4 bo4 k4", "k4 co4 k4"]));
+    assert!(!is_shaped(&["k20", "k15 -5"]));
+    for rows in [["12: k2 p2", "k6 k2tog"], ["6: k", "bo4 k8"], ["k", "kfb k"], ["k", "bo12"], ["co4 k8", "k"]] {
+        assert!(is_shaped(&rows), "{rows:?}");
+    }
+}
+
+#[test]
+fn rows_that_would_fit_are_told_of_a_chart_that_is_knitted_out() {
+    let chart = Chart::parse(&["6: k", "bo4 k8", "6: k"]).unwrap();
+    assert_eq!(chart.work(12, 13, 1000).unwrap().len(), 13);
+    let told = chart.work(12, 20, 1000).unwrap_err();
+    assert!(told.hint.ends_with("or knit 13 rows, the whole chart; up to 19 fit"), "{told}");
+    let told = Chart::parse(&["k6 k2tog", "k"]).unwrap().work(16, 20, 1000).unwrap_err();
+    assert!(told.hint.ends_with("or knit 2 rows, the whole chart"), "{told}");
+}
+
+#[test]
 fn what_is_bound_off_keeps_its_place_and_is_not_found_above() {
     let rows = worked(&["k", "k2 bo2 k2", "k2 co3 k2", "k", "bo3 k4"], 6, 6);
     assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [6, 6, 7, 7, 7, 4]);

@@ -273,18 +273,15 @@ pub(super) fn knit(
     if let (Some(Form::Flat | Form::Tube), true) = (&form, profile.is_some()) {
         table.error_at("profile", "a profile is of a surface of revolution", Some("form = \"revolution\""));
     }
-    let rows = match &charted.chart {
-        Some(chart) if lines_are_all(&form, &charted.lines) => chart.rows(),
+    let rows = match (&charted.chart, &form) {
+        (Some(chart), Some(form)) if !table.has("instructions") => {
+            Knit::rows_of(chart, form, !charted.lines.is_empty())
+        }
         _ => charted.rows,
     };
     let mut sizes = GivenSizes::read(table, Some(fabric), context, &form);
     sizes.or_written(charted.written, form.as_ref(), table.has("tile"));
     counted(table, yarns, Charted { rows, ..charted }, form, sizes)
-}
-
-/// Shaped pieces are knitted once, from the first row of the chart to the last.
-fn lines_are_all(form: &Option<Form>, lines: &[Span]) -> bool {
-    matches!(form, Some(Form::Revolution(_))) && !lines.is_empty()
 }
 
 /// `type = "stockinette"`: a flat knit of that pattern.
