@@ -455,6 +455,27 @@ fn make_knit_warns_as_a_scene_does() {
     assert!(quiet.is_empty(), "{quiet}");
 }
 
+/// The yarn of a weave is that of its file: selvedges, hems and fringes take some too.
+#[test]
+fn make_weave_tells_the_yarn_of_its_edges() {
+    let folder = directory();
+    let d = folder.path();
+    let mut lengths = Vec::new();
+    for edges in ["live", "selvedge", "finished", "fringe"] {
+        let said = yarnray(d, &["make", "weave", "--edges", edges, "-o", "a.bcc"]).good().stderr;
+        let number = |end: &str| -> f64 {
+            let number = said.split(end).next().and_then(|s| s.rsplit(' ').next());
+            number.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{said}"))
+        };
+        let info = yarnray(d, &["info", "a.bcc", "--json"]).good().stdout;
+        let of_file = serde_json::from_str::<serde_json::Value>(&info).unwrap()["length"].as_f64().unwrap();
+        let told = number(" of warp") + number(" of weft");
+        assert!((told / of_file - 1.0).abs() < 0.01, "{edges}: {told} {of_file}");
+        lengths.push(told);
+    }
+    assert!(lengths[1..].iter().all(|length| *length > 1.01 * lengths[0]), "{lengths:?}");
+}
+
 /// "Until piece measures" is how high the piece is, whatever a row of the yarn is, unless rows or a height are asked for.
 #[test]
 fn pieces_measure_what_their_instructions_say() {

@@ -141,9 +141,11 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
         log::say(&format!("note: {problem}; warps count from the left, wefts from the bottom"));
     }
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
-    write(cloth.strands(), &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
+    let strands = cloth.strands();
+    let [warp, weft] = weave::yarn_lengths(&strands);
+    write(strands, &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {
-        let Measures { spacing, see_through, crimp, thickness, size, length } = cloth.measures();
+        let Measures { spacing, see_through, crimp, thickness, size, .. } = cloth.measures();
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
         log::say(&format!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]));
         log::say(&format!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through));
@@ -151,7 +153,7 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
             true => format!("period {:.6} across, {:.6} up", size[0], size[1]),
             false => format!("{:.3} wide, {:.3} high", size[0], size[1]),
         };
-        log::say(&format!("{extent}; {:.1} of warp, {:.1} of weft", length[0], length[1]));
+        log::say(&format!("{extent}; {warp:.1} of warp, {weft:.1} of weft"));
     }
     Ok(())
 }

@@ -115,8 +115,14 @@ pub struct Measures {
     pub thickness: f64,
     /// Width and height of the cloth.
     pub size: [f64; 2],
-    /// Length of all warps and of all wefts.
+    /// Length of all warps and of all wefts of the ground, cut all around; [`yarn_lengths`] counts edges and pile too.
     pub length: [f64; 2],
+}
+
+/// Length of yarn of all warps and of all wefts, with what selvedges, hems, fringes and pile take.
+pub fn yarn_lengths(strands: &[PatternStrand]) -> [f64; 2] {
+    [StrandKind::Warp, StrandKind::Weft]
+        .map(|kind| strands.iter().filter(|s| s.kind == kind).map(PatternStrand::yarn_length).sum())
 }
 
 /// Control points between crossings unless asked otherwise.

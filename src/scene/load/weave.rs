@@ -66,10 +66,10 @@ impl WeavePlan {
         let wrong = |problem: String, hint: &str| context.error(self.header, problem, Some(hint.to_owned()));
         match self.weave.relax() {
             Ok(cloth) => {
+                let strands = cloth.strands();
+                let length = weave::yarn_lengths(&strands).map(|mm| mm / 1000.0);
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
-                    cloth.strands().into_iter().partition(|s| s.kind == StrandKind::Warp);
-                let length =
-                    [&warps, &wefts].map(|side| side.iter().map(PatternStrand::yarn_length).sum::<f64>() / 1000.0);
+                    strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
                 let origin = self.origin(cloth.count(), &cloth.measures(), length);
                 let tufts = [&warps, &wefts].map(|side| {
                     let strands = || side.iter().enumerate().filter(|(_, s)| s.is_of_tuft());
