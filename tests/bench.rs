@@ -48,6 +48,29 @@ seconds = 5
 converged_spp = 16
 "#;
 
+/// A suite of fidelity writes its table in three forms, and no page.
+#[test]
+fn a_small_suite_of_fidelity_from_end_to_end() {
+    let directory = directory();
+    let d = directory.path();
+    write(d, "s.toml", SWATCH);
+    let suite = "title = \"Small\"\nmeasure = \"fidelity\"\nreference = \"yarn:two-stream\"\ntested = \"yarn:aggregated\"\nmax_spp = 2\n\
+                 [lighting.sky]\nwithin = 0.05\nset = [\"light=[{type=\\\"environment\\\", radiance=1}]\"]\n\
+                 [[row]]\nname = \"swatch\"\nscene = \"s.toml\"\nlights = [\"sky\"]\n";
+    write(d, "suite.toml", suite);
+    let run = yarnray(d, &["bench", "suite.toml", "-o", "out"]).good();
+    let files = listing(&d.join("out"));
+    assert!(
+        ["table.csv", "table.json", "table.md"].iter().all(|name| files.iter().any(|file| file == name)),
+        "{files:?}"
+    );
+    assert!(files.iter().all(|file| file != "report.html"), "{files:?}");
+    let csv = std::fs::read_to_string(d.join("out/table.csv")).unwrap();
+    let lines: Vec<&str> = csv.lines().collect();
+    assert!(lines.len() == 2 && lines[0].starts_with("name,held_out,"), "{csv}");
+    assert!(lines[1].starts_with("\"swatch, sky\",false,0.05,"), "{csv} {}", run.stdout);
+}
+
 #[test]
 fn a_small_suite_from_end_to_end() {
     let directory = directory();

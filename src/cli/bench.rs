@@ -38,8 +38,9 @@ const EXAMPLES: &str = "Examples:
   yarnray bench scenes/table3.toml --row silk    only rows whose name contains this
   yarnray bench scenes/fidelity.toml             how far pictures are from those of explicit fibres, on many fabrics
 
-Writes table.md, table.csv, table.json and report.html (a page that needs nothing else), anew after every row. Begun again, it goes on
-after the last row that was finished; converged pictures are kept in the directory `cache` within. Each render is a process of its own.";
+Writes table.md, table.csv and table.json, anew after every row, and, unless the suite is of measure \"fidelity\", report.html (a page that
+needs nothing else). Begun again, it goes on after the last row that was finished; converged pictures are kept in the directory `cache`
+within. Each render is a process of its own.";
 
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
@@ -75,8 +76,12 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     let stem = args.suite.file_stem().map_or("suite".into(), |stem| stem.to_string_lossy().into_owned());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
-    let names = ["table.md", "table.csv", "table.json", "report.html", "rows/x", "cache/x"];
-    Files::default().reads("SUITE", [&args.suite]).writes("-o", &names.map(|name| out.join(name))).check(args.quiet)?;
+    let names = ["table.md", "table.csv", "table.json", "rows/x", "cache/x", "report.html"];
+    let names = &names[..if suite.measure == Measure::Fidelity { 5 } else { 6 }];
+    Files::default()
+        .reads("SUITE", [&args.suite])
+        .writes("-o", &names.iter().map(|name| out.join(name)).collect::<Vec<_>>())
+        .check(args.quiet)?;
     let threads = args.threads.map(|threads| threads as usize);
     let interrupt = interrupt_flag();
     let say = |text: &str| {
@@ -113,8 +118,10 @@ fn run_fidelity(
     out: &Path,
     say: impl FnMut(&str),
 ) -> Result<(), Failure> {
-    let write =
-        |table: &FidelityTable| write_all(out, [("table.md", table.to_markdown()), ("table.json", table.to_json())]);
+    let write = |table: &FidelityTable| {
+        let texts = [table.to_markdown(), table.to_csv(), table.to_json()];
+        write_all(out, ["table.md", "table.csv", "table.json"].into_iter().zip(texts))
+    };
     let saved = |table: &FidelityTable| write(table).map_err(as_bench_error);
     let table = fidelity::run(suite, processes, out, say, saved)?;
     write(&table)?;

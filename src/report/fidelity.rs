@@ -1,10 +1,10 @@
-//! How faithful pictures are to explicit fibres: the table of a suite, as Markdown and JSON.
+//! How faithful pictures are to explicit fibres: the table of a suite, as Markdown, CSV and JSON.
 
 use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-use super::table3::{Missing, ModelError};
+use super::table3::{Missing, ModelError, quoted};
 
 /// A channel counts where it holds more than this share of the light.
 const SHARE_THAT_COUNTS: f64 = 0.02;
@@ -162,6 +162,28 @@ impl Table {
         out
     }
 
+    /// The table as CSV: a line for every way of every case.
+    pub(crate) fn to_csv(&self) -> String {
+        let mut out =
+            "name,held_out,within,packings,spp,way,ratio_r,ratio_g,ratio_b,blocks,block_noise,relmse,relmse_8,flip,\
+                       mean_r,mean_g,mean_b,mean_error_r,mean_error_g,mean_error_b\n"
+                .to_owned();
+        let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+        for row in &self.rows {
+            for Way { name, error, blocks } in &row.ways {
+                let mut cells = vec![quoted(&row.name), row.held_out.to_string(), row.within.to_string()];
+                cells.extend([row.packings.to_string(), row.spp.to_string(), quoted(name)]);
+                cells.extend(error.mean_ratio.map(|v| v.to_string()));
+                cells.extend(
+                    [*blocks, row.block_noise, Some(error.relmse), error.relmse_8, Some(error.flip)].map(number),
+                );
+                cells.extend(row.mean.iter().chain(&row.mean_error).map(f64::to_string));
+                out += &(cells.join(",") + "\n");
+            }
+        }
+        out
+    }
+
     /// The table as JSON.
     pub(crate) fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and text become JSON") + "\n"
@@ -208,5 +230,9 @@ mod tests {
         assert!(text.contains("over 4 packings of the fibres"), "{text}");
         assert!(text.contains("Missing: m: gone"));
         assert_eq!(serde_json::from_str::<Table>(&table.to_json()).unwrap(), table);
+        let csv = table.to_csv();
+        let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+        assert!(lines.len() == 3 && lines.iter().all(|cells| cells.len() == lines[0].len()), "{csv}");
+        assert_eq!(lines[2][..10], ["\"b\"", "true", "0.05", "1", "64", "\"yarn\"", "1.04", "0.96", "1.5", "0.1"]);
     }
 }

@@ -280,7 +280,7 @@ impl Table {
 }
 
 /// Text in quotes, as CSV has it.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
