@@ -373,7 +373,12 @@ fn an_empty_scene_is_a_black_picture_and_a_warning() {
     write(directory.path(), "empty.toml", "");
     let arguments = ["render", "empty.toml", "--width", "8", "--height", "8", "--spp", "1", "-o", "o.exr"];
     let run = yarnray(directory.path(), &arguments).good();
-    assert!(run.stderr.contains("no light"), "{}", run.stderr);
+    let nothing = "warning: there is nothing to see: the scene has no [[fabric]] and no [[mesh]]\n";
+    assert!(run.stderr.contains(nothing) && !run.stderr.contains("light"), "{}", run.stderr);
+    let library = project("scenes/yarns.toml").display().to_string();
+    let told = yarnray(directory.path(), &["info", &library]).good().stdout;
+    let what = "no [[mesh]]; it is a library of ";
+    assert!(told.contains(what) && told.contains("`library = [\"yarns.toml\"]`") && !told.contains("black"), "{told}");
     let picture = image::read(&directory.path().join("o.exr")).expect("it was written");
     let [r, _, _] = picture.rgb().expect("it has colours");
     assert!(r.iter().all(|v| *v == 0.0));

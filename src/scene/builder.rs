@@ -1,6 +1,6 @@
 //! A scene described by values: what programs make without text, and what scene files are read into.
 
-use std::{collections::HashSet, f64::consts::TAU, fmt};
+use std::{collections::HashSet, f64::consts::TAU, fmt, path::Path};
 
 use glam::{DAffine3, DVec3};
 
@@ -19,7 +19,7 @@ use crate::{
     },
     image::png::Display,
     light::Light,
-    math::sampler::Stream,
+    math::{sampler::Stream, words::counted},
     scattering::fiber::FiberMaterial,
 };
 
@@ -195,13 +195,14 @@ impl SceneBuilder {
             fingerprint: String::new(),
             warnings,
         };
+        let described = [scene.yarns.len(), scene.fibers.len()];
         keep_used(&mut scene);
         remove_lobes(&mut scene);
         scene.look_for_fibers();
         for name in scene.render.force.clone() {
             force::force(&mut scene, &name).map_err(SceneError)?;
         }
-        warn_about_nothing(&mut scene);
+        warn_about_nothing(&mut scene, described);
         warn_about_size(&mut scene);
         warn_about_precision(&mut scene);
         warn_about_density(&mut scene);
@@ -446,12 +447,18 @@ fn warn_about_standing_hairs(scene: &mut Scene) {
     scene.warnings.extend(warnings.collect::<Vec<_>>());
 }
 
-/// A picture of nothing is no mistake, but seldom what was meant.
-fn warn_about_nothing(scene: &mut Scene) {
-    if scene.fabrics.is_empty() && scene.objects.is_empty() {
-        let what = "there is nothing to see: the scene has no [[fabric]] and no [[mesh]]";
-        scene.warnings.push(what.to_owned());
+/// A picture of nothing is no mistake, but seldom what was meant. So many yarns and fibres are described, of which a library is.
+fn warn_about_nothing(scene: &mut Scene, [yarns, fibers]: [usize; 2]) {
+    if !scene.shows_nothing() {
+        return;
     }
+    let mut what = "there is nothing to see: the scene has no [[fabric]] and no [[mesh]]".to_owned();
+    if yarns + fibers > 0 {
+        let (yarns, fibers) = (counted(yarns, "yarn"), counted(fibers, "fibre"));
+        let name = Path::new(&scene.path).file_name().unwrap_or_default().display();
+        what += &format!("; it is a library of {yarns} and {fibers}, which a scene takes by `library = [\"{name}\"]`");
+    }
+    scene.warnings.push(what);
 }
 
 /// A glove of ten metres, or of a tenth of a millimetre, is in another unit than was thought.

@@ -583,6 +583,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether there is nothing to see: neither cloth nor a mesh.
+    pub(crate) fn shows_nothing(&self) -> bool {
+        self.fabrics.is_empty() && self.objects.is_empty()
+    }
+
     /// Whether cloth moves while the shutter is open.
     pub fn cloth_moves(&self) -> bool {
         self.fabrics.iter().any(|f| !f.motion.later.is_empty())

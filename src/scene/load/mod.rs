@@ -268,7 +268,7 @@ fn threads(name: &str, text: &str, options: &LoadOptions) -> Option<usize> {
     settings::threads(&Reader::new(&document, &diagnostics).table_or_empty("render"))
 }
 
-/// Said of a scene without a light, which is no mistake: its depth, normals and masks are there.
+/// Said of a scene that says `light = []`, which is no mistake: its depth, normals and masks are there.
 const NO_LIGHT: &str =
     "the scene has no light: the picture will be black (without `light = []` it has a sky and a sun)";
 
@@ -278,7 +278,8 @@ fn parse_here(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, Lo
     let diagnostics = Diagnostics::new();
     match load_text(name, text, options, &mut sources, &diagnostics) {
         Some(mut scene) if !diagnostics.has_errors() => {
-            if scene.lights.is_empty() {
+            // Of a scene with nothing to see, that is told.
+            if scene.lights.is_empty() && !scene.shows_nothing() {
                 scene.warnings.push(NO_LIGHT.to_owned());
             }
             scene.warnings.extend(diagnostics.warnings(&sources));
