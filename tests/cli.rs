@@ -385,6 +385,18 @@ fn an_empty_scene_is_a_black_picture_and_a_warning() {
 }
 
 #[test]
+fn a_model_of_yarns_says_nothing_of_single_fibres() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let warned = |more: &[&str]| {
+        let told = yarnray(directory.path(), &[&["info", "s.toml"], more].concat()).good().stdout;
+        told.contains("the model `printed` is of yarns and plies, and mode fiber shows neither")
+    };
+    assert!(warned(&["--mode", "fiber", "--model", "printed"]));
+    assert!(!warned(&["--mode", "fiber"]) && !warned(&["--model", "printed"]));
+}
+
+#[test]
 fn numbers_below_zero_are_answered_by_the_option() {
     let directory = directory();
     write(directory.path(), "s.toml", SWATCH);

@@ -101,6 +101,10 @@ fn what_cannot_be_made_is_refused() {
             "error: --motif #: every row of a motif has 2 signs, like the first\n  hint: ",
         ),
         (
+            &["weave", "--draft", "plain", "--pile-height", "3", "-o", "a.bcc"],
+            "error: --pile-height: this draft has no pile\n  hint: ",
+        ),
+        (
             &["knit", "--motif", "#", "--color", ".=#ffffff", "-o", "a.bcc"],
             "error: --motif #: `#` stands for no yarn\n  hint: ",
         ),

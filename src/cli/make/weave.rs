@@ -117,6 +117,10 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
         threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
         tile: args.tile,
     };
+    if args.pile_height.is_some() && piece.draft.pile().is_none() {
+        let hint = "--draft terry, velvet or corduroy, or leave it out";
+        return Err(Failure::hinted("--pile-height: this draft has no pile", hint));
+    }
     if let Err((problem, instead)) = piece.edges.suit(&piece.draft) {
         return Err(Failure::hinted(problem, format!("--edges {}", instead.name())));
     }

@@ -47,9 +47,14 @@ pub(super) fn render(table: &Reader<'_>) -> RenderSettings {
         _ => PixelFilter::Gaussian(filter_width.unwrap_or(defaults::GAUSSIAN_WIDTH)),
     };
     let mode = table.one_of_or("mode", otherwise.mode, &Mode::NAMES);
+    let model = table.one_of_or("model", otherwise.model, &Model::NAMES);
+    if mode == Mode::Fiber && model != otherwise.model {
+        let message = format!("the model `{}` is of yarns and plies, and mode fiber shows neither", model.name());
+        table.warning_at("model", message, Some("mode = \"yarn\" or \"ply\", or leave the model out"));
+    }
     RenderSettings {
         mode,
-        model: table.one_of_or("model", otherwise.model, &Model::NAMES),
+        model,
         without: without(table),
         width,
         height,
