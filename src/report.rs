@@ -114,6 +114,7 @@ impl RunRecord<'_> {
             "embree": self.world.embree_version(),
             "scene": scene.path,
             "fingerprint": scene.fingerprint,
+            "frame": render.frame,
             "mode": render.mode.name(),
             "model": render.model.name(),
             "seed": render.seed,

@@ -98,6 +98,7 @@ fn frames_are_written_under_their_numbers() {
     let files = ["10", "8", "9", "a.008.exr", "a.009.exr", "a.010.exr", "s.toml", "s10.json", "s8.json", "s9.json"];
     assert_eq!(listing(d), files);
     assert_eq!(listing(&d.join("9")), ["b.png"]);
+    assert_eq!(crate::support::read_json(&d.join("s9.json"))["frame"], 9);
     // Each frame has noise of its own, and the same one however it is reached.
     let read = |name: &str| image::read(&d.join(name)).unwrap().channels;
     assert!(read("a.008.exr") != read("a.009.exr"));
