@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{
     lattice::{Ground, Lattice},
-    mesh::GarmentError,
+    mesh::{GarmentError, panel_in_words},
     options::{Cloth, Options},
     panels::Panel,
     sewing::Sewing,
@@ -39,8 +39,8 @@ pub(super) fn upright(
         let places = ((high - low).max(DVec2::ZERO) / cloths[c].tile.stitch()).element_product();
         if places > 4.0 * MOST_STITCHES {
             let problem = format!(
-                "panel `{}` lies askew in the texture coordinates: the rows and wales of the box around it hold {places:.1e} stitches",
-                panel.group
+                "{} lies askew in the texture coordinates: the rows and wales of the box around it hold {places:.1e} stitches",
+                panel_in_words(&panel.group)
             );
             return Err(GarmentError::at(panel.line, problem, "turn it upright, or its wales with `grain`, or cut it"));
         }
@@ -71,8 +71,10 @@ pub(super) fn flat(lattices: &[Lattice], panels: &[Panel]) -> Result<(), Garment
     for (lattice, panel) in lattices.iter().zip(panels) {
         if lattice.doubled * 100 > lattice.stitches as usize {
             let problem = format!(
-                "panel `{}` overlaps itself in the texture coordinates: {} of {} stitches have two places",
-                panel.group, lattice.doubled, lattice.stitches
+                "{} overlaps itself in the texture coordinates: {} of {} stitches have two places",
+                panel_in_words(&panel.group),
+                lattice.doubled,
+                lattice.stitches
             );
             return Err(GarmentError::at(panel.line, problem, "lay the panel out flat, without overlaps"));
         }
@@ -102,11 +104,13 @@ pub(super) fn hems(
             found = true;
             let least = 2.0 * line.turnup.fold.begin() + LEAST_IN_HEM * sewing.division(panel).stitch.max_element();
             if hem.width < least {
-                let problem = format!("a hem of {:.2} mm is too narrow for the cloth of panel `{group}`", hem.width);
+                let problem =
+                    format!("a hem of {:.2} mm is too narrow for the cloth of {}", hem.width, panel_in_words(group));
                 return Err(GarmentError::at(*at, problem, format!("`hem_width` of {least:.2} mm or more")));
             }
             if line.without_cloth(finder) > BARE {
-                let problem = format!("a hem of {:.2} mm is wider than panel `{group}` is high over it", hem.width);
+                let problem =
+                    format!("a hem of {:.2} mm is wider than {} is high over it", hem.width, panel_in_words(group));
                 let hint = "a smaller `hem_width`, or `hem = \"none\"` of that panel";
                 return Err(GarmentError::at(*at, problem, hint));
             }

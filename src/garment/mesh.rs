@@ -267,6 +267,11 @@ impl GarmentMesh {
     }
 }
 
+/// A panel by the name of its group, for people.
+pub(super) fn panel_in_words(group: &str) -> String {
+    if group.is_empty() { "the panel without a name".to_owned() } else { format!("panel `{group}`") }
+}
+
 /// Something that was found several times: how often, and where first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counted {
@@ -292,7 +297,7 @@ impl Counted {
         if self.count > 0 {
             let line = if self.line > 0 { format!(", line {}", self.line) } else { String::new() };
             let things = counted(self.count as u64, noun);
-            notes.push(format!("{things} {what} (first in panel `{}`{line})", self.panel));
+            notes.push(format!("{things} {what} (first in {}{line})", panel_in_words(&self.panel)));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use super::{
-    mesh::{Counted, Face, GarmentError, GarmentMesh},
+    mesh::{Counted, Face, GarmentError, GarmentMesh, panel_in_words},
     strain::{StrainRange, UNSTRAINED},
 };
 
@@ -346,7 +346,7 @@ fn charts(
             entry.1 = entry.1.saturating_add(1);
             if entry.1 > 2 {
                 let name = &mesh.parts[faces[i].part as usize].group;
-                let problem = format!("panel `{name}`: an edge with more than two faces in the flat panel");
+                let problem = format!("{}: an edge with more than two faces in the flat panel", panel_in_words(name));
                 return Err(GarmentError::at(faces[i].line as usize, problem, "remove doubled or inner faces"));
             }
             let (x, y) = (root(&mut parent, entry.0), root(&mut parent, i as u32));
@@ -483,6 +483,9 @@ mod tests {
             let [a, b, c] = face.map(|i| panels.uvs[i as usize]);
             assert!((b - a).perp_dot(c - a) > 0.0);
         }
+        let nameless = two("vt 40 0\nvt 30 0\nvt 30 10\nvt 40 10\n").replace("g right", "g");
+        let notes = self::panels(&nameless).unwrap().notes;
+        assert!(notes.iter().any(|n| n.contains("first in the panel without a name")), "{notes:?}");
     }
 
     #[test]

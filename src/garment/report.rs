@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{
     hem::Hem,
     lattice::Lattice,
+    mesh::panel_in_words,
     options::Options,
     panels::{LengthRatio, Panel, Panels},
     strain::Shapes,
@@ -50,7 +51,7 @@ impl Report {
         panels.note_upside_down(points, &mut notes);
         for (lattice, panel) in lattices.iter().zip(&panels.panels) {
             if lattice.stitches == 0 && options.near.is_none() {
-                notes.push(format!("panel `{}` has no room for a single stitch", panel.group));
+                notes.push(format!("{} has no room for a single stitch", panel_in_words(&panel.group)));
             }
         }
         for (Hem { kind, width }, length) in hemmed {
