@@ -480,6 +480,21 @@ fn make_weave_tells_the_yarn_of_its_edges() {
     assert!(lengths[1..].iter().all(|length| *length > 1.01 * lengths[0]), "{lengths:?}");
 }
 
+/// A line on overlap says of which diameter it is.
+#[test]
+fn overlap_says_its_diameter() {
+    let folder = directory();
+    let d = folder.path();
+    let made = ["make", "knit", "--stitches", "8", "--rows", "6", "-o", "a.usdc"];
+    let plied = yarnray(d, &[&made[..], &["--yarn", "wool"]].concat()).good().stderr;
+    assert!(plied.contains("(they touch at 1), by the mean width of plied yarn, 0."), "{plied}");
+    let of_file = yarnray(d, &["info", "a.usdc"]).good().stdout;
+    let by_file = "(they touch at 1), by the radius in the file: plied yarns that nestle count as overlapping\n";
+    assert!(of_file.contains(by_file), "{of_file}");
+    let round = yarnray(d, &made).good().stderr;
+    assert!(round.contains("(they touch at 1), by the radius written\n"), "{round}");
+}
+
 /// "Until piece measures" is how high the piece is, whatever a row of the yarn is, unless rows or a height are asked for.
 #[test]
 fn pieces_measure_what_their_instructions_say() {

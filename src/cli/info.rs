@@ -203,8 +203,8 @@ fn overlap_json(found: Option<Overlap>) -> Value {
     })
 }
 
-fn overlap_line(found: Option<Overlap>, tufts: bool) -> String {
-    found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o, tufts)))
+fn overlap_line(found: Option<Overlap>, by: &str, tufts: bool) -> String {
+    found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o, by, tufts)))
 }
 
 fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
@@ -269,7 +269,13 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     if !of_plies.is_empty() {
         text += &format!("  plies     {}: curves are plies or fibres of yarns\n", of_plies.len());
     }
-    text += &overlap_line(found, false);
+    // Of its yarn a file knows no more.
+    let by = match (radius, of_plies.is_empty()) {
+        (Some(_), _) => "by the radius asked for: plied yarns that nestle count as overlapping",
+        (None, true) => "by the radius in the file: plied yarns that nestle count as overlapping",
+        (None, false) => "by the radius in the file",
+    };
+    text += &overlap_line(found, by, false);
     if let Some(p) = proposal {
         text += &format!(
             "  proposal  radius {:.3}: at it {:.1} % of the length overlaps; one bend in a hundred is tighter than {:.3}, \
@@ -466,7 +472,12 @@ impl<'a> SceneFacts<'a> {
         for facts in &scene.garments {
             text += &garment_lines(facts);
         }
-        text += &overlap_line(self.overlap, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
+        let is_plied = |f: &Fabric| matches!(f.kind, CurveKind::Yarn(yarn) if scene.yarns[yarn].half_width() < 1.0);
+        let by = match scene.fabrics.iter().any(is_plied) {
+            true => "by the mean width of plied yarn",
+            false => "by the radius of the yarn",
+        };
+        text += &overlap_line(self.overlap, by, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
         text += &self.memory_lines();
         for used in [true, false] {
             text += if used { "  used\n" } else { "  left out\n" };

@@ -418,14 +418,15 @@ fn folds_in_words(scene: &Scene, fabric: &Fabric, folds: &Folds, yarns: usize) -
     )
 }
 
-/// What was measured of yarns that run into each other, for people; and whether strands of tufts lie beside them, which were not.
-fn overlap_in_words(o: &Overlap, tufts: bool) -> String {
+/// What was measured of yarns that run into each other, for people: `by` says by which diameter, `tufts` whether strands of tufts lie
+/// beside them, which were not.
+fn overlap_in_words(o: &Overlap, by: &str, tufts: bool) -> String {
     let without = if tufts { "; strands of tufts not counted" } else { "" };
     if o.nearest.is_infinite() {
         return format!("no yarn comes near another{without}");
     }
     format!(
-        "{:.2} % of their length overlaps by more than {:.0} % of the diameter; strands come within {:.3} diameters (they touch at 1){without}",
+        "{:.2} % of their length overlaps by more than {:.0} % of the diameter; strands come within {:.3} diameters (they touch at 1), {by}{without}",
         100.0 * o.share,
         100.0 * overlap::TOLERATED,
         o.nearest

@@ -127,7 +127,12 @@ pub(super) fn write(
         let ground = set.curves.iter().enumerate().filter(|(i, _)| of_tufts.get(*i) != Some(&true));
         let curves = ground.filter_map(|(_, c)| Some((c, c.radii.as_deref()?, half_width)));
         if let Some(found) = overlap_of_plied(curves) {
-            log::say(&overlap_in_words(&found, of_tufts.contains(&true)));
+            let by = if half_width < 1.0 {
+                format!("by the mean width of plied yarn, {half_width:.3} of twice the radius written")
+            } else {
+                "by the radius written".to_owned()
+            };
+            log::say(&overlap_in_words(&found, &by, of_tufts.contains(&true)));
         }
     }
     Ok(())
