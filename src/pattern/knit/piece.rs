@@ -294,13 +294,16 @@ impl Laying<'_> {
         let (low, high) = (EDGE as i32 - 1, self.loops.rows - EDGE as i32 + 1);
         let mut own = Thread::default();
         let count = course.visits.len();
-        let unlike = usize::try_from(course.row).ok().and_then(self.cells).is_some_and(|(cell, _)| cell.high > 1);
+        let cell = usize::try_from(course.row).ok().and_then(self.cells).map(|(cell, _)| cell);
+        let unlike = cell.is_some_and(|cell| cell.high > 1);
+        // Where a round begins anew within a repeat, stitches stand beside others than in their cell.
+        let breaks = round && cell.is_some_and(|cell| !self.loops.wide.is_multiple_of(cell.wide as usize));
         // Whether it begins and ends at the sides, and not beside another field.
         let flat = matches!(self.surface, Surface::Plane { .. });
         let fields = &self.loops.courses[self.courses_of(course.row)];
         let ends = [course.first == 0, fields.iter().all(|f| f.first <= course.first)].map(|end| flat && end);
         for (k, piece) in pieces.iter().enumerate() {
-            let side = !round && (k < EDGE || k + EDGE >= count);
+            let side = (!round || breaks) && (k < EDGE || k + EDGE >= count);
             // A row goes on as the next one, which its cell knows only where all rows are alike.
             let begins = round && (!course.holds.is_empty() || unlike) && (k == 0 || k + 1 == count);
             let edge = side || begins || (finished && (course.row <= low || course.row >= high)) || course.is_mixed(k);

@@ -100,6 +100,16 @@ fn a_tube_is_one_spiral_and_its_courses_lie_in_their_wales() {
     assert!(measured(&knit.strands(1.0).unwrap()).share <= 0.02);
 }
 
+#[test]
+fn a_round_may_begin_within_a_repeat() {
+    // Where a rib begins anew, stitches stand beside others than in its cell: two wales of knit, or three of purl.
+    for (pattern, stitches) in [("rib1x1", 25), ("rib1x1", 41), ("rib2x2", 41), ("rib2x2", 42), ("rib2x2", 43)] {
+        let knit = Knit { form: Form::Tube, ..knit(pattern, stitches, 8) };
+        let found = measured(&knit.strands(1.0).unwrap());
+        assert!(found.nearest > 0.85 && found.share < 0.05, "{pattern} on {stitches}: {found:?}");
+    }
+}
+
 /// A small hat: rib, stockinette, decreases to a crown.
 fn hat(stitches: u32) -> Knit {
     let chart = ["4: k2 p2", "3: k", "k6 k2tog", "k", "k5 ssk", "k", "k4 k2tog", "k3 k2tog", "k2 k2tog", "k1 k2tog"];
