@@ -10,7 +10,7 @@ use crate::{
     pattern::{
         PatternStrand,
         draft::{Draft, DraftError},
-        weave::{self, Extent, Impossible, Measures, Weave},
+        weave::{self, Extent, Impossible, Measures, Weave, whole_pairs},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Yarn, drawn_draft::Legend, palette},
@@ -184,6 +184,12 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         Impossible::TooSmall { warp, least } => {
             let name = if warp { "width" } else { "height" };
             format!("error: --{name} has no room for one yarn, or one repeat of a tile; at least {least:.3}")
+        }
+        Impossible::Unpaired { warps } => {
+            return Failure::hinted(
+                format!("this weave twines its warps in pairs: of {warps} one is left alone"),
+                format!("--warps {}", whole_pairs(warps)),
+            );
         }
         Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),
     })

@@ -98,8 +98,22 @@ pub enum Impossible {
         /// The smallest length.
         least: f64,
     },
+    /// A number of warps that are twined in pairs, which leaves one alone.
+    Unpaired {
+        /// How many.
+        warps: u32,
+    },
     /// More control points than [`MAX_POINTS`].
     TooLarge,
+}
+
+/// The numbers of warps next to an odd one that are whole pairs: what to ask for in place of one that is
+/// [unpaired](Impossible::Unpaired).
+pub(crate) fn whole_pairs(warps: u32) -> String {
+    match warps {
+        0 | 1 => "2".to_owned(),
+        _ => format!("{} or {}", warps - 1, warps + 1),
+    }
 }
 
 /// What a weave came to.
@@ -324,7 +338,17 @@ impl Weave {
                 // Threads of several spacings are so far apart in the mean.
                 Extent::Length(length) => length / spacing,
             };
-            let of = if self.tile { repeat as f64 } else { 1.0 };
+            let paired = side == 0 && self.draft.twines();
+            if let (Extent::Yarns(warps), true) = (extent, paired && !self.tile)
+                && !warps.is_multiple_of(2)
+            {
+                return Err(Impossible::Unpaired { warps });
+            }
+            let of = match (self.tile, paired) {
+                (true, _) => repeat as f64,
+                (false, true) => 2.0,
+                (false, false) => 1.0,
+            };
             let repeats = (wanted / of).round();
             if repeats < 1.0 && matches!(extent, Extent::Length(_)) {
                 return Err(Impossible::TooSmall { warp: side == 0, least: of * spacing });

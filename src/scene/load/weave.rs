@@ -16,7 +16,7 @@ use crate::{
     pattern::{
         PatternStrand, StrandKind,
         draft::{Draft, DraftError},
-        weave::{self, Edges, Extent, Impossible, Measures, Weave, shuttles},
+        weave::{self, Edges, Extent, Impossible, Measures, Weave, shuttles, whole_pairs},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Tufts, Yarn},
@@ -111,6 +111,10 @@ impl WeavePlan {
                     if warp { "width" } else { "height" }
                 ),
                 &format!("at least {:.3}", least / context.unit),
+            ),
+            Err(Impossible::Unpaired { warps }) => wrong(
+                format!("this weave twines its warps in pairs: of {warps} one is left alone"),
+                &format!("`warps` of {}", whole_pairs(warps)),
             ),
             Err(Impossible::TooLarge) => {
                 wrong("more than 2^27 control points".to_owned(), "fewer warps, wefts or points");
