@@ -5,12 +5,15 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::{Cloth, PatternStrand, StrandKind, strand};
 use crate::{
     math::{sampler::hash2, special::smooth_step},
-    pattern::draft::Draft,
+    pattern::{
+        draft::Draft,
+        rods::{Rods, Run, Strand},
+    },
 };
 
 /// How the cloth ends.
@@ -122,36 +125,72 @@ pub(super) fn hem_wefts(thickness: f64, spacing: f64) -> u32 {
     (length / spacing).floor() as u32
 }
 
-/// Lets warps go on beyond both ends, each its own way.
+/// Lets warps go on beyond both ends, each its own way, beside each other.
 pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f64) {
     let (spacing, radius) = (cloth.cell.spacing[0], cloth.weave.half_rooms[0]);
     let flat = cloth.weave.sized();
     let step = 1.2 * radius;
     let steps = (length / step).ceil().max(2.0) as usize;
-    for strand in strands.iter_mut().filter(|s| s.kind == StrandKind::Warp) {
-        let mut way = points(strand);
-        for end in 0..2 {
-            if end == 0 {
-                way.reverse();
-            }
-            let last = way[way.len() - 1];
+    // Cloths above each other end above each other.
+    let falls = if cloth.weave.draft.layers() > 1 { 0.0 } else { 1.0 };
+    let ends = [0, 1].map(|end| {
+        let mut ways: Vec<Vec<Point>> = Vec::new();
+        for strand in strands.iter().filter(|s| s.kind == StrandKind::Warp) {
+            let way = points(strand);
+            let last = if end == 0 { way[0] } else { way[way.len() - 1] };
             let away = if end == 0 { -1.0 } else { 1.0 };
             let random = |k: u32| f64::from(hash2(strand.index, 2 * k + end) >> 8) / f64::from(1u32 << 24) - 0.5;
             let (lean, bend, lift, cut) = (random(1), random(2), random(3), 1.0 + 0.15 * random(4));
-            let aim = 0.15 * radius - last.0.z;
-            for k in 1..=steps {
+            let aim = falls * (0.15 * radius - last.0.z);
+            let at = |k: usize| {
                 let s = k as f64 / steps as f64;
                 let ease = smooth_step(s);
                 let aside = spacing * (0.5 * lean * s + 0.7 * bend * (PI * s).sin()) * s;
                 let height = aim * ease.min(1.0) + 1.4 * radius * lift * ease;
                 let p = last.0 + DVec3::new(aside, away * length * cut * s, height);
-                way.push((p, last.1 + s * (radius - last.1), last.2.lerp(Vec3::Z, s as f32), last.3));
-            }
-            if end == 0 {
-                way.reverse();
-            }
+                (p, last.1 + s * (radius - last.1), last.2.lerp(Vec3::Z, s as f32), last.3)
+            };
+            ways.push((0..=steps).map(at).collect());
         }
+        find_room(&mut ways, radius);
+        ways
+    });
+    let warps = strands.iter_mut().filter(|s| s.kind == StrandKind::Warp);
+    for (strand, (before, after)) in warps.zip(ends[0].iter().zip(&ends[1])) {
+        let before = before[1..].iter().rev().copied();
+        let way: Vec<Point> = before.chain(points(strand)).chain(after[1..].iter().copied()).collect();
         *strand = from_points(StrandKind::Warp, strand.index, &way, flat);
+    }
+}
+
+/// Lets yarns of a radius that are held where they begin find room beside each other.
+fn find_room(ways: &mut [Vec<Point>], radius: f64) {
+    const STEPS: usize = 300;
+    /// How many of their points have the thickness and the place that the cloth gives them.
+    const HELD: usize = 1;
+    let unit = 2.0 * radius;
+    let mut rods = Rods::default();
+    for way in ways.iter() {
+        let start = rods.points.len();
+        for (k, point) in way.iter().enumerate() {
+            rods.points.push(point.0 / unit);
+            rods.rest.push(way.get(k + 1).map_or(1e-3, |next| point.0.distance(next.0) / unit));
+            rods.fixed.push(k < HELD);
+        }
+        rods.strands.push(Strand { start, count: way.len(), jump: None });
+    }
+    rods.relax(&Run {
+        steps: STEPS,
+        growing: STEPS / 3,
+        thin: 0.3,
+        free: [false; 2],
+        load: DVec2::ZERO,
+        press: 0.0,
+        firm: 2.0,
+        calm: 0.02,
+    });
+    for (point, at) in ways.iter_mut().flatten().zip(&rods.points) {
+        point.0 = *at * unit;
     }
 }
 

@@ -272,6 +272,19 @@ fn cloth_is_as_large_as_it_is_asked_to_be() {
 }
 
 #[test]
+fn a_leno_has_whole_pairs() {
+    let of = |warps| Weave { warps, ..weave("leno") };
+    let odd = of(Extent::Yarns(13));
+    assert!(matches!(odd.relax(), Err(Impossible::Unpaired { warps: 13 })));
+    assert_eq!([1, 13].map(whole_pairs), ["2", "12 or 14"]);
+    // What fills a width does.
+    for width in [9.0, 11.0, 13.0, 15.0] {
+        let filled = of(Extent::Length(width));
+        assert!(filled.relax().unwrap().count()[0].is_multiple_of(2), "{width}");
+    }
+}
+
+#[test]
 fn pairs_of_a_leno_are_twined() {
     let leno = weave("leno");
     let strands = leno.strands().unwrap();
@@ -462,6 +475,19 @@ fn fringes_are_as_long_as_they_are_asked_to_be() {
 }
 
 /// The warps of a corduroy are all of the ground: they alone are drawn out, and its pile stays as it is.
+/// Warps that lie above or beside each other where the cloth ends have less room there than they are thick.
+#[test]
+fn yarns_of_a_fringe_keep_apart() {
+    for name in ["plain", "twill 2/2", "satin 5", "huck", "basket 2", "double cloth"] {
+        let of = |edges| overlap_of(&Weave { edges, flatten: 1.5, ..weave(name) }.strands().unwrap());
+        let (cut, fringed) = (of(Edges::Live), of(Edges::Fringe(20.0)));
+        assert!(
+            fringed.share < cut.share + 0.05 && fringed.nearest > cut.nearest - 0.12,
+            "{name}: {cut:?} {fringed:?}"
+        );
+    }
+}
+
 #[test]
 fn a_corduroy_has_a_fringe_of_its_warps() {
     let [cut, drawn] = [Edges::Live, Edges::Fringe(20.0)].map(|edges| Weave { edges, ..weave("corduroy") });
