@@ -240,6 +240,26 @@ fn garments_are_laid_on_meshes_of_stages() {
     // The other format, which knows no unit, gives the same.
     let abc = said(info("garment.abc", "unit = \"cm\", ", &[]));
     assert_eq!(garment(&abc)["stitches"], garment(&usd)["stitches"]);
+    // What a file knows of itself counts, of the garment and of its body, and that is said.
+    let stage = stages.join("garment.usda");
+    let body = format!("prim = \"/figure/tube\", unit = \"mm\", body = {stage:?}, body_prim = \"/figure/tube\", ");
+    for more in ["prim = \"/figure/tube\", unit = \"mm\", ", &body] {
+        let other = said(info("garment.usda", more, &[]));
+        assert_eq!(garment(&other)["stitches"], garment(&usd)["stitches"], "{other}");
+        let told = "garment.usda: a unit of 10 mm is its own; the scene's, of 1 mm, is not used";
+        assert!(other["warnings"].to_string().contains(told), "{other}");
+    }
+    let same = said(info("garment.usda", "prim = \"/figure/tube\", unit = \"cm\", ", &[]));
+    assert!(!same["warnings"].to_string().contains("is its own"), "{same}");
+    // So of meshes beside the cloth.
+    let beside = |unit: &str| {
+        let mesh = format!("[[mesh]]\npath = {stage:?}\nprim = \"/figure/tube\"\n{unit}");
+        let cloth = "[[fabric]]\nyarn = \"one\"\nsource = { type = \"stockinette\", stitches = 4, rows = 4 }\n";
+        write(at, "m.toml", head("0.5") + cloth + &mesh);
+        said(yarnray(at, &["info", "m.toml", "--json"]))["warnings"].to_string()
+    };
+    assert!(beside("unit = \"m\"").contains("a unit of 10 mm is its own; the scene's, of 1000 mm, is not used"));
+    assert!(!beside("").contains("is its own"));
     info("garment.usda", "prim = \"/figure/tube\", ", &[]);
     // z points up in the one file, y in the other.
     yarnray(at, &["make", "garment", "s.toml", "-o", "g.txt"]).good();

@@ -342,7 +342,7 @@ impl MeshFile {
             obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
         };
         let (mut mesh, own_unit, up_axis) = read.map_err(|error| context.error(self.span, error, None)).ok()?;
-        let scale = self.unit.or(own_unit).unwrap_or(context.unit);
+        let scale = context.unit_of((&path, self.span), own_unit, self.unit).unwrap_or(context.unit);
         let z_up = self.z_up.unwrap_or(up_axis == Some(2));
         let up = if z_up { DAffine3::from_mat3(Y_UP) } else { DAffine3::IDENTITY };
         mesh.transform(&(DAffine3::from_scale(DVec3::splat(scale)) * up));

@@ -197,6 +197,21 @@ impl Context<'_> {
         self.diagnostics.push_once(Diagnostic::warning(message).at(span));
     }
 
+    /// Millimetres of a unit, of the file's own and the one that the scene says. What a file knows of itself is so, whatever
+    /// the scene says, which may have been written for another file; told if they differ.
+    fn unit_of(&self, (path, span): (&Path, Span), own: Option<f64>, asked: Option<f64>) -> Option<f64> {
+        if let (Some(own), Some(asked)) = (own, asked)
+            && (own - asked).abs() > 1e-6 * asked
+        {
+            let path = path.display();
+            self.warning_once(
+                span,
+                format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"),
+            );
+        }
+        own.or(asked)
+    }
+
     /// A vector in the scene's unit, as millimetres.
     fn position(&self, v: [f64; 3]) -> DVec3 {
         DVec3::from(v) * self.unit

@@ -335,14 +335,7 @@ impl CurveFile {
             }
         };
         set.notes.iter().for_each(|text| note(format!("{}: {text}", path.display())));
-        // What a file knows of itself is so, whatever the scene says, which may have been written for another file.
-        if let (Some(own), Some(asked)) = (set.unit_mm, self.unit)
-            && own != asked
-        {
-            let path = path.display();
-            note(format!("{path}: a unit of {own} mm is its own; the scene's, of {asked} mm, is not used"));
-        }
-        let scale = set.unit_mm.or(self.unit).unwrap_or(context.unit);
+        let scale = context.unit_of((path, self.span), set.unit_mm, self.unit).unwrap_or(context.unit);
         set.curves.par_iter_mut().for_each(|c| c.points.iter_mut().for_each(|p| *p *= scale));
         Some((set, scale))
     }

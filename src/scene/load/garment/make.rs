@@ -77,7 +77,7 @@ impl GarmentPlan {
         let cloths = self.cloths((library.yarns.get(yarn), radius), context, library, warnings);
         let frames = Frames::find(&self.path, detail);
         let (read, own_unit) = self.read(&frames, context)?;
-        let unit = self.unit.or(own_unit).unwrap_or(context.unit) * self.scale;
+        let unit = context.unit_of((&self.path, self.span), own_unit, self.unit).unwrap_or(context.unit) * self.scale;
         let rest = &read[&frames.rest];
         let cloths = cloths?;
         let sizes: Vec<DVec2> = cloths.iter().map(|c| c.tile.stitch()).collect();
@@ -358,7 +358,8 @@ impl GarmentPlan {
             match moment.body(self.prims[1].as_ref(), self.z_up, (context, *span)) {
                 Ok((mut mesh, own_unit)) => {
                     // A body without a unit of its own has the garment's.
-                    let scale = self.unit.or(own_unit).map_or(unit, |mm| mm * self.scale);
+                    let own = context.unit_of((path, *span), own_unit, self.unit);
+                    let scale = own.map_or(unit, |mm| mm * self.scale);
                     mesh.transform(&glam::DAffine3::from_scale(DVec3::splat(scale)));
                     read.insert(moment.clone(), mesh);
                 }
