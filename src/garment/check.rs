@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::{
+    hem::NoRoom,
     lattice::{Ground, Lattice},
     mesh::{GarmentError, panel_in_words},
     options::{Cloth, Options},
@@ -84,7 +85,7 @@ pub(super) fn flat(lattices: &[Lattice], panels: &[Panel]) -> Result<(), Garment
 
 /// A hem holds so many stitches of the cloth beside its bend.
 const LEAST_IN_HEM: f64 = 3.0;
-/// No more of a hem's length than this may have no cloth over it: by a seam that slants the panel is narrower there.
+/// No more of a hem's length than this may have no cloth over it, or a hem across: by a seam that slants the panel is narrower.
 const BARE: f64 = 0.2;
 
 /// Hems of panels that are sewn all round, or that are too narrow or too wide; `cloth` is that of each panel.
@@ -108,12 +109,21 @@ pub(super) fn hems(
                     format!("a hem of {:.2} mm is too narrow for the cloth of {}", hem.width, panel_in_words(group));
                 return Err(GarmentError::at(*at, problem, format!("`hem_width` of {least:.2} mm or more")));
             }
-            if line.without_cloth(finder) > BARE {
-                let problem =
-                    format!("a hem of {:.2} mm is wider than {} is high over it", hem.width, panel_in_words(group));
-                let hint = "a smaller `hem_width`, or `hem = \"none\"` of that panel";
-                return Err(GarmentError::at(*at, problem, hint));
-            }
+            let NoRoom { bare, met } = line.without_room(finder, hem.width);
+            let why = match (bare > BARE, met > BARE) {
+                (true, _) => format!("is wider than {} is high over it", panel_in_words(group)),
+                (_, true) => format!("meets the one across {}", panel_in_words(group)),
+                _ => continue,
+            };
+            let problem = format!("a hem of {:.2} mm {why}", hem.width);
+            // Rounded down, so that it fits.
+            let widest = (10.0 * line.widest(finder, BARE)).floor() / 10.0;
+            let instead = "`hem = \"none\"` of that panel";
+            let hint = match widest < least {
+                true => format!("{instead}: it has no room for a hem"),
+                false => format!("`hem_width` of at most {widest:.1} mm, or {instead}"),
+            };
+            return Err(GarmentError::at(*at, problem, hint));
         }
         if let (false, Some(group)) = (found, &asked.group)
             && asked.hems_itself

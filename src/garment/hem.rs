@@ -198,12 +198,57 @@ impl HemLine {
         (own && found.is_some() && !border.is_near_other(place, self.turnup.aside + 0.5 * high)).then_some(found)
     }
 
-    /// Which share of the edges' length has no cloth of the panel so far inside.
-    pub(super) fn without_cloth(&self, finder: &Finder<'_>) -> f64 {
-        let middle = |e: &HemEdge| e.border.ends[0].midpoint(e.border.ends[1]);
-        let length = |e: &HemEdge| e.border.ends[0].distance(e.border.ends[1]);
-        let bare = |e: &&HemEdge| !finder.find(middle(e) + e.inward[0] * self.turnup.hem.width).is_some();
-        let all: f64 = self.edges.iter().map(length).sum();
-        self.edges.iter().filter(bare).map(length).sum::<f64>() / all.max(1e-9)
+    /// Which share of the edges' length has no room for a hem of some width: the panel has no cloth so far inside, or an edge
+    /// across it is hemmed and lies nearer, so that each has its half.
+    pub(super) fn without_room(&self, finder: &Finder<'_>, width: f64) -> NoRoom {
+        let (mut all, mut bare, mut met) = (0.0, 0.0, 0.0);
+        for edge in &self.edges {
+            let [a, b] = edge.border.ends;
+            let length = a.distance(b);
+            let at = a.midpoint(b) + edge.inward[0] * width;
+            all += length;
+            if !finder.find(at).is_some() {
+                bare += length;
+            } else if self.is_met(edge, at, width) {
+                met += length;
+            }
+        }
+        let share = |part: f64| part / f64::max(all, 1e-9);
+        NoRoom { bare: share(bare), met: share(met) }
     }
+
+    /// Whether a place so far inside of an edge lies nearer to one across.
+    fn is_met(&self, edge: &HemEdge, at: DVec2, width: f64) -> bool {
+        let within = (1.0 - 1e-6) * width;
+        let inward = edge.border.direction().perp();
+        let mut near = self.tree.locate_within_distance(at.to_array(), within * within);
+        near.any(|line| {
+            let other = &self.edges[line.data].border;
+            let [a, b] = other.ends;
+            let t = ((at - a).dot(b - a) / (b - a).length_squared().max(1e-300)).clamp(0.0, 1.0);
+            other.direction().perp().dot(inward) < ACROSS && a.lerp(b, t).distance(at) < within
+        })
+    }
+
+    /// The widest hem for which no more than a share of the edges' length has no room, mm.
+    pub(super) fn widest(&self, finder: &Finder<'_>, share: f64) -> f64 {
+        let (mut fits, mut fails) = (0.0, self.turnup.hem.width);
+        for _ in 0..24 {
+            let width = 0.5 * (fits + fails);
+            let NoRoom { bare, met } = self.without_room(finder, width);
+            *(if bare > share || met > share { &mut fails } else { &mut fits }) = width;
+        }
+        fits
+    }
+}
+
+/// Two edges face each other across a panel if their directions inwards are at less than this cosine.
+const ACROSS: f64 = -0.5;
+
+/// Shares of the length of hemmed edges.
+pub(super) struct NoRoom {
+    /// Where the panel has no cloth.
+    pub(super) bare: f64,
+    /// Where a hem across has it.
+    pub(super) met: f64,
 }

@@ -244,6 +244,23 @@ fn hems_that_cannot_be_sewn_are_told() {
     assert!(narrow.problem.contains("too narrow") && narrow.hint.contains("hem_width"), "{narrow:?}");
     let wide = error(&square(), 130.0, None);
     assert!(wide.problem.contains("wider than panel `square`") && wide.line > 0, "{wide:?}");
+    // Opposite hems meet in the middle of 100 mm; where no edge across is hemmed there is room for more.
+    let mut text = String::new();
+    sheet(&mut text, "wide", 16, 10, 10.0, 0.0, &|u, v| DVec3::new(u, v, 0.0));
+    let wide = GarmentMesh::parse(&text).unwrap();
+    let meets = error(&wide, 51.0, None);
+    assert!(meets.problem.contains("51.00 mm meets the one across panel `wide`") && meets.line > 0, "{meets:?}");
+    assert!(
+        meets.hint.contains("`hem_width` of at most 49.9 mm") || meets.hint.contains("at most 50.0 mm"),
+        "{meets:?}"
+    );
+    let fits = |mesh: &GarmentMesh, width: f64| {
+        let mut options = hemmed(stockinette(), HemKind::Coverstitch);
+        options.cloths[0].hem = Some(Hem { kind: HemKind::Coverstitch, width });
+        Garment::new(mesh, options).map(|_| ())
+    };
+    assert_eq!(fits(&wide, 49.9), Ok(()));
+    assert_eq!(fits(&round(), 120.0), Ok(()));
     // A panel within another is sewn all round.
     let mut text = String::new();
     let at = |u: f64, v: f64| DVec3::new(u, v, 0.0);
