@@ -307,6 +307,28 @@ fn info_says_which_panels_stand_on_their_heads() {
     assert_eq!(down(&|u, v| [u, 0.0, -v], ""), None);
 }
 
+#[test]
+fn info_tells_how_much_is_stretched_and_compressed() {
+    let folder = directory();
+    let d = folder.path();
+    for (across, stretched, compressed) in [(0.8, 0.0, 1.0), (1.2, 1.0, 0.0), (1.0, 0.0, 0.0)] {
+        write(d, "g.obj", mesh(&|u, v| [across * u, v, 0.0]));
+        write(d, "s.toml", scene("path = \"g.obj\", uv_unit = \"mm\"", "", STILL));
+        let told = yarnray(d, &["info", "s.toml"]).good().stdout;
+        let range = format!("{:.3} to {:.3} (5 to 95 % of the cloth)", f64::min(across, 1.0), f64::max(across, 1.0));
+        let shares = format!(
+            "{:.1} % of the cloth is stretched by more than a tenth, {:.1} % is compressed by more than a tenth\n",
+            100.0 * stretched,
+            100.0 * compressed
+        );
+        assert!(told.contains(&range) && told.contains(&shares), "{told}");
+        let json = yarnray(d, &["info", "s.toml", "--json"]).good().stdout;
+        let json = serde_json::from_str::<serde_json::Value>(&json).unwrap()["garments"][0].clone();
+        let found = ["stretched", "compressed"].map(|key| json[key].as_f64());
+        assert_eq!(found, [Some(stretched), Some(compressed)], "{json}");
+    }
+}
+
 /// `info` lays nothing, but reads the body: one that is not there is an error, one with a rim a warning, in words of its own.
 #[test]
 fn a_body_is_looked_at_before_yarns_are_laid() {

@@ -318,6 +318,7 @@ fn garment_json(facts: &GarmentFacts) -> Value {
         "control_points": facts.control_points,
         "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
         "repairs": facts.repairs,
+        "compressed": facts.compressed,
     })
 }
 
@@ -325,14 +326,16 @@ fn garment_lines(facts: &GarmentFacts) -> String {
     let [p5, p50, p95] = facts.uv_ratio;
     let mut text = format!(
         "  garment   {}: {} of {} in {}, about {:.1} m of yarn, {}\n  stretch   3-D over \
-         flat lengths {p5:.3} to {p95:.3}, median {p50:.3}; {:.1} % of the cloth is stretched by more than a tenth\n",
+         flat lengths {p5:.3} to {p95:.3} (5 to 95 % of the cloth), median {p50:.3}; {:.1} % of the cloth is stretched by more \
+         than a tenth, {:.1} % is compressed by more than a tenth\n",
         facts.path,
         counted(facts.stitches, "stitch"),
         facts.cloth,
         counted(facts.panels.len(), "panel"),
         facts.yarn_length / 1000.0,
         counted(facts.control_points, "control point"),
-        100.0 * facts.stretched
+        100.0 * facts.stretched,
+        100.0 * facts.compressed
     );
     if let Some((at, radius)) = facts.near {
         text += &format!("  near      only what lies within {radius:.3} mm of {at:.3} mm\n");

@@ -54,6 +54,8 @@ pub(super) struct Panels {
     pub(super) ratio: LengthRatio,
     /// Share of the area that is stretched by more than a tenth along one of them.
     pub(super) stretched: f64,
+    /// The same of what is compressed.
+    pub(super) compressed: f64,
     /// Millimetres per unit of the texture coordinates.
     pub(super) uv_mm: f64,
     pub(super) notes: Vec<String>,
@@ -94,15 +96,16 @@ impl Panels {
         let sewn: Vec<[u32; 3]> = faces.iter().map(|f| f.points.map(|i| weld[i as usize])).collect();
         non_manifold(&sewn, &faces, mesh, &mut notes);
         let along = along_axes(mesh, &faces, unit_mm, uv_mm);
-        let (mut long, mut all) = (0.0, 0.0);
+        let (mut long, mut short, mut all) = (0.0, 0.0, 0.0);
         for pair in along.chunks_exact(2) {
             all += pair[0].1;
             long += if pair[0].0.max(pair[1].0) > 1.1 { pair[0].1 } else { 0.0 };
+            short += if pair[0].0.min(pair[1].0) < 0.9 { pair[0].1 } else { 0.0 };
         }
-        let stretched = long / all;
+        let (stretched, compressed) = (long / all, short / all);
         let [p5, p50, p95] = percentiles(along, [0.05, 0.5, 0.95]);
         let ratio = LengthRatio { p5, p50, p95 };
-        Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretched, uv_mm, notes })
+        Ok(Self { welded, sewn, cut, uvs, of_face, panels, ratio, stretched, compressed, uv_mm, notes })
     }
 
     /// Turns the texture coordinates of each panel by an angle, radians.

@@ -28,6 +28,8 @@ pub(crate) struct Report {
     pub ratio: LengthRatio,
     /// Share of the area that is stretched by more than a tenth along u or v.
     pub stretched: f64,
+    /// Share of it that is compressed by more than a tenth along u or v.
+    pub compressed: f64,
     /// Millimetres per unit of the texture coordinates.
     pub uv_mm: f64,
     /// What was repaired or found out, one line each.
@@ -71,6 +73,7 @@ impl Report {
             cloth,
             ratio: panels.ratio,
             stretched: panels.stretched,
+            compressed: panels.compressed,
             uv_mm: panels.uv_mm,
             panels: panels.panels.clone(),
             notes,

@@ -484,6 +484,8 @@ pub struct GarmentFacts {
     pub uv_ratio: [f64; 3],
     /// Share of the area that is stretched by more than a tenth.
     pub stretched: f64,
+    /// Share of it that is compressed by more than a tenth.
+    pub compressed: f64,
     /// Millimetres per unit of its texture coordinates.
     pub uv_mm: f64,
     /// The box around its mesh, millimetres, before the fabric is moved to its place.

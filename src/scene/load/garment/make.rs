@@ -232,6 +232,7 @@ impl GarmentPlan {
             control_points: points.iter().sum(),
             uv_ratio: [report.ratio.p5, report.ratio.p50, report.ratio.p95],
             stretched: report.stretched,
+            compressed: report.compressed,
             uv_mm: report.uv_mm,
             bounds: report.bounds,
             repairs: Vec::new(),
