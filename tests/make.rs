@@ -491,6 +491,15 @@ fn overlap_says_its_diameter() {
     let of_file = yarnray(d, &["info", "a.usdc"]).good().stdout;
     let by_file = "(they touch at 1), by the radius in the file: plied yarns that nestle count as overlapping\n";
     assert!(of_file.contains(by_file), "{of_file}");
+    // For programs too.
+    let diameter = |args: &[&str]| {
+        let json = yarnray(d, &[&["info", "--json"], args].concat()).good().stdout;
+        serde_json::from_str::<serde_json::Value>(&json).unwrap()["overlap"]["diameter"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(diameter(&["a.usdc"]), "radius in the file");
+    assert_eq!(diameter(&["a.usdc", "--radius", "0.4"]), "radius asked for");
+    write(d, "s.toml", "[[fabric]]\nyarn = \"wool\"\nsource = { type = \"stockinette\", stitches = 4, rows = 4 }\n");
+    assert_eq!(diameter(&["s.toml"]), "mean width of plied yarn");
     let round = yarnray(d, &made).good().stderr;
     assert!(round.contains("(they touch at 1), by the radius written\n"), "{round}");
 }

@@ -195,11 +195,14 @@ impl std::fmt::Display for Figure {
     }
 }
 
-/// Overlap as JSON: shares of the length and mean diameters.
-fn overlap_json(found: Option<Overlap>) -> Value {
+/// The diameter by which overlap of scenes and garments is measured: yarns of several plies count as wide as they are in the mean.
+const MEAN_WIDTH: &str = "mean width of plied yarn";
+
+/// Overlap as JSON: shares of the length and mean diameters, and which diameter that is.
+fn overlap_json(found: Option<Overlap>, diameter: &str) -> Value {
     found.map_or(Value::Null, |o| {
         let nearest = if o.nearest.is_finite() { json!(o.nearest) } else { Value::Null };
-        json!({"share": o.share, "tolerated": TOLERATED, "deepest": o.deepest, "nearest": nearest})
+        json!({"share": o.share, "tolerated": TOLERATED, "deepest": o.deepest, "nearest": nearest, "diameter": diameter})
     })
 }
 
@@ -235,19 +238,21 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     let numbered: std::collections::BTreeSet<i64> = set.ids.iter().flatten().copied().collect();
     let of_plies: std::collections::BTreeSet<i64> = set.plies.iter().flatten().copied().collect();
     let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
+    // Of its yarn a file knows no more.
+    let by = if radius.is_some() { "radius asked for" } else { "radius in the file" };
     // What the file does not say, and nobody has.
     let proposal = if radii || radius.is_some() { None } else { Proposal::new(set) };
     let sizes = proposal::sizes(set);
     let report = json!({
         "file": path.display().to_string(),
         "proposal": proposal.map(|p| json!({
-            "radius": p.radius, "unit": p.unit.0, "overlap": overlap_json(Some(p.overlap)),
+            "radius": p.radius, "unit": p.unit.0, "overlap": overlap_json(Some(p.overlap), "radius proposed"),
             "bend_radius": {"p1": p.bends[0], "p50": p.bends[1]},
         })),
         "size_cm": sizes.iter().map(|(unit, size)| ((*unit).to_owned(), list(*size))).collect::<serde_json::Map<_, Value>>(),
         "curves": set.curves.len(), "closed": closed, "open": open,
         "points": points, "basis": basis, "radii": radii, "up": up,
-        "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found),
+        "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found, by),
         "bounds": [list(low), list(high)], "notes": set.notes,
         "colored": colored, "colors": distinct.len(), "ids": numbered.len(),
         "plies": of_plies.len(),
@@ -269,13 +274,9 @@ fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, St
     if !of_plies.is_empty() {
         text += &format!("  plies     {}: curves are plies or fibres of yarns\n", of_plies.len());
     }
-    // Of its yarn a file knows no more.
-    let by = match (radius, of_plies.is_empty()) {
-        (Some(_), _) => "by the radius asked for: plied yarns that nestle count as overlapping",
-        (None, true) => "by the radius in the file: plied yarns that nestle count as overlapping",
-        (None, false) => "by the radius in the file",
-    };
-    text += &overlap_line(found, by, false);
+    let nestle =
+        if radius.is_some() || of_plies.is_empty() { ": plied yarns that nestle count as overlapping" } else { "" };
+    text += &overlap_line(found, &format!("by the {by}{nestle}"), false);
     if let Some(p) = proposal {
         text += &format!(
             "  proposal  radius {:.3}: at it {:.1} % of the length overlaps; one bend in a hundred is tighter than {:.3}, \
@@ -314,11 +315,11 @@ fn garment_json(facts: &GarmentFacts) -> Value {
         "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
         "near": facts.near.map(|(at, radius)| json!({"at_mm": at.to_array(), "radius_mm": radius})),
         "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
-        "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest})),
+        "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest, "diameter": MEAN_WIDTH})),
         "control_points": facts.control_points,
         "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
-        "repairs": facts.repairs,
         "compressed": facts.compressed,
+        "repairs": facts.repairs,
     })
 }
 
@@ -421,6 +422,13 @@ impl<'a> SceneFacts<'a> {
         self.scene.fabrics.iter().zip(&self.estimates).filter(|(f, _)| !f.curves.is_empty())
     }
 
+    /// By which diameter overlap is measured.
+    fn diameter(&self) -> &'static str {
+        let scene = self.scene;
+        let is_plied = |f: &Fabric| matches!(f.kind, CurveKind::Yarn(yarn) if scene.yarns[yarn].half_width() < 1.0);
+        if scene.fabrics.iter().any(is_plied) { MEAN_WIDTH } else { "radius of the yarn" }
+    }
+
     fn json(&self) -> Value {
         let Self { scene, total, memory, .. } = self;
         let render = &scene.render;
@@ -444,7 +452,7 @@ impl<'a> SceneFacts<'a> {
             "scene": scene.path, "fingerprint": scene.fingerprint,
             "mode": render.mode.name(), "model": render.model.name(),
             "image": {"width": render.width, "height": render.height, "spp": render.spp},
-            "fabrics": fabrics, "garments": garments, "overlap": overlap_json(self.overlap),
+            "fabrics": fabrics, "garments": garments, "overlap": overlap_json(self.overlap, self.diameter()),
             "bounds_mm": self.bounds.map(list),
             "memory": {
                 "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
@@ -475,12 +483,8 @@ impl<'a> SceneFacts<'a> {
         for facts in &scene.garments {
             text += &garment_lines(facts);
         }
-        let is_plied = |f: &Fabric| matches!(f.kind, CurveKind::Yarn(yarn) if scene.yarns[yarn].half_width() < 1.0);
-        let by = match scene.fabrics.iter().any(is_plied) {
-            true => "by the mean width of plied yarn",
-            false => "by the radius of the yarn",
-        };
-        text += &overlap_line(self.overlap, by, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
+        let by = format!("by the {}", self.diameter());
+        text += &overlap_line(self.overlap, &by, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
         text += &self.memory_lines();
         for used in [true, false] {
             text += if used { "  used\n" } else { "  left out\n" };
