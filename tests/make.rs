@@ -548,6 +548,14 @@ fn written_instructions_are_knitted_from_the_command_line_and_from_a_file() {
     }
     let read = |name: &str| std::fs::read(d.join(name)).unwrap();
     assert_eq!(read("a.txt"), read("b.txt"));
+    // What is repeated without an end has as many rows as a chart, also where the text binds it off.
+    let bound_off = text.to_owned() + "Rep rows 1-2. Bind off.";
+    for (how, rows, out) in [(&*bound_off, None, "d.txt"), (text, Some("20"), "e.txt")] {
+        let rows = rows.map_or(Vec::new(), |rows| vec!["--rows", rows]);
+        let piece = ["make", "knit", "--stitches", "8", "--instructions", how, "-o", out];
+        yarnray(d, &[&piece[..], &rows].concat()).good();
+    }
+    assert_eq!(read("d.txt"), read("e.txt"));
     // Charts are read from left to right, instructions from where a row begins.
     let rows = ["--chart", "p2 k2 p2 k2", "--chart", "p2 k2 p2 k2"];
     yarnray(d, &[&["make", "knit", "-o", "c.txt"], &rows[..], &size[..]].concat()).good();

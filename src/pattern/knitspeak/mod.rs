@@ -169,7 +169,8 @@ impl Instructions {
                     if self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side() {
                         (0..again.rows.len()).try_for_each(|k| needle.work(&self.copy(again, &needle, k)))?;
                     }
-                    return Ok(Worked { rows: needle.rows, whole: self.ends });
+                    // Bound off behind no height, they are as many as those of a chart.
+                    return Ok(Worked { rows: needle.rows, whole: self.ends && self.height.is_some() });
                 }
                 let least = least.min(MOST_ROWS);
                 for k in 0.. {

@@ -194,6 +194,8 @@ fn rows_are_repeated_as_they_are_told() {
         ("These 2 rows form the pattern. Cont in patt until work measures 10 cm.", 2, false),
         ("Repeat rows 1-2 until piece measures 25 cm [10 in]\nBind off.", 2, true),
         ("Rep last 2 rows twice more", 6, true),
+        ("Rep rows 1-2. Bind off.", 2, false),
+        ("Rep rows 1-2, ending with row 2. Bind off.", 2, false),
         ("Rep rows 1-2, 3 times more. Bind off all sts.", 8, true),
         ("Work rows 1-2 3 times", 6, true),
         ("Repeat from row 1 for 5 more rows", 7, true),
