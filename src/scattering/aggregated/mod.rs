@@ -380,5 +380,3 @@ mod swirl_tests;
 mod tests;
 #[cfg(test)]
 mod way_in_tests;
-#[cfg(test)]
-mod way_out_tests;

@@ -1,9 +1,8 @@
 //! What light meets after a fibre, counted on packings: [`AfterFiber`] is fitted to ways out of fibres that lines met.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
 use glam::DVec2;
-use rayon::prelude::*;
 use wide::f32x8;
 
 use super::lines::Lines;
@@ -11,11 +10,9 @@ use crate::{
     geometry::{
         after_fiber::{AfterFiber, AfterTurn, Missing, MissingFibers},
         cleared_strip::{ClearedStrip, misses},
-        density::ChordFibers,
-        gaps::PlyGaps,
         ply::PlyShape,
     },
-    math::sampler::{Stream, hash2},
+    math::sampler::Stream,
 };
 
 /// A line through the discs of a section: its direction, and how far beside the middle it is.
@@ -64,125 +61,53 @@ impl Way {
 /// Fits what light meets after a fibre to ways through packings: as many get out, and as many fibres are met, as are counted, about each number
 /// of expected fibres and each turn, along each axis, inside and by the rim.
 pub(super) fn after(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> AfterFiber {
-    /// So many ways are summed at a time.
-    const PART: usize = 16_384;
     let ways = ways(lines, sections, ply);
     let mut after = AfterFiber::free(0.0);
     let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
     for asked in [Asked::Unscattered { rate }, Asked::Counted] {
         // First as if those inside and by the rim and along both axes were alike: of some there are too few to begin with.
         for alike in [true, true, true, false, false, false] {
-            let of_ways = |ways: &[Way]| {
-                let mut sums = Tables::default();
-                for way in ways {
-                    let law = way.law(&after);
-                    sums.add(way, law.shares(), asked.counted(way), asked.fitted(way, &law));
-                }
-                sums
-            };
-            // In the same order whatever the number of threads.
-            let parts: Vec<Tables> = ways.par_chunks(PART).map(of_ways).collect();
             let mut sums = Tables::default();
-            parts.iter().for_each(|part| sums.add_all(part));
+            for way in &ways {
+                let law = way.law(&after);
+                sums.add(way, law.shares(), asked.counted(way), asked.fitted(way, &law));
+            }
             sums.improve(&mut after, asked, alike);
         }
     }
     after
 }
 
-/// A ray that meets fibres, the first of them in front.
-struct Ray<'a> {
-    line: Line<'a>,
-    hits: Vec<Hit>,
-    /// How deep the first fibre lies, seen in the circle that the section is when its axes are made equal.
-    depth: f64,
-    stream: Stream,
-}
-
-impl<'a> Ray<'a> {
-    /// A random one through one of the sections. `None` if it meets no fibre.
-    fn new(lines: &Lines, sections: &'a [Vec<DVec2>], index: usize) -> Option<Self> {
-        let mut stream = Stream::new(hash2(0xaf7e, index as u32));
-        let mut next = || f64::from(stream.next());
+/// Random ways, half of them onward and half back.
+fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
+    const RAYS: usize = 16_000;
+    const TURNS: usize = 4;
+    let mut stream = Stream::new(0xaf7e);
+    let mut next = || f64::from(stream.next());
+    let mut ways = Vec::with_capacity(2 * TURNS * RAYS);
+    for ray in 0..RAYS {
         let along = DVec2::from_angle(TAU * next());
         let offset = (2.0 * next() - 1.0) * (lines.reach(along.perp()) + lines.radius);
-        let line = Line { discs: &sections[index % sections.len()], along, offset };
+        let line = Line { discs: &sections[ray % sections.len()], along, offset };
         let mut hits = line.hits(lines);
-        let first = (0..hits.len()).min_by(|&a, &b| hits[a].enter.total_cmp(&hits[b].enter))?;
+        let Some(first) = (0..hits.len()).min_by(|&a, &b| hits[a].enter.total_cmp(&hits[b].enter)) else {
+            continue;
+        };
         hits.swap(0, first);
-        let [at, forth] = [hits[0].lies * along + offset * along.perp(), along].map(|v| lines.in_circle(v));
-        Some(Self { line, hits, depth: at.dot(forth) / forth.length(), stream })
-    }
-
-    /// How far along the line the first fibre lies that meets the share of the light which any does, as the model has it.
-    fn first_by_law(&self, lines: &Lines, ply: &PlyShape, share: f64) -> f64 {
-        let Line { discs, along, offset } = self.line;
-        let across = along.perp();
-        let (chord, from_axis, foot) = chord(lines, ply, offset * across, along);
-        let root = lines.stretch.sqrt();
-        let gaps = PlyGaps::new(ply.dead_zone(&chord, from_axis, (root * lines.reach(across)) as f32));
-        let tilt = lines.slopes.half_width(discs[self.hits[0].fiber], across);
-        let fibers = (tilt * lines.met(&chord)) as f32;
-        let before = gaps.fibers_passed(1.0 - share as f32 * (1.0 - gaps.unscattered(fibers))).min(fibers);
-        root * f64::from(foot - chord.place(if fibers > 0.0 { before / fibers } else { 0.0 }))
-    }
-
-    /// Ways out of the first fibre, which `lies` where the law has it, and of some of the others, which stand for all of these.
-    fn ways(mut self, lines: &Lines, ply: &PlyShape, lies: f64) -> Vec<Way> {
-        const TURNS: usize = 4;
-        const OTHERS: usize = 2;
-        let Self { line, hits, stream, .. } = &mut self;
-        let mut next = || f64::from(stream.next());
-        let mut ways = Vec::with_capacity(TURNS * (1 + OTHERS));
+        // Any other one stands for all but the first.
         let others = hits.len() - 1;
-        let drawn = if others == 0 { 0 } else { OTHERS };
-        for later in 0..=drawn {
-            let (index, weight) = match later {
-                0 => (0, 1.0),
-                _ => (1 + (next() * others as f64) as usize, others as f32 / drawn as f32),
-            };
-            let hit = &hits[index];
-            let lies = if later == 0 { lies } else { hit.lies };
+        let other = 1 + (next() * others as f64) as usize;
+        let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f32))];
+        for (later, hit) in looked_at.into_iter().enumerate() {
+            let Some((hit, weight)) = hit else { continue };
             for turn in 0..TURNS {
                 let turn = (turn as f64 + next()) / TURNS as f64 * TAU;
-                let w = DVec2::from_angle(turn).rotate(line.along);
-                let way = line.turned(lines, ply, (hit, lies, hits), later > 0, w);
+                let way = line.turned(lines, ply, (hit, &hits), later > 0, DVec2::from_angle(turn).rotate(along));
                 ways.extend(way.map(|way| Way { weight, ..way }));
             }
         }
-        ways
     }
-}
-
-/// Random ways, half of them onward and half back.
-///
-/// First fibres are met at other depths than the law has it ([`Ray::first_by_law`]). What is counted of one is set beside what the law says of a place
-/// that as many of its own lie before, so that the fit holds for the places at which the model has light leave.
-fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
-    const RAYS: usize = 16_000;
-    /// Of rays as far from the middle as these are, and in as many directions of a quarter.
-    const APART: usize = 16;
-    const DIRECTIONS: usize = 4;
-    let mut rays: Vec<_> = (0..RAYS).into_par_iter().filter_map(|index| Ray::new(lines, sections, index)).collect();
-    let kind = |ray: &Ray<'_>| {
-        let across = ray.line.along.perp();
-        let apart = ray.line.offset.abs() / (lines.reach(across) + lines.radius);
-        let direction = if lines.stretch == 1.0 { 0.0 } else { across.y.abs().asin() / FRAC_PI_2 };
-        let part = |of: f64, parts: usize| ((of * parts as f64) as usize).min(parts - 1);
-        part(direction, DIRECTIONS) * APART + part(apart, APART)
-    };
-    rays.sort_by_cached_key(kind);
-    let alike: Vec<_> = rays.chunk_by_mut(|a, b| kind(a) == kind(b)).collect();
-    let mut shares = Vec::with_capacity(RAYS);
-    for alike in alike {
-        alike.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        shares.extend((0..alike.len()).map(|rank| (rank as f64 + 0.5) / alike.len() as f64));
-    }
-    let of_rays = rays.into_par_iter().zip(shares).map(|(ray, share)| {
-        let lies = ray.first_by_law(lines, ply, share);
-        ray.ways(lines, ply, lies)
-    });
-    of_rays.collect::<Vec<_>>().concat()
+    ways
 }
 
 impl Line<'_> {
@@ -199,21 +124,13 @@ impl Line<'_> {
         self.discs.iter().enumerate().filter_map(hit).collect()
     }
 
-    /// The way of its light that is turned to a direction at one of them, the first or a `later` one, which `lies` so far along the line. `None` if it
-    /// begins outside of the ply.
-    fn turned(
-        &self,
-        lines: &Lines,
-        ply: &PlyShape,
-        (hit, lies, hits): (&Hit, f64, &[Hit]),
-        later: bool,
-        w: DVec2,
-    ) -> Option<Way> {
+    /// The way of its light that is turned to a direction at one of them, the first or a `later` one. `None` if it begins outside of the ply.
+    fn turned(&self, lines: &Lines, ply: &PlyShape, (hit, hits): (&Hit, &[Hit]), later: bool, w: DVec2) -> Option<Way> {
         let (along, across) = (self.along, self.along.perp());
         let at = |distance: f64| distance * along + self.offset * across;
         let turn = w.dot(along);
         // As the model has it: abreast of the fibre's centre, and from where the light came.
-        let from = at(lies) + FRAC_PI_4 * lines.radius * (turn.max(0.0) * w - along);
+        let from = at(hit.lies) + FRAC_PI_4 * lines.radius * (turn.max(0.0) * w - along);
         let (expected, offset) = ahead(lines, ply, from, w, (turn < 0.0).then_some(turn))?;
         let mut met = met(lines, self.discs, hit.fiber, at(hit.enter), w);
         let (mut open, mut is_open) = (1.0, true);
@@ -258,11 +175,16 @@ fn met(lines: &Lines, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> V
 /// The fibres, as circles, that light is expected to meet from a place in a direction, less those in the strip that it has swept if it was
 /// turned `back` by an angle of a cosine; and the distance of its way from the ply's axis. `None` if the place is outside and there are none.
 fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>) -> Option<(f64, f32)> {
-    if from.dot(w.perp()).abs() >= lines.reach(w.perp()) * (1.0 + lines.radius) {
+    let root = lines.stretch.sqrt();
+    let (beside, reach) = (from.dot(w.perp()), lines.reach(w.perp()));
+    if beside.abs() >= reach * (1.0 + lines.radius) {
         return None;
     }
-    let (chord, offset, foot) = chord(lines, ply, from, w);
-    let (root, thin) = (lines.stretch.sqrt(), lines.stretch.sqrt().recip() as f32);
+    // The middle of the line's way through the section.
+    let [from, to] = [from, w].map(|v| DVec2::new(v.x / root, v.y * root));
+    let foot = (-from.dot(to) / to.length_squared() / root) as f32;
+    let [offset, length, thin, wide] = [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
+    let chord = ply.chord(offset, length, thin, wide);
     let swept = |turn: f64| {
         let sine = (1.0 - turn * turn).max(0.0).sqrt() as f32;
         let strip = ClearedStrip::new(2.0 * thin * lines.radius as f32, [0.0, sine], [0.0, f32::INFINITY]);
@@ -270,17 +192,6 @@ fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>
     };
     let ahead = (chord.ahead(-foot) - back.map_or(0.0, swept)).max(0.0);
     Some((root * f64::from(ahead), offset))
-}
-
-/// The chord of a way from a place in a direction, its distance from the ply's axis, and how far along it is its middle.
-fn chord(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2) -> (ChordFibers, f32, f32) {
-    let root = lines.stretch.sqrt();
-    let (beside, reach) = (from.dot(w.perp()), lines.reach(w.perp()));
-    // The middle of the line's way through the section.
-    let [from, to] = [from, w].map(|v| lines.in_circle(v));
-    let foot = (-from.dot(to) / to.length_squared() / root) as f32;
-    let [offset, length, thin, wide] = [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
-    (ply.chord(offset, length, thin, wide), offset, foot)
 }
 
 /// What is counted of ways, and what the fit so far has of them: for each number of a row.
@@ -300,13 +211,6 @@ impl Sums {
         self.weight += weights;
         self.counted += weights * f32x8::splat(counted);
         self.fitted += weights * f32x8::splat(fitted);
-    }
-
-    fn add_all(&mut self, other: &Self) {
-        self.ways += other.ways;
-        self.weight += other.weight;
-        self.counted += other.counted;
-        self.fitted += other.fitted;
     }
 
     /// Those of one number.
@@ -400,11 +304,6 @@ impl Tables {
         }
     }
 
-    fn add_all(&mut self, other: &Self) {
-        let sums = self.0.as_flattened_mut().as_flattened_mut();
-        sums.iter_mut().zip(other.0.as_flattened().as_flattened()).for_each(|(sum, other)| sum.add_all(other));
-    }
-
     /// Brings what is asked nearer to what is counted; as if all of one turn were `alike`, or each for itself.
     fn improve(&self, after: &mut AfterFiber, asked: Asked, alike: bool) {
         let AfterFiber { first, later, back, back_later } = after;
@@ -471,7 +370,7 @@ mod tests {
             let lines = Lines { radius, stretch, slopes: Slopes::NONE };
             let mut ply = lines.ply(count);
             (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
-            (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
+            ply.regularity = packing.regularity as f32;
             let law = packing.after.unwrap();
             let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
             // By turns of 12 degrees: light that is out and fibres that are met, as they are and by the law.

@@ -98,12 +98,6 @@ impl Lines {
         if self.stretch == 1.0 { 1.0 } else { DVec2::new(root * across.x, across.y / root).length() }
     }
 
-    /// A vector of the section in the circle.
-    pub(super) fn in_circle(&self, v: DVec2) -> DVec2 {
-        let root = self.stretch.sqrt();
-        DVec2::new(v.x / root, v.y * root)
-    }
-
     /// What a line of a kind meets at a distance from the middle, its fibres counted as they are, and how much of the circle a unit
     /// of it passes.
     pub(super) fn chord(&self, ply: &PlyShape, kind: usize, offset: f64) -> (ChordFibers, f32) {
