@@ -40,7 +40,7 @@ pub struct PlyCrossing {
     /// Expected number of fibres on the chord.
     pub fibers: f32,
     /// How many more a unit of the chord meets where the ray comes in and where it goes out than on the mean, for the fibres' tilt
-    /// against the ray is not the same all along.
+    /// against the ray is not the same all along; over what it would be across the yarn, of which packings are measured.
     pub ends: [f32; 2],
     /// The gaps between them.
     pub gaps: PlyGaps,
@@ -228,9 +228,14 @@ impl Section<'_> {
         // Between two places where the unwound yarn's axes have turned, the straight line is shorter than w.
         let square = (cx * cx + cy * cy + cz * cz) / (wx * wx + wy * wy + wz * wz);
         let mean = (square.sqrt() * weights).reduce_add();
+        // The same of a ray across the yarn.
+        let (level, turned) = (wx * wx + wy * wy, wx * ty - wy * tx);
+        let mean_across = (((level + turned * turned) / level).sqrt() * weights).reduce_add();
         let at_end = |t: Vec2, w: Vec2, z: f32| {
+            let (level, turned) = (w.length_squared(), w.perp_dot(t));
             let (w, t) = (w.extend(z), t.extend(1.0));
-            (w.cross(t).length_squared() / w.length_squared()).sqrt() / mean
+            let square = w.cross(t).length_squared() / w.length_squared() * level / (level + turned * turned);
+            square.sqrt() * mean_across / mean
         };
         (mean * self.squeeze(), [at_end(ta, wa, za), at_end(tb, wb, zb)])
     }

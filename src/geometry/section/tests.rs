@@ -509,9 +509,12 @@ fn fibers_on_a_ray_lie_where_they_are_tilted_against_it() {
         for c in &crossings {
             const STEPS: usize = 400;
             let direction = section.direction();
+            // Packings are measured across the yarn.
+            let across = Vec3A::new(direction.x, direction.y, 0.0).normalize();
             let tilt = |share: f32| {
                 let depth = c.enter + (c.exit - c.enter) * share;
-                direction.cross(section.fiber_tangent(&shape, c.ply, section.point(depth), c.travel_at(depth))).length()
+                let t = section.fiber_tangent(&shape, c.ply, section.point(depth), c.travel_at(depth));
+                direction.cross(t).length() / across.cross(t).length()
             };
             let tilts: Vec<f32> = (0..STEPS).map(|k| tilt((k as f32 + 0.5) / STEPS as f32)).collect();
             let all: f32 = tilts.iter().sum();
@@ -527,7 +530,7 @@ fn fibers_on_a_ray_lie_where_they_are_tilted_against_it() {
             }
         }
     }
-    assert!(looks > 50_000.0 && most < 0.08 && off < 0.2 * even, "{} {most}, evenly {}", off / looks, even / looks);
+    assert!(looks > 50_000.0 && most < 0.08 && off < 0.25 * even, "{} {most}, evenly {}", off / looks, even / looks);
 }
 
 #[test]
