@@ -480,7 +480,7 @@ fn fringes_are_as_long_as_they_are_asked_to_be() {
 fn yarns_of_a_fringe_keep_apart() {
     for name in ["plain", "twill 2/2", "satin 5", "huck", "basket 2", "double cloth"] {
         let of = |edges| overlap_of(&Weave { edges, flatten: 1.5, ..weave(name) }.strands().unwrap());
-        let (cut, fringed) = (of(Edges::Live), of(Edges::Fringe(20.0)));
+        let (cut, fringed) = (of(Edges::Selvedge), of(Edges::Fringe(20.0)));
         assert!(
             fringed.share < cut.share + 0.05 && fringed.nearest > cut.nearest - 0.12,
             "{name}: {cut:?} {fringed:?}"
