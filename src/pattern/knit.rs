@@ -54,6 +54,13 @@ pub enum Form {
     Revolution(Vec<DVec2>),
 }
 
+impl Form {
+    /// Whether its rows are rounds, of which one goes on as the next.
+    pub(crate) fn is_round(&self) -> bool {
+        *self != Self::Flat
+    }
+}
+
 /// How a piece begins and ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Edges {
@@ -259,12 +266,12 @@ impl Knit {
     }
 
     fn has_slipped_sides(&self) -> bool {
-        self.edges == Edges::Slipped && self.form == Form::Flat
+        self.edges == Edges::Slipped && !self.form.is_round()
     }
 
     /// Whether a flat piece with sides has tucks, which come to them.
     fn has_tucks(&self) -> bool {
-        self.is_finished() && self.form == Form::Flat && self.chart.has_tucks()
+        self.is_finished() && !self.form.is_round() && self.chart.has_tucks()
     }
 
     fn is_double(&self) -> bool {
@@ -280,7 +287,7 @@ impl Knit {
         let slipped = self.edges == Edges::Slipped;
         let plain = Chart::named("stockinette").is_some_and(|plain| plain == self.chart);
         let wrong = match &self.colors {
-            _ if slipped && self.form != Form::Flat => {
+            _ if slipped && self.form.is_round() => {
                 ("what is knitted round has no sides to slip", "edges = \"finished\"")
             }
             Some(_) if slipped => (
@@ -303,7 +310,7 @@ impl Knit {
                 _ => return Ok(()),
             },
             _ if self.flat => return Ok(()),
-            _ if self.form != Form::Flat || self.edges == Edges::Tile => {
+            _ if self.form.is_round() || self.edges == Edges::Tile => {
                 ("only flat pieces with edges are blocked or curl", "leave out `flat`")
             }
             _ if self.repeat().is_none() => {

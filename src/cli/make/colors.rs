@@ -7,7 +7,7 @@ use clap::Args;
 use crate::{
     cli::{Failure, named, two},
     math::srgb::srgb_to_linear,
-    pattern::knit::{CARRY_ROWS, CATCH_FLOATS, Colors, Form, Knit, Work},
+    pattern::knit::{CARRY_ROWS, CATCH_FLOATS, Colors, Knit, Work},
     scene::{
         motif::{Cells, FITS, Motif, REPEATS, WrongRow, wrong_row, wrong_sign},
         palette::hex,
@@ -94,7 +94,7 @@ impl ColorArgs {
         let yarns: Vec<usize> = (0..colors.len()).collect();
         // Where the motif is not, the yarn of its first sign is.
         let cells = motif.cells([widest as f32, widths.len() as f32], &yarns, 0).map_err(|problem| wrong(&problem))?;
-        if piece.form != Form::Flat {
+        if piece.form.is_round() {
             cells.breaks_in_rounds(&widths).iter().for_each(|told| tell(told));
         }
         let (rows, order) = cells.colors(&widths);

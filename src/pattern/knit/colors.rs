@@ -42,7 +42,7 @@ impl Work {
     /// # Errors
     /// What is wrong, and what to do.
     pub(crate) fn suits(self, form: &Form) -> Result<(), [&'static str; 2]> {
-        if self == Self::Intarsia && *form != Form::Flat {
+        if self == Self::Intarsia && form.is_round() {
             let hint = "in the round yarns would hang at the wrong side of their fields: \"stranded\"";
             return Err(["intarsia is knitted flat", hint]);
         }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{
     super::chart::{Act, ChartError, Stitch, binds_from_right, gaps},
-    Form, Knit, short_rows,
+    Knit, short_rows,
 };
 
 /// What is wrong with a gap, and what to do.
@@ -26,9 +26,9 @@ pub(super) fn check(rows: &[Vec<Stitch>], knit: &Knit) -> Result<(), ChartError>
     if short_rows::any(rows) {
         return wrong(first, (does("beside short rows"), "leave out `bo` and `co`, or `-`".to_owned()));
     }
-    let first = knit.form == Form::Flat && binds_from_right(rows);
+    let first = !knit.form.is_round() && binds_from_right(rows);
     for (r, row) in rows.iter().enumerate() {
-        let backwards = knit.form == Form::Flat && (r % 2 == 1) != first;
+        let backwards = !knit.form.is_round() && (r % 2 == 1) != first;
         for gap in gaps(row) {
             if let Some(found) = held(row, r, &gap, backwards, knit).or_else(|| closed(rows, r, &gap, knit)) {
                 return wrong(r, found);
@@ -43,7 +43,7 @@ fn held(row: &[Stitch], r: usize, gap: &Range<usize>, backwards: bool, knit: &Kn
     let next = if backwards { gap.start.checked_sub(1) } else { Some(gap.end) };
     let way = if backwards { "right to left" } else { "left to right" };
     match next.and_then(|j| row.get(j)) {
-        None if knit.form != Form::Flat => {
+        None if knit.form.is_round() => {
             let problem = format!("row {} binds off its last stitch, and nothing is left to pass it over", r + 1);
             Some((problem, "begin the rounds elsewhere, so that stitches are left on both sides".to_owned()))
         }
@@ -64,7 +64,7 @@ fn held(row: &[Stitch], r: usize, gap: &Range<usize>, backwards: bool, knit: &Kn
 
 /// What is wrong with what is above a gap.
 fn closed(rows: &[Vec<Stitch>], r: usize, gap: &Range<usize>, knit: &Knit) -> Option<Wrong> {
-    let (row, is_round) = (&rows[r], knit.form != Form::Flat);
+    let (row, is_round) = (&rows[r], knit.form.is_round());
     if gap.start == 0 && is_round {
         let problem = format!("round {} binds off its first stitch", r + 1);
         return Some((problem, "begin the rounds elsewhere, so that stitches are left on both sides".to_owned()));

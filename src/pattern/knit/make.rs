@@ -171,7 +171,7 @@ impl Knit {
 
     /// The ways of its yarns through its rows, of which the first may go from right to left.
     pub(super) fn ways(&self, rows: &[Vec<Stitch>], from_right: bool) -> Vec<Way> {
-        let (finished, round) = (self.is_finished(), self.form != Form::Flat);
+        let (finished, round) = (self.is_finished(), self.form.is_round());
         let one = || Colors { rows: vec![vec![0]; self.rows as usize], work: Work::Stranded, catch: None, carry: 0 };
         let mut ways = self.colors.as_ref().unwrap_or(&one()).ways(finished, round);
         if from_right || short_rows::any(rows) {
@@ -195,7 +195,7 @@ impl Knit {
 
     /// What is drawn through what, in all colours, where yarns go through the rows on these ways.
     fn loops(&self, rows: &[Vec<Stitch>], ways: &[Way], mirrored: bool) -> Loops {
-        let round = self.form != Form::Flat;
+        let round = self.form.is_round();
         let border = Border {
             round: round.then_some(1.0),
             stacked: false,

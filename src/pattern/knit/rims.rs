@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::{
     super::chart::{ChartError, Stitch},
-    Form, Knit,
+    Knit,
 };
 
 /// How a piece is cast on.
@@ -63,7 +63,7 @@ fn ring(count: usize) -> f64 {
 /// What cannot be drawn together: flat pieces, open edges, too many loops, a tube that is too short.
 pub(super) fn drawn(knit: &Knit, given: Option<Vec<DVec2>>, rows: &[Vec<Stitch>]) -> Result<Vec<DVec2>, ChartError> {
     let wrong = |problem: String, hint: &str| Err(ChartError::new(None, problem, hint));
-    if knit.form == Form::Flat || !knit.is_finished() {
+    if !knit.form.is_round() || !knit.is_finished() {
         let problem = "only the last row of a finished tube or revolution is drawn together";
         return wrong(problem.to_owned(), "top = \"bound-off\", or another `form` and `edges = \"finished\"`");
     }

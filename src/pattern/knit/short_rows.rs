@@ -5,7 +5,7 @@
 
 use super::{
     super::chart::{Act, ChartError, Stitch, binds_from_right},
-    Form, Knit,
+    Knit,
     colors::Way,
 };
 
@@ -94,7 +94,7 @@ fn is_plain(stitch: &Stitch) -> bool {
 pub(super) fn turned(rows: &mut [Vec<Stitch>], knit: &Knit) -> Result<(), ChartError> {
     let Some(short) = rows.iter().position(|row| row.iter().any(|s| s.act == Act::Unworked)) else { return Ok(()) };
     let wrong = |Wrong { row, problem, hint }: Wrong| ChartError::new(Some(knit.chart.line_of(row)), problem, hint);
-    if knit.form != Form::Flat {
+    if knit.form.is_round() {
         let problem = format!("row {} leaves stitches unworked in the round", short + 1);
         return Err(wrong(Wrong {
             row: short,

@@ -204,12 +204,12 @@ impl Sizes {
                 Ok((repeats.min((MOST / of).max(least)) * of) as u32)
             };
             // Whole repeats, where rows do not fit otherwise or must close to a ring or a tile.
-            let whole = knit.form != Form::Flat || !knit.chart.is_plain() || knit.edges == Edges::Tile;
+            let whole = knit.form.is_round() || !knit.chart.is_plain() || knit.edges == Edges::Tile;
             let wide = knit.chart.even_width(10_000).filter(|_| whole).unwrap_or(1);
             let high = if knit.edges == Edges::Tile { knit.chart.rows() } else { 1 };
             if let Some(width) = open[0] {
                 // A ring of fewer cannot be laid.
-                let least = if knit.form == Form::Flat { 1 } else { FEWEST_ROUND };
+                let least = if knit.form.is_round() { FEWEST_ROUND } else { 1 };
                 knit.stitches = count(across, width, stitch[0], wide, least)?;
             }
             if let Some(height) = open[1] {
@@ -316,7 +316,7 @@ impl Knit {
             let problem = format!("more than 2^{} control points", MAX_POINTS.ilog2());
             return Err(misfit(problem, "fewer stitches, rows or points"));
         }
-        if self.form != Form::Flat && self.stitches < FEWEST_ROUND {
+        if self.form.is_round() && self.stitches < FEWEST_ROUND {
             let problem = format!("knitting in the round takes at least {FEWEST_ROUND} stitches");
             return Err(misfit(problem, "fewer are knitted flat"));
         }

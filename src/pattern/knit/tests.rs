@@ -274,7 +274,7 @@ fn each_colour_is_a_yarn_whose_floats_are_on_the_back() {
         eprintln!("{form:?}: {found:?}");
         assert!(found.share <= 0.02, "{form:?}: {found:?}");
         let radius = 16.0 * made.gauge[0] / TAU;
-        let depth = |p: &DVec3| if form == Form::Flat { p.z } else { p.x.hypot(p.z) - radius };
+        let depth = |p: &DVec3| if form.is_round() { p.x.hypot(p.z) - radius } else { p.z };
         // From round to round no yarn crosses the inside of a tube.
         let points = made.strands.iter().flat_map(|strand| &strand.curve.points);
         let deepest = points.map(depth).fold(0.0, f64::min);

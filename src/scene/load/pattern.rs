@@ -73,7 +73,7 @@ impl KnitPlan {
 
     /// Whether its rows go round.
     pub(super) fn is_round(&self) -> bool {
-        self.knit.form != Form::Flat
+        self.knit.form.is_round()
     }
 
     /// Tells if yarns run into each other.
@@ -337,7 +337,7 @@ fn counted(
     let yarn = yarns.thickness(flatten(table));
     let edges = table.one_of_or("edges", Edges::Finished, &Edges::NAMES);
     let tile = table.bool_or("tile", false);
-    if tile && (table.has("edges") || form.as_ref().is_some_and(|f| *f != Form::Flat)) {
+    if tile && (table.has("edges") || form.as_ref().is_some_and(Form::is_round)) {
         table.error_at("tile", "a tile is flat and has no edges", Some("leave out `edges` and `form`"));
     }
     let edges = if tile { Edges::Tile } else { edges };

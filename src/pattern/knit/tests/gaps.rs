@@ -43,7 +43,7 @@ fn undrawn(piece: &Knit) -> (Vec<String>, usize) {
     let (mut wrong, mut count) = (Vec::new(), 0);
     let first = binds_from_right(&rows);
     for (r, row) in rows.iter().enumerate().skip(1) {
-        let backwards = piece.form == Form::Flat && (r % 2 == 1) != first;
+        let backwards = !piece.form.is_round() && (r % 2 == 1) != first;
         for (k, s) in row.iter().enumerate().skip(2).take(row.len() - 4) {
             let own = (r as i32, k as i32);
             let (below, parent) = (r as i32 - 1, s.first_parent as i32);
