@@ -439,24 +439,25 @@ fn shaped_charts_are_knitted_once_and_tell_their_widths() {
 fn make_knit_warns_as_a_scene_does() {
     let folder = directory();
     let d = folder.path();
-    let cable = "12/12lc";
-    let size = "stitch_width = 3, row_height = 2.2";
-    let source = format!("{{ type = \"knit\", stitches = 24, rows = 8, chart = [\"8: k24\", \"{cable}\"], {size} }}");
+    // What is cut off.
+    let source = "{ type = \"knit\", stitches = 6, rows = 8, chart = [\"8: k6\", \"p6\"] }";
     write(d, "s.toml", format!("[[fabric]]\nyarn = \"wool\"\nsource = {source}\n"));
     let of_scene = yarnray(d, &["info", "s.toml"]).good().stdout;
-    let made = ["make", "knit", "--stitches", "24", "--chart", "8: k24", "--chart", cable, "-o", "a.bcc"];
-    let made = [&made[..], &["--stitch-width", "3", "--row-height", "2.2"]].concat();
-    let told = yarnray(d, &[&made[..], &["--rows", "8"]].concat()).good().stderr;
+    let made = ["make", "knit", "--stitches", "6", "--rows", "8", "--chart", "8: k6", "--chart", "p6", "-o", "a.bcc"];
+    let told = yarnray(d, &made).good().stderr;
     let cut_off = "8 rows are knitted of a chart of 9";
     assert!(
         told.contains(&format!("warning: {cut_off}\n")) && of_scene.contains(&format!("knit: {cut_off}\n")),
         "{told}"
     );
-    let told = yarnray(d, &[&made[..], &["--rows", "12"]].concat()).good().stderr;
+    let quiet = yarnray(d, &[&made[..], &["--quiet"]].concat()).good().stderr;
+    assert!(quiet.is_empty(), "{quiet}");
+    // What finds no room.
+    let made = ["make", "knit", "--stitches", "24", "--rows", "12", "--chart", "8: k24", "--chart", "12/12lc"];
+    let size = ["--stitch-width", "3", "--row-height", "2.2", "-o", "b.bcc"];
+    let told = yarnray(d, &[&made[..], &size].concat()).good().stderr;
     assert!(told.contains("warning: ") && told.contains("% of the yarn overlaps, by up to"), "{told}");
     assert!(told.contains("24 stitches change places in a row"), "{told}");
-    let quiet = yarnray(d, &[&made[..], &["--rows", "8", "--quiet"]].concat()).good().stderr;
-    assert!(quiet.is_empty(), "{quiet}");
 }
 
 /// The yarn of a weave is that of its file: selvedges, hems and fringes take some too.
