@@ -60,6 +60,13 @@ pub(super) struct Run {
     pub(super) calm: f64,
 }
 
+impl Run {
+    /// That by which yarns of a piece, which begin so thin, find room beside each other.
+    pub(super) fn finding_room(steps: usize, thin: f64) -> Self {
+        Self { steps, growing: steps / 3, thin, free: [false; 2], load: DVec2::ZERO, press: 0.0, firm: 2.0, calm: 0.02 }
+    }
+}
+
 /// Stiffness against stretching: a yarn under the forces of a loop becomes longer by about a hundredth.
 const STRETCH: f64 = 80.0;
 /// Stiffness of contact, for each pair of segments.

@@ -249,10 +249,10 @@ impl Knit {
     /// Lets yarns of a radius, in units, find room: at the edges where the rest repeats, else everywhere.
     fn relax(&self, layout: &Layout, threads: &mut [Thread], radius: f64) {
         if layout.even {
-            settle(threads, &finding_room(EDGE_STEPS, 0.6));
+            settle(threads, &Run::finding_room(EDGE_STEPS, 0.6));
             return;
         }
-        let run = finding_room(PIECE_STEPS, 0.8);
+        let run = Run::finding_room(PIECE_STEPS, 0.8);
         settle(threads, &run);
         threads.iter_mut().for_each(|t| t.refine(f64::from(self.points) / f64::from(layout.points)));
         let run = Run { growing: 0, ..run };
@@ -312,11 +312,6 @@ fn strand(index: usize, points: Vec<DVec3>, coordinates: Vec<[f32; 2]>) -> Patte
     }
 }
 
-/// How the yarns of a piece relax, which begin so thin.
-fn finding_room(steps: usize, thin: f64) -> Run {
-    Run { steps, growing: steps / 3, thin, free: [false; 2], load: DVec2::ZERO, press: 0.0, firm: 2.0, calm: 0.02 }
-}
-
 /// Lays a piece as it curls; then its yarns find room.
 fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3) {
     if curl.is_flat() {
@@ -326,5 +321,5 @@ fn roll_up(threads: &mut [Thread], curl: &Curl, to_middle: DVec3) {
         thread.points.iter_mut().for_each(|p| *p = curl.place(*p + to_middle) - to_middle);
         thread.state.fill(State::Move);
     }
-    settle(threads, &Run { growing: 0, ..finding_room(PIECE_STEPS, 1.0) });
+    settle(threads, &Run { growing: 0, ..Run::finding_room(PIECE_STEPS, 1.0) });
 }

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{Cloth, PatternStrand, StrandKind, strand};
 use crate::{
@@ -166,8 +166,7 @@ pub(super) fn fringe(cloth: &Cloth<'_>, strands: &mut [PatternStrand], length: f
 /// Lets yarns of a radius that are held where they begin find room beside each other.
 fn find_room(ways: &mut [Vec<Point>], radius: f64) {
     const STEPS: usize = 300;
-    /// How many of their points have the thickness and the place that the cloth gives them.
-    const HELD: usize = 1;
+    const THIN: f64 = 0.3;
     let unit = 2.0 * radius;
     let mut rods = Rods::default();
     for way in ways.iter() {
@@ -175,20 +174,11 @@ fn find_room(ways: &mut [Vec<Point>], radius: f64) {
         for (k, point) in way.iter().enumerate() {
             rods.points.push(point.0 / unit);
             rods.rest.push(way.get(k + 1).map_or(1e-3, |next| point.0.distance(next.0) / unit));
-            rods.fixed.push(k < HELD);
+            rods.fixed.push(k == 0);
         }
         rods.strands.push(Strand { start, count: way.len(), jump: None });
     }
-    rods.relax(&Run {
-        steps: STEPS,
-        growing: STEPS / 3,
-        thin: 0.3,
-        free: [false; 2],
-        load: DVec2::ZERO,
-        press: 0.0,
-        firm: 2.0,
-        calm: 0.02,
-    });
+    rods.relax(&Run::finding_room(STEPS, THIN));
     for (point, at) in ways.iter_mut().flatten().zip(&rods.points) {
         point.0 = *at * unit;
     }
