@@ -33,7 +33,7 @@ pub(super) use self::pressed::{Alike, flatten_where_touching};
 pub use self::{
     colors::{CARRY_ROWS, CATCH_FLOATS, Colors, Work},
     rims::{CastOn, Closing, Rims},
-    size::{Extent, Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, YARNS_PER_STITCH, fits_stitch},
+    size::{Measures, Misfit, ROW_HEIGHTS, STITCH_WIDTHS, Sizes, Thickness, YARNS_PER_STITCH, fits_stitch},
 };
 use super::{
     PatternStrand,

@@ -16,8 +16,8 @@ use crate::{
     pattern::{
         PatternStrand,
         chart::{Chart, PATTERNS},
-        knit::{self, CastOn, Closing, Edges, Extent, Form, Knit, Knitted, Misfit, Rims, Sizes, Thickness},
-        knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
+        knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Measures, Misfit, Rims, Sizes, Thickness},
+        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS, WrittenEnd},
     },
     scene::{Yarn, load::read_text},
 };
@@ -132,13 +132,13 @@ struct Charted {
     chart: Chart,
     stitches: u32,
     rows: u32,
-    /// How high the piece is to be by its instructions, mm, and after how many rows it may end.
-    written: (Option<f64>, Option<EveryFew>),
+    /// When the piece ends by its instructions.
+    end: WrittenEnd,
 }
 
 /// The chart of written instructions, or of those in a file whose name stands behind `@`, over so many stitches or as many as
 /// they cast on; what they repeat without an end, for at least so many rows, or as far as it may have to go.
-fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Charted, Failure> {
+fn written(text: &str, stitches: Option<u32>, asked: Option<u32>) -> Result<Charted, Failure> {
     let (text, name) = match text.strip_prefix('@') {
         None => (text.to_owned(), "--instructions".to_owned()),
         Some(path) => {
@@ -152,17 +152,10 @@ fn written(text: &str, stitches: Option<u32>, least: Option<u32>) -> Result<Char
     };
     let read = Instructions::read(&text).map_err(told)?;
     let stitches = stitches.or(read.cast_on()).unwrap_or(knit::COUNT);
-    let count = read.ending().map_or(knit::COUNT, |ending| ending.from(knit::COUNT));
-    let worked = match least {
-        Some(least) => read.work_rows(stitches, least as usize),
-        None if read.height().is_some() => read.work(stitches, MANY_ROWS as usize),
-        None => read.work(stitches, count as usize),
-    };
-    let worked = worked.map_err(told)?;
-    let rows = if worked.whole { worked.rows.len() as u32 } else { count };
+    let (worked, rows) = read.work_piece(stitches, asked, knit::COUNT).map_err(told)?;
     let parsed = Chart::parse(&worked.rows);
     let chart = parsed.map_err(|error| Failure::hinted(format!("{name}: {}", error.problem), error.hint))?;
-    Ok(Charted { chart, stitches, rows, written: (read.height(), read.ending()) })
+    Ok(Charted { chart, stitches, rows, end: read.end() })
 }
 
 impl KnitArgs {
@@ -171,11 +164,11 @@ impl KnitArgs {
         let form = self.form(yarn.radius)?;
         let by_itself = |chart| {
             let rows = Knit::rows_of(&chart, &form, !self.chart.is_empty());
-            Charted { chart, stitches: knit::COUNT, rows, written: (None, None) }
+            Charted { chart, stitches: knit::COUNT, rows, end: WrittenEnd::default() }
         };
-        let Charted { chart, stitches, rows, written } = if let Some(text) = &self.instructions {
-            let least = self.rows.or(self.size.height.map(|_| MANY_ROWS));
-            written(text, self.stitches, least)?
+        let Charted { chart, stitches, rows, end } = if let Some(text) = &self.instructions {
+            let asked = self.rows.or(self.size.height.map(|_| MANY_ROWS));
+            written(text, self.stitches, asked)?
         } else if self.chart.is_empty() {
             let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
             by_itself(chart.ok_or_else(|| wrong(&"unknown pattern"))?)
@@ -199,7 +192,7 @@ impl KnitArgs {
         if piece.edges == Edges::Live && piece.rims != Rims::default() {
             return Err(wrong(&"open loops have neither --cast-on nor --top; --edges finished has"));
         }
-        let piece = self.sized(&piece, yarn, written)?;
+        let piece = self.sized(&piece, yarn, end)?;
         piece.check_counts().map_err(told)?;
         Ok(piece)
     }
@@ -214,7 +207,7 @@ impl KnitArgs {
     }
 
     /// The piece in the size that is asked for, or as high as its instructions say.
-    fn sized(&self, piece: &Knit, yarn: &Thickness, written: (Option<f64>, Option<EveryFew>)) -> Result<Knit, Failure> {
+    fn sized(&self, piece: &Knit, yarn: &Thickness, end: WrittenEnd) -> Result<Knit, Failure> {
         let SizeArgs { gauge, width, height, circumference } = self.size;
         let mut sizes = Sizes {
             stitch: gauge.map(|g| g.map(|n| 100.0 / n)),
@@ -224,7 +217,7 @@ impl KnitArgs {
             counted: [self.stitches, self.rows].map(|count| count.is_some()),
             ending: None,
         };
-        sizes.or_written(written, Some(&piece.form), self.tile);
+        sizes.or_written(end, Some(&piece.form), self.tile);
         let measured = [self.stitch_width, self.row_height].map(|size| size.is_some());
         if let Some(clash) = sizes.clashes(Some(&piece.form), measured, spelled).into_iter().next() {
             return Err(told(clash));
@@ -276,7 +269,7 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     if !args.output.quiet {
         let Knit { rows, form, .. } = &piece;
         let [width, height] = gauge;
-        let Extent { stitches, across, up } = piece.extent(gauge);
+        let Measures { stitches, across, up } = piece.measures(gauge);
         let (stitches, period) = (from_to(stitches.map(|n| n.to_string())), across[1]);
         let across = from_to(across.map(|length| format!("{length:.3}")));
         log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));

@@ -8,7 +8,11 @@ use glam::DVec2;
 use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
 use crate::{
     math::words,
-    pattern::{MAX_POINTS, knitspeak::EveryFew, revolution::Revolution},
+    pattern::{
+        MAX_POINTS,
+        knitspeak::{EveryFew, WrittenEnd},
+        revolution::Revolution,
+    },
 };
 
 /// Sizes that a knit was given, mm.
@@ -30,7 +34,7 @@ pub struct Sizes {
 
 /// How large a piece is: its narrowest and its widest row, and its height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
+pub struct Measures {
     /// Stitches of the row that has the fewest, what is cast on among them, and of that which has the most.
     pub stitches: [u32; 2],
     /// Width of the narrowest and of the widest row, or the way round there.
@@ -108,10 +112,10 @@ const MOST: f64 = 1e6;
 impl Sizes {
     /// As high as written instructions say, mm, where nothing else says how many rows there are: neither a height, nor a count, nor a
     /// profile, nor a tile; and with the row as the last that they say.
-    pub fn or_written(&mut self, (height, ending): (Option<f64>, Option<EveryFew>), form: Option<&Form>, tile: bool) {
+    pub fn or_written(&mut self, end: WrittenEnd, form: Option<&Form>, tile: bool) {
         if !self.counted[1] && !tile && matches!(form, Some(Form::Flat | Form::Tube)) {
-            self.height = self.height.or(height);
-            self.ending = ending;
+            self.height = self.height.or(end.height);
+            self.ending = end.ending;
         }
     }
 
@@ -289,7 +293,7 @@ impl Form {
 
 impl Knit {
     /// How large it is, where stitches have this width and rows this distance.
-    pub fn extent(&self, [width, height]: [f64; 2]) -> Extent {
+    pub fn measures(&self, [width, height]: [f64; 2]) -> Measures {
         let widths = self.widths().unwrap_or_default();
         let [fewest, most] = widths.iter().fold([self.stitches; 2], |[a, b], &row| [a.min(row), b.max(row)]);
         let (across, up) = match &self.form {
@@ -303,7 +307,7 @@ impl Knit {
                 ([fewest, most].map(|stitches| f64::from(stitches) * width), f64::from(self.rows) * height)
             }
         };
-        Extent { stitches: [fewest, most], across, up }
+        Measures { stitches: [fewest, most], across, up }
     }
 
     /// Whether so many stitches and rows can be knitted in this form.

@@ -74,6 +74,15 @@ pub struct Instructions {
     ends: bool,
 }
 
+/// When a piece ends that is repeated without another end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WrittenEnd {
+    /// How high it is to be, mm: [`Instructions::height`].
+    pub height: Option<f64>,
+    /// After how many rows it may end: [`Instructions::ending`].
+    pub ending: Option<EveryFew>,
+}
+
 /// Rows of a chart, as instructions make them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Worked {
@@ -116,6 +125,27 @@ impl Instructions {
     /// After how many rows repeats without an end may stop, if they say which row is the last.
     pub fn ending(&self) -> Option<EveryFew> {
         self.ending.filter(|_| self.again.as_ref().is_some_and(|again| again.until == Until::Open))
+    }
+
+    /// Both.
+    pub fn end(&self) -> WrittenEnd {
+        WrittenEnd { height: self.height(), ending: self.ending() }
+    }
+
+    /// Works a piece: of so many rows, if they are `asked` for, or so high as its text says, or of so many as charts have `otherwise`; and
+    /// tells how many rows it has unless they are asked for.
+    ///
+    /// # Errors
+    /// As [`Self::work`].
+    pub fn work_piece(&self, cast_on: u32, asked: Option<u32>, otherwise: u32) -> Result<(Worked, u32)> {
+        let rows = self.ending().map_or(otherwise, |ending| ending.from(otherwise));
+        let worked = match asked {
+            Some(asked) => self.work_rows(cast_on, asked as usize)?,
+            None if self.height().is_some() => self.work(cast_on, MANY_ROWS as usize)?,
+            None => self.work(cast_on, rows as usize)?,
+        };
+        let rows = if worked.whole { worked.rows.len() as u32 } else { rows };
+        Ok((worked, rows))
     }
 
     /// Works them over so many stitches. What they tell to repeat without an end, and does not repeat from the first row on

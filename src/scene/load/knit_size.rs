@@ -5,7 +5,7 @@ use crate::{
     input::diagnostic::Span,
     pattern::{
         knit::{Form, Knit, Sizes, Thickness},
-        knitspeak::EveryFew,
+        knitspeak::WrittenEnd,
     },
 };
 
@@ -48,8 +48,8 @@ impl GivenSizes {
     }
 
     /// The height that written instructions say, mm, and after how many rows they may end, where no key says how many there are.
-    pub(super) fn or_written(&mut self, written: (Option<f64>, Option<EveryFew>), form: Option<&Form>, tile: bool) {
-        self.sizes.or_written(written, form, tile);
+    pub(super) fn or_written(&mut self, end: WrittenEnd, form: Option<&Form>, tile: bool) {
+        self.sizes.or_written(end, form, tile);
     }
 
     /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.

@@ -17,8 +17,8 @@ use crate::{
     math::words::from_to,
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
-        knit::{self, CastOn, Closing, Colors, Edges, Extent, Form, Knit, Knitted, Rims, Thickness, Work},
-        knitspeak::{EveryFew, Instructions, KnitSpeakError, MANY_ROWS},
+        knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Measures, Rims, Thickness, Work},
+        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS, WrittenEnd},
     },
 };
 
@@ -48,7 +48,7 @@ impl KnitPlan {
     fn origin(&self, made: &Knitted) -> String {
         let [across, up] = made.gauge.map(|mm| 100.0 / mm);
         let Knit { rows, form, .. } = &self.knit;
-        let Extent { stitches, across: size, up: height } = self.knit.extent(made.gauge);
+        let Measures { stitches, across: size, up: height } = self.knit.measures(made.gauge);
         let (stitches, width) = (from_to(stitches.map(|n| n.to_string())), from_to(size.map(|mm| format!("{mm:.0}"))));
         let size = match form {
             Form::Flat if self.knit.edges == Edges::Tile => format!(", period {:.4} x {height:.4} mm", size[1]),
@@ -141,8 +141,8 @@ pub(super) struct Charted {
     /// Stitches to cast on and rows to knit unless asked otherwise.
     stitches: u32,
     rows: u32,
-    /// How high the piece is to be by its instructions, mm, and after how many rows it may end.
-    written: (Option<f64>, Option<EveryFew>),
+    /// When the piece ends by its instructions.
+    end: WrittenEnd,
 }
 
 impl Charted {
@@ -153,7 +153,7 @@ impl Charted {
             lines: Vec::new(),
             stitches: knit::COUNT,
             rows: knit::COUNT,
-            written: (None, None),
+            end: WrittenEnd::default(),
         }
     }
 }
@@ -240,16 +240,11 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     let Ok(read) = Instructions::read(text).map_err(told) else { return charted };
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
-    charted.written = (read.height(), read.ending());
-    charted.rows = read.ending().map_or(charted.rows, |ending| ending.from(charted.rows));
-    let least = if table.has("height") || read.height().is_some() { MANY_ROWS } else { charted.rows };
-    let least = table.u64_or("rows", least.into(), 1..=1_000_000) as usize;
-    let asked = table.has("rows") || table.has("height");
-    let worked = if asked { read.work_rows(stitches, least) } else { read.work(stitches, least) };
-    let Ok(worked) = worked.map_err(told) else { return charted };
-    if worked.whole {
-        charted.rows = worked.rows.len() as u32;
-    }
+    charted.end = read.end();
+    let rows = table.u64_or("rows", MANY_ROWS.into(), 1..=1_000_000) as u32;
+    let asked = (table.has("rows") || table.has("height")).then_some(rows);
+    let Ok((worked, rows)) = read.work_piece(stitches, asked, knit::COUNT).map_err(told) else { return charted };
+    charted.rows = rows;
     charted.chart =
         Chart::parse(&worked.rows).map_err(|e| table.error_at("instructions", e.problem, Some(&e.hint))).ok();
     charted
@@ -280,7 +275,7 @@ pub(super) fn knit(
         _ => charted.rows,
     };
     let mut sizes = GivenSizes::read(table, Some(fabric), context, &form);
-    sizes.or_written(charted.written, form.as_ref(), table.has("tile"));
+    sizes.or_written(charted.end, form.as_ref(), table.has("tile"));
     counted(table, yarns, Charted { rows, ..charted }, form, sizes)
 }
 
