@@ -76,12 +76,10 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     let stem = args.suite.file_stem().map_or("suite".into(), |stem| stem.to_string_lossy().into_owned());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
-    let names = ["table.md", "table.csv", "table.json", "rows/x", "cache/x", "report.html"];
-    let names = &names[..if suite.measure == Measure::Fidelity { 5 } else { 6 }];
-    Files::default()
-        .reads("SUITE", [&args.suite])
-        .writes("-o", &names.iter().map(|name| out.join(name)).collect::<Vec<_>>())
-        .check(args.quiet)?;
+    let page = (suite.measure != Measure::Fidelity).then_some("report.html");
+    let names = ["table.md", "table.csv", "table.json", "rows/x", "cache/x"].into_iter().chain(page);
+    let written: Vec<PathBuf> = names.map(|name| out.join(name)).collect();
+    Files::default().reads("SUITE", [&args.suite]).writes("-o", &written).check(args.quiet)?;
     let threads = args.threads.map(|threads| threads as usize);
     let interrupt = interrupt_flag();
     let say = |text: &str| {
@@ -119,8 +117,8 @@ fn run_fidelity(
     say: impl FnMut(&str),
 ) -> Result<(), Failure> {
     let write = |table: &FidelityTable| {
-        let texts = [table.to_markdown(), table.to_csv(), table.to_json()];
-        write_all(out, ["table.md", "table.csv", "table.json"].into_iter().zip(texts))
+        let texts = [("table.md", table.to_markdown()), ("table.csv", table.to_csv()), ("table.json", table.to_json())];
+        write_all(out, texts)
     };
     let saved = |table: &FidelityTable| write(table).map_err(as_bench_error);
     let table = fidelity::run(suite, processes, out, say, saved)?;

@@ -222,12 +222,7 @@ impl HemLine {
         let within = (1.0 - 1e-6) * width;
         let inward = edge.border.direction().perp();
         let mut near = self.tree.locate_within_distance(at.to_array(), within * within);
-        near.any(|line| {
-            let other = &self.edges[line.data].border;
-            let [a, b] = other.ends;
-            let t = ((at - a).dot(b - a) / (b - a).length_squared().max(1e-300)).clamp(0.0, 1.0);
-            other.direction().perp().dot(inward) < ACROSS && a.lerp(b, t).distance(at) < within
-        })
+        near.any(|line| self.edges[line.data].border.direction().perp().dot(inward) < ACROSS)
     }
 
     /// The widest hem for which no more than a share of the edges' length has no room, mm.

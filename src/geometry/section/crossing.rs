@@ -55,7 +55,7 @@ impl PlyCrossing {
         self.travel[0] + share * (self.travel[1] - self.travel[0])
     }
 
-    /// The share of the chord's [`chord`](Self::chord) before which so many of its fibres lie.
+    /// The share of [`Self::chord`] that lies before so many of [`Self::fibers`].
     ///
     /// The tilt of the fibres is taken to change along the chord as the parabola that has its mean and its values at both ends.
     #[inline]

@@ -487,8 +487,13 @@ fn goes_on(words: &[&str]) -> bool {
         matches!(*w, "throughout" | "length" | "desired" | "required" | "wanted" | "wished" | "like" | "wish" | "long")
     };
     let pattern = |w: &&str| matches!(*w, "patt" | "pattern" | "pat" | "rib" | "ribbing" | "st" | "stitch");
-    let is_until = |w: &&str| matches!(*w, "until" | "till" | "til");
-    words.iter().all(filler) || words.iter().any(open) || (words.iter().any(pattern) && !words.iter().any(is_until))
+    words.iter().all(filler)
+        || words.iter().any(open)
+        || (words.iter().any(pattern) && !words.iter().any(|w| is_until(w)))
+}
+
+fn is_until(word: &str) -> bool {
+    matches!(word, "until" | "till" | "til")
 }
 
 /// "Ending with a WS row", "end on row 4": the words without it, and what it says.
@@ -558,7 +563,7 @@ fn often(words: &[&str]) -> Option<Often> {
         "thrice" => Some(3),
         _ => None,
     };
-    let until = words.iter().position(|w| matches!(*w, "until" | "till" | "til"));
+    let until = words.iter().position(|w| is_until(w));
     let in_all =
         words.iter().any(|w| matches!(*w, "total" | "altogether")) || words.windows(2).any(|w| w == ["in", "all"]);
     let repeats = |n: u32| if in_all { Often::InAll(n) } else { Often::More(n) };
@@ -599,7 +604,7 @@ fn stitches(n: u32, before: &[&str], behind: &[&str]) -> Option<Often> {
     if behind.iter().take(3).any(remain) || before.last().is_some_and(|w| matches!(*w, "only" | "just" | "last")) {
         return Some(Often::Left(n));
     }
-    let until = before.iter().any(|w| matches!(*w, "until" | "till" | "til" | "to"));
+    let until = before.iter().any(|w| is_until(w) || *w == "to");
     let counts = |w: &&str| {
         matches!(
             *w,

@@ -338,16 +338,19 @@ impl Weave {
                 // Threads of several spacings are so far apart in the mean.
                 Extent::Length(length) => length / spacing,
             };
-            let paired = side == 0 && self.draft.twines();
-            if let (Extent::Yarns(warps), true) = (extent, paired && !self.tile)
+            let paired = side == 0 && self.draft.twines() && !self.tile;
+            if let Extent::Yarns(warps) = extent
+                && paired
                 && !warps.is_multiple_of(2)
             {
                 return Err(Impossible::Unpaired { warps });
             }
-            let of = match (self.tile, paired) {
-                (true, _) => repeat as f64,
-                (false, true) => 2.0,
-                (false, false) => 1.0,
+            let of = if self.tile {
+                repeat as f64
+            } else if paired {
+                2.0
+            } else {
+                1.0
             };
             let repeats = (wanted / of).round();
             if repeats < 1.0 && matches!(extent, Extent::Length(_)) {
