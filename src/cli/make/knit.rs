@@ -17,7 +17,7 @@ use crate::{
         PatternStrand,
         chart::{Chart, PATTERNS},
         knit::{self, CastOn, Closing, Edges, Form, Knit, Knitted, Measures, Misfit, Rims, Sizes, Thickness},
-        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS, WrittenEnd},
+        knitspeak::{Asked, Instructions, KnitSpeakError, WrittenEnd},
     },
     scene::{Yarn, load::read_text},
 };
@@ -137,8 +137,8 @@ struct Charted {
 }
 
 /// The chart of written instructions, or of those in a file whose name stands behind `@`, over so many stitches or as many as
-/// they cast on; what they repeat without an end, for at least so many rows, or as far as it may have to go.
-fn written(text: &str, stitches: Option<u32>, asked: Option<u32>) -> Result<Charted, Failure> {
+/// they cast on; of as many rows as are asked for.
+fn written(text: &str, stitches: Option<u32>, asked: Asked) -> Result<Charted, Failure> {
     let (text, name) = match text.strip_prefix('@') {
         None => (text.to_owned(), "--instructions".to_owned()),
         Some(path) => {
@@ -167,8 +167,8 @@ impl KnitArgs {
             Charted { chart, stitches: knit::COUNT, rows, end: WrittenEnd::default() }
         };
         let Charted { chart, stitches, rows, end } = if let Some(text) = &self.instructions {
-            let asked = self.rows.or(self.size.height.map(|_| MANY_ROWS));
-            written(text, self.stitches, asked)?
+            let of_height = if self.size.height.is_some() { Asked::Height } else { Asked::Nothing };
+            written(text, self.stitches, self.rows.map_or(of_height, Asked::Rows))?
         } else if self.chart.is_empty() {
             let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
             by_itself(chart.ok_or_else(|| wrong(&"unknown pattern"))?)

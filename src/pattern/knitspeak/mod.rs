@@ -83,6 +83,17 @@ pub struct WrittenEnd {
     pub ending: Option<EveryFew>,
 }
 
+/// How far instructions are worked.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// What is repeated without an end has at least so many rows.
+    least: usize,
+    /// Whether shaped rows go on that have no end either.
+    shaped_go_on: bool,
+    /// Whether what is repeated ends where a row cannot be knitted.
+    stops_early: bool,
+}
+
 /// Rows of a chart, as instructions make them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Worked {
@@ -100,8 +111,20 @@ pub fn chart_rows(text: &str, cast_on: u32) -> Result<Vec<String>> {
     Ok(Instructions::read(text)?.work(cast_on, 0)?.rows)
 }
 
-/// Rows that are worked where a height says how many of them are kept, which is known when stitches have a size: so many are enough.
-pub const MANY_ROWS: u32 = 2000;
+/// How many rows are asked for of written instructions, beside what they say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// None: a piece as high as its text says, or of as many rows as charts have.
+    Nothing,
+    /// So many: where the text says no end, shaped rows go on too.
+    Rows(u32),
+    /// As many as a height takes, which is known when stitches have a size. The last of those that are worked are seldom wanted: they end where a row
+    /// cannot be knitted.
+    Height,
+}
+
+/// Rows that are worked for a height: so many are enough.
+const ROWS_FOR_A_HEIGHT: usize = 2000;
 
 impl Instructions {
     /// Reads instructions.
@@ -132,18 +155,19 @@ impl Instructions {
         WrittenEnd { height: self.height(), ending: self.ending() }
     }
 
-    /// Works a piece: of so many rows, if they are `asked` for, or so high as its text says, or of so many as charts have `otherwise`; and
-    /// tells how many rows it has unless they are asked for.
+    /// Works a piece of as many rows as are asked for, or of as many as charts have `otherwise`; and tells how many rows it has unless they are asked
+    /// for.
     ///
     /// # Errors
     /// As [`Self::work`].
-    pub fn work_piece(&self, cast_on: u32, asked: Option<u32>, otherwise: u32) -> Result<(Worked, u32)> {
+    pub fn work_piece(&self, cast_on: u32, asked: Asked, otherwise: u32) -> Result<(Worked, u32)> {
         let rows = self.ending().map_or(otherwise, |ending| ending.from(otherwise));
-        let worked = match asked {
-            Some(asked) => self.work_rows(cast_on, asked as usize)?,
-            None if self.height().is_some() => self.work(cast_on, MANY_ROWS as usize)?,
-            None => self.work(cast_on, rows as usize)?,
+        let (least, stops_early) = match asked {
+            Asked::Rows(rows) => (rows as usize, false),
+            Asked::Nothing if self.height().is_none() => (rows as usize, false),
+            Asked::Nothing | Asked::Height => (ROWS_FOR_A_HEIGHT, true),
         };
+        let worked = self.worked(cast_on, Extent { least, shaped_go_on: asked != Asked::Nothing, stops_early })?;
         let rows = if worked.whole { worked.rows.len() as u32 } else { rows };
         Ok((worked, rows))
     }
@@ -154,18 +178,11 @@ impl Instructions {
     /// # Errors
     /// A row that does not fit the stitches it finds, or does not make as many as it says.
     pub fn work(&self, cast_on: u32, least: usize) -> Result<Worked> {
-        self.worked(cast_on, least, false)
+        self.worked(cast_on, Extent { least, shaped_go_on: false, stops_early: false })
     }
 
-    /// As [`Self::work`], of text of which so many rows are asked for: where it says no end, shaped rows go on too.
-    ///
-    /// # Errors
-    /// As [`Self::work`].
-    pub fn work_rows(&self, cast_on: u32, rows: usize) -> Result<Worked> {
-        self.worked(cast_on, rows, true)
-    }
-
-    fn worked(&self, cast_on: u32, least: usize, asked: bool) -> Result<Worked> {
+    fn worked(&self, cast_on: u32, extent: Extent) -> Result<Worked> {
+        let Extent { least, shaped_go_on, stops_early } = extent;
         let reads = |row: &Written| row.body.reads_the_row_below();
         let mut needle = Needle {
             found: cast_on,
@@ -181,7 +198,7 @@ impl Instructions {
         // What set-up rows are for is repeated, whether it is told or not; so is what is shaped, where more rows are asked for.
         let goes_on = !pattern.is_empty()
             && !self.ends
-            && if set_up.is_empty() { shaped && asked } else { needle.found == begun || asked };
+            && if set_up.is_empty() { shaped && shaped_go_on } else { needle.found == begun || shaped_go_on };
         let implied = || Again {
             rows: (self.set_up..self.rows.len()).collect(),
             until: Until::Open,
@@ -209,8 +226,7 @@ impl Instructions {
                         break;
                     }
                     match needle.work(&self.copy(again, &needle, k)) {
-                        // Of as many rows as a height may take the last ones are seldom wanted.
-                        Err(_) if least >= MANY_ROWS as usize => break,
+                        Err(_) if stops_early => break,
                         worked => worked?,
                     }
                 }

@@ -303,17 +303,21 @@ fn a_height_ends_with_the_row_that_is_said() {
 fn shaped_rows_go_on_where_more_of_them_are_asked_for() {
     let text = "Row 1: k1, m1, k to end\nRow 2: p";
     let read = Instructions::read(text).unwrap();
-    let asked = read.work_rows(14, 6).unwrap();
+    let work = |read: &Instructions, stitches, asked| read.work_piece(stitches, asked, 20).map(|(worked, _)| worked);
+    let asked = work(&read, 14, Asked::Rows(6)).unwrap();
     assert_eq!(asked, Instructions::read(&format!("{text}\nRep rows 1-2.")).unwrap().work(14, 6).unwrap());
     assert_eq!((asked.rows.len(), asked.rows[4].as_str()), (6, "k15 m1l k"));
     assert_eq!(read.work(14, 6).unwrap().rows.len(), 2);
     // Fewer are cut off by who knits them, and what is bound off does not go on.
-    assert_eq!(read.work_rows(14, 1).unwrap().rows.len(), 2);
-    assert_eq!(Instructions::read(&format!("{text}\nBind off.")).unwrap().work_rows(14, 6).unwrap().rows.len(), 2);
+    assert_eq!(work(&read, 14, Asked::Rows(1)).unwrap().rows.len(), 2);
+    let bound_off = Instructions::read(&format!("{text}\nBind off.")).unwrap();
+    assert_eq!(work(&bound_off, 14, Asked::Rows(6)).unwrap().rows.len(), 2);
     // Where a height counts the rows, those that cannot be knitted are not wanted.
     let narrower = Instructions::read("Row 1: k2tog, k to end").unwrap();
-    assert_eq!(narrower.work_rows(5, MANY_ROWS as usize).unwrap().rows.len(), 4);
-    assert!(narrower.work_rows(5, 20).is_err());
+    assert_eq!(work(&narrower, 5, Asked::Height).unwrap().rows.len(), 4);
+    for rows in [20, 5000] {
+        assert!(work(&narrower, 5, Asked::Rows(rows)).is_err(), "{rows}");
+    }
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::{
     pattern::{
         chart::{Chart, ChartError, PATTERNS},
         knit::{self, CastOn, Closing, Colors, Edges, Form, Knit, Knitted, Measures, Rims, Thickness, Work},
-        knitspeak::{Instructions, KnitSpeakError, MANY_ROWS, WrittenEnd},
+        knitspeak::{Asked, Instructions, KnitSpeakError, WrittenEnd},
     },
 };
 
@@ -241,8 +241,13 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
     charted.end = read.end();
-    let rows = table.u64_or("rows", MANY_ROWS.into(), 1..=1_000_000) as u32;
-    let asked = (table.has("rows") || table.has("height")).then_some(rows);
+    let asked = if table.has("rows") {
+        Asked::Rows(table.u64_or("rows", knit::COUNT.into(), 1..=1_000_000) as u32)
+    } else if table.has("height") {
+        Asked::Height
+    } else {
+        Asked::Nothing
+    };
     let Ok((worked, rows)) = read.work_piece(stitches, asked, knit::COUNT).map_err(told) else { return charted };
     charted.rows = rows;
     charted.chart =
