@@ -72,6 +72,20 @@ fn sizes_are_kept_to_the_nearest_stitch_and_yarn() {
     assert!(said.contains("4 x 8, "), "{said}");
     for (args, least) in [
         (&lace("1")[..], "a circumference of 1.000 mm has no room for the smallest such knit\n  hint: it is 18.2 mm\n"),
+        (
+            &[
+                "knit",
+                "--instructions",
+                "Row 1: k2tog, k to end",
+                "--stitches",
+                "12",
+                "--gauge",
+                "22,30",
+                "--height",
+                "90",
+            ],
+            "error: a height of 90.000 mm is 27 rows, of which 11 can be knitted of 12 stitches\n  hint: they are 36.7 mm high",
+        ),
         (&["weave", "--width", "0.1"], "--width has no room for one yarn, or one repeat of a tile; at least "),
         (&["weave", "--height", "1", "--tile"], "--height has no room"),
     ] {

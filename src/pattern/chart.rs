@@ -365,6 +365,17 @@ impl Chart {
         [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
     }
 
+    /// How many of so many rows fit onto `cast_on` stitches, one after the other.
+    pub fn rows_that_fit(&self, cast_on: u32, rows: u32) -> u32 {
+        let mut found = cast_on;
+        let fits = |row: &&Row| {
+            let made = row.fit().made_of(found).and_then(|made| u32::try_from(made).ok());
+            found = made.unwrap_or(found);
+            made.is_some()
+        };
+        self.rows.iter().cycle().take(rows as usize).take_while(fits).count() as u32
+    }
+
     /// Knits `rows` rows onto `cast_on` stitches. Stitches that are bound off keep their places in their row.
     ///
     /// # Errors

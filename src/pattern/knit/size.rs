@@ -221,6 +221,20 @@ impl Sizes {
                 if let Some(ending) = self.ending {
                     knit.rows = ending.nearest((height / stitch[1]).min(MOST));
                 }
+                let fit = knit.chart.rows_that_fit(knit.stitches, knit.rows);
+                // What is wrong within the chart is told of its row.
+                if (knit.chart.rows()..knit.rows).contains(&fit) {
+                    let [asked, high] = [height, f64::from(fit) * stitch[1]].map(|length| length * diameter);
+                    return Err(Misfit {
+                        key: Some("height"),
+                        problem: format!(
+                            "a height of {asked:.3} mm is {} rows, of which {fit} can be knitted of {}",
+                            knit.rows,
+                            words::counted(knit.stitches, "stitch")
+                        ),
+                        hint: format!("they are {high:.1} mm high; or cast on another number of stitches"),
+                    });
+                }
             }
         }
         Ok(knit)

@@ -15,6 +15,8 @@ pub(super) struct GivenSizes {
     sizes: Sizes,
     stitches: Span,
     rows: Span,
+    /// What says how high it is.
+    height: Span,
 }
 
 impl GivenSizes {
@@ -44,7 +46,8 @@ impl GivenSizes {
         }
         let gauge = table.span("gauge");
         let [stitches, rows] = ["stitches", "rows"].map(|key| gauge.or(table.span(key)).unwrap_or(table.header()));
-        Self { sizes, stitches, rows }
+        let height = table.span("height").or(table.span("instructions")).unwrap_or(table.header());
+        Self { sizes, stitches, rows, height }
     }
 
     /// The height that written instructions say, mm, and after how many rows they may end, where no key says how many there are.
@@ -55,7 +58,11 @@ impl GivenSizes {
     /// The knit of this size, of yarn of a thickness. What cannot be knitted is told, with what would fit.
     pub(super) fn apply(&self, knit: &Knit, yarn: &Thickness, context: &Context<'_>) -> Option<Knit> {
         let sized = self.sizes.apply(knit, yarn);
-        let place = |key: Option<&str>| if key == Some("rows") { self.rows } else { self.stitches };
+        let place = |key| match key {
+            Some("rows") => self.rows,
+            Some("height") => self.height,
+            _ => self.stitches,
+        };
         sized.map_err(|wrong| context.error(place(wrong.key), wrong.problem, Some(wrong.hint))).ok()
     }
 }
