@@ -356,10 +356,8 @@ impl Chart {
 
     /// The next numbers of stitches to cast on, fewer and more, that `rows` rows fit; empty if none is near.
     fn counts_that_fit(&self, cast_on: u32, rows: u32) -> String {
-        // Each row is counted once, for it may be long and be tried often.
-        let all: Vec<Fit> = self.rows.iter().map(Row::fit).collect();
-        let next = |found: u32, fit: &Fit| u32::try_from(fit.made_of(found)?).ok();
-        let fits = |&count: &u32| all.iter().cycle().take(rows as usize).try_fold(count, next).is_some();
+        let all = self.fits();
+        let fits = |&count: &u32| first_that_fit(&all, count, rows) == rows;
         let fewer = (1..cast_on).rev().take(LARGEST_STEP_ASIDE).find(fits);
         let more = (cast_on + 1..).take(LARGEST_STEP_ASIDE).find(fits);
         [fewer, more].into_iter().flatten().map(|count| count.to_string()).collect::<Vec<_>>().join(" or ")
@@ -367,13 +365,12 @@ impl Chart {
 
     /// How many of so many rows fit onto `cast_on` stitches, one after the other.
     pub fn rows_that_fit(&self, cast_on: u32, rows: u32) -> u32 {
-        let mut found = cast_on;
-        let fits = |row: &&Row| {
-            let made = row.fit().made_of(found).and_then(|made| u32::try_from(made).ok());
-            found = made.unwrap_or(found);
-            made.is_some()
-        };
-        self.rows.iter().cycle().take(rows as usize).take_while(fits).count() as u32
+        first_that_fit(&self.fits(), cast_on, rows)
+    }
+
+    /// What each row takes and makes: counted once, for it may be long and be tried often.
+    fn fits(&self) -> Vec<Fit> {
+        self.rows.iter().map(Row::fit).collect()
     }
 
     /// Knits `rows` rows onto `cast_on` stitches. Stitches that are bound off keep their places in their row.
@@ -449,6 +446,16 @@ impl Fit {
             _ => (self.plain && found > self.takes).then_some(found.into()),
         }
     }
+}
+
+/// How many of so many rows, which are taken again and again, fit one after the other onto stitches.
+fn first_that_fit(all: &[Fit], cast_on: u32, rows: u32) -> u32 {
+    let mut found = Some(cast_on);
+    let fits = |fit: &&Fit| {
+        found = found.and_then(|found| u32::try_from(fit.made_of(found)?).ok());
+        found.is_some()
+    };
+    all.iter().cycle().take(rows as usize).take_while(fits).count() as u32
 }
 
 impl Row {

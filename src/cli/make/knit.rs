@@ -167,8 +167,7 @@ impl KnitArgs {
             Charted { chart, stitches: knit::COUNT, rows, end: WrittenEnd::default() }
         };
         let Charted { chart, stitches, rows, end } = if let Some(text) = &self.instructions {
-            let of_height = if self.size.height.is_some() { Asked::Height } else { Asked::Nothing };
-            written(text, self.stitches, self.rows.map_or(of_height, Asked::Rows))?
+            written(text, self.stitches, Asked::new(self.rows, self.size.height.is_some()))?
         } else if self.chart.is_empty() {
             let chart = Chart::named(self.pattern.as_deref().unwrap_or("stockinette"));
             by_itself(chart.ok_or_else(|| wrong(&"unknown pattern"))?)

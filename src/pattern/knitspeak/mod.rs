@@ -83,17 +83,6 @@ pub struct WrittenEnd {
     pub ending: Option<EveryFew>,
 }
 
-/// How far instructions are worked.
-#[derive(Clone, Copy)]
-struct Extent {
-    /// What is repeated without an end has at least so many rows.
-    least: usize,
-    /// Whether shaped rows go on that have no end either.
-    shaped_go_on: bool,
-    /// Whether what is repeated ends where a row cannot be knitted.
-    stops_early: bool,
-}
-
 /// Rows of a chart, as instructions make them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Worked {
@@ -118,9 +107,20 @@ pub enum Asked {
     Nothing,
     /// So many: where the text says no end, shaped rows go on too.
     Rows(u32),
-    /// As many as a height takes, which is known when stitches have a size. The last of those that are worked are seldom wanted: they end where a row
-    /// cannot be knitted.
+    /// As many as a height takes, which is known when stitches have a size; shaped rows go on as well. The last of those that are worked are seldom
+    /// wanted: they end where a row cannot be knitted.
     Height,
+}
+
+impl Asked {
+    /// What is asked for by a count of rows, or else by a height if there is one.
+    pub fn new(rows: Option<u32>, has_height: bool) -> Self {
+        match rows {
+            Some(rows) => Self::Rows(rows),
+            None if has_height => Self::Height,
+            None => Self::Nothing,
+        }
+    }
 }
 
 /// Rows that are worked for a height: so many are enough.
@@ -162,12 +162,11 @@ impl Instructions {
     /// As [`Self::work`].
     pub fn work_piece(&self, cast_on: u32, asked: Asked, otherwise: u32) -> Result<(Worked, u32)> {
         let rows = self.ending().map_or(otherwise, |ending| ending.from(otherwise));
-        let (least, stops_early) = match asked {
-            Asked::Rows(rows) => (rows as usize, false),
-            Asked::Nothing if self.height().is_none() => (rows as usize, false),
-            Asked::Nothing | Asked::Height => (ROWS_FOR_A_HEIGHT, true),
+        let asked = match asked {
+            Asked::Nothing if self.height().is_some() => Asked::Height,
+            asked => asked,
         };
-        let worked = self.worked(cast_on, Extent { least, shaped_go_on: asked != Asked::Nothing, stops_early })?;
+        let worked = self.worked(cast_on, asked, rows as usize)?;
         let rows = if worked.whole { worked.rows.len() as u32 } else { rows };
         Ok((worked, rows))
     }
@@ -178,11 +177,11 @@ impl Instructions {
     /// # Errors
     /// A row that does not fit the stitches it finds, or does not make as many as it says.
     pub fn work(&self, cast_on: u32, least: usize) -> Result<Worked> {
-        self.worked(cast_on, Extent { least, shaped_go_on: false, stops_early: false })
+        self.worked(cast_on, Asked::Nothing, least)
     }
 
-    fn worked(&self, cast_on: u32, extent: Extent) -> Result<Worked> {
-        let Extent { least, shaped_go_on, stops_early } = extent;
+    /// As [`Self::work`], for at least `otherwise` rows where nothing is asked for.
+    fn worked(&self, cast_on: u32, asked: Asked, otherwise: usize) -> Result<Worked> {
         let reads = |row: &Written| row.body.reads_the_row_below();
         let mut needle = Needle {
             found: cast_on,
@@ -195,10 +194,11 @@ impl Instructions {
         let begun = needle.found;
         pattern.iter().try_for_each(|row| needle.work(row))?;
         let shaped = needle.found != cast_on;
+        let more_asked = asked != Asked::Nothing;
         // What set-up rows are for is repeated, whether it is told or not; so is what is shaped, where more rows are asked for.
         let goes_on = !pattern.is_empty()
             && !self.ends
-            && if set_up.is_empty() { shaped && shaped_go_on } else { needle.found == begun || shaped_go_on };
+            && if set_up.is_empty() { shaped && more_asked } else { needle.found == begun || more_asked };
         let implied = || Again {
             rows: (self.set_up..self.rows.len()).collect(),
             until: Until::Open,
@@ -219,6 +219,11 @@ impl Instructions {
                     // Bound off behind no height, they are as many as those of a chart.
                     return Ok(Worked { rows: needle.rows, whole: self.ends && self.height.is_some() });
                 }
+                let least = match asked {
+                    Asked::Nothing => otherwise,
+                    Asked::Rows(rows) => rows as usize,
+                    Asked::Height => ROWS_FOR_A_HEIGHT,
+                };
                 let least = least.min(MOST_ROWS);
                 for k in 0.. {
                     let count = needle.rows.len();
@@ -226,7 +231,7 @@ impl Instructions {
                         break;
                     }
                     match needle.work(&self.copy(again, &needle, k)) {
-                        Err(_) if stops_early => break,
+                        Err(_) if asked == Asked::Height => break,
                         worked => worked?,
                     }
                 }

@@ -241,13 +241,8 @@ fn written(table: &Reader<'_>, text: &str, context: &Context<'_>) -> Charted {
     charted.stitches = read.cast_on().unwrap_or(charted.stitches);
     let stitches = table.u64_or("stitches", charted.stitches.into(), 1..=1_000_000) as u32;
     charted.end = read.end();
-    let asked = if table.has("rows") {
-        Asked::Rows(table.u64_or("rows", knit::COUNT.into(), 1..=1_000_000) as u32)
-    } else if table.has("height") {
-        Asked::Height
-    } else {
-        Asked::Nothing
-    };
+    let rows = table.u64("rows", 1..=1_000_000).map(|rows| rows as u32);
+    let asked = Asked::new(rows, table.has("height"));
     let Ok((worked, rows)) = read.work_piece(stitches, asked, knit::COUNT).map_err(told) else { return charted };
     charted.rows = rows;
     charted.chart =
