@@ -7,6 +7,7 @@ pub(crate) mod contact;
 pub mod curve;
 pub(crate) mod density;
 pub mod fiber;
+pub(crate) mod first_fiber;
 pub(crate) mod gaps;
 pub mod length;
 pub mod material_indices;

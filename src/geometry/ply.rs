@@ -4,7 +4,7 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::after_fiber::AfterFiber;
+use super::{after_fiber::AfterFiber, first_fiber::FirstFiber};
 
 /// One ply as a person describes it. Lengths in yarn radii, angles in radians.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +89,8 @@ pub struct PlyShape {
     pub regularity: f32,
     /// The same by the rim: [`super::density::PlyPacking::rim`].
     pub rim: f32,
+    /// How deep the first fibre on a line lies: [`super::density::PlyPacking::first`].
+    pub first: Option<FirstFiber>,
     /// What is free of others after a fibre: [`super::density::PlyPacking::after`].
     pub after: Option<AfterFiber>,
 }
@@ -111,6 +113,7 @@ impl PlyShape {
             depth: 0.0,
             regularity: 1.0,
             rim: 1.0,
+            first: None,
             after: None,
         }
     }

@@ -280,8 +280,20 @@ impl<'a> Section<'a> {
             let travel = [enter.travel, exit.travel];
             // Signed as h is: seen from the camera, towards which x points.
             let offset = -offset;
-            let crossing =
-                PlyCrossing { ply: index, enter: from, exit: to, foot, chord, offset, travel, fibers, ends, gaps };
+            let crossing = PlyCrossing {
+                ply: index,
+                enter: from,
+                exit: to,
+                foot,
+                chord,
+                offset,
+                wide,
+                length,
+                travel,
+                fibers,
+                ends,
+                gaps,
+            };
             let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
             if out.is_full() {
                 // What lies deepest is seen least.

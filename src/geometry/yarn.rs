@@ -105,6 +105,7 @@ impl YarnShape {
             ply.depth = packing.depth as f32;
             ply.regularity = packing.regularity as f32;
             ply.rim = packing.rim as f32;
+            ply.first = packing.first;
             ply.after = packing.after;
         }
         self

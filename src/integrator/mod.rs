@@ -325,7 +325,7 @@ impl<'a> Integrator<'a> {
         let [u_pass, u_light_choice, u_light_x, u_light_y] = path.sampler.next4();
         let seen = self.seen_fiber(hit, section, (yarns, yarn), path, scratch);
         // A line without any fibre comes after all others.
-        let u_pass = seen.map_or(u_pass, |seen| 1.0 - seen);
+        let u_pass = seen.map_or(u_pass, |[number, _]| 1.0 - number);
         if u_pass < unscattered {
             path.passes += 1;
             // Behind the surface, so that the same hit is not found again.
@@ -351,7 +351,7 @@ impl<'a> Integrator<'a> {
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
         let mut stream = path.sampler.even_stream();
-        let first_fiber = seen.map(|seen| (seen / (1.0 - unscattered)).min(1.0 - f32::EPSILON));
+        let first_fiber = seen.map(|[number, side]| [(number / (1.0 - unscattered)).min(1.0 - f32::EPSILON), side]);
         let arrival = Arrival { throughput: path.throughput, lit: !self.lights.is_empty(), first_fiber };
         let vertex = yarn.vertex(section, &scratch.crossings, unscattered, arrival, u, &mut stream);
 

@@ -62,7 +62,7 @@ impl Integrator<'_> {
         }
     }
 
-    /// Which fibre the camera sees first, by [`crate::geometry::section::SeenFiber::number`], if fibres are told apart there.
+    /// Which fibre the camera sees first, by [`crate::geometry::section::SeenFiber::numbers`], if fibres are told apart there.
     #[inline]
     pub(super) fn seen_fiber(
         &self,
@@ -71,7 +71,7 @@ impl Integrator<'_> {
         (yarns, yarn): (&YarnGeometry, &YarnScatterer),
         path: &Path<'_>,
         scratch: &Scratch,
-    ) -> Option<f32> {
+    ) -> Option<[f32; 2]> {
         let detail = self.fiber_detail.filter(|_| path.bounces == 0)?;
         let front = scratch.crossings.first()?;
         let shape = yarn.shape();
@@ -83,7 +83,7 @@ impl Integrator<'_> {
         let distance = yarns.strands.distance_along(hit.segment, hit.u)?;
         let ply = (yarns.first_ply + front.ply) as u32;
         let key = hash2(hash2(yarns.fabric as u32, yarns.strands.yarn_of(hit.segment) as u32), ply);
-        Some(section.seen_fiber(shape, front, distance).number(key, [stream.next(), stream.next()]))
+        Some(section.seen_fiber(shape, front, distance).numbers(key, [stream.next(), stream.next()]))
     }
 
     /// Notes a place on a yarn, which may move: it keeps its place in the yarn's frame.

@@ -94,9 +94,9 @@ pub struct Arrival {
     pub throughput: Rgb,
     /// Whether light may be sampled at the vertex too. Where only the path itself finds light, less has to be known of F.
     pub lit: bool,
-    /// Where fibres are told apart: the share of those lines whose first fibre is met before this one, [0, 1), in place of a random
-    /// number.
-    pub first_fiber: Option<f32>,
+    /// Where fibres are told apart, two numbers in [0, 1) in place of random ones: the share of those lines whose first fibre is met before this
+    /// one, and on which side of the ray it is.
+    pub first_fiber: Option<[f32; 2]>,
 }
 
 impl From<Rgb> for Arrival {

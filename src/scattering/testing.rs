@@ -4,6 +4,7 @@ use glam::{DVec2, Vec3A};
 
 use super::fiber::FiberMaterial;
 use crate::geometry::{
+    density::KnownPacking,
     fiber::{packing::measured, slopes::Twist},
     section::Section,
     yarn::{YarnShape, tests::touching_yarn},
@@ -32,7 +33,7 @@ pub(super) fn lossless() -> FiberMaterial {
 pub(super) fn packed_ply(fibers: u32, density: f64) -> YarnShape {
     let shape = touching_yarn(1, fibers, density, 0.0, 0.0);
     let radius = f64::from(shape.plies[0].fiber_radius / shape.plies[0].core_radius);
-    shape.packed(&[measured(fibers, radius, Twist::NONE, 1.0)])
+    shape.packed(&[measured(fibers, radius, Twist::NONE, 1.0, KnownPacking::default())])
 }
 
 /// The first disc that a ray from a place meets, but for one, and where.

@@ -463,22 +463,15 @@ impl Placement {
     pub fn packing_of(self, ply: &PlyParameters, twist: Twist, known: KnownPacking, stretch: f64) -> PlyPacking {
         let core = ply.radius - ply.fiber_radius;
         let fiber = ply.fiber_radius / core;
-        let measured = match self {
-            _ if ply.fibers == 0 || core <= 0.0 => {
-                PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0, after: None }
+        match self {
+            _ if ply.fibers == 0 || core <= 0.0 => known.over(PlyPacking::evenly(1.0)),
+            Self::Regular => {
+                packing::measured(ply.fibers, fiber, twist, stretch_of_both(stretch, ply.aspect.recip()), known)
             }
-            Self::Regular => packing::measured(ply.fibers, fiber, twist, stretch_of_both(stretch, ply.aspect.recip())),
             Self::Measured(distribution) => {
                 let crowding = distribution.crowding(fiber);
-                PlyPacking { crowding, depth: 0.0, regularity: 0.0, rim: 0.0, after: None }
+                known.over(PlyPacking { crowding, ..PlyPacking::evenly(0.0) })
             }
-        };
-        PlyPacking {
-            crowding: known.crowding.unwrap_or(measured.crowding),
-            depth: if known.crowding.is_some() { 0.0 } else { measured.depth },
-            regularity: known.regularity.unwrap_or(measured.regularity),
-            rim: known.regularity.unwrap_or(measured.rim),
-            after: measured.after,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Discs at random in a circle that do not overlap.
 
 mod after;
+mod first;
+mod line;
 mod lines;
 mod measure;
 #[cfg(test)]

@@ -188,7 +188,9 @@ fn more_fibers_than_there_is_room_for_lean_less_and_do_not_hang() {
         assert!((0.0..=1.0).contains(&room) && (room == 1.0) == (count == 0), "{room}");
         let discs = packing::hard_discs(count, fiber / (1.0 - fiber), twist, &mut Stream::new(2));
         assert!(discs.len() == count as usize && discs.iter().all(|d| d.length() <= 1.0 + 1e-12));
-        assert!(packing::measured(count, fiber / (1.0 - fiber), twist, 1.5).regularity.is_finite());
+        assert!(
+            packing::measured(count, fiber / (1.0 - fiber), twist, 1.5, KnownPacking::default()).regularity.is_finite()
+        );
     }
 }
 

@@ -8,6 +8,7 @@ use super::{Inside, Section, unrotate};
 use crate::{
     geometry::{
         density::ChordFibers,
+        first_fiber::FirstFiber,
         gaps::PlyGaps,
         ply::fiber_tangent,
         way::{self, Station, Way},
@@ -35,6 +36,10 @@ pub struct PlyCrossing {
     pub chord: ChordFibers,
     /// Signed distance of the ray from the ply's axis, in the circle of the ply's radius.
     pub offset: f32,
+    /// How wide fibres are across the ray in that circle, over their radius.
+    pub wide: f32,
+    /// How much of that circle a unit of the ray passes in the section.
+    pub length: f32,
     /// How far along the yarn the ray is at `enter` and at `exit`.
     pub travel: [f32; 2],
     /// Expected number of fibres on the chord.
@@ -176,6 +181,37 @@ impl PlyAhead<'_> {
 }
 
 impl Section<'_> {
+    /// How far beside the ray the middle of the first fibre of a crossing is, which `u` draws: in the circle of the ply's radius, signed as
+    /// [`PlyCrossing::offset`].
+    #[inline]
+    pub fn first_beside(&self, shape: &YarnShape, crossing: &PlyCrossing, u: f32) -> f32 {
+        let PlyCrossing { ply, offset, wide, .. } = crossing;
+        shape.plies[*ply].middle_beside(*offset, *wide, u) - offset
+    }
+
+    /// How deep the first fibre of a crossing is, so far `beside` the ray, which the gaps between fibres have at a `depth`, inside the yarn there:
+    /// below the end of its own chord of the core, as [`FirstFiber`] has it.
+    #[inline]
+    pub fn first_depth(
+        &self,
+        shape: &YarnShape,
+        crossing: &PlyCrossing,
+        inside: &Inside,
+        depth: f32,
+        beside: f32,
+    ) -> f32 {
+        let PlyCrossing { ply, foot, chord, offset, wide, length, .. } = crossing;
+        let of = &shape.plies[*ply];
+        let half = of.half_chord(offset + beside, *wide) / length;
+        let below = chord.half - (foot - depth) * self.cos;
+        let below = of.first.map_or(below, |first| {
+            let thick = self.thinness() * of.fiber_radius;
+            let by_rim = FirstFiber::by_rim((of.radius - offset.abs()) / of.fiber_radius);
+            thick * first.depth(below / thick, by_rim, inside.along_short_axis(shape, *ply, self.direction()))
+        });
+        (foot - (half - below).max(-half) / self.cos).max(0.0)
+    }
+
     /// Fibres that a unit of a chord's depth meets over those that it would meet across untwisted round plies: the mean
     /// from `enter` to `exit` of |w x t| for the unit vector w of the ray and the tangents t (of z = 1) of the fibres, times
     /// [`Self::squeeze`]. (The paper's 1 / cos(theta_fiber), Eq. 2, takes the worst place for all: fibres near the ply's

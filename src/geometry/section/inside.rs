@@ -172,6 +172,20 @@ impl Inside {
         self.tangent_at(shape, section, ply, self.at)
     }
 
+    /// The same of one so far beside a ray that comes from `w`, in the circle of the ply's radius.
+    #[inline]
+    pub fn fiber_tangent_beside(
+        &self,
+        shape: &YarnShape,
+        section: &Section<'_>,
+        ply: usize,
+        w: Vec3A,
+        beside: f32,
+    ) -> Vec3A {
+        let off = shape.plies[ply].as_in_section(beside * self.facing(shape, ply, w).perp());
+        self.tangent_at(shape, section, ply, self.at + off)
+    }
+
     /// The same at another point of the unwound yarn's section.
     #[inline]
     pub(super) fn tangent_at(&self, shape: &YarnShape, section: &Section<'_>, ply: usize, at: Vec2) -> Vec3A {

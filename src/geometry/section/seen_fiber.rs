@@ -25,6 +25,8 @@ const IN_TUFTS: f32 = 0.15;
 const TUFT: f32 = 4.0;
 /// How long a fibre stays on top, in its widths.
 const LENGTH: f32 = 100.0;
+/// What tells the second number of a fibre from the first.
+const SIDE: u32 = 1;
 
 /// A place on the surface of a ply, by its fibres.
 #[derive(Clone, Copy, Debug)]
@@ -54,10 +56,10 @@ impl Section<'_> {
 }
 
 impl SeenFiber {
-    /// A number in [0, 1), even over all lines: the share of lines on which the first fibre is met before that of this one. `key` tells
-    /// plies apart; two fresh numbers `u` blend one fibre into the next along a line.
+    /// Two numbers in [0, 1), even over all lines: the share of lines on which the first fibre is met before that of this one, and one that draws
+    /// on which side of the ray its middle is. `key` tells plies apart; two fresh numbers `u` blend one fibre into the next along a line.
     #[inline]
-    pub fn number(&self, key: u32, u: [f32; 2]) -> f32 {
+    pub fn numbers(&self, key: u32, u: [f32; 2]) -> [f32; 2] {
         let wide = if u[0] < IN_TUFTS { TUFT } else { 1.0 };
         let lines = (self.lines / wide).round().max(1.0);
         // A turn of 1 may come of rounding.
@@ -67,7 +69,8 @@ impl SeenFiber {
         let step = along.floor();
         let share = along - step;
         let next = u[1] < share * share * (3.0 - 2.0 * share);
-        unit(hash2(key, (step as i32).wrapping_add(i32::from(next)) as u32))
+        let fiber = hash2(key, (step as i32).wrapping_add(i32::from(next)) as u32);
+        [unit(fiber), unit(hash2(fiber, SIDE))]
     }
 }
 
@@ -116,18 +119,21 @@ mod tests {
     fn numbers_are_even_over_the_lines() {
         const BINS: usize = 16;
         const COUNT: usize = 40_000;
-        let mut bins = [0u32; BINS];
+        let mut bins = [[0u32; BINS]; 2];
         let mut u = Stream::new(3);
         for i in 0..COUNT {
             let place = SeenFiber { turn: u.next(), lines: 47.3, along: 300.0 * i as f32 * 1.618 };
-            let number = place.number(i as u32 % 40, [u.next(), u.next()]);
-            assert!((0.0..1.0).contains(&number));
-            bins[(number * BINS as f32) as usize] += 1;
+            for (bins, number) in bins.iter_mut().zip(place.numbers(i as u32 % 40, [u.next(), u.next()])) {
+                assert!((0.0..1.0).contains(&number));
+                bins[(number * BINS as f32) as usize] += 1;
+            }
         }
         let mean = (COUNT / BINS) as f32;
-        let chi_square: f32 = bins.iter().map(|&n| (n as f32 - mean).powi(2) / mean).sum();
-        // 15 degrees of freedom: above 37.7 once in a thousand.
-        assert!(chi_square < 37.7, "{chi_square}");
+        for bins in bins {
+            let chi_square: f32 = bins.iter().map(|&n| (n as f32 - mean).powi(2) / mean).sum();
+            // 15 degrees of freedom: above 37.7 once in a thousand.
+            assert!(chi_square < 37.7, "{chi_square}");
+        }
     }
 
     #[test]

@@ -40,11 +40,33 @@ const LITTLE: [f32; 2] = [0.25, 1.0];
 pub(super) struct Forward {
     /// The fibres that it meets, one after the other: at least one.
     pub(super) fibers: ArrayVec<Fiber, FOLLOWED>,
+    /// Where the first of them is, if that is on the camera's ray.
+    first: Option<First>,
     /// About the share of light that leaves from a node where F does not, and the path's weight: they decide between both.
     pub(super) gain: Rgb,
     pub(super) weight: Rgb,
     /// A direction drawn from the lobe.
     pub(super) drawn: Drawn,
+}
+
+/// A fibre that the camera's ray meets first, where the gaps between fibres have it.
+#[derive(Clone, Copy, Debug)]
+struct First {
+    crossing: PlyCrossing,
+    depth: f32,
+    /// How far its middle is beside the ray, in the circle of the ply's radius.
+    beside: f32,
+}
+
+impl First {
+    /// The same where packings have it, from where its own light leaves.
+    #[inline]
+    fn of_packings(&self, view: &View<'_>, by_gaps: &Spot) -> Spot {
+        let Self { crossing, depth, beside } = self;
+        let shape = view.yarn.occluder().shape();
+        let counted = view.section.first_depth(shape, crossing, &by_gaps.inside, *depth, *beside);
+        Spot { deeper: counted - depth, ..view.first_spot(crossing, counted, *beside) }
+    }
 }
 
 /// A place where light ends its chain.
@@ -181,30 +203,32 @@ struct Way<'a> {
 }
 
 impl Forward {
-    /// Draws the first fibre that a ray meets, and a way out from there. `weight` is the path's; `u_first` draws the first fibre. `None`
-    /// if there is none.
+    /// Draws the first fibre that a ray meets, and a way out from there. `weight` is the path's; two numbers draw the first fibre and on which side of
+    /// the ray it is. `None` if there is none.
     #[inline]
     pub(super) fn draw(
         view: &View<'_>,
         crossings: &Crossings,
         unscattered: f32,
         (weight, lit): (Rgb, bool),
-        u_first: f32,
+        [u_first, u_side]: [f32; 2],
         stream: &mut Stream,
     ) -> Option<Self> {
         let crossed = crossings.iter().map(|crossing| Crossed(view, *crossing));
         let (Crossed(_, crossing), depth) = nearest(crossed, 1.0 - u_first * (1.0 - unscattered), stream)?;
-        let spot = view.spot(&crossing, depth);
+        let beside = view.section.first_beside(view.yarn.occluder().shape(), &crossing, u_side);
+        let spot = view.first_spot(&crossing, depth, beside);
         let fiber = Fiber::new(view, spot, (view.camera, false), Rgb::ONE);
         let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
-        Some(Self::follow(view, fiber, weight, little, stream))
+        let forward = Self::follow(view, fiber, weight, little, stream);
+        Some(Self { first: Some(First { crossing, depth, beside }), ..forward })
     }
 
     /// Follows light from a fibre to the next, and so on, until it is out or ends by chance, which it may where `little` is passed on.
     #[inline]
     pub(super) fn follow(view: &View<'_>, first: Fiber, weight: Rgb, little: f32, stream: &mut Stream) -> Self {
         let gain = view.yarn.node_gain[first.spot.ply];
-        let mut forward = Self { fibers: ArrayVec::new(), gain, weight, drawn: Drawn::NOTHING };
+        let mut forward = Self { fibers: ArrayVec::new(), first: None, gain, weight, drawn: Drawn::NOTHING };
         let mut next = Some(first);
         while let Some(mut fiber) = next.take() {
             let passed = (fiber.passed * weight).max_channel();
@@ -264,6 +288,7 @@ impl Forward {
         }
         let before = drawn?;
         let Fiber { spot, back, ended, .. } = self.fibers[before];
+        let spot = self.first.filter(|_| before == 0).map_or(spot, |first| first.of_packings(view, &spot));
         let crossing = *crossings.iter().find(|crossing| crossing.ply == spot.ply).or(crossings.first())?;
         let first = &self.fibers[0].spot;
         let axial = if first.ply == spot.ply { first } else { &spot }.axial(view.camera);
@@ -371,7 +396,8 @@ impl Fiber {
             let gaps = yarn.plies[fibers.ply].gaps;
             let own = fibers.ply == spot.ply;
             let through = if own {
-                (-gaps.rate * way.after.met(fibers.expected, shape.plies[fibers.ply].by_rim(fibers.offset))).exp()
+                let by_rim = shape.plies[fibers.ply].by_rim(fibers.offset);
+                (-gaps.rate * way.after.met(fibers.expected, by_rim)).exp()
             } else {
                 gaps.unscattered(fibers.expected)
             };

@@ -115,6 +115,8 @@ struct Spot {
     inside: Inside,
     /// Unit tangent of the fibre there.
     tangent: Vec3A,
+    /// How much deeper on the camera's ray it is than where the gaps between fibres have the first one: 0 but of a first fibre's own light.
+    deeper: f32,
 }
 
 impl<'a> View<'a> {
@@ -129,12 +131,14 @@ impl<'a> View<'a> {
         (crossing.foot - crossing.chord.place(x) / self.section.cos).max(0.0)
     }
 
-    /// The place at a depth in it.
+    /// The place of the first fibre in a ply at a depth, whose middle is so far `beside` the ray, in the circle of the ply's radius.
     #[inline]
-    fn spot(&self, crossing: &PlyCrossing, depth: f32) -> Spot {
+    fn first_spot(&self, crossing: &PlyCrossing, depth: f32, beside: f32) -> Spot {
         let Self { yarn, section, .. } = self;
-        let inside = section.inside(yarn.occluder().shape(), section.point(depth), crossing.travel_at(depth));
-        Spot::new(self, crossing.ply, inside)
+        let shape = yarn.occluder().shape();
+        let inside = section.inside(shape, section.point(depth), crossing.travel_at(depth));
+        let tangent = inside.fiber_tangent_beside(shape, section, crossing.ply, self.camera, beside);
+        Spot { ply: crossing.ply, inside, tangent: tangent.normalize(), deeper: 0.0 }
     }
 }
 
@@ -143,7 +147,7 @@ impl Spot {
     #[inline]
     fn new(view: &View<'_>, ply: usize, inside: Inside) -> Self {
         let tangent = inside.fiber_tangent(view.yarn.occluder().shape(), view.section, ply);
-        Self { ply, inside, tangent: tangent.normalize() }
+        Self { ply, inside, tangent: tangent.normalize(), deeper: 0.0 }
     }
 
     /// The place in the ply's section, and the axes against which azimuths of light that leaves from there count. Of light that goes on from the
@@ -180,18 +184,23 @@ impl Spot {
     }
 
     /// How light that came from `back` goes on from here towards `w`. It starts where it met the fibre, on the side where it came from, and is
-    /// inside of it first if it goes on forward.
+    /// inside of it first if it goes on forward. What goes straight on meets what the camera's ray would: it starts where the gaps have
+    /// the fibre, which know how many are behind.
     #[inline]
     fn turned(&self, view: &View<'_>, back: Vec3A, w: Vec3A) -> Turned {
+        /// Cosines of turns, of 50 and 25 degrees: from none of it straight on to all.
+        const STRAIGHT_ON: [f32; 2] = [0.642_787_6, 0.906_307_8];
         let out = self.across(w);
         let length = out.length().max(1e-6);
         let out = out / length;
         let cos = -back.dot(out);
         let lead = view.section.thinness() * view.yarn.plies[self.ply].lead;
+        let [none, all] = STRAIGHT_ON;
+        let nearer = ((cos - none) / (all - none)).clamp(0.0, 1.0) * self.deeper;
         Turned {
             cos,
-            shift: lead * (back + cos.max(0.0) * out),
-            free: lead * (1.0 + cos.max(0.0)),
+            shift: lead * (back + cos.max(0.0) * out) + nearer * view.camera,
+            free: (lead * (1.0 + cos.max(0.0)) + nearer * view.section.cos).max(0.0),
             beside: (1.0 - w.z * w.z).max(0.0).sqrt() / length,
         }
     }
@@ -269,9 +278,9 @@ impl<'a> Vertex<'a> {
         let view = View::new(yarn, section);
         let Arrival { throughput, lit, first_fiber } = arrival.into();
         let weight = throughput.max(Rgb::splat(1e-20));
-        let first = first_fiber.unwrap_or(u[1]);
         // It takes an unknown number of them.
         let mut of_forward = stream.branch();
+        let first = first_fiber.unwrap_or_else(|| [u[1], of_forward.next()]);
         let forward = Forward::draw(&view, crossings, unscattered, (weight, lit), first, &mut of_forward);
         let end = forward.as_ref().and_then(|forward| forward.end(&view, crossings, u[0]));
         let node = LateNode::new(end, weight, [u[2], u[3]], stream.branch());
@@ -380,3 +389,5 @@ mod swirl_tests;
 mod tests;
 #[cfg(test)]
 mod way_in_tests;
+#[cfg(test)]
+mod way_out_tests;

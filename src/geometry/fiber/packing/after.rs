@@ -5,7 +5,10 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 use glam::DVec2;
 use wide::f32x8;
 
-use super::lines::Lines;
+use super::{
+    line::{Hit, Line},
+    lines::Lines,
+};
 use crate::{
     geometry::{
         after_fiber::{AfterFiber, AfterTurn, Missing, MissingFibers},
@@ -14,20 +17,6 @@ use crate::{
     },
     math::sampler::Stream,
 };
-
-/// A line through the discs of a section: its direction, and how far beside the middle it is.
-struct Line<'a> {
-    discs: &'a [DVec2],
-    along: DVec2,
-    offset: f64,
-}
-
-/// A fibre on a line: where the line enters it, and where it is abreast of its centre.
-struct Hit {
-    fiber: usize,
-    enter: f64,
-    lies: f64,
-}
 
 /// A way out of a ply from a fibre at which light was turned.
 #[derive(Clone, Copy)]
@@ -83,12 +72,9 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
     const RAYS: usize = 16_000;
     const TURNS: usize = 4;
     let mut stream = Stream::new(0xaf7e);
-    let mut next = || f64::from(stream.next());
     let mut ways = Vec::with_capacity(2 * TURNS * RAYS);
     for ray in 0..RAYS {
-        let along = DVec2::from_angle(TAU * next());
-        let offset = (2.0 * next() - 1.0) * (lines.reach(along.perp()) + lines.radius);
-        let line = Line { discs: &sections[ray % sections.len()], along, offset };
+        let line = Line::random(lines, &sections[ray % sections.len()], None, &mut stream);
         let mut hits = line.hits(lines);
         let Some(first) = (0..hits.len()).min_by(|&a, &b| hits[a].enter.total_cmp(&hits[b].enter)) else {
             continue;
@@ -96,13 +82,13 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
         hits.swap(0, first);
         // Any other one stands for all but the first.
         let others = hits.len() - 1;
-        let other = 1 + (next() * others as f64) as usize;
+        let other = 1 + (f64::from(stream.next()) * others as f64) as usize;
         let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f32))];
         for (later, hit) in looked_at.into_iter().enumerate() {
             let Some((hit, weight)) = hit else { continue };
             for turn in 0..TURNS {
-                let turn = (turn as f64 + next()) / TURNS as f64 * TAU;
-                let way = line.turned(lines, ply, (hit, &hits), later > 0, DVec2::from_angle(turn).rotate(along));
+                let turn = (turn as f64 + f64::from(stream.next())) / TURNS as f64 * TAU;
+                let way = line.turned(lines, ply, (hit, &hits), later > 0, DVec2::from_angle(turn).rotate(line.along));
                 ways.extend(way.map(|way| Way { weight, ..way }));
             }
         }
@@ -111,19 +97,6 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
 }
 
 impl Line<'_> {
-    /// The fibres on it.
-    fn hits(&self, lines: &Lines) -> Vec<Hit> {
-        let across = self.along.perp();
-        let hit = |(fiber, disc): (usize, &DVec2)| {
-            let off = disc.dot(across) - self.offset;
-            let half = lines.radius * lines.slopes.half_width(*disc, across);
-            let lies = disc.dot(self.along);
-            let enter = lies - lines.radius * (1.0 - (off / half).powi(2)).sqrt();
-            (off.abs() < half).then_some(Hit { fiber, enter, lies })
-        };
-        self.discs.iter().enumerate().filter_map(hit).collect()
-    }
-
     /// The way of its light that is turned to a direction at one of them, the first or a `later` one. `None` if it begins outside of the ply.
     fn turned(&self, lines: &Lines, ply: &PlyShape, (hit, hits): (&Hit, &[Hit]), later: bool, w: DVec2) -> Option<Way> {
         let (along, across) = (self.along, self.along.perp());
@@ -146,13 +119,12 @@ impl Line<'_> {
                 }
             }
         }
-        let tilt = lines.slopes.half_width(self.discs[hit.fiber], across);
         Some(Way {
             later,
             weight: 1.0,
             turn: turn as f32,
             short: if lines.stretch == 1.0 { 0.5 } else { (w.y * w.y) as f32 },
-            expected: (tilt * expected) as f32,
+            expected: expected as f32,
             by_rim: ply.by_rim(offset),
             met: met.len() as u32,
             open,
@@ -172,7 +144,7 @@ fn met(lines: &Lines, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> V
     discs.iter().enumerate().filter(is_met).map(|(other, _)| other).collect()
 }
 
-/// The fibres, as circles, that light is expected to meet from a place in a direction, less those in the strip that it has swept if it was
+/// The fibres that light is expected to meet from a place in a direction, less those in the strip that it has swept if it was
 /// turned `back` by an angle of a cosine; and the distance of its way from the ply's axis. `None` if the place is outside and there are none.
 fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>) -> Option<(f64, f32)> {
     let root = lines.stretch.sqrt();
@@ -181,8 +153,8 @@ fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>
         return None;
     }
     // The middle of the line's way through the section.
-    let [from, to] = [from, w].map(|v| DVec2::new(v.x / root, v.y * root));
-    let foot = (-from.dot(to) / to.length_squared() / root) as f32;
+    let [start, to] = [from, w].map(|v| DVec2::new(v.x / root, v.y * root));
+    let foot = (-start.dot(to) / to.length_squared() / root) as f32;
     let [offset, length, thin, wide] = [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
     let chord = ply.chord(offset, length, thin, wide);
     let swept = |turn: f64| {
@@ -191,7 +163,10 @@ fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>
         strip.fibers(&chord, foot)
     };
     let ahead = (chord.ahead(-foot) - back.map_or(0.0, swept)).max(0.0);
-    Some((root * f64::from(ahead), offset))
+    // As wide as they are in the middle of what is ahead.
+    let middle = 0.5 * ((foot - chord.half).max(0.0) + (foot + chord.half).max(0.0));
+    let wider = lines.slopes.half_width(from + root * f64::from(middle) * w, w.perp());
+    Some((wider * root * f64::from(ahead), offset))
 }
 
 /// What is counted of ways, and what the fit so far has of them: for each number of a row.
@@ -338,35 +313,29 @@ fn within(missing: f32, before: f32, knot: usize) -> f32 {
 mod tests {
     use std::f32::consts::PI;
 
-    use glam::DMat2;
-
     use super::{
-        super::{hard_discs, measure::squeezed, measured},
+        super::{measured, tests::other_sections},
         *,
     };
-    use crate::geometry::fiber::{
-        slopes::{Slopes, Twist},
-        yielding::Ellipse,
+    use crate::geometry::{
+        density::KnownPacking,
+        fiber::slopes::{Slopes, Twist},
     };
-
-    /// Sections of other packings than are measured.
-    fn others(count: u32, share: f64, stretch: f64) -> Vec<Vec<DVec2>> {
-        let radius = share / (1.0 - share);
-        let packings = (500..620).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed)));
-        match Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0))) {
-            None => packings.collect(),
-            Some(ellipse) => packings
-                .flat_map(|discs| squeezed(&discs, share, &Slopes::NONE, &ellipse).collect::<Vec<_>>())
-                .collect(),
-        }
-    }
 
     #[test]
     fn as_much_light_leaves_after_a_fiber_as_in_other_packings() {
-        for (count, density, stretch) in [(60u32, 0.2f64, 1.0), (60, 0.45, 1.0), (60, 0.6, 1.0), (100, 0.4, 1.5)] {
+        let given = KnownPacking { crowding: Some(0.1), regularity: Some(0.6) };
+        let measured_only = KnownPacking::default();
+        for (count, density, stretch, known) in [
+            (60u32, 0.2f64, 1.0, measured_only),
+            (60, 0.45, 1.0, measured_only),
+            (60, 0.45, 1.0, given),
+            (60, 0.6, 1.0, measured_only),
+            (100, 0.4, 1.5, measured_only),
+        ] {
             let share = (density / f64::from(count)).sqrt();
             let radius = share / (1.0 - share);
-            let packing = measured(count, radius, Twist::NONE, stretch);
+            let packing = measured(count, radius, Twist::NONE, stretch, known);
             let lines = Lines { radius, stretch, slopes: Slopes::NONE };
             let mut ply = lines.ply(count);
             (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
@@ -375,7 +344,7 @@ mod tests {
             let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
             // By turns of 12 degrees: light that is out and fibres that are met, as they are and by the law.
             let mut sums = [[[0.0f64; 5]; 15]; 2];
-            for way in ways(&lines, &others(count, share, stretch), &ply) {
+            for way in ways(&lines, &other_sections(count, share, stretch), &ply) {
                 let sum = &mut sums[usize::from(way.later)][(way.turn.acos() / PI * 15.0).min(14.0) as usize];
                 let numbers = [Asked::Unscattered { rate }, Asked::Counted]
                     .map(|asked| [asked.counted(&way), asked.fitted(&way, &way.law(&law))])
@@ -385,7 +354,7 @@ mod tests {
             }
             for (later, turns) in sums.iter().enumerate() {
                 for (turn, [out, by_law, met, met_by_law, all]) in turns.iter().enumerate() {
-                    let case = format!("{count} at {density}, {stretch}, later {later}, turn {turn}");
+                    let case = format!("{count} at {density}, {stretch}, {known:?}, later {later}, turn {turn}");
                     let (out, by_law) = (out / all, by_law / all);
                     assert!((out - by_law).abs() < 0.01 + 0.04 * out, "{case}: {out} are out, {by_law} by the law");
                     let (met, met_by_law) = (met / all, met_by_law / all);

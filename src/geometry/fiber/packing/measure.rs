@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
-use super::{after::after, leaning_discs, lines::Lines};
+use super::{after::after, first::first, leaning_discs, lines::Lines};
 use crate::{
     geometry::{
-        density::PlyPacking,
+        density::{KnownPacking, PlyPacking},
         fiber::{
             slopes::{Slopes, Twist},
             yielding::{Ellipse, Yielding},
@@ -33,33 +33,36 @@ const SQUEEZED: u32 = 4;
 /// would pass if these lay at random. The regularity is that with which the gaps of
 /// [`PlyGaps`](crate::geometry::gaps::PlyGaps) pass as much as pieces of lines away from the rim do; that by the rim with
 /// which they pass as much as lines in all directions through the packings, by least squares of the roots over the ply's
-/// width. What is free after a fibre is that with which as much light leaves that met one as on lines from the place where it
-/// did.
+/// width. The first fibre lies as deep as the first ones on random lines do. What is free after a fibre is that with which as much light
+/// leaves that met one as on lines from the place where it did. Both are told from what the others say, `known` or measured.
+///
+/// Fibres are packed as they lean on the mean around the ply; lines meet them as they lean on the yarn's outside.
 ///
 /// Of more than `MOST_MEASURED` discs some are packed as densely in their stead: the crowding is at the wall only, so it
 /// falls with a disc's radius.
-pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacking {
+pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64, known: KnownPacking) -> PlyPacking {
     let packed = count.min(MOST_MEASURED);
     let fewer = (f64::from(packed) / f64::from(count.max(1))).sqrt();
     // The same area fraction of the ply, whose radius is 1 + radius.
     let share = radius / (1.0 + radius) / fewer;
     if packed == 0 || share >= 1.0 {
-        return PlyPacking { crowding: 0.0, depth: 0.0, regularity: 1.0, rim: 1.0, after: None };
+        return known.over(PlyPacking::evenly(1.0));
     }
     let radius = share / (1.0 - share);
-    let slopes = twist.scaled(twist.room(packed, share)).in_core(share);
+    let twist = twist.scaled(twist.room(packed, share));
+    let (mean, outside) = (twist.in_core(share), twist.outside(share));
     let packings: Vec<Vec<DVec2>> = (0..MEASURED.div_ceil(packed).clamp(LEAST_PACKINGS, MOST_PACKINGS))
         .into_par_iter()
-        .map(|seed| leaning_discs(packed, radius, &slopes, &mut Stream::new(seed)))
+        .map(|seed| leaning_discs(packed, radius, &mean, &mut Stream::new(seed)))
         .collect();
     let pressed = Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0)));
     let sections: Vec<Vec<DVec2>> = match &pressed {
         None => packings,
-        Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, &slopes, ellipse)).collect(),
+        Some(ellipse) => packings.iter().flat_map(|discs| squeezed(discs, share, &outside, ellipse)).collect(),
     };
     let lines = match &pressed {
-        None => Lines { radius, stretch: 1.0, slopes },
-        Some(ellipse) => Lines { radius, stretch, slopes: ellipse.slopes_in(&slopes) },
+        None => Lines { radius, stretch: 1.0, slopes: outside },
+        Some(ellipse) => Lines { radius, stretch, slopes: ellipse.slopes_in(&outside) },
     };
     let mut ply = lines.ply(packed);
     lines.fit_wall(&sections, &mut ply);
@@ -67,8 +70,13 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64) -> PlyPacki
     let regularity = lines.inside(&sections, core);
     ply.regularity = regularity as f32;
     let rim = lines.rim(&sections, &mut ply);
+    let (crowding, depth) = (f64::from(ply.crowding) * fewer, f64::from(ply.depth));
+    let packing = known.over(PlyPacking { crowding, depth, rim, ..PlyPacking::evenly(regularity) });
+    (ply.crowding, ply.depth) = ((packing.crowding / fewer) as f32, packing.depth as f32);
+    (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
+    let first = Some(first(&lines, &sections, &ply));
     let after = Some(after(&lines, &sections, &ply));
-    PlyPacking { crowding: f64::from(ply.crowding) * fewer, depth: f64::from(ply.depth), regularity, rim, after }
+    PlyPacking { first, after, ..packing }
 }
 
 /// A packing in an ellipse, at some turns; in core radii, as the packing. `share` is a disc's radius over the ply's.

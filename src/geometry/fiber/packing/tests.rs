@@ -1,7 +1,21 @@
 //! Packings, and what is measured of them against other packings.
 
-use super::{lines::Lines, *};
-use crate::geometry::gaps::PlyGaps;
+use glam::DMat2;
+
+use super::{lines::Lines, measure::squeezed, *};
+use crate::geometry::{density::KnownPacking, fiber::yielding::Ellipse, gaps::PlyGaps};
+
+/// Sections of other packings than are measured.
+pub(super) fn other_sections(count: u32, share: f64, stretch: f64) -> Vec<Vec<DVec2>> {
+    let radius = share / (1.0 - share);
+    let packings = (500..620).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed)));
+    match Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0))) {
+        None => packings.collect(),
+        Some(ellipse) => {
+            packings.flat_map(|discs| squeezed(&discs, share, &Slopes::NONE, &ellipse).collect::<Vec<_>>()).collect()
+        }
+    }
+}
 
 #[test]
 fn discs_do_not_overlap_and_fill_the_core_evenly() {
@@ -49,12 +63,12 @@ fn crowding_is_that_of_many_packings_and_falls_with_the_discs() {
             .map(|at| at.length_squared())
             .collect();
         let want = 2.0 * many.iter().sum::<f64>() / many.len() as f64 - 1.0;
-        let got = measured(count, radius, Twist::NONE, 1.0).crowding;
+        let got = measured(count, radius, Twist::NONE, 1.0, KnownPacking::default()).crowding;
         assert!((got - want).abs() < 0.03, "{count}: {got}, not {want}");
     }
     let (few, radius) = of(100, 0.5);
     let (many, smaller) = of(10_000, 0.5);
-    let crowding = |count, radius| measured(count, radius, Twist::NONE, 1.0).crowding;
+    let crowding = |count, radius| measured(count, radius, Twist::NONE, 1.0, KnownPacking::default()).crowding;
     assert!(crowding(many, smaller).abs() < 0.5 * crowding(few, radius).abs() + 0.01);
     assert_eq!(crowding(0, 0.1), 0.0);
     assert!(crowding(1, 1.0).is_finite() && crowding(u32::MAX, 1e-9).is_finite());
@@ -64,7 +78,7 @@ fn crowding_is_that_of_many_packings_and_falls_with_the_discs() {
 fn lines_pass_loose_packings_more_regularly_than_dense_ones_that_are_pushed_apart() {
     let of = |count: u32, density: f64| {
         let fiber = (density / f64::from(count)).sqrt();
-        measured(count, fiber / (1.0 - fiber), Twist::NONE, 1.0).regularity
+        measured(count, fiber / (1.0 - fiber), Twist::NONE, 1.0, KnownPacking::default()).regularity
     };
     let (loose, dense) = (of(100, 0.2), of(100, 0.6));
     assert!((1.2..1.7).contains(&loose) && (0.4..1.1).contains(&dense), "{loose} {dense}");
@@ -79,7 +93,7 @@ fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
         let fiber = (density / f64::from(count)).sqrt();
         let radius = fiber / (1.0 - fiber);
         let lines = Lines { radius, stretch: 1.0, slopes: Slopes::NONE };
-        let packing = measured(count, radius, Twist::NONE, 1.0);
+        let packing = measured(count, radius, Twist::NONE, 1.0, KnownPacking::default());
         let mut ply = lines.ply(count);
         (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
         (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
@@ -114,7 +128,7 @@ fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
 fn packings_that_give_way_are_measured_as_they_lie_then() {
     let of = |density: f64, stretch: f64| {
         let fiber = (density / 70.0).sqrt();
-        measured(70, fiber / (1.0 - fiber), Twist::NONE, stretch)
+        measured(70, fiber / (1.0 - fiber), Twist::NONE, stretch, KnownPacking::default())
     };
     for density in [0.25, 0.5] {
         let (round, nearly, flat) = (of(density, 1.0), of(density, 1.01), of(density, 2.0));
@@ -125,8 +139,8 @@ fn packings_that_give_way_are_measured_as_they_lie_then() {
     // Dense ones that were only pushed apart are in better order when they have given way to each other.
     assert!(of(0.5, 1.5).regularity > of(0.5, 1.0).regularity);
     assert!(
-        measured(1, 1.0, Twist::NONE, 4.0).crowding.is_finite()
-            && measured(3, 0.9, Twist::NONE, 100.0).regularity.is_finite()
+        measured(1, 1.0, Twist::NONE, 4.0, KnownPacking::default()).crowding.is_finite()
+            && measured(3, 0.9, Twist::NONE, 100.0, KnownPacking::default()).regularity.is_finite()
     );
 }
 
