@@ -83,7 +83,7 @@ impl PlyShape {
     #[inline]
     pub fn chord(&self, offset: f32, length: f32, thin: f32, wide: f32) -> ChordFibers {
         // Centres keep as far from the rim as fibres are thick: across the line, and along it.
-        let half_width = (self.fiber_radius * wide).min(0.999 * self.radius);
+        let half_width = self.half_width(wide);
         let core = self.radius - half_width;
         let inverse = 1.0 / core;
         let circle = if self.depth == 0.0 { inverse } else { 1.0 / (core - self.depth * half_width).max(1e-3 * core) };
@@ -110,8 +110,7 @@ impl PlyShape {
         let [of_right, of_left, ..] = at.cos.to_array();
         let longest = if right * left < 0.0 { 1.0 } else { of_right.max(of_left) };
         let mean = (2.0 * squares / (upper - lower).max(1e-20)).min(longest);
-        let along = (self.radius - self.fiber_radius / wide).max(0.0);
-        let half = (mean * along).max(0.5 * self.fiber_radius);
+        let half = (mean * self.core_along(wide)).max(0.5 * self.fiber_radius);
         let half = half / length;
         let zone = (thin * self.fiber_radius).min(half);
         ChordFibers { even: (count * even).max(0.0), ring: (count * ring).max(0.0), half, zone }
@@ -134,9 +133,8 @@ impl PlyShape {
     /// [`Self::chord`].
     #[inline]
     pub fn half_chord(&self, middle: f32, wide: f32) -> f32 {
-        let core = self.core_across(wide);
-        let along = (self.radius - self.fiber_radius / wide).max(0.0);
-        along * (1.0 - (middle / core).powi(2)).max(0.0).sqrt()
+        let core = self.radius - self.half_width(wide);
+        self.core_along(wide) * (1.0 - (middle / core).powi(2)).max(0.0).sqrt()
     }
 
     /// How far from the ply's axis the middle of the first fibre is that a line meets at a distance from it: on either side of the line within a
@@ -144,9 +142,10 @@ impl PlyShape {
     /// to be linear in between.
     #[inline]
     pub fn middle_beside(&self, offset: f32, wide: f32, u: f32) -> f32 {
-        let (core, half_width) = (self.core_across(wide), self.fiber_radius * wide);
         /// About the share of first fibres that lie at the wall: 26 to 46 % in dense plies.
         const AT_WALL: f32 = 0.4;
+        let half_width = self.half_width(wide);
+        let core = self.radius - half_width;
         let [left, right] = [offset - half_width, offset + half_width].map(|at| at.clamp(-core, core));
         let [a, b] = [left, right].map(|at| (core * core - at * at).max(0.0).sqrt());
         let root = (a * a + u * (b * b - a * a)).max(0.0).sqrt();
@@ -154,10 +153,32 @@ impl PlyShape {
         left + (by_length + AT_WALL * (u - by_length)) * (right - left)
     }
 
-    /// How far from the ply's axis centres of fibres lie across a line.
+    /// How far centres of fibres keep from the rim across a line.
     #[inline]
-    fn core_across(&self, wide: f32) -> f32 {
-        self.radius - (self.fiber_radius * wide).min(0.999 * self.radius)
+    fn half_width(&self, wide: f32) -> f32 {
+        (self.fiber_radius * wide).min(0.999 * self.radius)
+    }
+
+    /// How far from the ply's axis they lie along it.
+    #[inline]
+    fn core_along(&self, wide: f32) -> f32 {
+        (self.radius - self.fiber_radius / wide).max(0.0)
+    }
+
+    /// How much the first fibre on a line at a distance from the ply's axis lies as those by the rim do, from 0 to 1.
+    #[inline]
+    pub fn first_by_rim(&self, offset: f32) -> f32 {
+        FirstFiber::by_rim((self.radius - offset.abs()) / self.fiber_radius)
+    }
+
+    /// Packs the fibres so; until then they lie evenly.
+    pub fn pack(&mut self, packing: &PlyPacking) {
+        self.crowding = packing.crowding as f32;
+        self.depth = packing.depth as f32;
+        self.regularity = packing.regularity as f32;
+        self.rim = packing.rim as f32;
+        self.first = packing.first;
+        self.after = packing.after;
     }
 
     /// How much the order of fibres on a line at a distance from the ply's axis is that by the rim, from 0 to 1: from two fibres below it

@@ -1,4 +1,4 @@
-//! How deep the first fibre that light meets in a ply lies (docs/model.md, section 3).
+//! How deep the first fibre that light meets in a ply lies (docs/model.md, section 4).
 
 /// The depth of first fibres by that at which the gaps of [`PlyGaps`](super::gaps::PlyGaps) have as many of them: in fibre radii below the end of the chord
 /// on which centres lie, where the gaps have [`FirstFiber::of_gaps`].

@@ -101,12 +101,7 @@ impl YarnShape {
     pub fn packed(mut self, packings: &[PlyPacking]) -> Self {
         assert_eq!(self.plies.len(), packings.len(), "one packing for each ply");
         for (ply, packing) in self.plies.iter_mut().zip(packings) {
-            ply.crowding = packing.crowding as f32;
-            ply.depth = packing.depth as f32;
-            ply.regularity = packing.regularity as f32;
-            ply.rim = packing.rim as f32;
-            ply.first = packing.first;
-            ply.after = packing.after;
+            ply.pack(packing);
         }
         self
     }

@@ -73,9 +73,8 @@ impl Twist {
     /// The same as if all sides of the ply were that on the yarn's outside, where light meets it. There the slope of the ply adds to that of its
     /// fibres; it is all that they have in the ply's middle.
     pub(super) fn outside(self, fiber: f64) -> Slopes {
-        let turn = DMat2::from_cols(DVec2::Y, DVec2::NEG_X);
-        let linear = (self.fibers * (1.0 - fiber).max(0.0) + self.plies) * turn;
-        Slopes { middle: DVec2::ZERO, linear, even: 0.0 }
+        let in_core = self.fibers * (1.0 - fiber).max(0.0);
+        Self { fibers: in_core + self.plies, plies: 0.0 }.in_core(0.0)
     }
 }
 

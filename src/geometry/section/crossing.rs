@@ -8,7 +8,6 @@ use super::{Inside, Section, unrotate};
 use crate::{
     geometry::{
         density::ChordFibers,
-        first_fiber::FirstFiber,
         gaps::PlyGaps,
         ply::fiber_tangent,
         way::{self, Station, Way},
@@ -190,7 +189,7 @@ impl Section<'_> {
     }
 
     /// How deep the first fibre of a crossing is, so far `beside` the ray, which the gaps between fibres have at a `depth`, inside the yarn there:
-    /// below the end of its own chord of the core, as [`FirstFiber`] has it.
+    /// below the end of its own chord of the core, as [`FirstFiber`](crate::geometry::first_fiber::FirstFiber) has it.
     #[inline]
     pub fn first_depth(
         &self,
@@ -206,8 +205,12 @@ impl Section<'_> {
         let below = chord.half - (foot - depth) * self.cos;
         let below = of.first.map_or(below, |first| {
             let thick = self.thinness() * of.fiber_radius;
-            let by_rim = FirstFiber::by_rim((of.radius - offset.abs()) / of.fiber_radius);
-            thick * first.depth(below / thick, by_rim, inside.along_short_axis(shape, *ply, self.direction()))
+            thick
+                * first.depth(
+                    below / thick,
+                    of.first_by_rim(*offset),
+                    inside.along_short_axis(shape, *ply, self.direction()),
+                )
         });
         (foot - (half - below).max(-half) / self.cos).max(0.0)
     }

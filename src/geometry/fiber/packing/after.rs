@@ -148,18 +148,15 @@ fn met(lines: &Lines, discs: &[DVec2], fiber: usize, from: DVec2, w: DVec2) -> V
 /// turned `back` by an angle of a cosine; and the distance of its way from the ply's axis. `None` if the place is outside and there are none.
 fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>) -> Option<(f64, f32)> {
     let root = lines.stretch.sqrt();
-    let (beside, reach) = (from.dot(w.perp()), lines.reach(w.perp()));
-    if beside.abs() >= reach * (1.0 + lines.radius) {
+    let (beside, scales) = (from.dot(w.perp()), lines.scales(w.perp()));
+    if beside.abs() >= scales.reach * (1.0 + lines.radius) {
         return None;
     }
-    // The middle of the line's way through the section.
-    let [start, to] = [from, w].map(|v| DVec2::new(v.x / root, v.y * root));
-    let foot = (-start.dot(to) / to.length_squared() / root) as f32;
-    let [offset, length, thin, wide] = [beside / reach, root * reach, root.recip(), reach.recip()].map(|v| v as f32);
-    let chord = ply.chord(offset, length, thin, wide);
+    let [foot, offset] = [lines.middle(from, w) / root, beside / scales.reach].map(|v| v as f32);
+    let chord = scales.chord(ply, offset);
     let swept = |turn: f64| {
         let sine = (1.0 - turn * turn).max(0.0).sqrt() as f32;
-        let strip = ClearedStrip::new(2.0 * thin * lines.radius as f32, [0.0, sine], [0.0, f32::INFINITY]);
+        let strip = ClearedStrip::new(2.0 * scales.thin * lines.radius as f32, [0.0, sine], [0.0, f32::INFINITY]);
         strip.fibers(&chord, foot)
     };
     let ahead = (chord.ahead(-foot) - back.map_or(0.0, swept)).max(0.0);
@@ -314,13 +311,10 @@ mod tests {
     use std::f32::consts::PI;
 
     use super::{
-        super::{measured, tests::other_sections},
+        super::tests::{measured_ply, other_sections},
         *,
     };
-    use crate::geometry::{
-        density::KnownPacking,
-        fiber::slopes::{Slopes, Twist},
-    };
+    use crate::geometry::density::KnownPacking;
 
     #[test]
     fn as_much_light_leaves_after_a_fiber_as_in_other_packings() {
@@ -333,18 +327,12 @@ mod tests {
             (60, 0.6, 1.0, measured_only),
             (100, 0.4, 1.5, measured_only),
         ] {
-            let share = (density / f64::from(count)).sqrt();
-            let radius = share / (1.0 - share);
-            let packing = measured(count, radius, Twist::NONE, stretch, known);
-            let lines = Lines { radius, stretch, slopes: Slopes::NONE };
-            let mut ply = lines.ply(count);
-            (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
-            ply.regularity = packing.regularity as f32;
-            let law = packing.after.unwrap();
+            let (lines, ply) = measured_ply(count, density, stretch, known);
+            let law = ply.after.unwrap();
             let rate = (1.0 - ply.mean_dead_zone()).recip() as f32;
             // By turns of 12 degrees: light that is out and fibres that are met, as they are and by the law.
             let mut sums = [[[0.0f64; 5]; 15]; 2];
-            for way in ways(&lines, &other_sections(count, share, stretch), &ply) {
+            for way in ways(&lines, &other_sections(count, density, stretch), &ply) {
                 let sum = &mut sums[usize::from(way.later)][(way.turn.acos() / PI * 15.0).min(14.0) as usize];
                 let numbers = [Asked::Unscattered { rate }, Asked::Counted]
                     .map(|asked| [asked.counted(&way), asked.fitted(&way, &way.law(&law))])

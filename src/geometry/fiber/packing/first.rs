@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use super::{line::Line, lines::Lines};
+use super::{
+    line::Line,
+    lines::{Lines, Scales},
+};
 use crate::{
     geometry::{first_fiber::FirstFiber, gaps::PlyGaps, ply::PlyShape},
     math::sampler::Stream,
@@ -98,11 +101,7 @@ struct Seen<'a> {
     ply: &'a PlyShape,
     /// How far beside the middle it is.
     offset: f32,
-    /// How wide and how thick fibres are there, over their radius.
-    wide: f32,
-    thin: f32,
-    /// How much of the circle a unit of the line passes, in radii of the section's long axis.
-    length: f32,
+    scales: Scales,
     /// Where the middle of its chord is, from the point nearest to the middle of the section.
     foot: f64,
     /// How many more fibres it meets than untwisted ones.
@@ -111,36 +110,32 @@ struct Seen<'a> {
 
 impl<'a> Seen<'a> {
     fn new(lines: &Lines, ply: &'a PlyShape, line: &Line<'_>) -> Self {
-        let root = lines.stretch.sqrt();
-        let in_circle = |v: DVec2| DVec2::new(v.x / root, v.y * root);
-        let (beside, along) = (in_circle(line.along.perp()), in_circle(line.along));
-        let reach = lines.reach(line.along.perp());
-        let foot = -line.offset * beside.dot(along) / along.length_squared();
-        let [offset, wide, thin, length, squeeze] =
-            [line.offset / reach, reach.recip(), root.recip(), root * reach, root].map(|v| v as f32);
-        Self { ply, offset, wide, thin, length, foot, squeeze }
+        let across = line.along.perp();
+        let scales = lines.scales(across);
+        let foot = lines.middle(line.offset * across, line.along);
+        let [offset, squeeze] = [line.offset / scales.reach, lines.stretch.sqrt()].map(|v| v as f32);
+        Self { ply, offset, scales, foot, squeeze }
     }
 
     /// One at a depth.
     fn first(&self, depth: f32) -> First {
-        let deep = (self.ply.radius - self.offset.abs()) / self.ply.fiber_radius;
-        First { depth, by_rim: FirstFiber::by_rim(deep) }
+        First { depth, by_rim: self.ply.first_by_rim(self.offset) }
     }
 
     /// The one that it meets, if it meets any.
     fn counted(&self, lines: &Lines, line: &Line<'_>) -> Option<First> {
         let hits = line.hits(lines);
         let first = hits.iter().min_by(|a, b| a.enter.total_cmp(&b.enter))?;
-        let middle = line.discs[first.fiber].dot(line.along.perp()) as f32 * self.wide;
-        let half = self.squeeze * self.ply.half_chord(middle, self.wide) / self.length;
+        let middle = line.discs[first.fiber].dot(line.along.perp()) as f32 * self.scales.wide;
+        let half = self.squeeze * self.ply.half_chord(middle, self.scales.wide) / self.scales.length;
         let depth = half + (first.lies - self.foot) as f32;
         Some(self.first(depth / lines.radius as f32))
     }
 
     /// One that the gaps draw by two numbers, if they draw any.
     fn by_gaps(&self, u: [f32; 2]) -> Option<First> {
-        let chord = self.ply.chord(self.offset, self.length, self.thin, self.wide);
-        let gaps = PlyGaps::new(self.ply.dead_zone(&chord, self.offset, self.length));
+        let chord = self.scales.chord(self.ply, self.offset);
+        let gaps = PlyGaps::new(self.ply.dead_zone(&chord, self.offset, self.scales.length));
         let fibers = self.squeeze * chord.total();
         let through = gaps.unscattered(fibers);
         if u[0] < through {
@@ -148,34 +143,25 @@ impl<'a> Seen<'a> {
         }
         let met = gaps.fibers_passed(1.0 - u[1] * (1.0 - through)).min(fibers);
         let depth = chord.half - chord.place(met / fibers.max(1e-20));
-        Some(self.first(depth / (self.thin * self.ply.fiber_radius)))
+        Some(self.first(depth / (self.scales.thin * self.ply.fiber_radius)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{measured, tests::other_sections},
+        super::tests::{measured_ply, other_sections},
         *,
     };
-    use crate::geometry::{
-        density::KnownPacking,
-        fiber::slopes::{Slopes, Twist},
-    };
+    use crate::geometry::density::KnownPacking;
 
     #[test]
     fn first_fibers_lie_as_deep_as_in_other_packings() {
         const NEAR: f32 = 1.5;
         for (count, density, stretch) in [(60u32, 0.2f64, 1.0), (60, 0.45, 1.0), (100, 0.55, 1.0), (100, 0.4, 1.5)] {
-            let share = (density / f64::from(count)).sqrt();
-            let radius = share / (1.0 - share);
-            let packing = measured(count, radius, Twist::NONE, stretch, KnownPacking::default());
-            let lines = Lines { radius, stretch, slopes: Slopes::NONE };
-            let mut ply = lines.ply(count);
-            (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
-            (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
-            let first = packing.first.unwrap();
-            let sections = other_sections(count, share, stretch);
+            let (lines, ply) = measured_ply(count, density, stretch, KnownPacking::default());
+            let first = ply.first.unwrap();
+            let sections = other_sections(count, density, stretch);
             for (axis, short) in [(DVec2::X, 0.0), (DVec2::Y, 1.0)] {
                 let mut stream = Stream::new(9);
                 // Inside and by the rim: how deep they are, as far as they are near, and how many; as counted, by the model, by the gaps alone.

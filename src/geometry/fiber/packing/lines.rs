@@ -24,6 +24,25 @@ pub(super) struct Lines {
     pub(super) slopes: Slopes,
 }
 
+/// How the circle of [`Lines`] is passed by lines in a direction.
+#[derive(Clone, Copy)]
+pub(super) struct Scales {
+    /// [`Lines::reach`].
+    pub(super) reach: f64,
+    /// How much of the circle a unit of a line passes, in radii of the section's long axis.
+    pub(super) length: f32,
+    /// How thick fibres are along a line and how wide across it, over their radius.
+    pub(super) thin: f32,
+    pub(super) wide: f32,
+}
+
+impl Scales {
+    /// The fibres on one at a distance from the middle, in the circle.
+    pub(super) fn chord(&self, ply: &PlyShape, offset: f32) -> ChordFibers {
+        ply.chord(offset, self.length, self.thin, self.wide)
+    }
+}
+
 /// Fibres that a line meets, or many do.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Met {
@@ -101,9 +120,22 @@ impl Lines {
     /// What a line of a kind meets at a distance from the middle, its fibres counted as they are, and how much of the circle a unit
     /// of it passes.
     pub(super) fn chord(&self, ply: &PlyShape, kind: usize, offset: f64) -> (ChordFibers, f32) {
-        let (root, reach) = (self.stretch.sqrt(), self.reach(Self::across(kind)));
-        let length = (root * reach) as f32;
-        (ply.chord(offset as f32, length, root.recip() as f32, reach.recip() as f32), length)
+        let scales = self.scales(Self::across(kind));
+        (scales.chord(ply, offset as f32), scales.length)
+    }
+
+    /// How the circle is passed by lines across which a direction is.
+    pub(super) fn scales(&self, across: DVec2) -> Scales {
+        let (root, reach) = (self.stretch.sqrt(), self.reach(across));
+        let [length, thin, wide] = [root * reach, root.recip(), reach.recip()].map(|v| v as f32);
+        Scales { reach, length, thin, wide }
+    }
+
+    /// How far along a line from a place the middle of its way through the section is.
+    pub(super) fn middle(&self, from: DVec2, along: DVec2) -> f64 {
+        let root = self.stretch.sqrt();
+        let [from, to] = [from, along].map(|v| DVec2::new(v.x / root, v.y * root));
+        -from.dot(to) / to.length_squared()
     }
 
     /// How many of a chord's fibres a line meets, which are thinner along it than the circle's.
@@ -221,7 +253,7 @@ impl Lines {
     }
 
     /// The regularity by the rim with which gaps between the fibres of a ply pass as much as lines through sections do.
-    pub(super) fn rim(&self, sections: &[Vec<DVec2>], ply: &mut PlyShape) -> f64 {
+    pub(super) fn rim(&self, sections: &[Vec<DVec2>], ply: &PlyShape) -> f64 {
         const LINES: usize = 24;
         let offsets: [f64; LINES] =
             std::array::from_fn(|line| (1.0 + self.radius) * (line as f64 + 0.5) / LINES as f64);
@@ -234,8 +266,8 @@ impl Lines {
                 sum.add(*met);
             }
         });
-        let mut error = |rim: f64| -> f64 {
-            ply.rim = rim as f32;
+        let error = |rim: f64| -> f64 {
+            let ply = &PlyShape { rim: rim as f32, ..ply.clone() };
             self.squares(sections, LINES, |kind, line, looks| {
                 let (chord, length) = self.chord(ply, kind, offsets[line]);
                 let gaps = PlyGaps::new(ply.dead_zone(&chord, offsets[line] as f32, length));

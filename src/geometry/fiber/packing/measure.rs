@@ -69,11 +69,10 @@ pub fn measured(count: u32, radius: f64, twist: Twist, stretch: f64, known: Know
     let core = pressed.as_ref().map_or(DVec2::ONE, |ellipse| ellipse.core(share) / (1.0 - share));
     let regularity = lines.inside(&sections, core);
     ply.regularity = regularity as f32;
-    let rim = lines.rim(&sections, &mut ply);
+    let rim = lines.rim(&sections, &ply);
     let (crowding, depth) = (f64::from(ply.crowding) * fewer, f64::from(ply.depth));
     let packing = known.over(PlyPacking { crowding, depth, rim, ..PlyPacking::evenly(regularity) });
-    (ply.crowding, ply.depth) = ((packing.crowding / fewer) as f32, packing.depth as f32);
-    (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
+    ply.pack(&PlyPacking { crowding: packing.crowding / fewer, ..packing });
     let first = Some(first(&lines, &sections, &ply));
     let after = Some(after(&lines, &sections, &ply));
     PlyPacking { first, after, ..packing }

@@ -3,10 +3,11 @@
 use glam::DMat2;
 
 use super::{lines::Lines, measure::squeezed, *};
-use crate::geometry::{density::KnownPacking, fiber::yielding::Ellipse, gaps::PlyGaps};
+use crate::geometry::{density::KnownPacking, fiber::yielding::Ellipse, gaps::PlyGaps, ply::PlyShape};
 
 /// Sections of other packings than are measured.
-pub(super) fn other_sections(count: u32, share: f64, stretch: f64) -> Vec<Vec<DVec2>> {
+pub(super) fn other_sections(count: u32, density: f64, stretch: f64) -> Vec<Vec<DVec2>> {
+    let share = (density / f64::from(count)).sqrt();
     let radius = share / (1.0 - share);
     let packings = (500..620).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed)));
     match Ellipse::of(DMat2::from_diagonal(DVec2::new(stretch, 1.0))) {
@@ -15,6 +16,16 @@ pub(super) fn other_sections(count: u32, share: f64, stretch: f64) -> Vec<Vec<DV
             packings.flat_map(|discs| squeezed(&discs, share, &Slopes::NONE, &ellipse).collect::<Vec<_>>()).collect()
         }
     }
+}
+
+/// A ply whose fibres are packed as measured, and lines through it.
+pub(super) fn measured_ply(count: u32, density: f64, stretch: f64, known: KnownPacking) -> (Lines, PlyShape) {
+    let share = (density / f64::from(count)).sqrt();
+    let radius = share / (1.0 - share);
+    let lines = Lines { radius, stretch, slopes: Slopes::NONE };
+    let mut ply = lines.ply(count);
+    ply.pack(&measured(count, radius, Twist::NONE, stretch, known));
+    (lines, ply)
 }
 
 #[test]
@@ -90,13 +101,8 @@ fn lines_pass_loose_packings_more_regularly_than_dense_ones_that_are_pushed_apar
 fn lines_by_the_rim_meet_as_many_fibers_as_in_packings_and_pass_as_much() {
     // Others than those that are measured, down to one fibre and a half below the rim.
     for (count, density) in [(78u32, 0.2f64), (78, 0.4), (78, 0.6), (60, 0.35), (25, 0.5), (200, 0.55)] {
-        let fiber = (density / f64::from(count)).sqrt();
-        let radius = fiber / (1.0 - fiber);
-        let lines = Lines { radius, stretch: 1.0, slopes: Slopes::NONE };
-        let packing = measured(count, radius, Twist::NONE, 1.0, KnownPacking::default());
-        let mut ply = lines.ply(count);
-        (ply.crowding, ply.depth) = (packing.crowding as f32, packing.depth as f32);
-        (ply.regularity, ply.rim) = (packing.regularity as f32, packing.rim as f32);
+        let (lines, ply) = measured_ply(count, density, 1.0, KnownPacking::default());
+        let radius = lines.radius;
         let packings: Vec<_> =
             (500..560).map(|seed| hard_discs(count, radius, Twist::NONE, &mut Stream::new(seed))).collect();
         let offsets: Vec<f64> = (0..15).map(|k| 1.0 + radius * (0.9 - 0.2 * f64::from(k))).collect();
