@@ -24,6 +24,47 @@ fn scatter_prints_the_agreed_json() {
     }
 }
 
+/// Green of what a yarn sends back and what it lets through, and all of both, of `scatter` with more options.
+fn halves(more: &[&str]) -> [f64; 3] {
+    let directory = directory();
+    let args = ["scatter", "wool", "--samples", "20000", "--json"];
+    let run = yarnray(directory.path(), &[&args, more].concat()).good();
+    let report: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    let [back, forward] = ["backward", "forward"].map(|half| report[half][1].as_f64().unwrap());
+    [back, forward, back + forward + report["unscattered"].as_f64().unwrap()]
+}
+
+#[test]
+fn white_yarns_of_any_number_of_plies_give_back_all_light() {
+    for plies in ["1", "2", "4", "7", "12", "64"] {
+        let white = ["r=0.1", "tt=0.5", "d=0.4"].map(|of| ["--set", of]);
+        let plies = format!("plies={plies}");
+        let [.., all] = halves(&[white.as_flattened(), &["--set", &plies]].concat());
+        assert!((all - 1.0).abs() < 0.01, "{plies}: {all}");
+    }
+}
+
+#[test]
+fn a_phase_may_have_any_number_of_turns() {
+    let of = |phase: &str| halves(&["--phase", phase, "--offset", "0.3"]);
+    let once = of("280");
+    assert_ne!(once, of("100"));
+    for phase in ["-80", "1000", "360000000280", "-360000000080"] {
+        assert_eq!(of(phase), once, "{phase}");
+    }
+}
+
+#[test]
+fn tt_may_be_as_narrow_as_one_likes() {
+    let of = |width: &str| halves(&["--set", "plies=1", "--set", &format!("beta_n={width}")]);
+    let narrow = of("0.1");
+    for width in ["0.02", "0.012", "0.001"] {
+        let narrower = of(width);
+        let alike = narrow.iter().zip(narrower).all(|(a, b)| (a - b).abs() < 0.004);
+        assert!(alike, "{width} degrees: {narrower:?}, not {narrow:?}");
+    }
+}
+
 #[test]
 fn scatter_writes_every_format_and_sweeps_any_key() {
     let directory = directory();
@@ -90,7 +131,7 @@ fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
     let directory = directory();
     for (args, word) in [
         (&["scatter", "silk2x"][..], "did you mean \"silk2\"?"),
-        (&["scatter", "silk1", "--theta", "90"], "between -90 and 90"),
+        (&["scatter", "silk1", "--theta", "90"], "above -90 and below 90"),
         (&["scatter", "silk1", "--offset", "1.1"], "from -1 to 1"),
         (&["scatter", "silk1", "--flatten", "0.5"], "from 1 to 4"),
         (&["scatter", "silk1", "--flatten", "1.5", "--phase", "3", "--truth", "9"], "leave it out"),
@@ -103,6 +144,10 @@ fn scatter_refuses_what_it_cannot_do_with_one_clear_message() {
         (&["scatter", "silk1", "-o", "x.exr"], ".json, .csv, .svg or .png"),
         (&["scatter", "absent.toml"], "no such file"),
         (&["scatter", "--fiber", "wol"], "did you mean \"wool\"?"),
+        (&["scatter", "wool", "--fiber", "silk"], "beside --fiber silk: expected a scene or library file"),
+        (&["scatter", "--fiber", "silk", "--phase", "3"], "--phase"),
+        (&["scatter", "--fiber", "silk", "--model", "paper"], "--model"),
+        (&["scatter", "--fiber", "silk", "--sweep", "offset=0..1:2"], "a single fibre has none"),
     ] {
         let run = yarnray(directory.path(), args);
         assert_eq!(run.status, Some(2), "{args:?}: {}", run.stderr);

@@ -295,11 +295,14 @@ impl<'a> Section<'a> {
                 gaps,
             };
             let place = out.iter().position(|c| c.enter > from).unwrap_or(out.len());
-            if out.is_full() {
+            if place == out.capacity() {
                 // What lies deepest is seen least.
+                return;
+            }
+            if out.is_full() {
                 out.pop();
             }
-            out.insert(place.min(out.len()), crossing);
+            out.insert(place, crossing);
         });
     }
 

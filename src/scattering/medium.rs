@@ -1,7 +1,7 @@
 //! A ply as a medium of fibres: what its material and its packing give before any ray is known, in `f64`.
 
 use std::{
-    f64::consts::{FRAC_PI_4, PI},
+    f64::consts::{FRAC_1_PI, FRAC_PI_4, PI},
     sync::Arc,
 };
 
@@ -30,23 +30,27 @@ mod calibrated {
     pub(super) const NEIGHBOURS_AT_ONCE: f64 = 0.25;
 }
 
-/// Share of the surroundings of a ply that an equal ply which touches it takes.
-const VIEW_OF_TOUCHING_PLY: f64 = 0.1817;
+/// Share of the surroundings of a ply that the others of a ring of so many equal plies take, which touch.
+///
+/// By crossed strings the ring sends to the outside what its convex hull is of all outlines: a circle's and a string of two radii for each ply.
+pub(crate) fn view_of_others(plies: usize) -> f64 {
+    if plies < 2 { 0.0 } else { 1.0 - FRAC_1_PI - (plies as f64).recip() }
+}
 
 /// Below this ratio of their variances R is much narrower than TT.
 const SHARP: f64 = 0.3;
 
 /// The effective extinction, per expected fibre, of a chain of light that keeps the weight `1 - loss` at each fibre,
-/// when hard cores of area fraction `density` keep fibres apart.
+/// when a dead zone, as a share of the way, keeps fibres apart: the area fraction of hard cores, or what was measured in its place.
 ///
-/// rate = (b - W0(a b e^b)) / eta with b = eta / (1 - eta): 1 - a for sparse fibres, 1 / (1 - eta) for a = 0.
-pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
-    let b = density / (1.0 - density);
+/// rate = (b - W0(a b e^b)) / d with b = d / (1 - d): 1 - a for sparse fibres, 1 / (1 - d) for a = 0.
+pub(crate) fn extinction_rate(loss: f64, dead_zone: f64) -> f64 {
+    let b = dead_zone / (1.0 - dead_zone);
     if b < 1e-4 {
         return loss;
     }
     if loss >= 1.0 {
-        return 1.0 / (1.0 - density);
+        return 1.0 / (1.0 - dead_zone);
     }
     if loss <= 0.0 {
         return 0.0;
@@ -58,7 +62,7 @@ pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
         for _ in 0..6 {
             x += ((-x / b).ln_1p() - x - goal) / (1.0 / (b - x) + 1.0);
         }
-        x / density
+        x / dead_zone
     } else {
         // Halley-free iteration for Lambert's W of e^l, which never forms e^l for large l.
         let l = (1.0 - loss).ln() + b.ln() + b;
@@ -66,7 +70,7 @@ pub(crate) fn extinction_rate(loss: f64, density: f64) -> f64 {
         for _ in 0..6 {
             w *= (1.0 + l - w.ln()) / (1.0 + w);
         }
-        (b - w) / density
+        (b - w) / dead_zone
     }
 }
 
@@ -188,15 +192,16 @@ pub(crate) const LEAST_RATE: f64 = 1e-6;
 const ALONG: [f32; 2] = [0.4, 1.6];
 
 impl PlyOptics {
-    /// For a ply among `plies` of a yarn whose section is pressed to axes of `stretch` : 1, with transport that is solved already.
+    /// For a ply of whose view the others of its yarn take the share `others`, where the yarn's section is pressed to axes of `stretch` : 1,
+    /// with transport that is solved already.
     pub(crate) fn new(
         material: &FiberMaterial,
         ply: &PlyShape,
-        plies: usize,
+        others: f64,
         stretch: f64,
         solutions: &Solutions,
     ) -> Self {
-        let fibers = Fibers::new(ply, plies);
+        let fibers = Fibers::new(ply, others);
         let channels = [0, 1, 2].map(|c| Channel::new(material, &fibers, c));
         let rgb = |of: &dyn Fn(&Channel) -> f64| Rgb::from(channels.each_ref().map(of));
         let sharp = material.beta_r.powi(2) < SHARP * material.beta_tt.powi(2);
@@ -257,11 +262,11 @@ struct Fibers {
     dead_zone: f64,
     gaps: PlyGaps,
     /// Share of the surroundings that the other plies of the yarn take.
-    neighbours: f64,
+    others: f64,
 }
 
 impl Fibers {
-    fn new(ply: &PlyShape, plies: usize) -> Self {
+    fn new(ply: &PlyShape, others: f64) -> Self {
         let (radius, core) = (f64::from(ply.fiber_radius), f64::from(ply.core_radius));
         let dead_zone = ply.mean_dead_zone();
         Self {
@@ -271,7 +276,7 @@ impl Fibers {
             sigma: 2.0 * radius * f64::from(ply.fibers) / (PI * core * core),
             dead_zone,
             gaps: PlyGaps::new(dead_zone as f32),
-            neighbours: ((plies - 1) as f64 * VIEW_OF_TOUCHING_PLY).min(1.0),
+            others,
         }
     }
 
@@ -364,7 +369,7 @@ impl<'a> Channel<'a> {
 
     /// The share of it that the other plies take, and of theirs that returns to them: see [`Medium`].
     fn taken_back(&self) -> f64 {
-        self.fibers.neighbours * (self.escape() * self.radius_optical() * PI / 2.0).min(1.0)
+        self.fibers.others * (self.escape() * self.radius_optical() * PI / 2.0).min(1.0)
     }
 
     fn escape_yarn(&self) -> f64 {
@@ -384,7 +389,7 @@ impl<'a> Channel<'a> {
             spacing: self.spacing(self.rho(), self.lost()),
             albedo: self.kept(),
             bends: (self.turned > 0.0).then(|| self.bends()),
-            alone: self.fibers.neighbours == 0.0,
+            alone: self.fibers.others == 0.0,
             sent_back: calibrated::NEIGHBOURS_AT_ONCE * taken_back,
             taken_back,
         }

@@ -20,9 +20,8 @@ use serde_json::{Value, json};
 
 /// By how much scattered light may exceed what came in.
 const ENERGY_ABOVE: f64 = 1e-4;
-/// The same for a single ray at a yarn with the aggregated model: its forward lobe follows the light's own way, and is
-/// brought back to its energy by a quadrature of three points only. Over the yarn's width the difference averages out.
-const ENERGY_ABOVE_ONE_RAY: f64 = 0.03;
+/// What white yarns send on at least, of a single ray too: light leaves them at last, wherever it went.
+const WHITE_ENERGY: f64 = 0.99;
 
 /// Which part of the renderer a case is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use glam::Vec3A;
 
 use super::{Spot, View};
 use crate::{
-    geometry::{density::ChordFibers, section::PlyAhead},
+    geometry::{density::ChordFibers, section::PlyAhead, yarn::MAX_PLIES},
     math::{Rgb, sampler::Stream},
 };
 
@@ -54,8 +54,8 @@ pub(super) fn nearest<S: Stretch>(
     Some((met, distance))
 }
 
-/// The most stretches of plies that are told apart on a way out.
-pub(super) const STRETCHES: usize = 16;
+/// The most stretches of plies that are told apart on a way out: one of each ply.
+pub(super) const STRETCHES: usize = MAX_PLIES;
 
 /// The plies on a way out, in no order.
 pub(super) type PliesAhead = ArrayVec<FibersAhead, STRETCHES>;

@@ -25,7 +25,11 @@ use glam::{Vec2, Vec3A};
 
 pub use super::escape::Solutions;
 use super::{
-    Arrival, Continuation, Direct, LobeValues, escape::Place, fiber::FiberMaterial, medium::PlyOptics, mis_weight,
+    Arrival, Continuation, Direct, LobeValues,
+    escape::Place,
+    fiber::FiberMaterial,
+    medium::{PlyOptics, view_of_others},
+    mis_weight,
 };
 use crate::{
     geometry::{
@@ -82,9 +86,9 @@ impl AggregatedYarn {
     ) -> Self {
         let shape = shape.into();
         assert_eq!(shape.plies.len(), materials.len(), "one material for each ply");
-        let count = shape.plies.len();
+        let others = view_of_others(shape.plies.len());
         let plies = shape.plies.iter().zip(materials);
-        let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, count, stretch, solutions)).collect();
+        let plies: Vec<_> = plies.map(|(ply, m)| PlyOptics::new(m, ply, others, stretch, solutions)).collect();
         let node_gain = plies.iter().map(|p| p.albedo * (p.leaves_yarn + 1.0) * 0.5).collect();
         let plies_overlap = shape.plies_overlap();
         Self { occluder: Occluder::new(shape, Transparency::Gaps), plies, plies_overlap, node_gain }

@@ -264,7 +264,8 @@ impl Node {
         let bent = from_around.as_ref().map(|back| (Some(back), optics.after.turned(later, turn * cosine, short)));
         let ahead = plies_ahead(view, spot, (shift, w), Some(0.0), free);
         let open = |back: Option<&WayBack>| back.map_or(1.0, WayBack::passes);
-        let mut out = WayOut { open: [open(direct.0), open(from_around.as_ref())], ..WayOut::default() };
+        let ways_back = [direct.0, from_around.as_ref().or(direct.0)];
+        let mut out = WayOut { open: ways_back.map(open), ..WayOut::default() };
         for fibers in &ahead {
             if fibers.ply == spot.ply {
                 let by_rim = shape.plies[fibers.ply].by_rim(fibers.offset);

@@ -9,12 +9,17 @@ use glam::Vec2;
 
 use super::*;
 use crate::{
-    geometry::{cleared_strip::ClearedStrip, ply::PlyParameters, yarn::touching_plies, yarn_frame::Pressed},
+    geometry::{
+        cleared_strip::ClearedStrip,
+        ply::{PlyParameters, PlyShape},
+        yarn::touching_plies,
+        yarn_frame::Pressed,
+    },
     math::special::{GAUSS_LEGENDRE_4, front_share_of_wrapped_normal, wrapped_normal},
     scattering::{
         kernel::{DIFFUSE, Latitudes, kappa_of_variance, kernel, spread},
         lobe::LobeFrame,
-        medium::{MirroredLobe, extinction_rate},
+        medium::{MirroredLobe, PlyOptics, extinction_rate},
         testing::{SILK, lossless, material, section, silk, sphere},
     },
 };
@@ -231,8 +236,10 @@ fn values_agree_with_the_reference_vectors() {
             beta_n: 1e-6,
             ..m.clone()
         };
-        let straight = AggregatedYarn::new(shape, &vec![&straight; count as usize]);
-        for (ply, straight) in yarn.plies.iter_mut().zip(straight.plies) {
+        // Each other ply takes as much of the view as one that touches.
+        let others = f64::from(count - 1) * 0.1817;
+        let straight = |ply: &PlyShape| PlyOptics::new(&straight, ply, others, 1.0, &Solutions::default());
+        for (ply, straight) in yarn.plies.iter_mut().zip(shape.plies.iter().map(straight)) {
             (ply.rho, ply.leaves_yarn, ply.slope) = (straight.rho, straight.leaves_yarn, 0.0);
             let single = |part: &dyn Fn(usize) -> f64| {
                 Rgb::from([0, 1, 2].map(|c: usize| part(c) / (1.0 - m.tt[c] * chain).max(1e-12)))

@@ -1,6 +1,6 @@
 //! Transport in an ellipse with the directions into which TT bends light: towards where light of a place leaves.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 use wide::f32x8;
 
@@ -73,17 +73,15 @@ impl Ways {
     }
 }
 
-/// How likely TT of a chain turns light by each number of directions: a wrapped normal distribution without what is the same all round.
+/// How likely TT of a chain turns light by each number of directions: a wrapped normal distribution, of any width, without what is the same all
+/// round.
 fn turns(sigma: f64, share: f64) -> [f32; DIRECTIONS] {
-    const PARTS: usize = 8;
     let width = TAU / DIRECTIONS as f64;
-    let density = |angle: f64| {
-        let of = |turn: i32| (-0.5 * ((angle + f64::from(turn) * TAU) / sigma).powi(2)).exp();
-        (-2..=2).map(of).sum::<f64>()
-    };
+    // Below an angle, of those that are not wrapped.
+    let below = |angle: f64| 0.5 * libm::erf(angle / (sigma * SQRT_2));
     let part = |k: usize| {
-        let from = k as f64 - 0.5;
-        (0..PARTS).map(|i| density((from + (i as f64 + 0.5) / PARTS as f64) * width)).sum::<f64>()
+        let from = (k as f64 - 0.5) * width;
+        (-2..=2).map(|turn| from + f64::from(turn) * TAU).map(|from| below(from + width) - below(from)).sum::<f64>()
     };
     let parts: [f64; DIRECTIONS] = std::array::from_fn(part);
     let all: f64 = parts.iter().sum();

@@ -128,6 +128,7 @@ struct Outgoing {
 impl Outgoing {
     /// The share that leaves, and how it does, but for a factor.
     fn new(share: f64, leaving: [f64; AZIMUTHS]) -> Self {
+        debug_assert!(share.is_finite() && leaving.iter().all(|part| part.is_finite()), "{share} {leaving:?}");
         let leaving = leaving.map(|part| part.max(0.0));
         let sum: f64 = leaving.iter().sum();
         let azimuths = if sum > 0.0 { leaving.map(|part| part / sum * AZIMUTHS as f64) } else { [1.0; AZIMUTHS] };

@@ -28,7 +28,7 @@ fn solved(medium: &Medium, stretch: f64) -> Solved {
 fn nothing_is_lost_that_is_not_absorbed() {
     for stretch in [1.0, 1.5, 4.0] {
         for radius in [1e-6, 0.1, 1.0, 4.0, 20.0, 200.0, 1e9] {
-            for (apart, taken_back) in [(0.0, 0.0), (0.5, 0.2)] {
+            for (apart, taken_back) in [(0.0, 0.0), (0.5, 0.2), (0.5, 0.68)] {
                 // What other plies take of nothing is nothing.
                 let of = |taken_back, albedo| {
                     let alone = apart == 0.0;
@@ -66,6 +66,27 @@ fn both_solutions_agree_where_the_section_is_nearly_round() {
             assert!((a.share - b.share).abs() < 0.01 * a.share + 1e-3, "{medium:?}, ring {i}: {} {}", a.share, b.share);
             for (a, b) in a.azimuths.iter().zip(b.azimuths) {
                 assert!((a - b).abs() < 0.12, "{medium:?}, ring {i}: {a} {b}");
+            }
+        }
+    }
+}
+
+/// However little TT turns light, the tables of directions have it.
+#[test]
+fn light_that_tt_hardly_bends_leaves_as_what_it_bends_a_little() {
+    for stretch in [1.0, 1.6] {
+        let azimuths = |sigma: f64| {
+            let spacing = Spacing { lead: 0.3, apart: 0.4 };
+            let bends = Bends { radius: 4.0, spacing, chain: 0.8, other: 0.1, sigma, share: 1.0 };
+            let bent = Medium { bends: Some(bends), taken_back: 0.1, ..medium(2.0, 0.9, 0.3) };
+            solved(&bent, stretch).onward.iter().flatten().flat_map(|cell| cell.azimuths).collect::<Vec<_>>()
+        };
+        let little = azimuths(1e-2);
+        // Each cell sends it to some sides more than to others.
+        assert!(little.iter().any(|part| *part > 1.3));
+        for sigma in [1e-3, 3e-4, 1e-5, 1e-12] {
+            for (a, b) in azimuths(sigma).iter().zip(&little) {
+                assert!((a - b).abs() < 1e-5, "{stretch} {sigma}: {a}, not {b}");
             }
         }
     }
@@ -215,7 +236,7 @@ fn light_that_packings_scatter_on_leaves_as_the_tables_have_it() {
         let ply = &shape.plies[0];
         let radius = f64::from(ply.fiber_radius / ply.core_radius);
         let scattering = material(([albedo; 3], [0.0; 3], [0.0; 3]), [0.1, 0.1, 0.4]);
-        let leaving = PlyOptics::new(&scattering, ply, 1, 1.0, &Solutions::default()).leaving;
+        let leaving = PlyOptics::new(&scattering, ply, 0.0, 1.0, &Solutions::default()).leaving;
         let packings: Vec<Vec<DVec2>> =
             (0..32).map(|seed| hard_discs(fibers, radius, Twist::NONE, &mut Stream::new(seed))).collect();
         let mut stream = Stream::new(7);

@@ -17,7 +17,7 @@
 //! in what passes, so that thin yarns of pale fibres return more than they get.
 //!
 //! In order: B_1 + F_1^2 B_2 + F_1^2 F_2^2 B_3 ..., which is what Eq. 14 seems to mean; as printed it counts each ply
-//! twice and dims none. Forward, plies multiply (Eq. 14). All three use the kernel of [`super::kernel`] for every
+//! twice and dims none. Forward, plies multiply (Eq. 14). All use the kernel of [`super::kernel`] for every
 //! longitudinal lobe, since the printed one (Eq. 5) neither conserves energy nor is reciprocal.
 //!
 //! `Printed` returns more light than it gets, up to twice: that is what it is for, and nothing here stops it.
