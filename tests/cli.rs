@@ -433,3 +433,17 @@ fn a_curve_file_is_no_scene() {
     assert!(run.stderr.contains("it holds no curve that can be drawn"), "{}", run.stderr);
     assert!(run.stderr.contains("triangles go into a [[mesh]]"), "{}", run.stderr);
 }
+
+#[test]
+fn a_picture_whose_light_overflows_fails() {
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let light = "light=[{type=\"environment\", radiance=3e38}]";
+    let run = yarnray(directory.path(), &["render", "s.toml", "--spp", "4", "--set", light, "-o", "x.png"]);
+    assert_eq!(run.status, Some(2), "{}", run.stderr);
+    assert!(
+        run.stderr.contains("samples are not finite") && run.stderr.contains("lights too bright"),
+        "{}",
+        run.stderr
+    );
+}

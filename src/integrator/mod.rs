@@ -182,6 +182,11 @@ impl<'a> Integrator<'a> {
         loop {
             path.ray.time = scratch.time;
             path.ray.looks = path.bounces == 0;
+            if !path.ray.is_finite() {
+                // It would meet nothing, as a ray to the sky.
+                sample.radiance = Rgb::splat(f32::NAN);
+                break;
+            }
             let hit = self.cloth.world().intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             let first = path.bounces == 0;

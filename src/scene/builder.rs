@@ -478,6 +478,10 @@ fn warn_about_size(scene: &mut Scene) {
 fn warn_about_precision(scene: &mut Scene) {
     let Some((low, high)) = scene.bounds() else { return };
     let thinnest = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(_, r)| r).copied().fold(f64::MAX, f64::min);
+    if thinnest <= 0.0 {
+        scene.warnings.push("yarns of radius 0 are not seen: `radius` of a fabric gives them one".to_owned());
+        return;
+    }
     let ratio = 0.5 * (high - low).length() / thinnest;
     if ratio > 1e5 {
         scene.warnings.push(format!(

@@ -104,6 +104,14 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         summary(world, &rendered, &phases, &written);
         saver.failed.into_iter().for_each(|error| _ = attempts.note(Err::<(), _>(error)));
         attempts.finish()?;
+        let counters = &rendered.counters;
+        if counters.invalid > counters.camera / 2 {
+            let problem = format!("{} of {} samples are not finite", counters.invalid, counters.camera);
+            return Err(Failure::hinted(
+                problem,
+                "lights too bright, or places too far, for single precision".to_owned(),
+            ));
+        }
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })
 }

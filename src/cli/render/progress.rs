@@ -104,7 +104,9 @@ pub(super) fn summary(world: &World, rendered: &Rendered, phases: &Phases, outpu
     if c.invalid > 0 {
         tracing::warn!("{} not finite, left out", counted(c.invalid, "sample"));
     }
-    if least == 0 && most > 0 {
+    if least == 0 && c.invalid > 0 {
+        tracing::warn!("some pixels have no sample that is finite, and are black");
+    } else if least == 0 && most > 0 {
         tracing::warn!("some pixels have no sample and are black: the time was too short for one sample each");
     }
 }

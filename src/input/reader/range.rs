@@ -21,6 +21,8 @@ impl Range {
     pub(crate) const FINITE: Range = Range { low: Limit::None, high: Limit::None };
     /// Above 0.
     pub(crate) const POSITIVE: Range = Range::above(0.0);
+    /// A coordinate: what single precision holds with room for squares, in any unit.
+    pub(crate) const PLACE: Range = Range::between(-1e12, 1e12);
     /// From 0 to 1, both included.
     pub(crate) const UNIT: Range = Range::between(0.0, 1.0);
 

@@ -485,9 +485,9 @@ impl Plans {
 
 /// `scale`, `rotate` (about x, then y, then z) and `translate` of a table.
 fn placement(table: &Reader<'_>, context: &Context<'_>) -> DAffine3 {
-    let scale = table.f64_or("scale", 1.0, Range::POSITIVE);
+    let scale = table.f64_or("scale", 1.0, Range::POSITIVE.and_at_most(1e9));
     let [rx, ry, rz] = table.vec3_or("rotate", [0.0; 3], Range::FINITE).map(radians);
-    let translate = context.position(table.vec3_or("translate", [0.0; 3], Range::FINITE));
+    let translate = context.position(table.vec3_or("translate", [0.0; 3], Range::PLACE));
     let rotation = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
     DAffine3::from_scale_rotation_translation(DVec3::splat(scale), rotation, translate)
 }

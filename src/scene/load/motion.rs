@@ -36,7 +36,7 @@ pub(super) fn read(
                 Some("type = \"perspective\" with position and target, or [camera.turntable]"),
             );
         }
-        let place = |name| key.vec3(name, Range::FINITE).map(|p| context.position(p));
+        let place = |name| key.vec3(name, Range::PLACE).map(|p| context.position(p));
         let (position, target) = (place("position"), place("target"));
         let opening = match projection {
             Projection::Perspective(_) => key.f64("fov", Range::above(0.0).and_below(180.0)).map(radians),

@@ -93,8 +93,8 @@ fn read_camera(root: &Reader<'_>, context: &Context<'_>, frame: bool, number: u3
         let lens = lens(&table, context, projection, Focus::Cloth);
         setup.map(|setup| CameraSetup { margin: Some(margin), lens, motion, ..setup })
     } else {
-        let position = table.required_vec3("position", Range::FINITE);
-        let target = table.vec3_or("target", [0.0; 3], Range::FINITE);
+        let position = table.required_vec3("position", Range::PLACE);
+        let target = table.vec3_or("target", [0.0; 3], Range::PLACE);
         let projection = if kind == CameraKind::Perspective {
             fov(&table)
         } else {
@@ -129,7 +129,7 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
     // A size in the world of cameras, whatever the scene's unit.
     let sensor = table.f64_or("sensor_height", defaults::SENSOR_HEIGHT, Range::POSITIVE);
     let distance = table.f64("focus_distance", Range::POSITIVE).map(|d| d * context.unit);
-    let point = table.vec3("focus", Range::FINITE).map(|p| context.position(p));
+    let point = table.vec3("focus", Range::PLACE).map(|p| context.position(p));
     if aperture.is_some() && f_number.is_some() {
         table.error_at("f_number", "give `aperture` or `f_number`, not both", None);
     }
@@ -225,7 +225,7 @@ fn sun(towards: DVec3, angle: f64, irradiance: Rgb) -> Light {
 }
 
 fn point(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
-    let position = table.required_vec3("position", Range::FINITE);
+    let position = table.required_vec3("position", Range::PLACE);
     let intensity = intensity(table, context);
     Some(LightPlan::Ready(Light::Point { position: context.position(position?).as_vec3a(), intensity }))
 }
@@ -260,7 +260,7 @@ fn disk(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
 }
 
 fn sphere(table: &Reader<'_>, context: &Context<'_>) -> Option<Shape> {
-    let position = table.required_vec3("position", Range::FINITE);
+    let position = table.required_vec3("position", Range::PLACE);
     let radius = radius(table, context);
     Some(Shape::Sphere { centre: context.position(position?).as_vec3a(), radius: radius? })
 }
@@ -278,8 +278,8 @@ fn intensity(table: &Reader<'_>, context: &Context<'_>) -> Rgb {
 
 /// `position` and the unit vector from there to `target`.
 fn aim(table: &Reader<'_>, context: &Context<'_>) -> Option<(Vec3A, Vec3A)> {
-    let position = table.required_vec3("position", Range::FINITE);
-    let target = context.position(table.vec3_or("target", [0.0; 3], Range::FINITE));
+    let position = table.required_vec3("position", Range::PLACE);
+    let target = context.position(table.vec3_or("target", [0.0; 3], Range::PLACE));
     let position = context.position(position?);
     let direction = (target - position).try_normalize();
     if direction.is_none() {

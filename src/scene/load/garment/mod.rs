@@ -162,7 +162,7 @@ pub(super) fn garment(
         (context.resolve(p, span), span)
     });
     let near = source.table("near").and_then(|table| {
-        let at = table.required_vec3("at", Range::FINITE).map(|at| context.position(at));
+        let at = table.required_vec3("at", Range::PLACE).map(|at| context.position(at));
         let radius = table.required_f64("radius", Range::POSITIVE).map(|r| r * context.unit);
         table.finish();
         at.zip(radius)
