@@ -229,10 +229,11 @@ fn place(shown: &Path) -> tempfile::TempDir {
     d
 }
 
-/// Whether a cheap command does no more than to render a whole scene of the project, as `tests/scenes.rs` does with all of them.
+/// Whether a cheap command does no more than to render a scene of the project, as `tests/scenes.rs` does with all of them: a part of the picture
+/// takes as long to lay out as the whole.
 fn renders_a_scene(words: &[String]) -> bool {
     let mut words = words.to_vec();
-    for option in ["-o", "--width", "--height", "--spp", "--max-bounces"] {
+    for option in ["-o", "--width", "--height", "--crop", "--spp", "--max-bounces"] {
         without(&mut words, option);
     }
     words.retain(|w| w != "-q");

@@ -242,19 +242,24 @@ fn texture_coordinates_run_over_the_cloth_as_a_tint_does() {
         let channel = |name: &str| picture.channel(name).expect("the channel");
         let (alpha, u, v) = (channel("A"), channel("uv.U"), channel("uv.V"));
         let mut sums = [[0.0_f64; 5]; 2];
+        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for i in (0..alpha.len()).filter(|&i| alpha[i] == 1.0) {
-            for (sums, (uv, axis)) in sums.iter_mut().zip([(u[i], "P.X"), (v[i], "P.Y")]) {
+            for ((sums, ends), (uv, axis)) in sums.iter_mut().zip(&mut ends).zip([(u[i], "P.X"), (v[i], "P.Y")]) {
                 let (uv, at) = (f64::from(uv), f64::from(channel(axis)[i]));
+                *ends = [ends[0].min(at), ends[1].max(at)];
                 assert!((-0.05..1.05).contains(&uv), "{mode}: {uv}");
                 let more = [1.0, uv, at, uv * at, at * at];
                 sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
             }
         }
-        for [n, uv, at, both, square] in sums {
+        for ([n, uv, at, both, square], [from, to]) in sums.into_iter().zip(ends) {
             // The slope of coordinates over places: one over the cloth's size.
             let slope = (both - uv * at / n) / (square - at * at / n);
-            let size = 1.0 / slope;
-            assert!(n > 500.0 && size > 30.0 && size < 90.0, "{mode}: {n} pixels, as if {size} mm wide");
+            let (size, seen) = (1.0 / slope, to - from);
+            assert!(
+                n > 500.0 && (size / seen - 1.0).abs() < 0.08,
+                "{mode}: {n} pixels, as if {size} mm wide, not {seen}"
+            );
             // Evenly over it: the mean is near the middle.
             assert!((uv / n - 0.5).abs() < 0.03, "{mode}: mean {}", uv / n);
         }

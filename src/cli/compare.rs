@@ -143,7 +143,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         .iter()
         .filter_map(|(name, limit)| {
             let value = metric(&comparison, name)?;
-            exceeds(name, value, *limit).then(|| format!("{name} is {value:.6}, worse than {limit}"))
+            exceeds(name, value, *limit).then(|| match value.is_nan() {
+                true => format!("{name} has no value: the pictures are too small or too dark for it"),
+                false => format!("{name} is {value:.6}, worse than {limit}"),
+            })
         })
         .collect();
     if worse.is_empty() { Ok(()) } else { Err(Failure::Check(worse.join("\n"))) }

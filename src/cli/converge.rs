@@ -12,9 +12,12 @@ use super::{
     terminal::print,
     thread_pool, write_text,
 };
-use crate::experiment::{
-    converge::{self, Options},
-    method::Method,
+use crate::{
+    experiment::{
+        converge::{self, Options},
+        method::Method,
+    },
+    scene::Mode,
 };
 
 const EXAMPLES: &str = "Examples:
@@ -85,8 +88,10 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     let plain = args.options.load(&args.scene, args.quiet)?;
     outputs.check(args.quiet)?;
     let methods = if args.methods.is_empty() {
-        let yarn = Method { mode: crate::scene::Mode::Yarn, model: Some(plain.render.model) };
-        reference.into_iter().filter(|method| *method != yarn).chain([yarn]).collect()
+        let yarn = Method { mode: Mode::Yarn, model: Some(plain.render.model) };
+        // The reference may be just that, by its mode alone.
+        let is_yarn = |method: &Method| Method { model: method.model.or(yarn.model), ..*method } == yarn;
+        reference.into_iter().chain(Some(yarn).filter(|_| !reference.as_ref().is_some_and(is_yarn))).collect()
     } else {
         args.methods.clone()
     };

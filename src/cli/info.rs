@@ -44,7 +44,7 @@ const EXAMPLES: &str = "Examples:
 pub(super) struct InfoArgs {
     /// A scene (.toml), a curve file (.bcc, .hair, .pyp, .obj, .yarns, .smobj, .txt, .curves, .usd, .usda, .usdc, .usdz, .abc), a mesh (.obj or a stage) or a film (a checkpoint, a part of a render).
     file: PathBuf,
-    /// Radius of the yarns of a curve file that has none, in its unit: tells how far they overlap.
+    /// Radius of the yarns of a curve file, in its unit, in place of what it says: tells how far they overlap.
     #[arg(long, value_name = "R", value_parser = positive)]
     radius: Option<f64>,
     /// Print JSON.

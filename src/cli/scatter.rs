@@ -59,7 +59,7 @@ pub(super) struct ScatterArgs {
     #[arg(long, value_name = "K")]
     ply: Option<usize>,
     /// Measure a single fibre instead.
-    #[arg(long, value_name = "NAME", conflicts_with = "ply")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["ply", "model", "offset", "average", "phase"])]
     fiber: Option<String>,
     /// The yarn's model; repeated, all are shown. Default: aggregated.
     #[arg(long, value_parser = names(&Model::NAMES))]
@@ -111,6 +111,11 @@ fn pair(text: &str) -> Result<(f64, f64), String> {
     let (a, b) = text.split_once(',').ok_or("expected two numbers, as in 10,150")?;
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or("expected two numbers");
     Ok((number(a)?, number(b)?))
+}
+
+/// An angle in radians, less than a turn: single precision holds it to the last ten millionth.
+fn azimuth(degrees: f64) -> f64 {
+    degrees.rem_euclid(360.0).to_radians()
 }
 
 /// The most that a yarn can be pressed flat: as in weaves.
@@ -256,10 +261,8 @@ impl ScatterArgs {
 
     fn check(&self, view: &View) -> Result<(), Failure> {
         if view.theta.is_nan() || view.theta.abs() >= std::f64::consts::FRAC_PI_2 {
-            return Err(input(format!(
-                "theta {}: expected an angle between -90 and 90 degrees",
-                view.theta.to_degrees()
-            )));
+            let theta = view.theta.to_degrees();
+            return Err(input(format!("theta {theta}: expected an angle above -90 and below 90 degrees")));
         }
         if view.offset.is_some_and(|h| !(-1.0..=1.0).contains(&h)) {
             return Err(input(format!("offset {}: expected a number from -1 to 1", view.offset.unwrap_or_default())));
@@ -282,7 +285,7 @@ impl ScatterArgs {
         let view = View {
             theta: self.theta.to_radians(),
             offset: self.offset,
-            phase: self.phase.map(f64::to_radians),
+            phase: self.phase.map(azimuth),
             flatten: self.flatten,
         };
         self.check(&view)?;
@@ -292,10 +295,16 @@ impl ScatterArgs {
     /// The job for one value of the sweep, with these assignments.
     fn swept(&self, sweep: &Sweep, at: f64, set: &[String]) -> Result<Job, Failure> {
         let mut view = self.view()?;
+        if self.fiber.is_some() && matches!(sweep.key.as_str(), "offset" | "phase" | "flatten") {
+            return Err(input(format!(
+                "--sweep {}: a single fibre has none; `theta` or a key of the fibre",
+                sweep.key
+            )));
+        }
         match sweep.key.as_str() {
             "theta" => view.theta = at.to_radians(),
             "offset" => view.offset = Some(at),
-            "phase" => view.phase = Some(at.to_radians()),
+            "phase" => view.phase = Some(azimuth(at)),
             "flatten" => view.flatten = at,
             _ => {
                 let path = self.path_of(&sweep.key)?;
@@ -335,8 +344,7 @@ impl ScatterArgs {
     fn measure(&self, job: &Job) -> Result<Found, Failure> {
         let effort = Effort { paths: self.samples, seed: self.seed };
         let light = self.light.map(|(t, p)| (t.to_radians(), p.to_radians()));
-        let value_effort = Effort { paths: effort.paths.min(100_000), ..effort };
-        let values = |s: &Specimen<'_>| light.map(|l| goniometer::value(s, &job.view, l, value_effort));
+        let values = |s: &Specimen<'_>| light.map(|l| goniometer::value(s, &job.view, l, effort));
         if let Some(name) = &self.fiber {
             let specimen = Specimen::Fiber(job.definitions.fiber(name)?);
             let all = vec![("fiber".to_owned(), goniometer::measure(&specimen, &job.view, effort))];
@@ -377,6 +385,11 @@ pub(super) fn run(args: &ScatterArgs) -> Result<(), Failure> {
         }
     }
     Files::default().writes("-o", &args.out).check(true)?;
+    if let (Some(name), Some(source), None) = (&args.fiber, &args.source, args.file()) {
+        return Err(input(format!(
+            "`{source}` beside --fiber {name}: expected a scene or library file (.toml), or nothing"
+        )));
+    }
     if args.samples == 0 {
         return Err(input("--samples 0: expected at least 1"));
     }

@@ -375,7 +375,10 @@ impl Comparison {
             pixels: [pair.counted.len(), count],
             non_finite: pair.non_finite,
             means,
-            mean_ratio: std::array::from_fn(|k| means[0][k] / means[1][k]),
+            // Black is as bright as black.
+            mean_ratio: std::array::from_fn(
+                |k| if means[0][k] == means[1][k] { 1.0 } else { means[0][k] / means[1][k] },
+            ),
             ratio_uncertainty: pair.variance.as_ref().map(|_| std::array::from_fn(uncertainty)),
             errors,
             ssim: (windows > 0).then(|| similarity / f64::from(windows)),

@@ -138,6 +138,8 @@ fn black_against_white_is_the_end_of_the_scale() {
     assert_eq!(comparison.flip_hdr, None);
     assert!(comparison.mean_ratio.iter().all(|r| !r.is_finite()));
     near(comparison.full().rel_mse, 1.0 / EPSILON, 1e-9);
+    let same = Comparison::new(&Pair::new(&black, &black).unwrap()).unwrap();
+    assert_eq!((same.mean_ratio, same.full().rel_mse), ([1.0; 3], 0.0));
 }
 
 #[test]
