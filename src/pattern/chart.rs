@@ -25,6 +25,7 @@
 //! `12: k2 p2` stands for twelve such rows. A row is repeated over the whole width; rows are repeated upwards.
 
 mod gaps;
+mod repeat;
 mod steps;
 
 use std::{fmt, sync::Arc};
@@ -32,6 +33,7 @@ use std::{fmt, sync::Arc};
 use self::steps::parse_steps;
 pub(super) use self::{
     gaps::{binds_from_right, gaps},
+    repeat::Whole,
     steps::WIDEST_CABLE,
 };
 

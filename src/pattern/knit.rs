@@ -37,7 +37,7 @@ pub use self::{
 };
 use super::{
     PatternStrand,
-    chart::{Act, Chart, ChartError, Stitch},
+    chart::{Act, Chart, ChartError, Stitch, Whole},
     revolution::Revolution,
     tile::RelaxedRows,
 };
@@ -108,6 +108,12 @@ pub struct Knit {
     pub colors: Option<Colors>,
     /// Whether a flat piece is blocked; else its edges roll as they would by themselves.
     pub flat: bool,
+}
+
+/// What is knitted again and again: a chart as small as it goes, and the stitches that all its rows fit.
+struct Repeat {
+    chart: Chart,
+    wide: u32,
 }
 
 /// A piece as it came out.
@@ -181,16 +187,25 @@ impl Knit {
     }
 
     /// The repeat of the chart, if it has one that fits the stitches.
-    fn repeat(&self) -> Option<u32> {
-        let wide = self.chart.even_width(LARGEST_CELL)?;
-        (u64::from(wide) * u64::from(self.chart.rows()) <= LARGEST_CELL.into()).then_some(wide)
+    fn repeat(&self) -> Option<Repeat> {
+        let ends = self.edges != Edges::Tile;
+        self.repeat_in(Whole {
+            stitches: (ends && !self.form.is_round()).then_some(self.stitches),
+            rows: ends.then_some(self.rows),
+        })
     }
 
-    /// The same, or what is wrong with asking for one.
-    fn repeat_for(&self, what: &str) -> Result<u32, ChartError> {
+    fn repeat_in(&self, whole: Whole) -> Option<Repeat> {
+        let chart = self.chart.smallest(whole);
+        let wide = chart.even_width(LARGEST_CELL)?;
+        (u64::from(wide) * u64::from(chart.rows()) <= LARGEST_CELL.into()).then_some(Repeat { chart, wide })
+    }
+
+    /// The repeat of a chart that goes on without an end, or what is wrong with asking for one.
+    fn repeat_for(&self, what: &str) -> Result<Repeat, ChartError> {
         let hint = "every row makes as many stitches as it takes, and few rows and stitches repeat";
         let problem = || format!("a chart with shaping or short rows has no repeat {what}");
-        self.repeat().ok_or_else(|| ChartError::new(None, problem(), hint))
+        self.repeat_in(Whole::default()).ok_or_else(|| ChartError::new(None, problem(), hint))
     }
 
     /// Width of a stitch and distance between rows, in diameters: given, or found by relaxing a repeat of the chart.
@@ -199,7 +214,7 @@ impl Knit {
             return [width, height];
         }
         match self.repeat() {
-            Some(wide) => self.cell(wide, self.size(), self.points).gauge(),
+            Some(repeat) => self.cell(&repeat, self.size(), self.points).gauge(),
             None => {
                 let rows = self.worked().unwrap_or_default();
                 let points = if short_rows::any(&rows) { self.points } else { COARSE };
@@ -208,8 +223,8 @@ impl Knit {
         }
     }
 
-    fn cell(&self, wide: u32, size: [Option<f64>; 2], points: u32) -> Cell {
-        Cell::relaxed(&self.chart, wide, self.yarn(size), points, size)
+    fn cell(&self, Repeat { chart, wide }: &Repeat, size: [Option<f64>; 2], points: u32) -> Cell {
+        Cell::relaxed(chart, *wide, self.yarn(size), points, size)
     }
 
     /// A repeat of the chart as it relaxes: what a [`super::tile::Tile`] is made of. It is large enough that no yarn is
@@ -219,9 +234,9 @@ impl Knit {
     /// A chart that grows or shrinks has no repeat.
     pub(super) fn relaxed_rows(&self) -> Result<RelaxedRows, ChartError> {
         const SMALLEST: f64 = 9.0;
-        let wide = self.repeat_for("that could be laid")?;
-        self.check_repeat_held()?;
-        let cell = self.cell(wide, self.size(), self.points);
+        let repeat = self.repeat_for("that could be laid")?;
+        self.check_held_on(&repeat)?;
+        let cell = self.cell(&repeat, self.size(), self.points);
         self.check_relaxed(&cell)?;
         let [across, up] = (SMALLEST / cell.period).ceil().max(DVec2::ONE).to_array();
         let row = |r: usize| -> Vec<(DVec3, [f32; 2])> {

@@ -13,6 +13,7 @@ pub mod chart;
 pub mod draft;
 pub mod knit;
 pub mod knitspeak;
+mod period;
 mod relax;
 pub mod revolution;
 mod rods;

@@ -1,6 +1,7 @@
 //! The smallest repeat of a whole cloth: drafts of weaving programs list every end and every pick.
 
 use super::{Draft, DraftError};
+use crate::pattern::period::period;
 
 /// The most crossings of a repeat: relaxing a large one takes half a millisecond and 5 kB for each.
 pub const MOST_CROSSINGS: usize = 512 * 512;
@@ -45,22 +46,6 @@ impl Draft {
     }
 }
 
-/// The least distance at which all that follows is the same again; a repeat is seen twice at least. By the failure function
-/// of Knuth, Morris and Pratt ("Fast Pattern Matching in Strings", 1977), which compares at most `2 * count` times.
-fn period(count: usize, same: impl Fn(usize, usize) -> bool) -> usize {
-    // For each place: how many of the first are the last up to there.
-    let mut again = vec![0; count];
-    for i in 1..count {
-        let mut length: usize = again[i - 1];
-        while length > 0 && !same(length, i) {
-            length = again[length - 1];
-        }
-        again[i] = length + usize::from(same(length, i));
-    }
-    let period = count - again[count - 1];
-    if 2 * period <= count { period } else { count }
-}
-
 /// Values over their mean; none where all are the same.
 fn relative(values: &mut Vec<f64>) {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
@@ -89,14 +74,6 @@ mod tests {
         assert_eq!((draft.warps(), draft.wefts()), (10, 4));
         assert!((threads[0].thickness[0] - 3.0 / 1.4).abs() < 1e-12 && threads[0].thickness.len() == 10);
         assert!(threads[1].spacing.is_empty());
-    }
-
-    #[test]
-    fn periods_are_the_least_that_are_seen_twice() {
-        for (text, want) in [("aaaa", 1), ("abcabca", 3), ("abcab", 5), ("aabaab", 3), ("aabaaab", 7), ("a", 1)] {
-            let text = text.as_bytes();
-            assert_eq!(period(text.len(), |i, j| text[i] == text[j]), want);
-        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ impl Layout {
     fn new(knit: &Knit, rows: &[Vec<Stitch>], profile: Option<&Revolution>) -> Self {
         let size = profile.map_or(knit.size(), |p| knit.size_on(p, rows).map(Some));
         let points_of_cell = if profile.is_some() { COARSE } else { knit.points };
-        let cell = knit.repeat().map(|wide| knit.cell(wide, size, points_of_cell));
+        let cell = knit.repeat().map(|repeat| knit.cell(&repeat, size, points_of_cell));
         let even = cell.is_some() && profile.is_none();
         let points = if even || short_rows::any(rows) { knit.points } else { COARSE };
         let kinds = if cell.is_none() { knit.rows_of_a_kind(rows, size, points) } else { Kinds::default() };
@@ -144,14 +144,14 @@ impl Knit {
     /// A patch that repeats, of one colour, centred.
     fn patch(&self, yarn: &Thickness) -> Result<Knitted, ChartError> {
         let diameter = yarn.pressed();
-        let wide = self.repeat_for("for a tile")?;
-        self.check_repeat_held()?;
-        let high = self.chart.rows();
+        let repeat = self.repeat_for("for a tile")?;
+        self.check_held_on(&repeat)?;
+        let (wide, high) = (repeat.wide, repeat.chart.rows());
         if !self.stitches.is_multiple_of(wide) || !self.rows.is_multiple_of(high) {
             let problem = format!("a tile of {} x {} of what repeats over {wide} x {high}", self.stitches, self.rows);
             return Err(ChartError::new(None, problem, "give multiples of these stitches and rows"));
         }
-        let cell = self.cell(wide, self.size(), self.points);
+        let cell = self.cell(&repeat, self.size(), self.points);
         self.check_relaxed(&cell)?;
         let [width, height] = cell.gauge();
         let size = DVec2::new(f64::from(self.stitches) * width, f64::from(self.rows) * height);

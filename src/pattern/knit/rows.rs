@@ -1,6 +1,6 @@
 //! The rows of a piece as they are worked: as the chart has them, with sides that hold.
 
-use super::{Closing, Knit, YARN_PER_STITCH, cell::Cell, gaps, short_rows};
+use super::{Closing, Knit, Repeat, YARN_PER_STITCH, cell::Cell, gaps, short_rows};
 use crate::pattern::{
     MAX_POINTS,
     chart::{Act, ChartError, Stitch},
@@ -91,10 +91,10 @@ impl Knit {
     }
 
     /// As [`Self::check_held`] of a chart that repeats, which is relaxed as if it went on.
-    pub(super) fn check_repeat_held(&self) -> Result<(), ChartError> {
-        let (Some(wide), longest) = (self.repeat(), MOST_HELD + self.yarn(self.size()) as u32) else { return Ok(()) };
-        let rows = self.chart.work(wide, self.chart.rows().saturating_add(longest), u64::MAX)?;
-        Self { stitches: wide, ..self.clone() }.check_held(&rows)
+    pub(super) fn check_held_on(&self, Repeat { chart, wide }: &Repeat) -> Result<(), ChartError> {
+        let longest = MOST_HELD + self.yarn(self.size()) as u32;
+        let rows = chart.work(*wide, chart.rows().saturating_add(longest), u64::MAX)?;
+        Self { chart: chart.clone(), stitches: *wide, ..self.clone() }.check_held(&rows)
     }
 
     pub(super) fn worked(&self) -> Result<Vec<Vec<Stitch>>, ChartError> {
@@ -103,7 +103,7 @@ impl Knit {
         gaps::check(&rows, self)?;
         short_rows::turned(&mut rows, self)?;
         self.check_held(&rows)?;
-        self.check_repeat_held()?;
+        self.repeat().map_or(Ok(()), |repeat| self.check_held_on(&repeat))?;
         if self.has_tucks() {
             pass_tucks_at_sides(&mut rows);
         }
