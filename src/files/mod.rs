@@ -5,6 +5,7 @@
 pub mod curve_file;
 pub(crate) mod mesh_file;
 pub(crate) mod obj;
+pub(crate) mod obj_text;
 pub mod stage;
 
 use std::path::Path;

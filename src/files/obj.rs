@@ -1,7 +1,6 @@
 //! Triangle meshes from Wavefront OBJ files.
 
 use std::{
-    cell::Cell,
     fmt,
     fs::File,
     io::{self, BufRead, BufReader, Read},
@@ -11,7 +10,7 @@ use std::{
 use glam::{DVec2, DVec3};
 use tobj::LoadError;
 
-use super::{EXPORT, foreign};
+use super::{EXPORT, foreign, obj_text::ObjLines};
 use crate::{geometry::mesh::Mesh, input::system::in_words};
 
 /// The largest file that is read.
@@ -37,35 +36,59 @@ impl fmt::Display for MeshError {
 
 impl std::error::Error for MeshError {}
 
-/// Counts the lines that a parser has taken, so that its error has a place.
-struct Counting<'a, R> {
-    inner: R,
-    lines: &'a Cell<usize>,
+/// The lines of a file for a parser, one at a time, so that its error has a place. Elements without faces are left out: the parser
+/// would take those of three corners for faces.
+struct OfFaces<R> {
+    lines: ObjLines<R>,
+    /// Of the file, the line that was given last.
+    number: usize,
+    /// What is wrong with it, if that was noticed here.
+    problem: Option<String>,
+    /// What is left of it.
+    text: Vec<u8>,
+    taken: usize,
 }
 
-impl<R: BufRead> Read for Counting<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.inner.read(buffer)
+impl<R: BufRead> OfFaces<R> {
+    fn new(reader: R) -> Self {
+        Self { lines: ObjLines::new(reader), number: 0, problem: None, text: Vec::new(), taken: 0 }
     }
 }
 
-impl<R: BufRead> BufRead for Counting<'_, R> {
+impl<R: BufRead> Read for OfFaces<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let taken = self.fill_buf()?.read(buffer)?;
+        self.consume(taken);
+        Ok(taken)
+    }
+}
+
+impl<R: BufRead> BufRead for OfFaces<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        self.inner.fill_buf()
+        if self.taken == self.text.len()
+            && let Some(line) = self.lines.next()
+        {
+            let line = line.inspect_err(|error| self.problem = Some(in_words(error)))?;
+            self.number = line.number;
+            if let Some(problem) = line.damage() {
+                self.problem = Some(problem);
+                return Err(io::ErrorKind::InvalidData.into());
+            }
+            let of_faces = !matches!(line.text.split_whitespace().next(), Some("l" | "p"));
+            self.text = if of_faces { line.text.into_bytes() } else { Vec::new() };
+            self.text.push(b'\n');
+            self.taken = 0;
+        }
+        Ok(&self.text[self.taken..])
     }
 
     fn consume(&mut self, amount: usize) {
-        self.inner.consume(amount);
-    }
-
-    fn read_line(&mut self, line: &mut String) -> io::Result<usize> {
-        self.lines.set(self.lines.get() + 1);
-        self.inner.read_line(line)
+        self.taken += amount;
     }
 }
 
-/// Reads all faces of a file as one mesh; polygons become fans, materials and lines are left aside. Where some faces
-/// lack normals or texture coordinates, all go without.
+/// Reads all faces of a file as one mesh; polygons become fans, materials, lines and points left aside. Where some
+/// faces lack normals or texture coordinates, all go without.
 ///
 /// # Errors
 /// What is wrong with the file, and in which line.
@@ -91,19 +114,22 @@ pub(crate) fn read_grouped(path: &Path) -> Result<(Mesh, Vec<String>), MeshError
 }
 
 fn parse(reader: impl BufRead) -> Result<(Mesh, Vec<String>), (usize, String)> {
-    let lines = Cell::new(0);
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    let mut reader = Counting { inner: reader, lines: &lines };
+    let mut reader = OfFaces::new(reader);
     // Materials of the file are not asked for: the scene names its own.
-    let (models, _) =
-        tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).map_err(|error| match error {
-            // Faces are put together when an object ends: the line is no longer known.
+    let loaded = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default()));
+    let (models, _) = loaded.map_err(|error| match (error, reader.problem.take()) {
+        (_, Some(problem)) => (reader.number, problem),
+        // Faces are put together when an object ends: the line is no longer known.
+        (
             LoadError::FaceVertexOutOfBounds
             | LoadError::FaceTexCoordOutOfBounds
             | LoadError::FaceNormalOutOfBounds
-            | LoadError::FaceColorOutOfBounds => (0, format!("{error}: a face names what the file does not have")),
-            _ => (lines.get(), format!("{error}; is this an OBJ file?")),
-        })?;
+            | LoadError::FaceColorOutOfBounds,
+            None,
+        ) => (0, format!("{error}: a face names what the file does not have")),
+        (_, None) => (reader.number, format!("{error}; is this an OBJ file?")),
+    })?;
     let with_faces = models.into_iter().filter(|m| !m.mesh.indices.is_empty());
     let (names, meshes): (Vec<String>, Vec<tobj::Mesh>) = with_faces.map(|m| (m.name, m.mesh)).unzip();
     if meshes.is_empty() {
@@ -159,6 +185,30 @@ mod tests {
         let mesh = parsed(&mixed).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.normals.len(), mesh.uvs.len()), (2, 0, 0));
         assert!(mesh.triangles.iter().flatten().all(|&i| (i as usize) < mesh.points.len()));
+    }
+
+    #[test]
+    fn lines_and_points_are_no_faces() {
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+        let with_face = format!("{corners}l 1 2 3\np 1 2 3 4\nf 1 2 4\nl 1 2 3 4\n");
+        assert_eq!(parsed(&with_face).unwrap().triangles.len(), 1);
+        assert!(parsed(&format!("{corners}l 1 2 3\n")).unwrap_err().1.contains("no faces"));
+    }
+
+    #[test]
+    fn lines_end_and_go_on_as_they_may() {
+        let plain = parsed("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        for text in [
+            "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 \\\n2 3",
+            "v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3",
+            "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n",
+        ] {
+            assert_eq!(parsed(text).unwrap(), plain, "{text:?}");
+        }
+        let damaged = parsed("v 0 0 0\nxv 1 0 0\nv 0 1 0\nf 1 2 2\n").unwrap_err();
+        assert!(damaged.0 == 2 && damaged.1.contains("\"xv\""), "{damaged:?}");
+        // The first line of those that belong together.
+        assert_eq!(parsed("v 0 0 0\nv 1 \\\nzero 0\n").unwrap_err().0, 2);
     }
 
     #[test]

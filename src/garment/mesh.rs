@@ -13,7 +13,7 @@ use std::{
 use glam::{DVec2, DVec3};
 
 use crate::{
-    files::{EXPORT, foreign, stage::PolygonMesh},
+    files::{EXPORT, foreign, obj_text::ObjLines, stage::PolygonMesh},
     input::system::in_words,
     math::words::counted,
 };
@@ -174,9 +174,10 @@ impl GarmentMesh {
         let mut mesh = Self::default();
         let mut part = Part { group: String::new(), material: String::new() };
         let mut polygons = Counted::default();
-        for (index, line) in text.lines().enumerate() {
-            let number = index + 1;
-            let mut words = line.split_whitespace();
+        // Bytes in memory are always there.
+        for line in ObjLines::new(text.as_bytes()).map_while(Result::ok) {
+            let number = line.number;
+            let mut words = line.text.split_whitespace();
             match words.next() {
                 Some("v") => mesh.points.push(DVec3::from(numbers(words, number)?)),
                 Some("vt") => mesh.uvs.push(DVec2::from(numbers(words, number)?)),
@@ -203,7 +204,11 @@ impl GarmentMesh {
                         });
                     }
                 }
-                _ => {}
+                _ => {
+                    if let Some(problem) = line.damage() {
+                        return Err(GarmentError::at(number, problem, "is the file damaged?"));
+                    }
+                }
             }
         }
         if mesh.faces.is_empty() {
@@ -336,6 +341,16 @@ mod tests {
     }
 
     #[test]
+    fn lines_are_those_of_all_obj_files() {
+        let plain = GarmentMesh::parse(&format!("{QUAD}f 1/1 2/2 3/3 4/4\n")).unwrap();
+        let split = format!("{QUAD}f 1/1 2/2 \\\n3/3 4/4\n");
+        let with_mark = format!("\u{feff}{}", &QUAD["g a b\n".len()..]);
+        assert_eq!(GarmentMesh::parse(&split).unwrap(), plain);
+        assert_eq!(GarmentMesh::parse(&split.replace("\\\n", "").replace('\n', "\r")).unwrap(), plain);
+        assert_eq!(GarmentMesh::parse(&(with_mark + "f 1/1 2/2 3/3\n")).unwrap().points.len(), 4);
+    }
+
+    #[test]
     fn mistakes_are_placed() {
         let wrong = |more: &str| GarmentMesh::parse(&format!("{QUAD}{more}")).unwrap_err();
         assert_eq!(wrong("f 1/1 2/2 9/3\n").line, 10);
@@ -344,6 +359,7 @@ mod tests {
         assert!(wrong("f 1/1 -9/2 3/3\n").problem.contains("-9"));
         assert!(wrong("v nan 0 0\n").problem.contains("finite"));
         assert!(wrong("").problem.contains("no faces"));
+        assert_eq!(wrong("vtt 0 0\n").line, 10);
         let many = GarmentMesh::parse(&format!("{QUAD}v 0 2 0\nvt 0 2\nf 1/1 2/2 3/3 4/4 5/5\n")).unwrap();
         assert!(many.notes[0].starts_with("1 face of more than four corners"), "{:?}", many.notes);
     }

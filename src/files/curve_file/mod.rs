@@ -432,7 +432,7 @@ fn number(token: &str, name: &str, line: u64) -> Result<f64, CurveFileError> {
 }
 
 /// A piece of the file for a message: quoted, escaped and not too long.
-fn quoted(token: &str) -> String {
+pub(super) fn quoted(token: &str) -> String {
     const LONGEST: usize = 40;
     let head: String = token.chars().take(LONGEST).collect();
     let dots = if head.len() < token.len() { "..." } else { "" };

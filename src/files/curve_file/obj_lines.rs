@@ -9,8 +9,11 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::repair::{Ends, Repair};
-use super::{CurveFileError, FileLocation, ReadOptions, lines, number, quoted};
-use crate::geometry::curve::{Basis, CurveSet};
+use super::{CurveFileError, FileLocation, ReadOptions, number, quoted};
+use crate::{
+    files::obj_text::ObjLines,
+    geometry::curve::{Basis, CurveSet},
+};
 
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, CurveFileError> {
     let basis = options.basis.unwrap_or(Basis::CatmullRom);
@@ -29,22 +32,24 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
         let points = chain.drain(..).map(|i| vertices[i]).collect();
         repair.add(basis, if ring { Ends::Closed } else { Ends::Open }, points, None);
     };
-    for line in lines(bytes) {
-        let mut tokens = line.content.split_whitespace();
+    // Bytes in memory are always there.
+    for line in ObjLines::new(bytes).map_while(Result::ok) {
+        let at = line.number as u64;
+        let mut tokens = line.text.split('#').next().unwrap_or_default().split_whitespace();
         match tokens.next() {
             Some("v") => {
                 let mut coordinate = |name| match tokens.next() {
-                    Some(token) => number(token, name, line.number),
+                    Some(token) => number(token, name, at),
                     None => {
-                        let problem = format!("expected \"v x y z\", found {}", quoted(&line.content));
-                        Err(CurveFileError::line(line.number, problem))
+                        let problem = format!("expected \"v x y z\", found {}", quoted(&line.text));
+                        Err(CurveFileError::line(at, problem))
                     }
                 };
                 vertices.push(DVec3::new(coordinate("x")?, coordinate("y")?, coordinate("z")?));
             }
             Some("l") => {
                 for (i, token) in tokens.enumerate() {
-                    let index = vertex(token, vertices.len(), line.number)?;
+                    let index = vertex(token, vertices.len(), at)?;
                     if i == 0 {
                         let closed = chain.len() >= 4 && chain.first() == chain.last();
                         if chain.last() == Some(&index) && !closed {
@@ -55,11 +60,15 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<CurveSet, Cur
                     chain.push(index);
                     total += 1;
                     if total > options.max_points {
-                        return Err(CurveFileError::too_many_points(FileLocation::Line(line.number), total, options));
+                        return Err(CurveFileError::too_many_points(FileLocation::Line(at), total, options));
                     }
                 }
             }
-            _ => {}
+            _ => {
+                if let Some(problem) = line.damage() {
+                    return Err(CurveFileError::line(at, problem));
+                }
+            }
         }
     }
     finish(&mut chain, &vertices, &mut repair);
@@ -110,6 +119,15 @@ mod tests {
 
     fn read(text: &str) -> CurveSet {
         parse(text.as_bytes(), &ReadOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn lines_are_those_of_all_obj_files() {
+        for text in ["\u{feff}v 0 0 0\rv 1 0 0\rv 2 1 0\rl 1 2 3", "v 0 0 0\nv 1 0 0\nv 2 1 0\nl 1 \\\n2 3\n"] {
+            assert_eq!(read(text).curves[0].points.len(), 3, "{text:?}");
+        }
+        let damaged = parse(b"v 0 0 0\nvv 1 0 0\n", &ReadOptions::default()).unwrap_err();
+        assert_eq!(damaged.location, FileLocation::Line(2));
     }
 
     #[test]
