@@ -11,7 +11,10 @@ use glam::{DVec2, DVec3};
 use tobj::LoadError;
 
 use super::{EXPORT, foreign, obj_text::ObjLines};
-use crate::{geometry::mesh::Mesh, input::system::in_words};
+use crate::{
+    geometry::{mesh::Mesh, polygon},
+    input::system::in_words,
+};
 
 /// The largest file that is read.
 const MAX_BYTES: u64 = 1 << 31;
@@ -87,7 +90,7 @@ impl<R: BufRead> BufRead for OfFaces<R> {
     }
 }
 
-/// Reads all faces of a file as one mesh; polygons become fans, materials, lines and points left aside. Where some
+/// Reads all faces of a file as one mesh; polygons are cut into triangles, materials, lines and points left aside. Where some
 /// faces lack normals or texture coordinates, all go without.
 ///
 /// # Errors
@@ -114,7 +117,8 @@ pub(crate) fn read_grouped(path: &Path) -> Result<(Mesh, Vec<String>), MeshError
 }
 
 fn parse(reader: impl BufRead) -> Result<(Mesh, Vec<String>), (usize, String)> {
-    let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
+    // Polygons are cut here: the parser's fans do not fill hollow ones.
+    let options = tobj::LoadOptions { triangulate: false, single_index: true, ignore_points: true, ignore_lines: true };
     let mut reader = OfFaces::new(reader);
     // Materials of the file are not asked for: the scene names its own.
     let loaded = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default()));
@@ -151,7 +155,17 @@ fn parse(reader: impl BufRead) -> Result<(Mesh, Vec<String>), (usize, String)> {
         if uvs {
             mesh.uvs.extend(part.texcoords.chunks_exact(2).map(|t| DVec2::new(f64::from(t[0]), f64::from(t[1]))));
         }
-        mesh.triangles.extend(part.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| i + first as u32)));
+        // Where all are triangles, none is counted.
+        let counts = part.face_arities.iter().map(|&count| count as usize);
+        let triangles = part.indices.len() / 3 * usize::from(part.face_arities.is_empty());
+        let mut rest = part.indices.as_slice();
+        for count in counts.chain(std::iter::repeat_n(3, triangles)) {
+            let (face, others) = rest.split_at(count);
+            let corners: Vec<DVec3> = face.iter().map(|&i| mesh.points[first as usize + i as usize]).collect();
+            let cut = polygon::triangles(&polygon::in_plane(&corners));
+            mesh.triangles.extend(cut.into_iter().map(|t| t.map(|k| face[k] + first as u32)));
+            rest = others;
+        }
     }
     if let Some(point) = mesh.points.iter().position(|p| !p.is_finite()) {
         return Err((0, format!("point {point} is not finite")));
@@ -185,6 +199,17 @@ mod tests {
         let mesh = parsed(&mixed).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.normals.len(), mesh.uvs.len()), (2, 0, 0));
         assert!(mesh.triangles.iter().flatten().all(|&i| (i as usize) < mesh.points.len()));
+    }
+
+    #[test]
+    fn hollow_faces_are_filled_within_their_outline() {
+        let mesh = parsed("v 0 0 0\nv 12 6 0\nv 24 0 0\nv 12 24 0\nf 1 2 3 4\nf 3 4 1 2\n").unwrap();
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| mesh.points[i as usize]);
+            0.5 * (b - a).cross(c - a)
+        };
+        assert_eq!(mesh.triangles.len(), 4);
+        assert!(mesh.triangles.iter().all(|t| area(t) == DVec3::new(0.0, 0.0, 108.0)), "{:?}", mesh.triangles);
     }
 
     #[test]

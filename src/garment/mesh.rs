@@ -14,6 +14,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     files::{EXPORT, foreign, obj_text::ObjLines, stage::PolygonMesh},
+    geometry::polygon,
     input::system::in_words,
     math::words::counted,
 };
@@ -77,6 +78,8 @@ pub(crate) struct Face {
     pub part: u32,
     /// Where it is in the file.
     pub line: u32,
+    /// Index of the polygon that it was cut from.
+    pub polygon: u32,
 }
 
 /// The names that a `[[fabric.panel]]` may choose a face by.
@@ -158,10 +161,20 @@ impl GarmentMesh {
                 mesh.uvs.len() as u32 - 1
             })
         };
-        let faces = given.counts.iter().zip(&part_of_face).flat_map(|(&count, &part)| vec![part; count as usize - 2]);
-        let triangles = given.triangles().zip(faces);
+        // In the order of corners, which no cut changes.
+        let uvs: Vec<u32> = (0..given.corners.len()).map(&mut uv).collect();
+        let of_polygons = given.counts.iter().zip(&part_of_face).zip(0..);
+        let faces =
+            of_polygons.flat_map(|((&count, &part), polygon)| std::iter::repeat_n((part, polygon), count as usize - 2));
+        let triangles = given.triangles_in_uv().zip(faces);
         mesh.faces = triangles
-            .map(|(t, part)| Face { points: t.map(|c| given.corners[c]), uvs: t.map(&mut uv), part, line: 0 })
+            .map(|(t, (part, polygon))| Face {
+                points: t.map(|c| given.corners[c]),
+                uvs: t.map(|c| uvs[c]),
+                part,
+                line: 0,
+                polygon,
+            })
             .collect();
         Ok(mesh)
     }
@@ -174,6 +187,7 @@ impl GarmentMesh {
         let mut mesh = Self::default();
         let mut part = Part { group: String::new(), material: String::new() };
         let mut polygons = Counted::default();
+        let mut polygon = 0;
         // Bytes in memory are always there.
         for line in ObjLines::new(text.as_bytes()).map_while(Result::ok) {
             let number = line.number;
@@ -193,16 +207,15 @@ impl GarmentMesh {
                     if corners.len() > 4 {
                         polygons.add(&part.group, number);
                     }
-                    // Always about the first corner: all frames of an animation must be cut alike.
-                    for k in 1..corners.len() - 1 {
-                        let of = |corner: usize| [corners[0], corners[k], corners[k + 1]][corner];
-                        mesh.faces.push(Face {
-                            points: [0, 1, 2].map(|k| of(k).0),
-                            uvs: [0, 1, 2].map(|k| of(k).1),
-                            part: own,
-                            line: number as u32,
-                        });
-                    }
+                    let flat: Vec<DVec2> = corners.iter().map(|&(_, uv)| mesh.uvs[uv as usize]).collect();
+                    mesh.faces.extend(polygon::triangles(&flat).into_iter().map(|t| Face {
+                        points: t.map(|k| corners[k].0),
+                        uvs: t.map(|k| corners[k].1),
+                        part: own,
+                        line: number as u32,
+                        polygon,
+                    }));
+                    polygon += 1;
                 }
                 _ => {
                     if let Some(problem) = line.damage() {
@@ -256,20 +269,29 @@ impl GarmentMesh {
     ///
     /// # Errors
     /// What differs.
-    pub(crate) fn same_topology(&self, other: &Self) -> Result<(), String> {
+    pub(crate) fn same_topology<'a>(&'a self, other: &'a Self) -> Result<(), String> {
         if self.points.len() != other.points.len() {
             return Err(format!("{} points, where the first frame has {}", other.points.len(), self.points.len()));
         }
         if self.faces.len() != other.faces.len() {
             return Err(format!("{} triangles, where the first frame has {}", other.faces.len(), self.faces.len()));
         }
-        let differs = self.faces.iter().zip(&other.faces).find(|(a, b)| a.points != b.points || a.uvs != b.uvs);
+        // Texture coordinates that move may cut a polygon otherwise; the first frame's cut counts.
+        let polygons = |mesh: &'a Self| mesh.faces.chunk_by(|a, b| a.polygon == b.polygon);
+        let differs = polygons(self).zip(polygons(other)).find(|(a, b)| a != b && outline(a) != outline(b));
         match differs {
-            Some((_, face)) if face.line == 0 => Err("a face has other corners than in the first frame".to_owned()),
-            Some((_, face)) => Err(format!("the face in line {} has other corners than in the first frame", face.line)),
+            Some((_, [face, ..])) if face.line > 0 => {
+                Err(format!("the face in line {} has other corners than in the first frame", face.line))
+            }
+            Some(_) => Err("a face has other corners than in the first frame".to_owned()),
             None => Ok(()),
         }
     }
+}
+
+/// The edges around the triangles of a polygon, between corners that are point and texture coordinates.
+fn outline(faces: &[Face]) -> Vec<[(u32, u32); 2]> {
+    polygon::outline(faces.iter().map(|f| [0, 1, 2].map(|k| (f.points[k], f.uvs[k]))))
 }
 
 /// A panel by the name of its group, for people.
@@ -348,6 +370,17 @@ mod tests {
         assert_eq!(GarmentMesh::parse(&split).unwrap(), plain);
         assert_eq!(GarmentMesh::parse(&split.replace("\\\n", "").replace('\n', "\r")).unwrap(), plain);
         assert_eq!(GarmentMesh::parse(&(with_mark + "f 1/1 2/2 3/3\n")).unwrap().points.len(), 4);
+    }
+
+    #[test]
+    fn polygons_are_cut_as_the_first_frame_says() {
+        let cut = |x: f64| format!("{}vt {x} {x}\nf 2/2 3/5 4/4 1/1\n", QUAD.replace("vt 1 1\n", "vt 9 9\n"));
+        let [first, hollow] = [1.0, 0.3].map(|x| GarmentMesh::parse(&cut(x)).unwrap());
+        assert_ne!(first.faces, hollow.faces, "the hollow one is cut through its inner corner");
+        first.same_topology(&hollow).unwrap();
+        let mut other = GarmentMesh::parse(&cut(1.0)).unwrap();
+        other.faces[1].points.swap(0, 2);
+        assert!(first.same_topology(&other).unwrap_err().contains("line 11"));
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub mod mesh;
 pub(crate) mod occluder;
 pub mod overlap;
 pub mod ply;
+pub(crate) mod polygon;
 pub(crate) mod proposal;
 pub mod ray;
 pub mod section;

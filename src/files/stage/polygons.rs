@@ -1,11 +1,11 @@
 //! Polygon meshes with texture coordinates that have corners of their own, and groups of faces.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::Range};
 
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
 use super::{MAX_POINTS, Problem};
-use crate::geometry::mesh::Mesh;
+use crate::geometry::{mesh::Mesh, polygon};
 
 /// Faces that belong together: a subset of an object, or the object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -246,19 +246,33 @@ impl PolygonMesh {
                 mesh.points.len() as u32 - 1
             })
         };
-        let triangles: Vec<[u32; 3]> = self.triangles().map(|t| t.map(&mut vertex)).collect();
-        mesh.triangles = triangles;
+        // In the order of corners, which no cut changes.
+        let vertices: Vec<u32> = (0..self.corners.len()).map(&mut vertex).collect();
+        mesh.triangles = self.triangles().map(|t| t.map(|corner| vertices[corner])).collect();
         mesh
     }
 
-    /// The indices into `corners` of every triangle: each polygon as a fan about its first corner.
+    /// The indices into `corners` of every triangle, each polygon cut as it lies in space.
     pub fn triangles(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        let at = |&corner: &u32| self.points[corner as usize];
+        self.cut(move |own| polygon::in_plane(&self.corners[own].iter().map(at).collect::<Vec<_>>()))
+    }
+
+    /// The same, each polygon cut as it lies in the texture coordinates, which must be there.
+    pub(crate) fn triangles_in_uv(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        self.cut(|own| self.uv_corners[own].iter().map(|&uv| self.uvs[uv as usize]).collect())
+    }
+
+    fn cut<'a>(&'a self, flat: impl Fn(Range<usize>) -> Vec<DVec2> + 'a) -> impl Iterator<Item = [usize; 3]> + 'a {
         let first = self.counts.iter().scan(0, |sum, &count| {
             let first = *sum;
             *sum += count as usize;
-            Some((first, count as usize))
+            Some(first..*sum)
         });
-        first.flat_map(|(first, count)| (1..count - 1).map(move |k| [first, first + k, first + k + 1]))
+        first.flat_map(move |own| {
+            let first = own.start;
+            polygon::triangles(&flat(own)).into_iter().map(move |t| t.map(|k| first + k))
+        })
     }
 }
 
@@ -279,6 +293,17 @@ mod tests {
         assert!(mesh.clone().place(&nowhere, false).is_err());
         assert_eq!(mesh.corners, [3, 2, 1, 0]);
         assert_eq!(mesh.triangles().collect::<Vec<_>>(), [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn hollow_faces_are_cut_by_ears() {
+        let points = [[0.0, 0.0], [12.0, 6.0], [24.0, 0.0], [12.0, 24.0]].map(|[x, y]| DVec3::new(0.0, x, y));
+        let mut mesh = PolygonMesh::new(points.to_vec(), &[4, 3], &[0, 1, 2, 3, 0, 1, 3]).unwrap();
+        assert_eq!(mesh.triangles().collect::<Vec<_>>(), [[1, 2, 3], [0, 1, 3], [4, 5, 6]]);
+        // Convex as it was cut from flat cloth.
+        let uv = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        mesh.set_uvs(AtCorners { values: uv.map(DVec2::from).to_vec(), indices: None }).unwrap();
+        assert_eq!(mesh.triangles_in_uv().collect::<Vec<_>>(), [[0, 1, 2], [0, 2, 3], [4, 5, 6]]);
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::{
         obj,
         stage::{self, PolygonMesh, PrimPattern, Stage},
     },
-    geometry::mesh::Mesh,
+    geometry::{mesh::Mesh, polygon},
     image::texture::Texture,
     input::diagnostic::Span,
     math::Rgb,
@@ -320,6 +320,26 @@ impl MeshPlan {
     }
 }
 
+/// Whether triangles are those of the same polygons, which may be cut otherwise where they bend.
+fn same_faces(a: &[[u32; 3]], b: &[[u32; 3]]) -> bool {
+    // Larger polygons than of so many triangles are not put together.
+    const MOST: usize = 256;
+    if a.len() != b.len() {
+        return false;
+    }
+    let outline = |triangles: &[[u32; 3]]| polygon::outline(triangles.iter().copied());
+    let mut at = 0;
+    while at < a.len() {
+        let most = MOST.min(a.len() - at);
+        let same = |n: &usize| a[at] == b[at] || outline(&a[at..at + n]) == outline(&b[at..at + n]);
+        match (1..=most).find(same) {
+            Some(n) => at += n,
+            None => return false,
+        }
+    }
+    true
+}
+
 impl MeshFile {
     /// The file of a frame.
     fn of_frame(&self, frame: u32) -> PathBuf {
@@ -351,7 +371,7 @@ impl MeshFile {
 
     /// Points of the next frame's mesh; none if nothing moves.
     fn moved(&self, mesh: &Mesh, later: Mesh, path: &Path, context: &Context<'_>) -> Option<Vec<DVec3>> {
-        if mesh.triangles == later.triangles && mesh.points.len() == later.points.len() {
+        if mesh.points.len() == later.points.len() && same_faces(&mesh.triangles, &later.triangles) {
             return Some(if mesh.points == later.points { Vec::new() } else { later.points });
         }
         let message = format!(
