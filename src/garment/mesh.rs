@@ -29,6 +29,8 @@ pub(crate) struct GarmentError {
     pub path: Option<PathBuf>,
     /// Counted from 1; 0 where no line is at fault.
     pub line: usize,
+    /// Whether the mesh is at fault, and not what is asked of it.
+    pub of_mesh: bool,
     /// The number of the cloth that asks for what cannot be, if one does.
     pub cloth: Option<usize>,
     /// What is wrong.
@@ -40,11 +42,12 @@ pub(crate) struct GarmentError {
 impl GarmentError {
     /// Something that is wrong with the scene's numbers, not with the file.
     pub(crate) fn new(problem: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::at(0, problem, hint)
+        Self { of_mesh: false, ..Self::at(0, problem, hint) }
     }
 
+    /// Something that is wrong with the mesh, in a line of its file or, at 0, as a whole.
     pub(super) fn at(line: usize, problem: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { path: None, line, cloth: None, problem: problem.into(), hint: hint.into() }
+        Self { path: None, line, of_mesh: true, cloth: None, problem: problem.into(), hint: hint.into() }
     }
 
     /// The same, of a file.
@@ -317,6 +320,16 @@ impl Counted {
 
     pub(super) fn count(&self) -> usize {
         self.count
+    }
+
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// Both together.
+    pub(super) fn with(self, later: Self) -> Self {
+        let count = self.count + later.count;
+        if self.count > 0 { Self { count, ..self } } else { Self { count, ..later } }
     }
 
     /// Says of so many of a thing what they are, once.

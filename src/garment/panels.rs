@@ -199,8 +199,12 @@ impl Areas<'_> {
         let total: f64 = faces.iter().map(|f| self.of(f)).sum();
         let total_uv: f64 = faces.iter().map(|f| self.in_uv(f).abs()).sum();
         let count = faces.len() as f64;
-        if total_uv <= 0.0 || total <= 0.0 {
-            let hint = "the texture coordinates are the flat panels of the garment";
+        if total <= 0.0 {
+            let problem = "the faces have no area in space: their corners fall together, or lie on lines";
+            return Err(GarmentError::at(0, problem, "were its numbers rounded? export it near the origin"));
+        }
+        if total_uv <= 0.0 {
+            let hint = "the texture coordinates are the flat panels of the garment: unwrap it, or export them";
             return Err(GarmentError::at(0, "the texture coordinates have no area", hint));
         }
         if !(total_uv.is_finite() && total.is_finite()) {
@@ -237,7 +241,7 @@ impl Areas<'_> {
         }
         let mut panels: Vec<Panel> = Vec::with_capacity(number);
         let mut mirrored = Counted::default();
-        let mut flipped = Counted::default();
+        let mut flipped = vec![Counted::default(); number];
         let mut done = vec![false; uvs.len()];
         for (i, face) in faces.iter().enumerate() {
             let panel = of_face[i] as usize;
@@ -259,7 +263,7 @@ impl Areas<'_> {
             panels[panel].faces += 1;
             panels[panel].area += self.in_uv(face).abs();
             if (self.in_uv(face) < 0.0) != mirror {
-                flipped.add(self.group(face), face.line as usize);
+                flipped[panel].add(self.group(face), face.line as usize);
             }
             for c in cut[i] {
                 if mirror && !std::mem::replace(&mut done[c as usize], true) {
@@ -268,12 +272,21 @@ impl Areas<'_> {
             }
         }
         mirrored.note("panel", "mirrored in its texture coordinates, turned round", notes);
-        if flipped.count() * 20 > faces.len() {
-            let problem =
-                format!("{} of {} triangles lie upside down in the texture coordinates", flipped.count(), faces.len());
-            return Err(GarmentError::at(0, problem, "panels must lie flat, without folds over themselves"));
+        let all: usize = flipped.iter().map(Counted::count).sum();
+        let worst = flipped.iter().zip(&panels).max_by_key(|(flipped, _)| flipped.count());
+        if let Some((flipped, panel)) = worst.filter(|_| all * 20 > faces.len()) {
+            let problem = format!(
+                "{}: {} of its {} triangles lie upside down in the texture coordinates",
+                panel_in_words(&panel.group),
+                flipped.count(),
+                panel.faces
+            );
+            let hint = "panels must lie flat, without folds over themselves: halves that share their texture coordinates \
+                        are laid side by side";
+            return Err(GarmentError::at(flipped.line(), problem, hint));
         }
-        flipped.note("triangle", "upside down in the texture coordinates, without stitches", notes);
+        let upside_down = flipped.into_iter().reduce(Counted::with).unwrap_or_default();
+        upside_down.note("triangle", "upside down in the texture coordinates, without stitches", notes);
         Ok(panels)
     }
 }
@@ -508,6 +521,18 @@ mod tests {
         let doubled = panels(&(two(PLAIN) + "g left\nf 1/1 2/2 3/3\nf 1/1 2/2 4/4\n")).unwrap_err();
         assert!(doubled.problem.contains("`left`") && doubled.line > 0, "{doubled:?}");
         let none = panels("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 0 0\nvt 0 0\nf 1/1 2/2 3/3\n").unwrap_err();
-        assert!(none.problem.contains("no area"));
+        assert!(none.problem.contains("texture coordinates have no area"));
+        let line = panels("v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n").unwrap_err();
+        assert!(line.problem.contains("no area in space") && line.of_mesh, "{line:?}");
+    }
+
+    #[test]
+    fn folded_panels_are_named() {
+        let folded = panels(&two("vt 30 0\nvt 40 0\nvt 40 10\nvt 39 9\n")).unwrap();
+        assert!(folded.notes.iter().all(|n| !n.contains("upside down")), "cut as it lies flat: {:?}", folded.notes);
+        let text = two(PLAIN).replace("f 2/5 5/6 6/7 3/8\n", "f 2/5 5/6 6/7\nf 2/5 6/7 3/6\n");
+        let error = panels(&text).unwrap_err();
+        assert!(error.problem.starts_with("panel `right`: 1 of its 2 triangles lie upside down"), "{error:?}");
+        assert_eq!(error.line, 19);
     }
 }

@@ -92,7 +92,8 @@ impl GarmentPlan {
             pressed: self.body.is_some(),
             near: self.near,
         };
-        let garment = Garment::new(rest, options).map_err(|error| self.tell(error, context)).ok()?;
+        let of_file = |error: GarmentError| if error.of_mesh { error.of(&frames.rest.path) } else { error };
+        let garment = Garment::new(rest, options).map_err(|error| self.tell(of_file(error), context)).ok()?;
         let mut notes = garment.report().notes.clone();
         let tex: Vec<Option<f64>> = self.rules.iter().map(|rule| rule.tex(yarn, library)).collect();
         let (stranded, own) = self.stranded((yarn, color), (&garment, &sizes), context, library, warnings)?;
@@ -175,8 +176,6 @@ impl GarmentPlan {
 
     fn tell(&self, error: GarmentError, context: &Context<'_>) {
         let hint = Some(error.hint.clone()).filter(|h| !h.is_empty());
-        let unnamed = error.line > 0 && error.path.is_none();
-        let error = if unnamed { GarmentError { path: Some(self.path.clone()), ..error } } else { error };
         let rule = error.cloth.and_then(|i| self.rules.get(i));
         context.error(rule.map_or(self.span, |rule| rule.span), error.to_string(), hint);
     }
