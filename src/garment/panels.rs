@@ -77,11 +77,8 @@ impl Panels {
         let mut notes = mesh.notes.clone();
         let (weld, welded) = weld(&mesh.points);
         let areas = Areas { mesh, unit_mm };
-        let (faces, grain) = areas.sound_faces(&weld, &mut notes)?;
-        let (mut cut, mut uvs) = joined_corners(mesh, &faces, &weld, grain);
-        let (of_face, order) = charts(&cut, uvs.len(), &faces, mesh)?;
-        let faces: Vec<Face> = order.iter().map(|&i| faces[i]).collect();
-        cut = order.iter().map(|&i| cut[i]).collect();
+        let (mut faces, grain) = areas.sound_faces(&weld, &mut notes)?;
+        let Charts { faces, cut, mut uvs, of_face } = areas.charts(&mut faces, &weld, grain, &mut notes)?;
 
         let ratios: Vec<(f64, f64)> =
             faces.iter().map(|f| ((areas.of(f) / areas.in_uv(f).abs()).sqrt(), areas.of(f))).collect();
@@ -224,6 +221,83 @@ impl Areas<'_> {
         Ok((faces.iter().copied().filter(sound).collect(), 1e-7 * (total_uv / count).sqrt()))
     }
 
+    /// Faces that are wound against most of those that they are joined to within their part would be knitted inside out: turns
+    /// them round.
+    fn wind_alike(&self, faces: &mut [Face], cut: &[[u32; 3]], notes: &mut Vec<String>) {
+        // For each edge of two faces both of them, and whether the second one goes along it as the first one does.
+        let mut edges: HashMap<[u32; 2], (u8, [usize; 2], [bool; 2])> = HashMap::with_capacity(cut.len() * 3 / 2);
+        for (i, f) in cut.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (f[k], f[(k + 1) % 3]);
+                let (count, both, ways) = edges.entry([a.min(b), a.max(b)]).or_default();
+                if let Some(place) = both.get_mut(usize::from(*count)) {
+                    (*place, ways[usize::from(*count)]) = (i, a < b);
+                }
+                *count = count.saturating_add(1);
+            }
+        }
+        if edges.values().all(|(count, _, [first, second])| *count != 2 || first != second) {
+            return;
+        }
+        let across = |i: usize| {
+            let of = |k: usize| {
+                let (a, b) = (cut[i][k], cut[i][(k + 1) % 3]);
+                let (count, both, ways) = edges[&[a.min(b), a.max(b)]];
+                (count == 2).then(|| (both[usize::from(both[0] == i)], ways[0] == ways[1]))
+            };
+            [0, 1, 2].map(of).into_iter().flatten()
+        };
+        let mut against: Vec<Option<bool>> = vec![None; cut.len()];
+        let mut turned = Counted::default();
+        for start in 0..cut.len() {
+            if against[start].is_some() {
+                continue;
+            }
+            against[start] = Some(false);
+            let (mut piece, mut done, mut one_sided) = (vec![start], 0, false);
+            while let Some(&i) = piece.get(done) {
+                done += 1;
+                for (next, alike) in across(i) {
+                    let side = against[i].map(|side| side != alike);
+                    match against[next] {
+                        None => {
+                            against[next] = side;
+                            piece.push(next);
+                        }
+                        Some(_) => one_sided |= against[next] != side,
+                    }
+                }
+            }
+            let other = piece.iter().filter(|&&i| against[i] == Some(true)).count();
+            let wrong = 2 * other <= piece.len();
+            // Of a band with one side no winding is right.
+            piece.retain(|&i| !one_sided && against[i] == Some(wrong));
+            piece.sort_unstable();
+            for i in piece {
+                turned.add(self.group(&faces[i]), faces[i].line as usize);
+                faces[i].points.swap(1, 2);
+                faces[i].uvs.swap(1, 2);
+            }
+        }
+        turned.note("triangle", "wound against their neighbours, turned round", notes);
+    }
+
+    /// The pieces of faces that hang together in the texture coordinates and are of one part.
+    fn charts(
+        &self,
+        faces: &mut [Face],
+        weld: &[u32],
+        grain: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<Charts, GarmentError> {
+        let of_parts: Vec<usize> = faces.iter().map(|f| f.part as usize).collect();
+        self.wind_alike(faces, &joined_corners(self.mesh, faces, weld, grain, &of_parts).0, notes);
+        let (cut, uvs) = joined_corners(self.mesh, faces, weld, grain, &of_parts);
+        let (of_face, order) = charts(&cut, uvs.len(), faces, self.mesh)?;
+        let faces = order.iter().map(|&i| faces[i]).collect();
+        Ok(Charts { faces, cut: order.iter().map(|&i| cut[i]).collect(), uvs, of_face })
+    }
+
     /// The panels, their areas in the unit of the file's texture coordinates. Those whose texture is seen from behind are
     /// turned round: an S twist stays S.
     fn upright_panels(
@@ -291,17 +365,32 @@ impl Areas<'_> {
     }
 }
 
-/// Corners that share place, texture coordinates (within `grain`) and part are one: the corners of each face, and the texture
-/// coordinates of all corners.
-fn joined_corners(mesh: &GarmentMesh, faces: &[Face], weld: &[u32], grain: f64) -> (Vec<[u32; 3]>, Vec<DVec2>) {
-    let mut corners: HashMap<(u32, [i64; 2], u32), u32> = HashMap::new();
+/// Faces, those of a panel after each other, over corners with their texture coordinates, and the panel of each.
+struct Charts {
+    faces: Vec<Face>,
+    cut: Vec<[u32; 3]>,
+    uvs: Vec<DVec2>,
+    of_face: Vec<u32>,
+}
+
+/// Corners that share place, texture coordinates (within `grain`) and the label of their face are one: the corners of each face,
+/// and the texture coordinates of all corners.
+fn joined_corners(
+    mesh: &GarmentMesh,
+    faces: &[Face],
+    weld: &[u32],
+    grain: f64,
+    labels: &[usize],
+) -> (Vec<[u32; 3]>, Vec<DVec2>) {
+    let mut corners: HashMap<(u32, [i64; 2], usize), u32> = HashMap::new();
     let mut uvs = Vec::new();
     let cut = faces
         .iter()
-        .map(|f| {
+        .zip(labels)
+        .map(|(f, &label)| {
             [0, 1, 2].map(|k| {
                 let uv = mesh.uvs[f.uvs[k] as usize];
-                let key = (weld[f.points[k] as usize], (uv / grain).round().to_array().map(|v| v as i64), f.part);
+                let key = (weld[f.points[k] as usize], (uv / grain).round().to_array().map(|v| v as i64), label);
                 *corners.entry(key).or_insert_with(|| {
                     uvs.push(uv);
                     uvs.len() as u32 - 1
@@ -534,5 +623,35 @@ mod tests {
         let error = panels(&text).unwrap_err();
         assert!(error.problem.starts_with("panel `right`: 1 of its 2 triangles lie upside down"), "{error:?}");
         assert_eq!(error.line, 19);
+    }
+
+    /// A grid of 4 x 4 squares of 10 mm in one piece, a group for each row where `rows` says so.
+    fn grid(rows: bool) -> String {
+        let mut text = String::new();
+        for (y, x) in (0..5).flat_map(|y| (0..5).map(move |x| (y, x))) {
+            text += &format!("v {x} {y} 0\nvt {x} {y}\n");
+        }
+        for (y, x) in (0..4).flat_map(|y| (0..4).map(move |x| (y, x))) {
+            let [a, b, c, d] = [1, 2, 7, 6].map(|k| k + 5 * y + x);
+            text += &if rows { format!("g row{y}\n") } else { String::new() };
+            text += &format!("f {a}/{a} {b}/{b} {c}/{c} {d}/{d}\n");
+        }
+        text
+    }
+
+    #[test]
+    fn faces_wound_against_their_neighbours_are_turned() {
+        let plain = panels(&grid(false)).unwrap();
+        let flipped = panels(&grid(false).replace("f 7/7 8/8 13/13 12/12\n", "f 12/12 13/13 8/8 7/7\n")).unwrap();
+        let told =
+            "2 triangles wound against their neighbours, turned round (first in the panel without a name, line 56)";
+        assert!(flipped.notes.iter().any(|n| n == told), "{:?}", flipped.notes);
+        assert!(
+            flipped.notes.iter().all(|n| !n.contains("upside down")) && plain.panels[0].area == flipped.panels[0].area
+        );
+        for face in &flipped.cut {
+            let [a, b, c] = face.map(|i| flipped.uvs[i as usize]);
+            assert!((b - a).perp_dot(c - a) > 0.0);
+        }
     }
 }
