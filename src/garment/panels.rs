@@ -82,12 +82,13 @@ impl Panels {
 
         let ratios: Vec<(f64, f64)> =
             faces.iter().map(|f| ((areas.of(f) / areas.in_uv(f).abs()).sqrt(), areas.of(f))).collect();
-        let [found] = percentiles(ratios, [0.5]);
+        let [found] = percentiles(ratios.clone(), [0.5]);
         let uv_mm = unit_of(found, uv_mm, &mut notes)?;
         for uv in &mut uvs {
             *uv *= uv_mm;
         }
         let panels = areas.upright_panels(&faces, &of_face, &cut, &mut uvs, &mut notes)?;
+        same_unit(&panels, &ratios, uv_mm)?;
         let panels = panels.into_iter().map(|panel| Panel { area: panel.area * uv_mm * uv_mm, ..panel }).collect();
 
         let sewn: Vec<[u32; 3]> = faces.iter().map(|f| f.points.map(|i| weld[i as usize])).collect();
@@ -525,6 +526,28 @@ fn percentiles<const N: usize>(mut values: Vec<(f64, f64)>, shares: [f64; N]) ->
     })
 }
 
+/// Panels whose texture coordinates are in another unit than those of the others; `ratios` are 3-D lengths over theirs of the faces,
+/// panel by panel, with their areas.
+fn same_unit(panels: &[Panel], ratios: &[(f64, f64)], uv_mm: f64) -> Result<(), GarmentError> {
+    let mut rest = ratios;
+    for panel in panels {
+        let (own, others) = rest.split_at(panel.faces);
+        rest = others;
+        let [found] = percentiles(own.to_vec(), [0.5]);
+        let ratio = found / uv_mm;
+        if !(1.0 / WRONG_UNIT..=WRONG_UNIT).contains(&ratio) {
+            let problem = format!(
+                "{} is {ratio:.3} times as long as in the texture coordinates: their unit is about {found:.4} mm there and \
+                 {uv_mm:.4} mm in the whole garment",
+                panel_in_words(&panel.group)
+            );
+            let hint = "give the texture coordinates of all panels one scale, or leave out what is no cloth";
+            return Err(GarmentError::at(panel.line, problem, hint));
+        }
+    }
+    Ok(())
+}
+
 /// Millimetres per unit of texture coordinates, from what is said or from the ratio of lengths.
 fn unit_of(found: f64, said: Option<f64>, notes: &mut Vec<String>) -> Result<f64, GarmentError> {
     if let Some(said) = said {
@@ -613,6 +636,15 @@ mod tests {
         assert!(none.problem.contains("texture coordinates have no area"));
         let line = panels("v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n").unwrap_err();
         assert!(line.problem.contains("no area in space") && line.of_mesh, "{line:?}");
+    }
+
+    #[test]
+    fn panels_of_another_unit_are_told() {
+        let error = panels(&two("vt 300 0\nvt 400 0\nvt 400 100\nvt 300 100\n")).unwrap_err();
+        assert!(error.problem.starts_with("panel `left` is 10.000 times as long"), "{error:?}");
+        assert_eq!(error.line, 16);
+        // A band that is stretched is none of these.
+        panels(&two("vt 30 0\nvt 35 0\nvt 35 10\nvt 30 10\n")).unwrap();
     }
 
     #[test]
