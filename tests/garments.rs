@@ -352,3 +352,33 @@ fn a_body_is_looked_at_before_yarns_are_laid() {
         serde_json::from_str(&yarnray(d, &["info", "body.obj", "--json"]).good().stdout).unwrap();
     assert_eq!((&info["vertices"], &info["open_edges"], &info["uv_bounds"]), (&4.into(), &0.into(), &().into()));
 }
+
+#[test]
+fn panels_without_names_are_chosen_by_number() {
+    let folder = directory();
+    let d = folder.path();
+    let nameless: String = mesh(&flat).lines().filter(|l| !l.starts_with('g')).map(|l| format!("{l}\n")).collect();
+    write(d, "g.obj", nameless);
+    let own = |key: &str| {
+        let panel = format!("[[fabric.panel]]\n{key}\ncloth = {{ type = \"knit\", pattern = \"rib1x1\" }}\n[[light]]");
+        write(d, "s.toml", scene("path = \"g.obj\"", "", STILL).replace("[[light]]", &panel));
+        yarnray(d, &["info", "s.toml"])
+    };
+    let told = own("panel = 2").good().stdout;
+    assert!(
+        told.contains("  panels     1 without a name: ") && told.contains("\n             2 without a name: "),
+        "{told}"
+    );
+    let scene = load(&d.join("s.toml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let left_of = |fabric: &yarnray::scene::Fabric| {
+        let points = fabric.curves.iter().flat_map(|(curve, _)| &curve.points);
+        points.map(|p| p.x + scene.middle.x).fold(f64::INFINITY, f64::min)
+    };
+    let [stockinette, rib] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };
+    assert!(rib.origin.ends_with("g.obj, 2, rib1x1"), "{}", rib.origin);
+    assert!(left_of(stockinette) < 5.0 && left_of(rib) > 75.0, "{} {}", left_of(stockinette), left_of(rib));
+    let refused = own("panel = 3");
+    assert!(refused.stderr.contains("there is no panel 3: the garment has 2 panels"), "{}", refused.stderr);
+    let hint = "the mesh has neither groups nor materials; `panel = 1` chooses by number";
+    assert!(own("group = \"left\"").stderr.contains(hint));
+}

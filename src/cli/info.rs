@@ -308,8 +308,10 @@ fn length_of(fabric: &Fabric) -> f64 {
 
 /// A garment for programs: all that is known of it.
 fn garment_json(facts: &GarmentFacts) -> Value {
-    let panels: Vec<Value> =
-        facts.panels.iter().map(|(name, stitches)| json!({"panel": name, "stitches": stitches})).collect();
+    let numbered = facts.panels.iter().zip(1..);
+    let panels: Vec<Value> = numbered
+        .map(|((name, stitches), number)| json!({"number": number, "panel": name, "stitches": stitches}))
+        .collect();
     let [p5, p50, p95] = facts.uv_ratio;
     json!({
         "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
@@ -338,6 +340,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
         100.0 * facts.stretched,
         100.0 * facts.compressed
     );
+    text += &panel_lines(&facts.panels);
     if let Some((at, radius)) = facts.near {
         text += &format!("  near      only what lies within {radius:.3} mm of {at:.3} mm\n");
     }
@@ -352,6 +355,22 @@ fn garment_lines(facts: &GarmentFacts) -> String {
     }
     for repair in &facts.repairs {
         text += &format!("  repair    {repair}\n");
+    }
+    text
+}
+
+/// Panels with the numbers by which a scene may choose them, for people.
+fn panel_lines(panels: &[(String, u64)]) -> String {
+    const MOST: usize = 24;
+    let mut text = String::new();
+    for ((name, stitches), number) in panels.iter().take(MOST).zip(1..) {
+        let label = if number == 1 { "panels" } else { "" };
+        let name = if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
+        text += &format!("  {label:<9} {number:>2} {name}: {}\n", counted(*stitches, "stitch"));
+    }
+    if panels.len() > MOST {
+        let others = counted((panels.len() - MOST) as u64, "other");
+        text += &format!("  {:<9} and {others}, which `--json` lists\n", "");
     }
     text
 }

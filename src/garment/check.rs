@@ -5,15 +5,54 @@ use glam::DVec2;
 use super::{
     hem::NoRoom,
     lattice::{Ground, Lattice},
-    mesh::{GarmentError, panel_in_words},
-    options::{Cloth, Options},
+    mesh::{GarmentError, Part, panel_in_words},
+    options::{Cloth, Options, PanelChoice},
     panels::Panel,
     sewing::Sewing,
     surface::{BorderEdge, bounds},
 };
+use crate::{files::stage::glob, math::words::counted};
 
 /// More stitches than these are not laid.
 const MOST_STITCHES: f64 = 2e7;
+
+/// How panels without a name of their own are chosen.
+const BY_NUMBER: &str = "`panel = 1` chooses by number, as `info` counts them";
+
+/// Groups or materials that no part of the mesh has.
+pub(super) fn named(parts: &[Part], cloths: &[Cloth]) -> Result<(), GarmentError> {
+    for (i, cloth) in cloths.iter().enumerate() {
+        let Some(PanelChoice::Named(name)) = &cloth.panels else { continue };
+        if parts.iter().any(|part| glob(name, &part.group) || glob(name, &part.material)) {
+            continue;
+        }
+        let all = parts.iter().flat_map(|part| [part.group.as_str(), part.material.as_str()]);
+        let mut names: Vec<&str> = all.filter(|name| !name.is_empty()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.truncate(24);
+        let hint = match names.is_empty() {
+            true => format!("the mesh has neither groups nor materials; {BY_NUMBER}"),
+            false => format!("it has: {}", names.join(", ")),
+        };
+        let problem = format!("no group or material of the mesh is called \"{name}\"");
+        return Err(GarmentError { cloth: Some(i), ..GarmentError::new(problem, hint) });
+    }
+    Ok(())
+}
+
+/// Numbers that no panel has, of so many.
+pub(super) fn numbered(panels: usize, cloths: &[Cloth]) -> Result<(), GarmentError> {
+    for (i, cloth) in cloths.iter().enumerate() {
+        if let Some(PanelChoice::Numbered(number)) = cloth.panels
+            && !(1..=panels).contains(&number)
+        {
+            let problem = format!("there is no panel {number}: the garment has {}", counted(panels as u64, "panel"));
+            return Err(GarmentError { cloth: Some(i), ..GarmentError::new(problem, BY_NUMBER) });
+        }
+    }
+    Ok(())
+}
 
 /// Panels that hold too many stitches; `cloth` is that of each of them.
 pub(super) fn not_too_many(panels: &[Panel], cloth: &[usize], cloths: &[Cloth]) -> Result<(), GarmentError> {
@@ -125,10 +164,10 @@ pub(super) fn hems(
             };
             return Err(GarmentError::at(*at, problem, hint));
         }
-        if let (false, Some(group)) = (found, &asked.group)
+        if let (false, Some(chosen)) = (found, &asked.panels)
             && asked.hems_itself
         {
-            let problem = format!("no edge of the panels \"{group}\" is free to be hemmed: all are sewn");
+            let problem = format!("no edge of the panels \"{chosen}\" is free to be hemmed: all are sewn");
             return Err(GarmentError::new(problem, "leave `hem` out, or name the panels whose edges are free"));
         }
     }

@@ -51,7 +51,7 @@ pub(crate) use self::{
     hem::{Hem, HemKind},
     lay::{LaidYarn, Tension},
     mesh::{GarmentError, GarmentMesh},
-    options::{Cloth, Options},
+    options::{Cloth, Options, PanelChoice},
     panels::Panel,
     report::Report,
     seam::SeamKind,
@@ -84,6 +84,7 @@ impl Garment {
     /// # Errors
     /// What is wrong with the mesh, or with what is to be laid on it.
     pub(crate) fn new(mesh: &GarmentMesh, options: Options) -> Result<Self, GarmentError> {
+        check::named(&mesh.parts, &options.cloths)?;
         let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm)?;
         let cloth = choose(&panels.panels, &options.cloths)?;
         panels.turn(&cloth.iter().map(|&c| -options.cloths[c].grain).collect::<Vec<_>>());
@@ -246,34 +247,21 @@ fn clearance(shapes: &[Shapes]) -> f64 {
     shapes.iter().map(|s| 2.2 * s.diameter).fold(0.0, f64::max)
 }
 
+/// The last cloth that a group or material has, or a panel of a number, from 1; else the first one.
+fn cloth_of(group: &str, material: &str, number: Option<usize>, cloths: &[Cloth]) -> usize {
+    let takes = |cloth: &Cloth| match &cloth.panels {
+        Some(PanelChoice::Named(name)) => glob(name, group) || glob(name, material),
+        Some(PanelChoice::Numbered(chosen)) => Some(*chosen) == number,
+        None => false,
+    };
+    cloths.iter().rposition(takes).unwrap_or(0)
+}
+
 /// The cloth of each panel.
 fn choose(panels: &[Panel], cloths: &[Cloth]) -> Result<Vec<usize>, GarmentError> {
-    let chosen: Vec<usize> = panels
-        .iter()
-        .map(|panel| {
-            let takes = |c: &Cloth| c.group.as_ref().is_some_and(|g| glob(g, &panel.group) || glob(g, &panel.material));
-            cloths.iter().rposition(takes).unwrap_or(0)
-        })
-        .collect();
-    for (i, cloth) in cloths.iter().enumerate() {
-        let Some(group) = &cloth.group else { continue };
-        if !panels.iter().any(|p| glob(group, &p.group) || glob(group, &p.material)) {
-            let mut names: Vec<&str> =
-                panels.iter().flat_map(|p| [p.group.as_str(), p.material.as_str()]).filter(|n| !n.is_empty()).collect();
-            names.sort_unstable();
-            names.dedup();
-            names.truncate(24);
-            let hint = if names.is_empty() {
-                "the mesh has neither groups nor materials".to_owned()
-            } else {
-                format!("it has: {}", names.join(", "))
-            };
-            let problem = format!("no group or material of the mesh is called \"{group}\"");
-            return Err(GarmentError { cloth: Some(i), ..GarmentError::new(problem, hint) });
-        }
-        debug_assert!(i > 0, "the first cloth is for the rest");
-    }
-    Ok(chosen)
+    check::numbered(panels.len(), cloths)?;
+    let numbered = panels.iter().zip(1..);
+    Ok(numbered.map(|(panel, number)| cloth_of(&panel.group, &panel.material, Some(number), cloths)).collect())
 }
 
 #[cfg(test)]

@@ -1,15 +1,35 @@
 //! What is laid on a garment, as it was asked for.
 
+use std::fmt;
+
 use glam::DVec3;
 
 use super::{hem::Hem, lay::Tension, seam::SeamKind};
 use crate::pattern::tile::Tile;
 
+/// Which panels a cloth is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum PanelChoice {
+    /// Group or material, with `*` and `?`.
+    Named(String),
+    /// As `info` counts them, from 1.
+    Numbered(usize),
+}
+
+impl fmt::Display for PanelChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Named(name) => write!(f, "{name}"),
+            Self::Numbered(number) => write!(f, "{number}"),
+        }
+    }
+}
+
 /// The cloth of some panels.
 #[derive(Clone, Debug)]
 pub(crate) struct Cloth {
-    /// Group or material of the panels, with `*` and `?`; `None` for all that no other cloth takes.
-    pub group: Option<String>,
+    /// Which panels; `None` for all that no other cloth takes.
+    pub panels: Option<PanelChoice>,
     /// What repeats, mm, at the gauge that it is to have.
     pub tile: Tile,
     /// Angle by which rows are turned against the panel's u axis, radians.

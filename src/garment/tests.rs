@@ -24,7 +24,7 @@ fn options(tile: Tile) -> Options {
     Options {
         unit_mm: 1.0,
         uv_mm: None,
-        cloths: vec![Cloth { group: None, tile, grain: 0.0, points: 12, seam: None, hem: None, hems_itself: false }],
+        cloths: vec![Cloth { panels: None, tile, grain: 0.0, points: 12, seam: None, hem: None, hems_itself: false }],
         seam: SeamKind::Mattress,
         tension: None,
         coordinates: true,
@@ -319,7 +319,7 @@ fn pressed_places_are_let_out_and_small_garments_stay_small() {
 fn groups_that_no_panel_has_are_told() {
     let cloths = vec![
         options(stockinette()).cloths.remove(0),
-        Cloth { group: Some("nobody".into()), ..options(stockinette()).cloths.remove(0) },
+        Cloth { panels: Some(PanelChoice::Named("nobody".into())), ..options(stockinette()).cloths.remove(0) },
     ];
     let error = Garment::new(&square(), Options { cloths, ..options(stockinette()) }).err().unwrap();
     assert!(error.problem.contains("nobody") && error.hint.contains("square"), "{error:?}");

@@ -234,7 +234,11 @@ fn hems_that_cannot_be_sewn_are_told() {
         let mut options = hemmed(stockinette(), HemKind::Coverstitch);
         options.cloths[0].hem = Some(Hem { kind: HemKind::Coverstitch, width });
         if let Some(group) = group {
-            let own = Cloth { group: Some(group.to_owned()), hems_itself: true, ..options.cloths[0].clone() };
+            let own = Cloth {
+                panels: Some(PanelChoice::Named(group.to_owned())),
+                hems_itself: true,
+                ..options.cloths[0].clone()
+            };
             options.cloths[0].hem = None;
             options.cloths.push(own);
         }

@@ -58,8 +58,8 @@ impl Rule {
 
     /// What messages call it.
     fn origin(&self, mesh: &Path) -> String {
-        let group = self.group.as_ref().map_or(String::new(), |g| format!(", {g}"));
-        format!("{}{group}, {}", mesh.display(), self.cloth.name)
+        let panels = self.panels.as_ref().map_or(String::new(), |chosen| format!(", {chosen}"));
+        format!("{}{panels}, {}", mesh.display(), self.cloth.name)
     }
 }
 
@@ -154,9 +154,9 @@ impl GarmentPlan {
             let yarn = rule.yarn.as_ref().and_then(|name| library.yarns.get(name));
             let tile =
                 rule.cloth.tile(rule.stitch, yarn.map_or(own, |yarn| (Some(yarn), yarn.radius)), context, warnings)?;
-            let (group, points) = (rule.group.clone(), rule.cloth.points);
+            let (panels, points) = (rule.panels.clone(), rule.cloth.points);
             let Rule { grain, seam, hem, hems_itself, .. } = *rule;
-            Some(Cloth { group, tile, grain, points, seam, hem, hems_itself })
+            Some(Cloth { panels, tile, grain, points, seam, hem, hems_itself })
         });
         made.collect()
     }

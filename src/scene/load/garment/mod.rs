@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     files::{curve_file, stage::PrimPattern},
-    garment::{Hem, HemKind, SeamKind},
+    garment::{Hem, HemKind, PanelChoice, SeamKind},
     input::diagnostic::Span,
     pattern::{
         chart::Chart,
@@ -63,7 +63,7 @@ struct ClothPlan {
 
 /// A panel's own cloth, or the fabric's.
 struct Rule {
-    group: Option<String>,
+    panels: Option<PanelChoice>,
     /// What mattes call it, if not as the fabric.
     name: Option<String>,
     /// Where that stands; of the fabric's own cloth, where the mesh is named.
@@ -180,7 +180,7 @@ pub(super) fn garment(
     let (gauge, per) = (stitch(fabric, None), per(fabric));
     let grain = grain(fabric);
     let rule = |cloth| Rule {
-        group: None,
+        panels: None,
         name: None,
         span,
         cloth,
@@ -197,10 +197,7 @@ pub(super) fn garment(
         .tables("panel")
         .into_iter()
         .map(|table| {
-            if !table.has("group") {
-                table.error("missing key `group`: which panels these are", Some("group = \"rib_*\""));
-            }
-            let group = table.string("group").map(str::to_owned);
+            let panels = chosen(&table);
             let name = table.string("name").map(str::to_owned);
             if name.as_ref().is_some_and(String::is_empty) {
                 table.error_at("name", "the name of a panel cannot be empty", None);
@@ -218,9 +215,9 @@ pub(super) fn garment(
             let own_hem = HemKeys::read(&table, context);
             let hem = own_hem.hem(&table, Some(hem_keys));
             let rule = Rule {
-                group: Some(group?),
+                panels: Some(panels?),
                 name,
-                span: table.span("group").unwrap_or(table.header()),
+                span: table.span("group").or(table.span("panel")).unwrap_or(table.header()),
                 stitch: stitch(&table, Some(per)).or(gauge),
                 grain: if table.has("grain") { self::grain(&table) } else { grain },
                 cloth: match own_cloth {
@@ -244,6 +241,20 @@ pub(super) fn garment(
         rules.push(panel?);
     }
     Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, near, body, prims, z_up, rules })
+}
+
+/// `group` or `panel` of a `[[fabric.panel]]`.
+fn chosen(table: &Reader<'_>) -> Option<PanelChoice> {
+    let (group, number) = (table.string("group"), table.u64("panel", 1..=u64::from(u32::MAX)));
+    match (table.has("group"), table.has("panel")) {
+        (true, true) => table.error_at("panel", "give `group` or `panel`, not both", None),
+        (false, false) => {
+            let hint = "group = \"rib_*\", or panel = 1 of those that `info` counts";
+            table.error("missing key `group` or `panel`: which panels these are", Some(hint));
+        }
+        _ => {}
+    }
+    group.map(|name| PanelChoice::Named(name.to_owned())).or(number.map(|n| PanelChoice::Numbered(n as usize)))
 }
 
 fn grain(table: &Reader<'_>) -> f64 {
