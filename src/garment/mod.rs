@@ -40,6 +40,7 @@ use self::{
     hem_threads::{HemThread, hem_threads},
     lattice::{Ground, Lattice},
     lay::{Laying, lay},
+    mesh::Part,
     panels::Panels,
     sewing::Sewing,
     sheet::Sheet,
@@ -85,7 +86,8 @@ impl Garment {
     /// What is wrong with the mesh, or with what is to be laid on it.
     pub(crate) fn new(mesh: &GarmentMesh, options: Options) -> Result<Self, GarmentError> {
         check::named(&mesh.parts, &options.cloths)?;
-        let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm)?;
+        let rule = |part: &Part| cloth_of(&part.group, &part.material, None, &options.cloths);
+        let mut panels = Panels::new(mesh, options.unit_mm, options.uv_mm, rule)?;
         let cloth = choose(&panels.panels, &options.cloths)?;
         panels.turn(&cloth.iter().map(|&c| -options.cloths[c].grain).collect::<Vec<_>>());
         check::not_too_many(&panels.panels, &cloth, &options.cloths)?;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use super::{
-    mesh::{Counted, Face, GarmentError, GarmentMesh, panel_in_words},
+    mesh::{Counted, Face, GarmentError, GarmentMesh, Part, panel_in_words},
     strain::{StrainRange, UNSTRAINED},
 };
 
@@ -68,8 +68,14 @@ const UV_UNITS: [(&str, f64); 4] = [("m", 1000.0), ("cm", 10.0), ("mm", 1.0), ("
 const WRONG_UNIT: f64 = 2.5;
 
 impl Panels {
-    /// `unit_mm` is the millimetres per unit of positions, `uv_mm` of texture coordinates, if that is known.
-    pub(super) fn new(mesh: &GarmentMesh, unit_mm: f64, uv_mm: Option<f64>) -> Result<Self, GarmentError> {
+    /// `unit_mm` is the millimetres per unit of positions, `uv_mm` of texture coordinates, if that is known. Parts for which `rule`
+    /// is not the same are panels of their own, also where the texture coordinates go on.
+    pub(super) fn new(
+        mesh: &GarmentMesh,
+        unit_mm: f64,
+        uv_mm: Option<f64>,
+        rule: impl Fn(&Part) -> usize,
+    ) -> Result<Self, GarmentError> {
         if mesh.uvs.is_empty() {
             let hint = "the texture coordinates are the flat panels of the garment: export them with the mesh";
             return Err(GarmentError::at(0, "no texture coordinates", hint));
@@ -78,7 +84,8 @@ impl Panels {
         let (weld, welded) = weld(&mesh.points);
         let areas = Areas { mesh, unit_mm };
         let (mut faces, grain) = areas.sound_faces(&weld, &mut notes)?;
-        let Charts { faces, cut, mut uvs, of_face } = areas.charts(&mut faces, &weld, grain, &mut notes)?;
+        let rules: Vec<usize> = mesh.parts.iter().map(rule).collect();
+        let Charts { faces, cut, mut uvs, of_face } = areas.charts(&mut faces, &weld, grain, &rules, &mut notes)?;
 
         let ratios: Vec<(f64, f64)> =
             faces.iter().map(|f| ((areas.of(f) / areas.in_uv(f).abs()).sqrt(), areas.of(f))).collect();
@@ -283,18 +290,34 @@ impl Areas<'_> {
         turned.note("triangle", "wound against their neighbours, turned round", notes);
     }
 
-    /// The pieces of faces that hang together in the texture coordinates and are of one part.
+    /// The pieces of faces that hang together in the texture coordinates, cut where `rules`, those of the parts, are others.
     fn charts(
         &self,
         faces: &mut [Face],
         weld: &[u32],
         grain: f64,
+        rules: &[usize],
         notes: &mut Vec<String>,
     ) -> Result<Charts, GarmentError> {
         let of_parts: Vec<usize> = faces.iter().map(|f| f.part as usize).collect();
         self.wind_alike(faces, &joined_corners(self.mesh, faces, weld, grain, &of_parts).0, notes);
         let (cut, uvs) = joined_corners(self.mesh, faces, weld, grain, &of_parts);
-        let (of_face, order) = charts(&cut, uvs.len(), faces, self.mesh)?;
+        let parted = charts(&cut, uvs.len(), faces, self.mesh)?;
+        let mut turned = vec![0.0; faces.len()];
+        for (&i, &chart) in parted.1.iter().zip(&parted.0) {
+            turned[chart as usize] += self.in_uv(&faces[i]);
+        }
+        // Parts of one piece of cloth are joined, but not a panel and its mirror image that lies on it.
+        let mut labels = vec![0; faces.len()];
+        for (&i, &chart) in parted.1.iter().zip(&parted.0) {
+            labels[i] = 2 * rules[faces[i].part as usize] + usize::from(turned[chart as usize] < 0.0);
+        }
+        let joined = joined_corners(self.mesh, faces, weld, grain, &labels);
+        // Where parts lie on each other they stay apart.
+        let (cut, uvs, (of_face, order)) = match charts(&joined.0, joined.1.len(), faces, self.mesh) {
+            Ok(found) => (joined.0, joined.1, found),
+            Err(_) => (cut, uvs, parted),
+        };
         let faces = order.iter().map(|&i| faces[i]).collect();
         Ok(Charts { faces, cut: order.iter().map(|&i| cut[i]).collect(), uvs, of_face })
     }
@@ -589,7 +612,7 @@ mod tests {
     const PLAIN: &str = "vt 30 0\nvt 40 0\nvt 40 10\nvt 30 10\n";
 
     fn panels(text: &str) -> Result<Panels, GarmentError> {
-        Panels::new(&GarmentMesh::parse(text).unwrap(), 10.0, None)
+        Panels::new(&GarmentMesh::parse(text).unwrap(), 10.0, None, |_| 0)
     }
 
     #[test]
@@ -620,9 +643,9 @@ mod tests {
     fn units_are_found_and_checked() {
         let text = two(PLAIN);
         let mesh = GarmentMesh::parse(&text).unwrap();
-        assert!(Panels::new(&mesh, 10.0, Some(1000.0)).unwrap_err().problem.contains("10.0000 mm"));
-        assert_eq!(Panels::new(&mesh, 1.0, None).unwrap().uv_mm, 1.0);
-        let odd = Panels::new(&mesh, 3.0, None).unwrap();
+        assert!(Panels::new(&mesh, 10.0, Some(1000.0), |_| 0).unwrap_err().problem.contains("10.0000 mm"));
+        assert_eq!(Panels::new(&mesh, 1.0, None, |_| 0).unwrap().uv_mm, 1.0);
+        let odd = Panels::new(&mesh, 3.0, None, |_| 0).unwrap();
         assert!((odd.uv_mm - 3.0).abs() < 1e-9 && odd.notes[0].contains("3.0000 mm"), "{:?}", odd.notes);
     }
 
@@ -685,5 +708,21 @@ mod tests {
             let [a, b, c] = face.map(|i| flipped.uvs[i as usize]);
             assert!((b - a).perp_dot(c - a) > 0.0);
         }
+    }
+
+    #[test]
+    fn parts_are_joined_unless_rules_differ() {
+        let mesh = GarmentMesh::parse(&grid(true)).unwrap();
+        let of = |rule: fn(&Part) -> usize| Panels::new(&mesh, 10.0, None, rule).unwrap();
+        assert_eq!(of(|_| 0).panels.len(), 1);
+        let cut = of(|part| usize::from(part.group == "row2"));
+        assert_eq!(cut.panels.iter().map(|p| p.group.as_str()).collect::<Vec<_>>(), ["row0", "row2", "row3"]);
+    }
+
+    #[test]
+    fn mirror_images_that_lie_on_each_other_stay_apart() {
+        // Front and back are one over the other in the texture coordinates, and meet at the side.
+        let panels = panels(&two("vt 10 0\nvt 0 0\nvt 0 10\nvt 10 10\n")).unwrap();
+        assert_eq!(panels.panels.iter().map(|p| p.mirrored).collect::<Vec<_>>(), [false, true]);
     }
 }
