@@ -377,8 +377,25 @@ fn panels_without_names_are_chosen_by_number() {
     let [stockinette, rib] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };
     assert!(rib.origin.ends_with("g.obj, 2, rib1x1"), "{}", rib.origin);
     assert!(left_of(stockinette) < 5.0 && left_of(rib) > 75.0, "{} {}", left_of(stockinette), left_of(rib));
+    assert!(told.contains("  edges     80 mm sewn, 480 mm free, as cut\n"), "{told}");
     let refused = own("panel = 3");
     assert!(refused.stderr.contains("there is no panel 3: the garment has 2 panels"), "{}", refused.stderr);
     let hint = "the mesh has neither groups nor materials; `panel = 1` chooses by number";
     assert!(own("group = \"left\"").stderr.contains(hint));
+}
+
+/// A seam whose sides do not quite meet, or are divided in other ways, stays open: that is told with both panels.
+#[test]
+fn seams_that_stay_open_are_told() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "s.toml", scene("path = \"g.obj\"", "", STILL));
+    write(d, "g.obj", mesh(&flat));
+    assert!(!yarnray(d, &["info", "s.toml"]).good().stdout.contains("not sewn"));
+    // The right panel's left side: the first nine are the left panel's right one.
+    write(d, "g.obj", mesh(&flat).replace("\nv 80 ", "\nv 80.02 ").replacen("v 80.02 ", "v 80 ", 9));
+    let open = yarnray(d, &["info", "s.toml"]).good().stdout;
+    let note = "panel `left` (number 1, line 164) and panel `right` (number 2, line 391) lie within 0.020 mm of each other along 80 mm and are not sewn";
+    assert!(open.contains(note), "{open}");
+    assert!(open.contains("  edges     0 mm sewn, 640 mm free, as cut\n"), "{open}");
 }

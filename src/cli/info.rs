@@ -320,7 +320,7 @@ fn garment_json(facts: &GarmentFacts) -> Value {
         "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest, "diameter": MEAN_WIDTH})),
         "control_points": facts.control_points,
         "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
-        "compressed": facts.compressed,
+        "compressed": facts.compressed, "sewn_mm": facts.sewn, "free_mm": facts.free,
         "repairs": facts.repairs,
     })
 }
@@ -341,6 +341,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
         100.0 * facts.compressed
     );
     text += &panel_lines(&facts.panels);
+    text += &format!("  edges     {:.0} mm sewn, {:.0} mm free, as cut\n", facts.sewn, facts.free);
     if let Some((at, radius)) = facts.near {
         text += &format!("  near      only what lies within {radius:.3} mm of {at:.3} mm\n");
     }

@@ -18,6 +18,7 @@ mod hem_threads;
 mod lattice;
 mod lay;
 pub(crate) mod mesh;
+mod open_edges;
 mod options;
 mod panels;
 mod report;
@@ -121,7 +122,9 @@ impl Garment {
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
         let worn = surface.worn_lengths(&pose, panels.panels.len());
-        let report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &hemmed, &options);
+        let mut report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &hemmed, &options);
+        [report.sewn, report.free] = open_edges::lengths(&borders);
+        open_edges::note_gaps(&panels.panels, &borders, &pose, &mut report.notes);
         Ok(Self { panels, surface, lattices, shapes, sewing, edgings, hem_threads, clearances, worn, options, report })
     }
 

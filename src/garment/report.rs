@@ -32,6 +32,10 @@ pub(crate) struct Report {
     pub compressed: f64,
     /// Millimetres per unit of the texture coordinates.
     pub uv_mm: f64,
+    /// Length of all seams as cut, mm.
+    pub sewn: f64,
+    /// Length of all edges that are sewn to nothing, as cut, mm.
+    pub free: f64,
     /// What was repaired or found out, one line each.
     pub notes: Vec<String>,
     /// The box around the mesh, mm.
@@ -75,6 +79,8 @@ impl Report {
             stretched: panels.stretched,
             compressed: panels.compressed,
             uv_mm: panels.uv_mm,
+            sewn: 0.0,
+            free: 0.0,
             panels: panels.panels.clone(),
             notes,
             bounds: (low, high),

@@ -488,6 +488,10 @@ pub struct GarmentFacts {
     pub compressed: f64,
     /// Millimetres per unit of its texture coordinates.
     pub uv_mm: f64,
+    /// Length of its seams as cut, millimetres.
+    pub sewn: f64,
+    /// Length of its free edges as cut, millimetres.
+    pub free: f64,
     /// The box around its mesh, millimetres, before the fabric is moved to its place.
     pub bounds: (DVec3, DVec3),
     /// What was repaired or found out, one line each.

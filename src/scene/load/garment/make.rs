@@ -233,6 +233,8 @@ impl GarmentPlan {
             stretched: report.stretched,
             compressed: report.compressed,
             uv_mm: report.uv_mm,
+            sewn: report.sewn,
+            free: report.free,
             bounds: report.bounds,
             repairs: Vec::new(),
         }
