@@ -399,3 +399,21 @@ fn seams_that_stay_open_are_told() {
     assert!(open.contains(note), "{open}");
     assert!(open.contains("  edges     0 mm sewn, 640 mm free, as cut\n"), "{open}");
 }
+
+/// Single precision would tell places 10 km away apart by a millimetre.
+#[test]
+fn garments_far_from_the_origin_are_laid_as_near_to_it() {
+    let folder = directory();
+    let d = folder.path();
+    let laid = |by: f64| {
+        write(d, "g.obj", mesh(&|u, v| [u + by, v, 0.0]));
+        let path = write(d, "s.toml", scene("path = \"g.obj\"", "", STILL));
+        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let points = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(curve, _)| curve.points.clone());
+        points.map(|p| p + scene.middle - DVec3::new(by, 0.0, 0.0)).collect::<Vec<_>>()
+    };
+    let (near, far) = (laid(0.0), laid(1e7));
+    assert_eq!(near.len(), far.len());
+    let furthest = near.iter().zip(&far).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(furthest < 1e-3, "{furthest}");
+}

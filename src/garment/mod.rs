@@ -31,6 +31,8 @@ mod strain;
 mod subdivide;
 mod surface;
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -181,17 +183,20 @@ impl Garment {
         stranded: &[Option<Stranded>],
         notes: &mut Vec<String>,
     ) -> Result<Vec<Laid>, (usize, String)> {
+        let origin = local_origin(&self.panels.points(first, self.options.unit_mm));
         let mut poses = Vec::with_capacity(frames.len());
         for (i, frame) in frames.iter().enumerate() {
             first.same_topology(frame).map_err(|problem| (i, problem))?;
-            poses.push(self.surface.pose(&self.panels.points(frame, self.options.unit_mm)));
+            let mut points = self.panels.points(frame, self.options.unit_mm);
+            points.iter_mut().for_each(|p| *p -= origin);
+            poses.push(self.surface.pose(&points));
         }
         let stranded = |cloth: usize| stranded.get(cloth).and_then(Option::as_ref);
         let behind = |(cloth, shapes): (usize, &Shapes)| stranded(cloth).map_or(0.0, |_| Lanes::reach(shapes));
         let least = self.shapes.iter().enumerate().map(behind).fold(clearance(&self.shapes), f64::max);
         let of_point = |i: usize| self.clearances.get(i).map_or(least, |c| least.max(f64::from(*c)));
         let most = self.clearances.iter().map(|c| f64::from(*c)).fold(4.0 * least, f64::max);
-        let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(mesh, most)).collect();
+        let bodies: Vec<Body> = bodies.par_iter().map(|mesh| Body::new(&moved(mesh, -origin), most)).collect();
         let mut laid: Vec<Laid> = vec![vec![Vec::new(); self.options.cloths.len()]; frames.len()];
         for (i, pose) in poses.iter_mut().enumerate() {
             let pushed = bodies.get(i).map_or(0, |body| pose.push_out(body, &of_point));
@@ -237,8 +242,29 @@ impl Garment {
                 frame[cloth].append(&mut yarns);
             }
         }
+        if origin != DVec3::ZERO {
+            let yarns = laid.par_iter_mut().flatten().flatten();
+            yarns.for_each(|yarn| yarn.points.iter_mut().for_each(|p| *p += origin));
+        }
         Ok(laid)
     }
+}
+
+/// Where cloth is laid from: sheets are of single precision, which tells places within 10 m apart by a thousandth of a millimetre.
+fn local_origin(points: &[DVec3]) -> DVec3 {
+    const FAR: f64 = 1e4;
+    let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    if low.abs().max(high.abs()).max_element() > FAR { (0.5 * (low + high)).round() } else { DVec3::ZERO }
+}
+
+/// A mesh moved by so much.
+fn moved(mesh: &Mesh, by: DVec3) -> Cow<'_, Mesh> {
+    let mut mesh = Cow::Borrowed(mesh);
+    if by != DVec3::ZERO {
+        mesh.to_mut().points.iter_mut().for_each(|p| *p += by);
+    }
+    mesh
 }
 
 /// The tile of each cloth at the strains that occur on its panels.
