@@ -353,6 +353,26 @@ fn a_body_is_looked_at_before_yarns_are_laid() {
     assert_eq!((&info["vertices"], &info["open_edges"], &info["uv_bounds"]), (&4.into(), &0.into(), &().into()));
 }
 
+/// Notes of what was repaired are said where a picture is made, once for all of its frames.
+#[test]
+fn a_render_says_once_what_was_repaired() {
+    let folder = directory();
+    let d = folder.path();
+    let mut faces = mesh(&flat);
+    // Wound the other way, it would show its wrong side.
+    faces = faces.replace("f 1/1 2/2 11/11 10/10\n", "f 10/10 11/11 2/2 1/1\n");
+    write(d, "g.obj", faces);
+    write(d, "s.toml", scene("path = \"g.obj\"", "", STILL));
+    let told = "note: 2 triangles wound against their neighbours, turned round (first in panel `left`, line 164)\n";
+    let says = |args: &[&str]| {
+        let run = yarnray(d, &[&["render", "s.toml", "--spp", "1"], args].concat()).good();
+        run.stderr.matches(told).count()
+    };
+    assert_eq!(says(&["-o", "o.png"]), 1);
+    assert_eq!(says(&["--frames", "1..2", "-o", "o.####.png"]), 1);
+    assert_eq!(says(&["-o", "o.png", "-q"]), 0);
+}
+
 #[test]
 fn panels_without_names_are_chosen_by_number() {
     let folder = directory();

@@ -25,6 +25,10 @@ pub(super) fn warn(args: &RenderArgs, scene: &Scene, world: &World, yarns: &[usi
     for warning in &scene.warnings {
         tracing::warn!("{warning}");
     }
+    // Of several frames once: they say nearly the same.
+    if args.frames.is_none() || args.options.frames.is_some() {
+        scene.garments.iter().flat_map(|g| &g.repairs).for_each(|note| tracing::info!("note: {note}"));
+    }
     for (i, fabric) in scene.fabrics.iter().enumerate() {
         let Some(folds) = world.folds(i) else { continue };
         let told = folds_in_words(scene, fabric, &folds, yarns[i]);
