@@ -291,3 +291,14 @@ fn all_mistakes_of_a_scene_are_told_at_once() {
     write(d, "s.toml", scene);
     refused_with(d, &["render", "s.toml", "-o", "o.exr"], &["`fov` must be ", "did you mean `fibers`?", "`fibers`"]);
 }
+
+#[test]
+fn libraries_of_the_command_line_are_read() {
+    let folder = directory();
+    let at = folder.path();
+    write(at, "lib.toml", "[yarn.mine]\nradius = 1\nfiber = \"wool\"\nfibers = 60\ndensity = 0.4\n");
+    write(at, "s.toml", "[[fabric]]\nyarn = \"mine\"\nsource = { type = \"straight\", count = 3, length = 20 }\n");
+    let with = |library: &str| yarnray(at, &["info", "s.toml", "--set", library, "--set", "yarn.mine.radius=2"]);
+    assert!(with("library=[\"lib.toml\"]").good().stdout.contains("`mine`"));
+    assert!(with("library=[\"none.toml\"]").stderr.contains("cannot read the library"));
+}

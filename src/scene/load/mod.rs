@@ -60,7 +60,7 @@ pub struct LoadOptions {
     /// `KEY=VALUE` of each `--set`.
     pub assignments: Vec<String>,
     /// Keys that have an option of their own: dotted path, value, and the option as it was given.
-    pub settings: Vec<(String, Value, String)>,
+    pub settings: Vec<Setting>,
     /// `--curves`: this file in place of the first fabric's curves.
     pub curves: Option<PathBuf>,
     /// `--frame`: the camera frames what there is.
@@ -279,7 +279,7 @@ pub fn parse(name: &str, text: &str, options: &LoadOptions) -> Result<Scene, Loa
 fn threads(name: &str, text: &str, options: &LoadOptions) -> Option<usize> {
     let (mut sources, diagnostics) = (Sources::new(), Diagnostics::new());
     let mut document = Document::parse(name, text, &mut sources, &diagnostics)?;
-    apply_options(&mut document, options, &mut sources, &diagnostics);
+    apply_options(&mut document, &options.settings, &options.assignments, &mut sources, &diagnostics);
     settings::threads(&Reader::new(&document, &diagnostics).table_or_empty("render"))
 }
 
@@ -328,17 +328,34 @@ fn load_text(
     diagnostics: &Diagnostics,
 ) -> Option<Scene> {
     let mut document = Document::parse(name, text, sources, diagnostics)?;
+    // Which libraries there are is said before they are read, and of their tables what is said after.
+    let (of_libraries, others): (Vec<String>, _) = options.assignments.iter().cloned().partition(|a| is_of_library(a));
+    apply_options(&mut document, &[], &of_libraries, sources, diagnostics);
     let libraries_are_read = merge_libraries(&mut document, sources, diagnostics);
-    apply_options(&mut document, options, sources, diagnostics);
+    apply_options(&mut document, &options.settings, &others, sources, diagnostics);
     build(name, &document, options, sources, diagnostics, libraries_are_read)
 }
 
+/// Whether an assignment of the command line is of the scene's key `library`.
+fn is_of_library(assignment: &str) -> bool {
+    assignment.split(['=', '.']).next().is_some_and(|key| key.trim() == "library")
+}
+
+/// Dotted path of a key, its value, and the option as it was given.
+type Setting = (String, Value, String);
+
 /// Adds what the command line says of a scene's keys.
-fn apply_options(document: &mut Document, options: &LoadOptions, sources: &mut Sources, diagnostics: &Diagnostics) {
-    for (key, value, label) in &options.settings {
+fn apply_options(
+    document: &mut Document,
+    settings: &[Setting],
+    assignments: &[String],
+    sources: &mut Sources,
+    diagnostics: &Diagnostics,
+) {
+    for (key, value, label) in settings {
         document.set(key, value.clone(), label, sources, diagnostics);
     }
-    for assignment in &options.assignments {
+    for assignment in assignments {
         document.apply_option(assignment, sources, diagnostics);
     }
 }
