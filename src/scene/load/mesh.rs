@@ -165,7 +165,9 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
             let z_up = table.one_of("up", &[("y", false), ("z", true)]);
             let prim = prim_pattern(&table, "prim");
             smooth = table.bool_or("smooth", false);
-            Some(Source::File(MeshFile { path: context.resolve(path, span), span, unit, z_up, prim, frame }))
+            let path = context.resolve(path, span);
+            refuse_prim(&table, "prim", &path);
+            Some(Source::File(MeshFile { path, span, unit, z_up, prim, frame }))
         }
         (None, true) => shape(&table, context),
         (None, false) => {
@@ -283,6 +285,15 @@ pub(super) fn prim_pattern(table: &Reader<'_>, key: &str) -> Option<PrimPattern>
             table.error_at(key, problem, Some("prim = \"/Garment/*\""));
             None
         }
+    }
+}
+
+/// Refuses `prim`, or another key, of a file that has none.
+pub(super) fn refuse_prim(table: &Reader<'_>, key: &str, path: &Path) {
+    if table.has(key) && !stage::is_stage(path) {
+        let problem = format!("`{key}` chooses meshes of a USD or Alembic file, which {} is not", path.display());
+        let hint = "leave it out: all faces of an OBJ file are taken, and `group` of a [[fabric.panel]] chooses panels";
+        table.error_at(key, problem, Some(hint));
     }
 }
 

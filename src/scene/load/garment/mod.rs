@@ -11,7 +11,7 @@ use super::{
     color::{self, ColorPlan},
     gauge::{per, stitch},
     known_yarns::{KnownYarns, thickness},
-    mesh::prim_pattern,
+    mesh::{prim_pattern, refuse_prim},
     pattern::{self, Stranding},
     weave,
 };
@@ -161,6 +161,10 @@ pub(super) fn garment(
         let span = source.span("body").unwrap_or(source.header());
         (context.resolve(p, span), span)
     });
+    if let Some(path) = &path {
+        refuse_prim(source, "prim", path);
+        refuse_prim(source, "body_prim", body.as_ref().map_or(path, |(body, _)| body));
+    }
     let near = source.table("near").and_then(|table| {
         let at = table.required_vec3("at", Range::PLACE).map(|at| context.position(at));
         let radius = table.required_f64("radius", Range::POSITIVE).map(|r| r * context.unit);
