@@ -292,6 +292,21 @@ fn all_mistakes_of_a_scene_are_told_at_once() {
     refused_with(d, &["render", "s.toml", "-o", "o.exr"], &["`fov` must be ", "did you mean `fibers`?", "`fibers`"]);
 }
 
+/// Before a long render, as pictures.
+#[test]
+fn statistics_that_cannot_be_written_are_refused_before_the_render() {
+    let folder = directory();
+    let at = folder.path();
+    write(at, "s.toml", SWATCH);
+    let run = yarnray(at, &["render", "s.toml", "-o", "o.png", "--stats", "/dev/null/s.json"]);
+    assert!(run.status == Some(2) && !at.join("o.png").exists(), "{run:?}");
+    #[cfg(target_os = "linux")]
+    {
+        let run = yarnray(at, &["render", "s.toml", "-o", "o.png", "--stats", "/proc/s.json"]);
+        assert!(run.status == Some(2) && !at.join("o.png").exists(), "{run:?}");
+    }
+}
+
 #[test]
 fn libraries_of_the_command_line_are_read() {
     let folder = directory();

@@ -18,6 +18,9 @@ use crate::input::system::in_words;
 /// [`ImageError::Write`].
 pub fn check(path: &Path) -> Result<(), ImageError> {
     check_target(path)?;
+    if is_special(path) {
+        return Ok(());
+    }
     // Dropped at once, and with that removed.
     temporary(path).map(drop)
 }

@@ -141,7 +141,7 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
     for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
     }
-    for path in outputs.films.iter().chain(&args.checkpoint) {
+    for path in outputs.films.iter().chain(&args.checkpoint).chain(&args.stats) {
         image::whole_file::check(path)?;
     }
     check_shard(args, scene, outputs)?;
