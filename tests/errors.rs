@@ -292,6 +292,27 @@ fn all_mistakes_of_a_scene_are_told_at_once() {
     refused_with(d, &["render", "s.toml", "-o", "o.exr"], &["`fov` must be ", "did you mean `fibers`?", "`fibers`"]);
 }
 
+/// What a file is, and which command reads it.
+#[test]
+fn info_says_what_it_cannot_tell_of() {
+    let folder = directory();
+    let at = folder.path();
+    write(at, "empty.txt", "");
+    write(at, "a.exr", "picture");
+    write(at, "cut.film", "yarn");
+    write(at, "no.abc", "usda");
+    write(at, "yarns.dat", "1 2 3");
+    refused(at, &["info", "empty.txt"], "error: empty.txt: the file is empty; is the file cut short?\n");
+    refused_with(at, &["info", "a.exr"], &["error: a.exr: a picture", "`yarnray compare A B` measures pictures"]);
+    refused_with(at, &["info", "cut.film"], &["cut.film"]);
+    refused_with(
+        at,
+        &["info", "no.abc"],
+        &[if cfg!(feature = "usd") { "expected an Alembic file" } else { "Alembic" }],
+    );
+    refused_with(at, &["info", "yarns.dat"], &[".smobj"]);
+}
+
 /// Before a long render, as pictures.
 #[test]
 fn statistics_that_cannot_be_written_are_refused_before_the_render() {

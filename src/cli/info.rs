@@ -9,7 +9,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, folds_in_words, overlap_in_words, positive, terminal::print};
+use super::{Failure, SceneArgs, folds_in_words, overlap_in_words, positive, render::is_film_path, terminal::print};
 use crate::{
     cloth::{self, Estimate},
     files::{
@@ -25,6 +25,7 @@ use crate::{
         proposal::{self, Proposal},
         strand::Folds,
     },
+    image::output::Format,
     input::diagnostic::listed,
     math::words::{bytes_in_words, counted},
     plan::{Feature, Memory, Plan},
@@ -59,7 +60,7 @@ pub(super) struct InfoArgs {
 
 pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let is_scene = has_extension(&args.file, "toml");
-    let (report, text) = if film_file::is_film(&args.file) {
+    let (report, text) = if film_file::is_film(&args.file) || is_film_path(&args.file) {
         film_report(&args.file)?
     } else if is_scene {
         let scene = args.options.load_or_survey(&args.file, args.quiet, true)?;
@@ -76,6 +77,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
 
 /// What a file of curves holds, or of faces alone.
 fn file_report(path: &Path, radius: Option<f64>) -> Result<(Value, String), Failure> {
+    if path.is_file() && Format::of(path).is_ok() {
+        let problem = format!("{}: a picture, of which `info` tells nothing", path.display());
+        return Err(Failure::hinted(problem, "`yarnray compare A B` measures pictures"));
+    }
     let read = curve_file::read(path, &ReadOptions::default());
     let has_curves = read.as_ref().is_ok_and(|set| !set.curves.is_empty());
     let stage = if stage::is_stage(path) { Stage::open(path).ok() } else { None };

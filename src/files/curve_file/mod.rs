@@ -216,7 +216,7 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
     if stage::is_stage(path) {
         return staged::read(path, options);
     }
-    if has_extension(path, "smobj") {
+    if has_extension(path, STITCH_MESH) {
         let own = path.with_extension("sf");
         let library = options.faces.as_ref().unwrap_or(&own);
         let in_library = |error: CurveFileError| {
@@ -237,9 +237,13 @@ fn read_unnamed(path: &Path, options: &ReadOptions) -> Result<CurveSet, CurveFil
         )
         .hint(format!(
             "name it {} after its content",
-            dotted(EXTENSIONS.iter().map(|(name, _)| *name).chain(stage::EXTENSIONS))
+            dotted(EXTENSIONS.iter().map(|(name, _)| *name).chain([STITCH_MESH]).chain(stage::EXTENSIONS))
         ))
     })?;
+    // Binary formats tell what they miss.
+    if bytes.is_empty() && matches!(format, Format::Text | Format::Obj) {
+        return Err(CurveFileError::new(FileLocation::File, "the file is empty").hint("is the file cut short?"));
+    }
     parse(&bytes, format, options)
 }
 
@@ -285,6 +289,9 @@ const EXTENSIONS: [(&str, Format); 7] = [
     ("txt", Format::Text),
     ("curves", Format::Text),
 ];
+
+/// The extension of stitch meshes.
+const STITCH_MESH: &str = "smobj";
 
 fn of_extension(path: &Path) -> Option<Format> {
     let found = extension(path)?;

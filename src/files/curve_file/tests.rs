@@ -46,7 +46,7 @@ fn errors_name_the_file() {
     assert_eq!(
         message(&path),
         "expected a curve file, found neither the letters BCC or HAIR nor a known extension; \
-         name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .usda, .usdc, .usd, .usdz or .abc after its content"
+         name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .smobj, .usda, .usdc, .usd, .usdz or .abc after its content"
     );
 }
 

@@ -14,16 +14,27 @@ const MAGIC: &[u8] = b"PXR-USDC";
 const MOST_EXPANSION: u64 = 255 * 4;
 const SECTION_ENTRY: usize = 32;
 
+const ARCHIVE: &[u8] = b"PK\x03\x04";
+
+fn is_text(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().starts_with(b"#usda")
+}
+
+/// Whether a file begins as USD files do.
+pub(super) fn is_usd(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC) || bytes.starts_with(ARCHIVE) || is_text(bytes)
+}
+
 /// Looks a file over. The text reader makes room as it reads: of text only the depth counts. Layers inside of archives
 /// are looked over one by one.
 pub(super) fn look_over(bytes: &[u8]) -> Result<(), Problem> {
     if bytes.starts_with(MAGIC) {
         return binary(bytes);
     }
-    if bytes.starts_with(b"PK\x03\x04") {
+    if bytes.starts_with(ARCHIVE) {
         return archive(bytes);
     }
-    if bytes.trim_ascii_start().starts_with(b"#usda") {
+    if is_text(bytes) {
         return text(bytes);
     }
     Err(Problem::new("expected a USD file, found neither #usda, PXR-USDC nor an archive at its beginning"))
@@ -32,7 +43,7 @@ pub(super) fn look_over(bytes: &[u8]) -> Result<(), Problem> {
 /// Files of a `.usdz` are stored, not deflated: they are looked over where they lie.
 fn archive(bytes: &[u8]) -> Result<(), Problem> {
     let mut at = 0;
-    while bytes[at..].starts_with(b"PK\x03\x04") {
+    while bytes[at..].starts_with(ARCHIVE) {
         let field = |offset: usize, size: usize| number(bytes, at + offset, size);
         let (method, size) = (field(8, 2)?, field(18, 4)? as usize);
         let start = at + 30 + field(26, 2)? as usize + field(28, 2)? as usize;

@@ -27,6 +27,8 @@ use openusd::{
     usd::{self, Prim, PrimPredicate, SchemaBase, SchemaKind, TimeCode},
 };
 
+use crate::files::has_extension;
+
 use super::{
     Contents, Format, MAX_DEPTH, PrimPattern, Problem, StageCamera, Take,
     curves::{Batch, ID_NAMES, PLY_NAMES, Spread, StageBasis, Wrap},
@@ -55,6 +57,9 @@ impl fmt::Debug for UsdStage {
 impl UsdStage {
     /// Opens the layer of these bytes at a path, and all that it refers to.
     pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<Self, Problem> {
+        if has_extension(path, "abc") && !check::is_usd(&bytes) {
+            return Err(Problem::new("expected an Alembic file, found neither Ogawa nor HDF5 at its beginning"));
+        }
         check::look_over(&bytes)?;
         let name = path.to_str().ok_or_else(|| Problem::new("the path is not UTF-8, which USD needs"))?;
         let open = || Ok(usd::Stage::builder().resolver(LookingResolver::new(path, bytes)).open(name)?);
