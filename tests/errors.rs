@@ -203,7 +203,7 @@ fn missing_files_are_named() {
         d,
         &["info", "what.xyz"],
         "error: what.xyz: expected a curve file, found neither the letters BCC or HAIR nor a known extension; \
-         name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .usda, .usdc, .usd, .usdz or .abc after its content\n",
+         name it .bcc, .hair, .pyp, .obj, .yarns, .txt, .curves, .smobj, .usda, .usdc, .usd, .usdz or .abc after its content\n",
     );
     write(d, "bytes.toml", b"[render]\nspp = \xff\n");
     refused(d, &["render", "bytes.toml", "-o", "o.exr"], "bytes.toml: error: byte 15: not UTF-8 text\n");
