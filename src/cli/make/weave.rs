@@ -181,6 +181,10 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         Impossible::TooMuchCover { most } => {
             format!("error: these yarns cover at most {most:.3} of the plane in this weave")
         }
+        Impossible::TooFewWarps { least } => {
+            let problem = format!("wefts that turn at the sides take at least {least} warps in this weave");
+            return Failure::hinted(problem, format!("--warps {least}, or --edges live"));
+        }
         Impossible::TooSmall { warp, least } => {
             let name = if warp { "width" } else { "height" };
             format!("error: --{name} has no room for one yarn, or one repeat of a tile; at least {least:.3}")

@@ -103,6 +103,11 @@ pub enum Impossible {
         /// How many.
         warps: u32,
     },
+    /// A single warp in a layer of cloth whose wefts turn at its sides: nothing would hold them.
+    TooFewWarps {
+        /// The least number of warps.
+        least: u32,
+    },
     /// More control points than [`MAX_POINTS`].
     TooLarge,
 }
@@ -359,6 +364,10 @@ impl Weave {
             Ok((repeats.clamp(1.0, 1e9 / of) * of) as u32)
         };
         let count = [count(0, self.warps, self.draft.warps())?, count(1, self.wefts, self.draft.wefts())?];
+        let least = 2 * self.draft.layers() as u32;
+        if count[0] < least && self.edges != Edges::Live && !self.draft.cut_wefts() {
+            return Err(Impossible::TooFewWarps { least });
+        }
         // In f64, which does not overflow.
         let points = 2.0 * f64::from(count[0]) * f64::from(count[1]) * f64::from(self.nodes());
         if points > MAX_POINTS as f64 {

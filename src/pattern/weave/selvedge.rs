@@ -253,7 +253,7 @@ impl Plan {
             };
             // Most yarns change sides where the cloth begins: floats end there.
             let last = self.ends - 1;
-            let next = self.taken - 1 + if self.reach == 0 { 1 } else { picks.layers };
+            let next = if self.reach == 0 { self.taken } else { self.taken - 1 + picks.layers };
             let beside = from_side(cloth, right, next) as usize;
             let changes =
                 |inverted: bool| (0..high).filter(|&i| own(i, last, inverted) != body.warp_over(i, beside)).count();

@@ -237,6 +237,20 @@ fn spacings_and_cover_are_kept() {
 }
 
 #[test]
+fn few_warps_hold_the_turns_of_wefts_or_are_refused() {
+    for (name, least) in [("plain", 2), ("twill 2/1", 2), ("satin 5", 2), ("terry", 2), ("double cloth", 4)] {
+        for warps in 1..=least {
+            let few =
+                Weave { warps: Extent::Yarns(warps), wefts: Extent::Yarns(5), edges: Edges::Selvedge, ..weave(name) };
+            match few.strands() {
+                Ok(strands) => assert!(warps == least && !strands.is_empty(), "{name} {warps}"),
+                Err(why) => assert!(warps < least && why == Impossible::TooFewWarps { least }, "{name} {warps}"),
+            }
+        }
+    }
+}
+
+#[test]
 fn too_little_room_is_refused() {
     let tight = Weave { warp_spacing: Some(2.2), weft_spacing: Some(2.2), ..weave("plain") };
     let Err(Impossible::TooTight { warp: true, least }) = tight.relax() else { panic!("accepted") };
