@@ -181,6 +181,9 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         Impossible::TooMuchCover { most } => {
             format!("error: these yarns cover at most {most:.3} of the plane in this weave")
         }
+        Impossible::TooLittleCover { least } => {
+            format!("error: these yarns cover at least {least:.3} of the plane in this weave; a greater --cover")
+        }
         Impossible::TooFewWarps { least } => {
             let problem = format!("wefts that turn at the sides take at least {least} warps in this weave");
             return Failure::hinted(problem, format!("--warps {least}, or --edges live"));

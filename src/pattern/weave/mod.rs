@@ -91,6 +91,12 @@ pub enum Impossible {
         /// The most that is possible.
         most: f64,
     },
+    /// Less cover than yarns give that are 64 times as far from each other as they have to be, or those whose spacing is given by
+    /// themselves.
+    TooLittleCover {
+        /// The least that is possible.
+        least: f64,
+    },
     /// A width or height in which not one yarn, or not one repeat of a tile, has room.
     TooSmall {
         /// Whether it is the width, which warps fill; else the height.
@@ -177,6 +183,8 @@ pub fn shuttles<T: PartialEq>(yarns: &[T]) -> Vec<u32> {
 /// Yarns that are pressed into each other by more than this share of their surface by more than 5 % of their diameter
 /// have no room.
 const MOST_OVERLAP: f64 = 0.03;
+/// Distance of yarns, over the least, beyond which no cover is looked for: a plain weave of them covers a sixtieth of the plane.
+const FARTHEST: f64 = 64.0;
 /// Share of the distance at which yarns lie side by side below which no draft has room.
 const HOPELESS: f64 = 0.2;
 /// Distance of wefts over that of warps where wefts are cut: two picks to an end, so that the ground is closed when the floats
@@ -320,8 +328,7 @@ impl Weave {
             return Err(impossible);
         }
         if let Some(cover) = self.cover {
-            let free = free();
-            let spacing = self.spacing_for(cover, &free)?;
+            let spacing = self.spacing_for(cover, &UnitCell::relax(&self.draft, &options))?;
             return self.cloth(UnitCell::relax(&self.draft, &CellOptions { spacing, ..options.clone() }));
         }
         let cell = UnitCell::relax(&self.draft, &options);
@@ -376,15 +383,15 @@ impl Weave {
         Ok(Cloth { weave: self, cell, count })
     }
 
-    /// Spacings at which the cloth covers so much of the plane.
-    fn spacing_for(&self, cover: f64, free: &UnitCell) -> Result<[Option<f64>; 2], Impossible> {
+    /// Spacings at which the cloth covers so much of the plane, which is `closest` where spacings are open.
+    fn spacing_for(&self, cover: f64, closest: &UnitCell) -> Result<[Option<f64>; 2], Impossible> {
         let options = self.options();
-        let at = |factor: f64| [0, 1].map(|side| Some(options.spacing[side].unwrap_or(free.spacing[side] * factor)));
+        let at = |factor: f64| [0, 1].map(|side| Some(options.spacing[side].unwrap_or(closest.spacing[side] * factor)));
         let covered = |factor: f64| {
             let cell = UnitCell::relax(&self.draft, &CellOptions { spacing: at(factor), ..options.clone() });
             1.0 - cell.see_through()
         };
-        let most = 1.0 - free.see_through();
+        let most = 1.0 - closest.see_through();
         if cover > most + 0.02 {
             return Err(Impossible::TooMuchCover { most });
         }
@@ -393,7 +400,10 @@ impl Weave {
         }
         // Cover falls as spacings grow; yarns that do not touch any more are straight.
         let (mut low, mut high) = (1.0, 2.0);
-        while covered(high) > cover && high < 64.0 {
+        while covered(high) > cover {
+            if high >= FARTHEST {
+                return Err(Impossible::TooLittleCover { least: covered(FARTHEST) });
+            }
             (low, high) = (high, 2.0 * high);
         }
         for _ in 0..10 {

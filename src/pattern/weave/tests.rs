@@ -237,6 +237,16 @@ fn spacings_and_cover_are_kept() {
 }
 
 #[test]
+fn too_little_cover_is_refused() {
+    let beside = Weave { warp_spacing: Some(5.0), cover: Some(0.3), ..weave("plain") };
+    let Err(Impossible::TooLittleCover { least }) = beside.relax() else { panic!("accepted") };
+    assert!((0.35..0.6).contains(&least), "{least}");
+    assert!(Weave { cover: Some(least + 0.1), ..beside }.relax().is_ok());
+    let alone = Weave { cover: Some(0.01), ..weave("plain") };
+    assert!(matches!(alone.relax(), Err(Impossible::TooLittleCover { least }) if (0.01..0.05).contains(&least)));
+}
+
+#[test]
 fn few_warps_hold_the_turns_of_wefts_or_are_refused() {
     for (name, least) in [("plain", 2), ("twill 2/1", 2), ("satin 5", 2), ("terry", 2), ("double cloth", 4)] {
         for warps in 1..=least {

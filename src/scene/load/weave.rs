@@ -105,6 +105,10 @@ impl WeavePlan {
                 format!("these yarns cover at most {most:.3} of the plane in this weave"),
                 "a lower `cover`, a higher `flatten`, or no cover at all for the closest",
             ),
+            Err(Impossible::TooLittleCover { least }) => wrong(
+                format!("these yarns cover at least {least:.3} of the plane in this weave"),
+                "a higher `cover`, or thinner yarns; where one distance of yarns is given, a greater one",
+            ),
             Err(Impossible::TooFewWarps { least }) => wrong(
                 format!("wefts that turn at the sides take at least {least} warps in this weave"),
                 "more `warps`, or `edges = \"live\"`",
