@@ -172,7 +172,8 @@ impl Instructions {
     }
 
     /// Works them over so many stitches. What they tell to repeat without an end, and does not repeat from the first row on
-    /// with as many stitches, is repeated for at least `least` rows.
+    /// with as many stitches, is repeated for at least `least` rows. Fewer rows than that, if they are an odd number of a flat piece, are
+    /// worked once more from the other side.
     ///
     /// # Errors
     /// A row that does not fit the stitches it finds, or does not make as many as it says.
@@ -204,7 +205,15 @@ impl Instructions {
             until: Until::Open,
             line: self.rows[self.set_up].line,
         };
+        // Over an odd number of rows the other side comes next.
+        let other_side_next = self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side();
         let Some(again) = &self.again.clone().or_else(|| goes_on.then(implied)) else {
+            let least = if let Asked::Rows(rows) = asked { rows as usize } else { otherwise };
+            let is_repeated = !self.ends && !shaped && set_up.is_empty() && needle.behind == 0;
+            if is_repeated && other_side_next && self.rows.len() < least {
+                let again = implied();
+                (0..again.rows.len()).try_for_each(|k| needle.work(&self.copy(&again, &needle, k)))?;
+            }
             return Ok(Worked { rows: needle.rows, whole: self.ends || shaped });
         };
         match again.until {
@@ -212,8 +221,7 @@ impl Instructions {
             Until::Open => {
                 let all = again.rows.iter().copied().eq(0..self.rows.len());
                 if all && !shaped && needle.behind == 0 {
-                    // Over an odd number of rows the other side comes next.
-                    if self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side() {
+                    if other_side_next {
                         (0..again.rows.len()).try_for_each(|k| needle.work(&self.copy(again, &needle, k)))?;
                     }
                     // Bound off behind no height, they are as many as those of a chart.

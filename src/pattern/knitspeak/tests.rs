@@ -399,3 +399,13 @@ fn set_up_rows_are_knitted_once() {
     // Row 1 would be on the right side.
     assert_eq!(work("Set-up row: k", 20), Worked { rows: vec!["p4".into()], whole: false });
 }
+
+#[test]
+fn one_row_of_a_flat_piece_is_worked_from_both_sides() {
+    let piece = |text: &str, asked| Instructions::read(text).unwrap().work_piece(4, asked, 20).unwrap().0.rows;
+    assert_eq!(piece("Row 1: Knit.", Asked::Nothing), ["k4", "p4"]);
+    assert_eq!(piece("Row 1: Knit.", Asked::Rows(1)), ["k4"]);
+    assert_eq!(piece("Rnd 1: Knit.", Asked::Nothing), ["k4"]);
+    let three = "Row 1: Knit.\nRow 2: Purl.\nRow 3: Purl.";
+    assert_eq!(piece(three, Asked::Nothing), ["k4", "k4", "p4", "p4", "p4", "k4"]);
+}
