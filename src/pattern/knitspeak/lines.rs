@@ -381,6 +381,13 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
                 Head { rows: Vec::new(), side: None, round: is_round(row), next, all: None, odd: None, set_up: false };
             Line::Row(head, if name.starts_with('k') { "knit" } else { "purl" }.to_owned())
         }
+        // "Knit every row."
+        [name @ ("k" | "knit" | "p" | "purl"), all, row] if is_all(all) && is_row(row) => {
+            let all = Some(1);
+            let head =
+                Head { rows: Vec::new(), side: None, round: is_round(row), next: 0, all, odd: None, set_up: false };
+            Line::Row(head, name.to_owned())
+        }
         ["cast", "on", n, ..] | ["co", n, ..] if number(n).is_some() => Line::CastOn(number(n).unwrap_or_default()),
         ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,
         ["break" | "cut", "yarn" | "the", ..] | ["weave", "in", ..] | ["worked", "over", ..] => Line::Nothing,

@@ -187,11 +187,14 @@ impl Reading {
         let row = Written { line, side: Side::Right, round: false, count, body };
         if head.rows.is_empty() {
             // Rows of a side, of whichever numbers.
+            let apart = head.all.unwrap_or(2);
             let first = match (head.odd, head.side) {
                 (Some(odd), _) => odd == self.set_up.is_multiple_of(2),
+                // "All rows", of either side.
+                (None, None) => apart == 1,
                 (None, side) => side == Some(self.first_side),
             };
-            self.fill.push((if first { 1 } else { 2 }, head.all.unwrap_or(2), Written { count: None, ..row }));
+            self.fill.push((if first { 1 } else { 2 }, apart, Written { count: None, ..row }));
             return Ok(());
         }
         for &number in &head.rows {
@@ -350,7 +353,9 @@ impl Reading {
     fn finish(mut self) -> Result<Instructions> {
         // One more, so that the last row of the repeat has its partner.
         if self.again.is_none() {
-            self.fill_up(usize::from(self.last() % 2 == 1));
+            // Where no row has a number, each of them is there once.
+            let own = self.fill.iter().map(|(_, apart, _)| *apart).max().filter(|_| self.last() == self.set_up);
+            self.fill_up(own.unwrap_or(self.last() % 2).min(MOST_ROWS));
         }
         let last = self.last();
         if last == 0 {

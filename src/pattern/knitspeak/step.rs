@@ -86,7 +86,7 @@ const MARKERS: [&[&str]; 16] = [
 pub(super) fn instead_of(word: &str) -> Option<&'static str> {
     let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
     Some(match stem {
-        "k1b" | "p1b" => {
+        "k1b" | "p1b" | "below" => {
             "it is a stitch through the back loop to some, into the row below to others: k1 tbl, or `tuck` and k as in brioche"
         }
         "bind" | "bo" | "cast" | "co" => {

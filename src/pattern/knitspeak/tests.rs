@@ -409,3 +409,15 @@ fn one_row_of_a_flat_piece_is_worked_from_both_sides() {
     let three = "Row 1: Knit.\nRow 2: Purl.\nRow 3: Purl.";
     assert_eq!(piece(three, Asked::Nothing), ["k4", "k4", "p4", "p4", "p4", "k4"]);
 }
+
+#[test]
+fn all_rows_are_told_at_once() {
+    let piece = |text: &str| Instructions::read(text).unwrap().work_piece(4, Asked::Nothing, 20).unwrap().0.rows;
+    for text in ["All rows: Knit.", "Every row: knit", "Knit every row.", "Knit all rows."] {
+        assert_eq!(piece(text), ["k4", "p4"], "{text}");
+    }
+    assert_eq!(piece("Purl every row"), ["p4", "k4"]);
+    assert_eq!(piece("Knit every round."), ["k4"]);
+    assert_eq!(piece("RS rows: Knit. WS rows: Purl."), ["k4", "k4"]);
+    assert_eq!(piece("Set-up row: Purl.\nSet-up row: Purl.\nAll rows: Knit.")[..4], ["p4", "k4", "k4", "p4"]);
+}
