@@ -152,6 +152,14 @@ fn what_cannot_be_made_is_refused() {
         ),
         (&["knit", "--chart", "k q", "-o", "a.bcc"], "error: unknown step \"q\"; "),
         (
+            &["knit", "--width", "1e9", "--rows", "2", "-o", "a.bcc"],
+            "error: a width of 1000000000.000 mm takes more than 1000000 stitches",
+        ),
+        (
+            &["knit", "--height", "1e9", "--stitches", "2", "-o", "a.bcc"],
+            "error: a height of 1000000000.000 mm takes more than 1000000 rows",
+        ),
+        (
             &["knit", "--stitches", "1000000", "--rows", "1000000", "-o", "a.bcc"],
             "error: more than 2^27 control points",
         ),

@@ -205,7 +205,21 @@ impl Sizes {
                     let hint = format!("it is {smallest:.1} mm");
                     return Err(Misfit { key: None, problem, hint });
                 }
-                Ok((repeats.min((MOST / of).max(least)) * of) as u32)
+                if repeats * of > MOST {
+                    let (noun, [size, most]) = (
+                        if key == "height" { "row" } else { "stitch" },
+                        [size, MOST * own].map(|length| length * diameter),
+                    );
+                    return Err(Misfit {
+                        key: (key == "height").then_some("height"),
+                        problem: format!(
+                            "a {key} of {size:.3} mm takes more than {}",
+                            words::counted(MOST as u64, noun)
+                        ),
+                        hint: format!("at most {most:.1} mm"),
+                    });
+                }
+                Ok((repeats * of) as u32)
             };
             // Whole repeats, where rows do not fit otherwise or must close to a ring or a tile.
             let whole = knit.form.is_round() || !knit.chart.is_plain() || knit.edges == Edges::Tile;
