@@ -124,8 +124,8 @@ impl Garment {
         let clearances =
             if options.pressed { sewing.clearances(&pose, &borders, clearance(&shapes)) } else { Vec::new() };
         let worn = surface.worn_lengths(&pose, panels.panels.len());
-        let mut report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &hemmed, &options);
-        [report.sewn, report.free] = open_edges::lengths(&borders);
+        let edges = open_edges::lengths(&borders);
+        let mut report = Report::new(&panels, &points, &lattices, (cloth, &shapes), &hemmed, edges, &options);
         open_edges::note_gaps(&panels.panels, &borders, &pose, &mut report.notes);
         Ok(Self { panels, surface, lattices, shapes, sewing, edgings, hem_threads, clearances, worn, options, report })
     }
@@ -250,11 +250,16 @@ impl Garment {
     }
 }
 
+/// The least and the greatest coordinates of points.
+fn box_around(points: &[DVec3]) -> (DVec3, DVec3) {
+    let all = || points.iter().copied();
+    (all().fold(DVec3::INFINITY, DVec3::min), all().fold(DVec3::NEG_INFINITY, DVec3::max))
+}
+
 /// Where cloth is laid from: sheets are of single precision, which tells places within 10 m apart by a thousandth of a millimetre.
 fn local_origin(points: &[DVec3]) -> DVec3 {
     const FAR: f64 = 1e4;
-    let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let (low, high) = box_around(points);
     if low.abs().max(high.abs()).max_element() > FAR { (0.5 * (low + high)).round() } else { DVec3::ZERO }
 }
 

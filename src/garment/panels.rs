@@ -231,7 +231,7 @@ impl Areas<'_> {
 
     /// Faces that are wound against most of those that they are joined to within their part would be knitted inside out: turns
     /// them round.
-    fn wind_alike(&self, faces: &mut [Face], cut: &[[u32; 3]], notes: &mut Vec<String>) {
+    fn wind_alike(&self, faces: &mut [Face], cut: &mut [[u32; 3]], notes: &mut Vec<String>) {
         // For each edge of two faces both of them, and whether the second one goes along it as the first one does.
         let mut edges: HashMap<[u32; 2], (u8, [usize; 2], [bool; 2])> = HashMap::with_capacity(cut.len() * 3 / 2);
         for (i, f) in cut.iter().enumerate() {
@@ -256,7 +256,7 @@ impl Areas<'_> {
             [0, 1, 2].map(of).into_iter().flatten()
         };
         let mut against: Vec<Option<bool>> = vec![None; cut.len()];
-        let mut turned = Counted::default();
+        let (mut turned, mut turn_round) = (Counted::default(), Vec::new());
         for start in 0..cut.len() {
             if against[start].is_some() {
                 continue;
@@ -285,8 +285,10 @@ impl Areas<'_> {
                 turned.add(self.group(&faces[i]), faces[i].line as usize);
                 faces[i].points.swap(1, 2);
                 faces[i].uvs.swap(1, 2);
+                turn_round.push(i);
             }
         }
+        turn_round.into_iter().for_each(|i| cut[i].swap(1, 2));
         turned.note("triangle", "wound against their neighbours, turned round", notes);
     }
 
@@ -300,8 +302,8 @@ impl Areas<'_> {
         notes: &mut Vec<String>,
     ) -> Result<Charts, GarmentError> {
         let of_parts: Vec<usize> = faces.iter().map(|f| f.part as usize).collect();
-        self.wind_alike(faces, &joined_corners(self.mesh, faces, weld, grain, &of_parts).0, notes);
-        let (cut, uvs) = joined_corners(self.mesh, faces, weld, grain, &of_parts);
+        let (mut cut, uvs) = joined_corners(self.mesh, faces, weld, grain, &of_parts);
+        self.wind_alike(faces, &mut cut, notes);
         let parted = charts(&cut, uvs.len(), faces, self.mesh)?;
         let mut turned = vec![0.0; faces.len()];
         for (&i, &chart) in parted.1.iter().zip(&parted.0) {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{
+    box_around,
     hem::Hem,
     lattice::Lattice,
     mesh::panel_in_words,
@@ -44,13 +45,14 @@ pub(crate) struct Report {
 
 impl Report {
     /// Of panels divided into stitches; `points` are welded, mm, `cloth` is that of each panel, `hemmed` how long edges of each
-    /// kind of hem are, mm.
+    /// kind of hem are, mm, and then how long seams and free edges are.
     pub(super) fn new(
         panels: &Panels,
         points: &[DVec3],
         lattices: &[Lattice],
         (cloth, shapes): (Vec<usize>, &[Shapes]),
         hemmed: &[(Hem, f64)],
+        [sewn, free]: [f64; 2],
         options: &Options,
     ) -> Self {
         let mut notes = panels.notes.clone();
@@ -66,8 +68,6 @@ impl Report {
         }
         let mut stitches_of = vec![0; shapes.len()];
         lattices.iter().zip(&cloth).for_each(|(lattice, own)| stitches_of[*own] += lattice.stitches);
-        let low = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         Self {
             stitches: lattices.iter().map(|l| l.stitches).collect(),
             yarn_length: stitches_of.iter().zip(shapes).map(|(n, shape)| *n as f64 * shape.length).collect(),
@@ -79,11 +79,11 @@ impl Report {
             stretched: panels.stretched,
             compressed: panels.compressed,
             uv_mm: panels.uv_mm,
-            sewn: 0.0,
-            free: 0.0,
+            sewn,
+            free,
             panels: panels.panels.clone(),
             notes,
-            bounds: (low, high),
+            bounds: box_around(points),
         }
     }
 

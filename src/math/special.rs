@@ -52,11 +52,16 @@ pub(crate) fn front_share_of_wrapped_normal(sigma: f64) -> f64 {
     if sigma > 4.0 {
         return 0.5 + 2.0 / PI * (-0.5 * sigma * sigma).exp();
     }
+    share_of_wrapped_normal([-FRAC_PI_2, FRAC_PI_2], sigma)
+}
+
+/// The share of it between two angles of its circle, radians, of any width up to 4.
+pub(crate) fn share_of_wrapped_normal([from, to]: [f64; 2], sigma: f64) -> f64 {
     let scale = 1.0 / (sigma.max(1e-300) * SQRT_2);
     (-6..=6)
         .map(|k| {
             let shift = 2.0 * PI * f64::from(k);
-            0.5 * (libm::erf((FRAC_PI_2 + shift) * scale) - libm::erf((shift - FRAC_PI_2) * scale))
+            0.5 * (libm::erf((to + shift) * scale) - libm::erf((shift + from) * scale))
         })
         .sum()
 }

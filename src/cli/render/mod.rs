@@ -107,10 +107,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let counters = &rendered.counters;
         if counters.invalid > counters.camera / 2 {
             let problem = format!("{} of {} samples are not finite", counters.invalid, counters.camera);
-            return Err(Failure::hinted(
-                problem,
-                "lights too bright, or places too far, for single precision".to_owned(),
-            ));
+            return Err(Failure::hinted(problem, "lights too bright, or places too far, for single precision"));
         }
         if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
     })

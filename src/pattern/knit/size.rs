@@ -206,18 +206,12 @@ impl Sizes {
                     return Err(Misfit { key: None, problem, hint });
                 }
                 if repeats * of > MOST {
-                    let (noun, [size, most]) = (
-                        if key == "height" { "row" } else { "stitch" },
-                        [size, MOST * own].map(|length| length * diameter),
-                    );
-                    return Err(Misfit {
-                        key: (key == "height").then_some("height"),
-                        problem: format!(
-                            "a {key} of {size:.3} mm takes more than {}",
-                            words::counted(MOST as u64, noun)
-                        ),
-                        hint: format!("at most {most:.1} mm"),
-                    });
+                    let [size, most] = [size, MOST * own].map(|length| length * diameter);
+                    let of_rows = key == "height";
+                    let all = words::counted(MOST as u64, if of_rows { "row" } else { "stitch" });
+                    let problem = format!("a {key} of {size:.3} mm takes more than {all}");
+                    let hint = format!("at most {most:.1} mm");
+                    return Err(Misfit { key: of_rows.then_some("height"), problem, hint });
                 }
                 Ok((repeats * of) as u32)
             };

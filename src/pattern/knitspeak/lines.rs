@@ -20,7 +20,7 @@ pub(super) enum Line {
 }
 
 /// What stands before the colon.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Head {
     pub(super) rows: Vec<usize>,
     pub(super) side: Option<Side>,
@@ -240,8 +240,7 @@ fn is_number(word: &str) -> bool {
 
 impl Reading {
     fn new() -> Self {
-        let head = Head { rows: Vec::new(), side: None, round: false, next: 0, all: None, odd: None, set_up: false };
-        Self { head, known: false, range: false, goes_on: true, said: String::new() }
+        Self { head: Head::default(), known: false, range: false, goes_on: true, said: String::new() }
     }
 
     fn word(&mut self, word: &str, next: &str, line: usize) -> Result<Then> {
@@ -373,20 +372,16 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
     if let Some(copies) = Copies::read(&words, text, line)? {
         return Ok(Line::Again(copies));
     }
+    let whole_row = |name: &str| if name.starts_with('k') { "knit" } else { "purl" }.to_owned();
     Ok(match words[..] {
         // "Knit 3 rows."
         [name @ ("k" | "knit" | "p" | "purl"), n, row] if number(n).is_some() && is_row(row) => {
             let next = number(n).map_or(0, |n| n as usize).min(MOST_ROWS);
-            let head =
-                Head { rows: Vec::new(), side: None, round: is_round(row), next, all: None, odd: None, set_up: false };
-            Line::Row(head, if name.starts_with('k') { "knit" } else { "purl" }.to_owned())
+            Line::Row(Head { round: is_round(row), next, ..Head::default() }, whole_row(name))
         }
         // "Knit every row."
         [name @ ("k" | "knit" | "p" | "purl"), all, row] if is_all(all) && is_row(row) => {
-            let all = Some(1);
-            let head =
-                Head { rows: Vec::new(), side: None, round: is_round(row), next: 0, all, odd: None, set_up: false };
-            Line::Row(head, name.to_owned())
+            Line::Row(Head { round: is_round(row), all: Some(1), ..Head::default() }, whole_row(name))
         }
         ["cast", "on", n, ..] | ["co", n, ..] if number(n).is_some() => Line::CastOn(number(n).unwrap_or_default()),
         ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,

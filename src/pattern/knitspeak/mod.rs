@@ -196,24 +196,24 @@ impl Instructions {
         pattern.iter().try_for_each(|row| needle.work(row))?;
         let shaped = needle.found != cast_on;
         let more_asked = asked != Asked::Nothing;
+        let least = if let Asked::Rows(rows) = asked { rows as usize } else { otherwise };
+        // Over an odd number of rows the other side comes next.
+        let other_side_next = self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side();
+        let from_both_sides = !shaped && needle.behind == 0 && other_side_next && self.rows.len() < least;
         // What set-up rows are for is repeated, whether it is told or not; so is what is shaped, where more rows are asked for.
         let goes_on = !pattern.is_empty()
             && !self.ends
-            && if set_up.is_empty() { shaped && more_asked } else { needle.found == begun || more_asked };
+            && if set_up.is_empty() {
+                shaped && more_asked || from_both_sides
+            } else {
+                needle.found == begun || more_asked
+            };
         let implied = || Again {
             rows: (self.set_up..self.rows.len()).collect(),
             until: Until::Open,
             line: self.rows[self.set_up].line,
         };
-        // Over an odd number of rows the other side comes next.
-        let other_side_next = self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side();
         let Some(again) = &self.again.clone().or_else(|| goes_on.then(implied)) else {
-            let least = if let Asked::Rows(rows) = asked { rows as usize } else { otherwise };
-            let is_repeated = !self.ends && !shaped && set_up.is_empty() && needle.behind == 0;
-            if is_repeated && other_side_next && self.rows.len() < least {
-                let again = implied();
-                (0..again.rows.len()).try_for_each(|k| needle.work(&self.copy(&again, &needle, k)))?;
-            }
             return Ok(Worked { rows: needle.rows, whole: self.ends || shaped });
         };
         match again.until {
@@ -227,12 +227,7 @@ impl Instructions {
                     // Bound off behind no height, they are as many as those of a chart.
                     return Ok(Worked { rows: needle.rows, whole: self.ends && self.height.is_some() });
                 }
-                let least = match asked {
-                    Asked::Nothing => otherwise,
-                    Asked::Rows(rows) => rows as usize,
-                    Asked::Height => ROWS_FOR_A_HEIGHT,
-                };
-                let least = least.min(MOST_ROWS);
+                let least = if asked == Asked::Height { ROWS_FOR_A_HEIGHT } else { least }.min(MOST_ROWS);
                 for k in 0.. {
                     let count = needle.rows.len();
                     if count >= least && self.ending.is_none_or(|ending| ending.holds(count as u32)) {

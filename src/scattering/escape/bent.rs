@@ -1,6 +1,6 @@
 //! Transport in an ellipse with the directions into which TT bends light: towards where light of a place leaves.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::TAU;
 
 use wide::f32x8;
 
@@ -8,6 +8,7 @@ use super::{
     AZIMUTHS, Bends, Medium, Outgoing, RINGS, Spacing,
     flight::{CELLS, Flight, QUARTER, SECTORS, landing},
 };
+use crate::math::special::share_of_wrapped_normal;
 
 /// Directions, one for each azimuth that is held, and places along each, that are looked at from every cell.
 const DIRECTIONS: usize = AZIMUTHS;
@@ -77,12 +78,7 @@ impl Ways {
 /// round.
 fn turns(sigma: f64, share: f64) -> [f32; DIRECTIONS] {
     let width = TAU / DIRECTIONS as f64;
-    // Below an angle, of those that are not wrapped.
-    let below = |angle: f64| 0.5 * libm::erf(angle / (sigma * SQRT_2));
-    let part = |k: usize| {
-        let from = (k as f64 - 0.5) * width;
-        (-2..=2).map(|turn| from + f64::from(turn) * TAU).map(|from| below(from + width) - below(from)).sum::<f64>()
-    };
+    let part = |k: usize| share_of_wrapped_normal([-0.5, 0.5].map(|half| (k as f64 + half) * width), sigma);
     let parts: [f64; DIRECTIONS] = std::array::from_fn(part);
     let all: f64 = parts.iter().sum();
     let parts = parts.map(|part| (part / all - (1.0 - share) / DIRECTIONS as f64).max(0.0));
