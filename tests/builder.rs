@@ -97,6 +97,19 @@ fn what_makes_no_scene_is_told() {
     assert!(mesh(&|m| m.uvs.truncate(2)).contains("texture coordinates"));
     assert!(error(&|s| s.size(0, 48)).contains("at least one pixel"));
     assert!(error(&|s| s.yarns[0].fibers.clear()).contains("yarn `wool`"));
+    assert!(error(&|s| s.yarns[0].plies[1].fibers = 0).contains("ply 2 is "));
+    assert!(error(&|s| s.yarns[0].plies[0].radius = f64::NAN).contains("ply 1 is "));
+    assert!(error(&|s| s.fabrics[0].phases.clear()).contains("phases"));
+    assert!(error(&|s| s.fabrics[0].uvs = vec![Vec::new()]).contains("texture coordinates"));
+    assert!(error(&|s| s.fabrics[0].motion.later = vec![vec![Vec::new()]]).contains("at all times"));
+    let painted = |index: u16| {
+        error(&|s| {
+            s.fabrics[0].variants = vec![s.yarns[0].clone()];
+            s.fabrics[0].material_indices = s.fabrics[0].curves.iter().map(|_| vec![index; 4]).collect();
+            s.lights.push(at(f32::NAN));
+        })
+    };
+    assert!(painted(1).contains("indices into its variants") && painted(0).contains("finite position"));
 }
 
 #[test]

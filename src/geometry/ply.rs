@@ -26,6 +26,14 @@ pub struct PlyParameters {
 }
 
 impl PlyParameters {
+    /// Whether it holds fibres, and all its numbers are finite and in their range.
+    pub fn is_sound(&self) -> bool {
+        let Self { radius, aspect, distance, angle, fibers, fiber_radius, fiber_twist } = *self;
+        let positive = |v: f64| v > 0.0 && v.is_finite();
+        let finite = distance.is_finite() && angle.is_finite() && fiber_twist.is_finite();
+        fibers > 0 && positive(radius) && positive(fiber_radius) && positive(aspect) && aspect <= 1.0 && finite
+    }
+
     /// The longer semi-axis of the cross-section.
     pub fn long_axis(&self) -> f64 {
         self.radius / self.aspect.sqrt()

@@ -230,6 +230,14 @@ impl SceneBuilder {
             if !(yarn.radius > 0.0 && yarn.radius.is_finite()) {
                 return fail(format!("yarn `{}`: expected a radius above 0, found {}", yarn.name, yarn.radius));
             }
+            if let Some(k) = yarn.plies.iter().position(|ply| !ply.is_sound()) {
+                return fail(format!(
+                    "yarn `{}`: expected a ply of fibres, finite, with radii above 0; ply {} is {:?}",
+                    yarn.name,
+                    k + 1,
+                    yarn.plies[k]
+                ));
+            }
         }
         for fabric in &self.fabrics {
             let known = match fabric.kind {
@@ -250,6 +258,9 @@ impl SceneBuilder {
                         radii.len()
                     ));
                 }
+            }
+            if let Some(problem) = fabric.problem() {
+                return fail(format!("fabric `{}`: {problem}", fabric.name));
             }
         }
         for Object { origin, mesh, next, .. } in &self.objects {
@@ -283,12 +294,39 @@ impl Default for FiberMaterial {
 }
 
 impl Fabric {
+    /// What does not fit its curves, where that is so.
+    fn problem(&self) -> Option<&'static str> {
+        let of_curves = |counts: &mut dyn Iterator<Item = usize>| {
+            counts.eq(self.curves.iter().map(|(curve, _)| curve.points.len()))
+        };
+        let at_times = |times: &[Vec<Vec<DVec3>>]| times.iter().all(|t| of_curves(&mut t.iter().map(Vec::len)));
+        let FabricMotion { later, rest, flow } = &self.motion;
+        let moves = at_times(later) && at_times(flow) && at_times(rest.as_slice());
+        let finite = later.iter().chain(flow).chain(rest).flatten().flatten().all(|p| p.is_finite());
+        let of_variants =
+            |indices: &Vec<u16>| !indices.is_empty() && indices.iter().all(|i| usize::from(*i) < self.variants.len());
+        let colored = self.variants.is_empty()
+            || (self.material_indices.len() == self.curves.len() && self.material_indices.iter().all(of_variants));
+        if !moves || !finite {
+            Some("expected finite points at all times, as many as its curves have")
+        } else if !self.uvs.is_empty() && !of_curves(&mut self.uvs.iter().map(Vec::len)) {
+            Some("expected texture coordinates for all points or for none")
+        } else if !colored {
+            Some("expected indices into its variants for each curve")
+        } else if !self.curves.is_empty() && (self.phases.is_empty() || !self.phases.iter().all(|p| p.is_finite())) {
+            Some("expected finite phases of its plies")
+        } else {
+            None
+        }
+    }
+
     /// Yarns or fibres of even radius (millimetres) along curves, without motion and of one colour. Plies start at
     /// phases that are random in `seed`.
     pub fn new(name: impl Into<String>, kind: CurveKind, curves: Vec<Curve>, radius: f64, seed: u32) -> Self {
         let mut stream = Stream::new(seed);
         Self {
             name: name.into(),
+            named: true,
             origin: "a program".to_owned(),
             panels: Vec::new(),
             from_file: false,
@@ -379,10 +417,11 @@ fn bounds_of_objects(objects: &[Object]) -> Option<(DVec3, DVec3)> {
     objects.iter().filter_map(|o| o.mesh.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// Numbers the fabrics whose name another one before them has.
+/// Numbers the fabrics whose name another one before them has; names that were given come before those of yarns.
 fn tell_names_apart(fabrics: &mut [Fabric]) {
     let mut taken: HashSet<String> = HashSet::new();
-    for fabric in fabrics {
+    let (named, others): (Vec<_>, Vec<_>) = fabrics.iter_mut().partition(|fabric| fabric.named);
+    for fabric in named.into_iter().chain(others) {
         let given = fabric.name.clone();
         let mut number = 1;
         while !taken.insert(fabric.name.clone()) {
@@ -474,7 +513,7 @@ fn warn_about_size(scene: &mut Scene) {
     }
 }
 
-/// Single-precision hits lose a percent of a radius where the scene is a hundred thousand radii wide.
+/// Single-precision hits lose more than half a percent of a radius where the scene is a hundred thousand radii wide.
 fn warn_about_precision(scene: &mut Scene) {
     let Some((low, high)) = scene.bounds() else { return };
     let thinnest = scene.fabrics.iter().flat_map(|f| &f.curves).flat_map(|(_, r)| r).copied().fold(f64::MAX, f64::min);
@@ -483,10 +522,12 @@ fn warn_about_precision(scene: &mut Scene) {
         return;
     }
     let ratio = 0.5 * (high - low).length() / thinnest;
+    let uncertain = 0.5 * f64::from(f32::EPSILON) * ratio;
     if ratio > 1e5 {
         scene.warnings.push(format!(
-            "the scene is {ratio:.1e} times as wide as its thinnest yarn: positions of hits are uncertain by more than \
-             0.2 % of that yarn's radius"
+            "the scene is {ratio:.1e} times as wide as its thinnest yarn: positions of hits are uncertain by {:.1} % of that \
+             yarn's radius",
+            100.0 * uncertain
         ));
     }
 }

@@ -233,6 +233,7 @@ fn of_fabric(fabric: &Fabric, scene: &Scene, path: &str, keys: &mut Keys) {
     let Fabric {
         // Names are for messages and mattes: what covers a pixel is counted by number.
         name: _,
+        named: _,
         origin: _,
         panels: _,
         from_file: _,

@@ -327,6 +327,8 @@ impl Tufts {
 pub struct Fabric {
     /// Its name, of which there is no other: given, or that of its yarn.
     pub name: String,
+    /// Whether that was given to it, and is not its yarn's.
+    pub named: bool,
     /// Where the curves came from, for messages.
     pub origin: String,
     /// Of cloth on a garment: from which of its curves on they lie on the panel of a name.

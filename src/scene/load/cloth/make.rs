@@ -250,6 +250,7 @@ impl Made {
             motion,
             exact,
         } = self;
+        let name = name.or_else(|| keys.name.clone());
         let random = || curves.iter().map(|_| TAU * f64::from(stream.next())).collect();
         let phases = keys.phases.clone().unwrap_or_else(random);
         let of_file = match curves.first().map(|(curve, _)| curve.basis) {
@@ -258,7 +259,8 @@ impl Made {
             _ => Basis::CatmullRom,
         };
         let mut fabric = Fabric {
-            name: name.or_else(|| keys.name.clone()).unwrap_or_else(|| keys.kind.name().to_owned()),
+            named: name.is_some(),
+            name: name.unwrap_or_else(|| keys.kind.name().to_owned()),
             origin,
             panels,
             from_file,
