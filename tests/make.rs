@@ -480,6 +480,18 @@ fn make_knit_warns_as_a_scene_does() {
     let told = yarnray(d, &[&made[..], &size].concat()).good().stderr;
     assert!(told.contains("warning: ") && told.contains("% of the yarn overlaps, by up to"), "{told}");
     assert!(told.contains("24 stitches change places in a row"), "{told}");
+    let made = ["make", "weave", "--draft", "double cloth", "--edges", "selvedge", "-o", "b.bcc"];
+    let told = yarnray(d, &[&made[..], &["--warps", "4", "--wefts", "5"]].concat()).good().stderr;
+    assert!(told.contains("% of the yarn overlaps, by up to") && told.contains("a wider setting"), "{told}");
+    assert!(!yarnray(d, &made).good().stderr.contains("warning"));
+    // What is too low for its hems, in the unit of the scene.
+    write(
+        d,
+        "low.toml",
+        "unit = \"cm\"\n[[fabric]]\nyarn = \"wool\"\nsource = { type = \"weave\", wefts = 6, edges = \"finished\" }\n",
+    );
+    let told = yarnray(d, &["info", "low.toml"]).good().stdout;
+    assert!(told.contains("hems take a height of ") && told.contains("it has selvedges alone"), "{told}");
 }
 
 /// The yarn of a weave is that of its file: selvedges, hems and fringes take some too.

@@ -2,7 +2,8 @@
 //!
 //! [`draft`] and [`weave`] make woven cloth, [`chart`] and [`knit`] knitted cloth, flat, as a tube or on a surface of
 //! [`revolution`], or as a [`tile`] that is laid elsewhere; `rods` relaxes yarns as elastic rods, `relax` lets those of a
-//! tile push each other apart until they touch, and `bend` tells where a yarn folds. What overlap is left [`overlap`] measures.
+//! tile push each other apart until they touch, and `bend` tells where a yarn folds. What overlap is left [`overlap`] measures, and
+//! `crowded` tells of much.
 //!
 //! [`overlap`]: crate::geometry::overlap
 //! What happens by chance (how pile leans, where a fringe ends) is a function of its place: the same description gives the
@@ -10,6 +11,7 @@
 
 mod bend;
 pub mod chart;
+mod crowded;
 pub mod draft;
 pub mod knit;
 pub mod knitspeak;

@@ -10,7 +10,7 @@ use crate::{
     pattern::{
         PatternStrand,
         draft::{Draft, DraftError},
-        weave::{self, Extent, Impossible, Measures, Weave, whole_pairs},
+        weave::{self, Edges, Extent, Impossible, Measures, Weave, whole_pairs},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Yarn, drawn_draft::Legend, palette},
@@ -57,7 +57,7 @@ pub(super) struct WeaveArgs {
     #[arg(long, value_name = "X", value_parser = share)]
     crimp: Option<f64>,
     /// Cut all around (the default), with selvedges at the sides, with a fringe or with hems.
-    #[arg(long, value_parser = named(&weave::Edges::NAMES))]
+    #[arg(long, value_parser = named(&Edges::NAMES))]
     edges: Option<weave::EdgesOf>,
     /// Whole repeats, cut all around: cloth that goes on at one border as it begins at the other.
     #[arg(long, conflicts_with = "edges")]
@@ -110,7 +110,7 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
         // Curve files know round yarns only.
         flatten: 1.0,
         points: args.points,
-        edges: args.edges.map_or(weave::Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
+        edges: args.edges.map_or(Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
         pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
         draft,
         shuttles: file.as_ref().map(|f| weave::shuttles(&f.colors[1])).unwrap_or_default(),
@@ -146,6 +146,11 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
     }
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     let strands = cloth.strands();
+    if !args.output.quiet {
+        cloth.too_low_for_hems(1.0).into_iter().chain(cloth.crowded(&strands)).for_each(|told| {
+            log::say(&format!("warning: {told}"));
+        });
+    }
     let [warp, weft] = weave::yarn_lengths(&strands);
     write(strands, &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
     if !args.output.quiet {

@@ -113,9 +113,12 @@ fn bulge(thickness: f64) -> f64 {
     (FOLDED + 0.5) * thickness
 }
 
-/// Whether hems at both ends of cloth that is so high when it is hemmed do not reach each other.
-pub(super) fn has_room_for_hems(height: f64, thickness: f64) -> bool {
-    2.0 * (HEM[0] * FOLDED * thickness + bulge(thickness)) < height
+/// How high cloth is at least when it is hemmed at both ends: as far as a hem and the fold inside of it reach, twice, and one
+/// thickness between them.
+pub(super) fn least_hemmed(thickness: f64) -> f64 {
+    // The fold is half as deep as its layers are apart, and half the cloth lies outside of its middle.
+    let fold = 0.5 * FOLDED + 0.5;
+    2.0 * (HEM[0] * FOLDED + fold) * thickness + 2.0 * bulge(thickness) + thickness
 }
 
 /// Wefts that a hem takes at each end, beside those of cloth as high as it is when it is hemmed.

@@ -4,6 +4,7 @@
 //! Structure", 1937), flatten at the same area (Kemp, "An Extension of Peirce's Cloth Geometry", 1958), and are as close
 //! as the loom beats them up, unless spacings or a cover are given.
 
+mod crowded;
 mod edges;
 mod intrusion;
 mod minimize;
@@ -142,6 +143,13 @@ pub struct Measures {
     pub size: [f64; 2],
     /// Length of all warps and of all wefts of the ground, cut all around; [`yarn_lengths`] counts edges and pile too.
     pub length: [f64; 2],
+}
+
+impl Measures {
+    /// How high the cloth is at least when it is [hemmed](Edges::Finished); lower cloth has selvedges.
+    pub fn least_hemmed(&self) -> f64 {
+        edges::least_hemmed(self.thickness)
+    }
 }
 
 /// Length of yarn of all warps and of all wefts, with what selvedges, hems, fringes and pile take.
@@ -489,10 +497,11 @@ impl Cloth<'_> {
     /// The yarns of the cloth: warps from left to right, those of the selvedges last, then wefts from bottom to top. Selvedges
     /// make one strand of the wefts of a shuttle, with the number of the first.
     pub fn strands(&self) -> Vec<PatternStrand> {
-        let Measures { thickness, size, .. } = self.measures();
+        let measures = self.measures();
+        let Measures { thickness, size, .. } = measures;
         let cut = self.weave.draft.cut_wefts();
         let edges = match self.weave.edges {
-            Edges::Finished if cut || !edges::has_room_for_hems(size[1], thickness) => Edges::Selvedge,
+            Edges::Finished if cut || measures.least_hemmed() > size[1] => Edges::Selvedge,
             edges => edges,
         };
         let hem = if edges == Edges::Finished { edges::hem_wefts(thickness, self.cell.spacing[1]) } else { 0 };

@@ -660,6 +660,11 @@ fn hems_have_room_or_are_left_out() {
     }
     let (small, flat) = made("plain", 5);
     assert!(small.nearest > 0.9 && flat > -3.0, "{small:?}, {flat}");
+    // The lowest cloth that has hems: one at the bottom and one at the top do not meet.
+    for draft in ["plain", "twill 2/2", "satin 5", "basket 2"] {
+        let lowest = (8..40).map(|wefts| made(draft, wefts)).find(|(_, folded)| *folded < -5.0).unwrap().0;
+        assert!(lowest.share < 0.02 && lowest.nearest > 0.7, "{draft}: {lowest:?}");
+    }
 }
 
 /// A distance given in another unit would have each yarn meet thousands of others.

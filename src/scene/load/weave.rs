@@ -35,6 +35,8 @@ pub(super) struct WeavePlan {
     header: Span,
     /// Whether spacings of warps and wefts are those of the draft's file.
     filed: [bool; 2],
+    /// Whether the scene asks for hems.
+    hems: bool,
 }
 
 /// Woven yarns.
@@ -62,11 +64,14 @@ impl WeavePlan {
     }
 
     /// Weaves it.
-    pub(super) fn make(&self, context: &Context<'_>) -> Option<Woven> {
+    pub(super) fn make(&self, context: &Context<'_>, warnings: &mut Vec<String>) -> Option<Woven> {
         let wrong = |problem: String, hint: &str| context.error(self.header, problem, Some(hint.to_owned()));
         match self.weave.relax() {
             Ok(cloth) => {
                 let strands = cloth.strands();
+                let low = cloth.too_low_for_hems(context.unit).filter(|_| self.hems);
+                let told = low.into_iter().chain(cloth.crowded(&strands));
+                warnings.extend(told.map(|told| format!("{}: {told}", self.name)));
                 let length = weave::yarn_lengths(&strands).map(|mm| mm / 1000.0);
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
@@ -219,6 +224,7 @@ pub(super) fn weave(
         name,
         header: table.header(),
         filed,
+        hems: edges == Edges::Finished && table.has("edges"),
     })
 }
 

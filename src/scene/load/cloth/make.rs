@@ -110,7 +110,7 @@ impl FabricPlan {
                     .collect::<Option<Vec<Made>>>()?
             }
             Source::Knit(plan) => vec![base.knit(plan, &keys.color, warnings)?],
-            Source::Weave(plan) => base.weave(&plan)?,
+            Source::Weave(plan) => base.weave(&plan, warnings)?,
             Source::Straight { count, length, spacing } => {
                 let curves = with_radius(straight(count, length, spacing), base.radius);
                 vec![Made::new(format!("{count} straight"), base.kind, curves, None)]
@@ -164,8 +164,8 @@ impl<'a> Base<'a> {
     }
 
     /// Warp and weft: apart if they are of different yarns.
-    fn weave(&self, plan: &WeavePlan) -> Option<Vec<Made>> {
-        let Woven { origin, sides, tufts: [warp_tufts, weft_tufts] } = plan.make(self.context)?;
+    fn weave(&self, plan: &WeavePlan, warnings: &mut Vec<String>) -> Option<Vec<Made>> {
+        let Woven { origin, sides, tufts: [warp_tufts, weft_tufts] } = plan.make(self.context, warnings)?;
         let [(warps, mut coordinates), (wefts, weft_coordinates)] = sides;
         let weft = self.named_or_own(plan.weft_yarn.as_deref())?;
         let [warp_radius, weft_radius] = plan.radii();
