@@ -1,6 +1,8 @@
 //! Lights of all kinds against closed forms and against each other.
 
-use crate::support::{Picture, SWATCH, render};
+use yarnray::image::exr::{self, ChannelSpec, ExrLayout, Line, Sample};
+
+use crate::support::{Picture, SWATCH, directory, render};
 
 /// The middle of a floor of albedo 0.8 at y = 0, seen straight from above; `more` are tables of lights.
 fn floor(more: &str, spp: u32) -> Picture {
@@ -27,12 +29,13 @@ fn a_floor_has_the_irradiance_of_the_closed_forms() {
         ("type = \"spot\"\nposition = [0, 10, 0]\nangle = 20\nintensity = 50", 0.5),
         ("type = \"point\"\nposition = [0, 3, 4]\nintensity = 50", 2.0 * 0.6),
         ("type = \"distant\"\ntowards = [0, 1, 1]\nirradiance = 2", 2f64.sqrt()),
+        ("type = \"distant\"\ntowards = [0, 1, 0]\nangular_radius = 60\nirradiance = 2", 2.0),
     ];
     let mut all = String::new();
     let mut sum = 0.0;
     for (light, irradiance) in lights {
         // A camera that looks through the lights sees the floor all the same.
-        let hidden = if light.contains("radius") || light.contains("size") { "\nvisible = false\n" } else { "\n" };
+        let hidden = if light.contains("\nradius") || light.contains("size") { "\nvisible = false\n" } else { "\n" };
         let table = format!("[[light]]\n{light}{hidden}");
         let got = floor(&table, 64).mean()[1];
         let want = 0.8 / pi * irradiance;
@@ -43,6 +46,34 @@ fn a_floor_has_the_irradiance_of_the_closed_forms() {
     // All at once.
     let got = floor(&all, 256).mean()[1];
     assert!((got / sum - 1.0).abs() < 0.02, "all lights: {got}, not {sum}");
+}
+
+/// Angles of any size are angles.
+#[test]
+fn a_sky_turns_by_whole_rounds() {
+    let sky = |rotate: &str| {
+        let folder = directory();
+        let path = folder.path().join("sky.exr");
+        let layout = ["R", "G", "B"].map(|name| ChannelSpec::new(name, Sample::F32));
+        exr::write(&path, &ExrLayout::new(8, 4, layout.into()), |_, lines| {
+            for (channel, line) in lines.iter_mut().enumerate() {
+                if let Line::Float(line) = line {
+                    line.iter_mut().enumerate().for_each(|(x, v)| *v = ((x + channel) % 3) as f32);
+                }
+            }
+        })
+        .unwrap();
+        floor(
+            &format!(
+                "[[light]]\ntype = \"environment\"\nimage = {:?}\nrotate = {rotate}\n",
+                path.display().to_string()
+            ),
+            8,
+        )
+        .mean()
+    };
+    assert_eq!(sky("30"), sky("-7170"));
+    assert!(sky("1e300").iter().all(|v| v.is_finite()));
 }
 
 #[test]
@@ -72,7 +103,7 @@ fn cloth_under_a_ball_of_light_is_as_under_a_disc_of_the_sky() {
     );
     let disc = format!(
         "{cloth}[[light]]\ntype = \"distant\"\ntowards = [0, 0.6, 0.8]\nangular_radius = 25\nirradiance = {}\n",
-        4.0 * std::f64::consts::PI * (1.0 - angle.cos())
+        2.0 * std::f64::consts::PI * angle.sin().powi(2)
     );
     let args = ["--spp", "1024"];
     let (ball, disc) = (render(&ball, &args), render(&disc, &args));

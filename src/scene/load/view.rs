@@ -194,7 +194,7 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
 fn environment(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
     let radiance = Rgb::from(table.rgb_or("radiance", [defaults::RADIANCE; 3], BRIGHT));
     let environment = Environment { radiance, image: None, visible: table.bool_or("visible", true) };
-    let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE)) as f32;
+    let turn = radians(table.f64_or("rotate", 0.0, Range::FINITE).rem_euclid(360.0)) as f32;
     let Some(path) = table.string("image") else {
         return Some(LightPlan::Ready(Light::Environment(environment)));
     };
