@@ -67,6 +67,10 @@ fn shards_make_the_picture_of_one_machine() {
     };
     assert_eq!(common(&whole), common(&merged));
     assert_eq!(merged.attribute("yarnray.parts"), Some(&Attribute::Whole(3)));
+    // A merged film goes on as a whole one does.
+    render(d, "--spp 14 --checkpoint merged.film --resume -o more.exr").good();
+    render(d, "--spp 14 -o want14.exr").good();
+    same(d, "want14.exr", "more.exr");
     // More shards than samples: some are empty.
     for i in 1..=5 {
         render(d, &format!("--spp 3 --shard {i}/5 -o s{i}.film")).good();
@@ -242,6 +246,13 @@ fn adaptive_renders_resume_and_do_not_depend_on_threads() {
     assert!((16.0..80.0).contains(&least) && most > 110.0 && (mean - 100.0).abs() < 2.0, "{least} {mean} {most}");
     let counts = image::read(&d.join("end.exr")).unwrap().channel("samples.count").unwrap().to_vec();
     assert!(counts.contains(&(least as f32)) && counts.contains(&(most as f32)));
+    // Not in parts, whichever comes first.
+    render(d, "--spp 20 --adaptive --crop 0,0,24,36 --checkpoint l.film -o l.exr").good();
+    render(d, "--spp 20 --crop 24,0,48,36 --checkpoint r.film -o r.exr").good();
+    for parts in ["l.film r.film", "r.film l.film"] {
+        let told = merge(d, &format!("{parts} --partial -o m.exr"));
+        assert!(told.status == Some(2) && told.stderr.contains("l.film was sampled adaptively"), "{}", told.stderr);
+    }
     // Its film is no even one's.
     let other = render(d, "--spp 100 --checkpoint c.film --resume -o b.exr").stderr;
     assert!(other.contains("render.adaptive: true there, false here"), "{other}");

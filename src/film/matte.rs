@@ -48,8 +48,8 @@ impl Matte {
         }
     }
 
-    /// Takes back what [`Self::save`] wrote for so many pixels: `None` if it is something else.
-    pub(super) fn load(&mut self, bytes: &[u8]) -> Option<()> {
+    /// Takes back what [`Self::save`] wrote for so many pixels, of a scene of so many fabrics: `None` if it is something else.
+    pub(super) fn load(&mut self, bytes: &[u8], fabrics: usize) -> Option<()> {
         let (words, []) = bytes.as_chunks::<4>() else { return None };
         let mut words = words.iter().map(|w| u32::from_le_bytes(*w));
         for counts in &mut self.pixels {
@@ -58,7 +58,8 @@ impl Matte {
                 let mut word = || words.next();
                 counts.push((ClothId { fabric: word()?, yarn: word()?, ply: word()? }, word()?));
             }
-            if !counts.is_sorted_by_key(|(id, _)| *id) {
+            let known = counts.iter().all(|(id, _)| (id.fabric as usize) < fabrics);
+            if !known || !counts.is_sorted_by_key(|(id, _)| *id) {
                 return None;
             }
         }
@@ -87,10 +88,11 @@ mod tests {
         let mut bytes = Vec::new();
         forward.save(&mut bytes);
         let mut again = Matte::new(2);
-        assert_eq!(again.load(&bytes), Some(()));
+        assert_eq!(again.load(&bytes, 1), Some(()));
         assert_eq!(again, forward);
-        assert_eq!(again.load(&bytes[..bytes.len() - 4]), None);
+        assert_eq!(again.load(&bytes, 0), None);
+        assert_eq!(again.load(&bytes[..bytes.len() - 4], 1), None);
         bytes.extend([0; 4]);
-        assert_eq!(again.load(&bytes), None);
+        assert_eq!(again.load(&bytes, 1), None);
     }
 }

@@ -296,15 +296,16 @@ impl Tile {
         self.matte.save(out);
     }
 
-    /// Takes back what [`Self::save`] wrote for a tile of this size and these layers: `None` if it is something else.
-    pub fn load(&mut self, mut bytes: &[u8]) -> Option<()> {
+    /// Takes back what [`Self::save`] wrote for a tile of this size and these layers, of a scene of so many fabrics: `None` if it
+    /// is something else.
+    pub fn load(&mut self, mut bytes: &[u8], fabrics: usize) -> Option<()> {
         let mut expected = 0;
         for_all_sums!(&self.sums, add_bytes, &mut expected);
         if bytes.len() < expected {
             return None;
         }
         for_all_sums!(&mut self.sums, load_all, &mut bytes);
-        self.matte.load(bytes)
+        self.matte.load(bytes, fabrics)
     }
 }
 

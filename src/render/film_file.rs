@@ -155,7 +155,7 @@ pub(crate) fn read(path: &Path) -> Result<(About, Job), ImageError> {
         tile.share = [12, 16].map(|k| f32::from_le_bytes(word(k)));
         let long = |k: usize| u64::from(u32::from_le_bytes(word(k + 4))) << 32 | u64::from(u32::from_le_bytes(word(k)));
         tile.rays = [20, 28].map(long);
-        tile.load(&bytes[TILE_EXTRA..]).is_some()
+        tile.load(&bytes[TILE_EXTRA..], header.about.frame.fabrics.len()).is_some()
     })?;
     let job = Job {
         film,
@@ -443,7 +443,10 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::SceneBuilder;
+    use crate::{
+        film::{ClothId, Sample},
+        scene::SceneBuilder,
+    };
 
     #[test]
     fn metadata_come_back_under_their_name_and_under_the_earlier_one() {
@@ -530,5 +533,15 @@ mod tests {
             bytes[first..first + 4].copy_from_slice(&length.to_le_bytes());
             assert!(problem(&bytes).is_some_and(|p| p.contains("tile 0 at byte")), "{length}");
         }
+        // A matte of cloth that the scene does not have.
+        let mut scene = scene;
+        scene.layers.cryptomatte = true;
+        let about = About::new(&scene, "4.3.3", Vec::new(), None);
+        let mut job = Job::new(&scene, None).unwrap();
+        let cloth = Some(ClothId { fabric: 7, yarn: 0, ply: 0 });
+        job.film.tiles_mut()[0].add(3, 0, &Sample { cloth, ..Sample::default() });
+        write(&path, &about, &job).unwrap();
+        let told = read(&path).map(drop).unwrap_err().to_string();
+        assert!(told.contains("tile 0 at byte"), "{told}");
     }
 }

@@ -50,8 +50,9 @@ impl From<ImageError> for MergeError {
     }
 }
 
-/// Keys in which parts of one render may differ.
-const OF_THE_PART: [&str; 2] = ["shard", "render.crop"];
+/// Keys in which parts of one render may differ, and the number of samples, which a shard names to fix its part and a whole film
+/// does not.
+const OF_THE_PART: [&str; 3] = ["shard", "render.crop", "render.spp"];
 
 /// Puts parts of a render together: shards of its samples, crops of its frame, or shards of crops.
 ///
@@ -114,16 +115,16 @@ pub(crate) fn merge(paths: &[PathBuf], partial: bool) -> Result<(About, Job), Me
 fn same_render(parts: &[(&Path, Header)]) -> Result<(), MergeError> {
     let keys = |h: &Header| -> Vec<(String, String)> {
         let mut keys = h.about.keys.clone();
-        keys.retain(|(key, _)| !OF_THE_PART.contains(&key.as_str()) && key != "render.spp");
+        keys.retain(|(key, _)| !OF_THE_PART.contains(&key.as_str()));
         keys.push(("render.spp".to_owned(), h.about.spp.to_string()));
         keys
     };
     let (first, header) = &parts[0];
     let wanted = keys(header);
-    if header.planned && parts.len() > 1 {
+    if let Some((path, _)) = parts.iter().find(|(_, h)| h.planned && parts.len() > 1) {
         return Err(MergeError::Parts(format!(
             "{} was sampled adaptively: what one machine would have sampled cannot be made from such parts",
-            first.display()
+            path.display()
         )));
     }
     for (path, header) in &parts[1..] {
