@@ -235,8 +235,9 @@ struct YarnrayOiioTexture {
     OIIO::TextureSystem::TextureHandle *handle;
 };
 
-FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, YarnrayOiioTexture **texture,
-                                       int32_t size[2], char *message, size_t message_size) {
+FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, uint64_t sample_limit,
+                                       YarnrayOiioTexture **texture, int32_t size[2], char *message,
+                                       size_t message_size) {
     return guarded(message, message_size, [&]() -> int32_t {
         std::string file(path), why;
         auto input = OIIO::ImageInput::open(file);
@@ -255,6 +256,11 @@ FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, Yarnr
         const bool ready = levels && spec.tile_width > 0 && spec.nchannels >= 3 && spec.alpha_channel < 0
                            && !is_srgb_encoded(spec);
         if (!ready) {
+            // All of it is read at once, in four channels where it has more.
+            if (uint64_t(spec.width) * uint64_t(spec.height) > sample_limit / uint64_t(spec.nchannels)) {
+                say(message, message_size, "too large to be read at once: make tiles and smaller levels of it with maketx");
+                return YARNRAY_OIIO_FAILED;
+            }
             if (!make_texture(file, copy, why)) {
                 say(message, message_size, why);
                 return YARNRAY_OIIO_FAILED;

@@ -265,7 +265,7 @@ impl TextureFile {
     ///
     /// # Errors
     /// [`OiioError`]
-    pub(crate) fn open(path: &Path, copy: &Path) -> Result<Self, OiioError> {
+    pub(crate) fn open(path: &Path, copy: &Path, sample_limit: usize) -> Result<Self, OiioError> {
         let face = face()?;
         let (path, copy) = (c_path(path)?, c_path(copy)?);
         let mut message = [0_u8; MESSAGE_SIZE];
@@ -276,6 +276,7 @@ impl TextureFile {
             face.yarnray_oiio_texture_open(
                 path.as_ptr(),
                 copy.as_ptr(),
+                sample_limit as u64,
                 &mut raw,
                 size.as_mut_ptr(),
                 message.as_mut_ptr().cast::<c_char>(),

@@ -2,7 +2,7 @@
 //!
 //! Reading ([`read`]) looks at what a file is, not at what it is called. EXR and PNG need nothing but this program;
 //! all else goes through OpenImageIO, which is loaded only then. Writing ([`exr::write`], [`output::write_colors`])
-//! asks for row after row, so that no second copy of the picture is needed, and a file appears whole or not at all
+//! asks for row after row, so that EXR and PNG need no second copy of the picture, and a file appears whole or not at all
 //! ([`whole_file::write`]).
 //!
 //! Colours are linear, with the primaries of Rec. 709, and associated with alpha wherever there is one.

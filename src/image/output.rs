@@ -11,20 +11,56 @@ use super::{
 };
 use crate::input::diagnostic::listed;
 
-/// The extensions that can be written.
-const EXTENSIONS: [(&str, Format); 11] = [
-    ("exr", Format::Exr),
-    ("png", Format::Png),
-    ("hdr", Format::Linear),
-    ("tif", Format::Linear),
-    ("tiff", Format::Linear),
-    ("jpg", Format::Screen),
-    ("jpeg", Format::Screen),
-    ("bmp", Format::Screen),
-    ("tga", Format::Screen),
-    ("ppm", Format::Screen),
-    ("webp", Format::Screen),
-];
+/// Files of one extension.
+struct Kind {
+    extension: &'static str,
+    format: Format,
+    /// Whether they hold alpha.
+    alpha: bool,
+    /// The most pixels across and down, where that is less than a render may have.
+    most: Option<usize>,
+}
+
+/// All that can be written.
+const KINDS: [Kind; 11] = {
+    const fn kind(extension: &'static str, format: Format) -> Kind {
+        Kind { extension, format, alpha: true, most: None }
+    }
+    const fn opaque(kind: Kind) -> Kind {
+        Kind { alpha: false, ..kind }
+    }
+    const fn at_most(most: usize, kind: Kind) -> Kind {
+        Kind { most: Some(most), ..kind }
+    }
+    [
+        kind("exr", Format::Exr),
+        kind("png", Format::Png),
+        opaque(kind("hdr", Format::Linear)),
+        kind("tif", Format::Linear),
+        kind("tiff", Format::Linear),
+        // libjpeg ends the process where there are more.
+        opaque(at_most(65_500, kind("jpg", Format::Screen))),
+        opaque(at_most(65_500, kind("jpeg", Format::Screen))),
+        kind("bmp", Format::Screen),
+        at_most(65_535, kind("tga", Format::Screen)),
+        opaque(kind("ppm", Format::Screen)),
+        at_most(16_383, kind("webp", Format::Screen)),
+    ]
+};
+
+impl Kind {
+    fn of(path: &Path) -> Result<&'static Self, ImageError> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        let known = |found: &str| KINDS.iter().find(|kind| kind.extension == found);
+        if let Some(kind) = extension.as_deref().and_then(known) {
+            return Ok(kind);
+        }
+        let problem =
+            extension.map_or_else(|| "it has no extension".to_owned(), |e| format!("unknown extension `{e}`"));
+        let known = listed(KINDS.map(|kind| kind.extension.to_owned()), "and");
+        Err(ImageError::unwritable(path, format!("{problem}; known are {known}")))
+    }
+}
 
 /// What kind of file the extension of a path asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,15 +81,7 @@ impl Format {
     /// # Errors
     /// [`ImageError::Write`], which lists the known extensions.
     pub fn of(path: &Path) -> Result<Self, ImageError> {
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-        let known = |found: &str| EXTENSIONS.iter().find(|(name, _)| *name == found).map(|(_, format)| *format);
-        if let Some(format) = extension.as_deref().and_then(known) {
-            return Ok(format);
-        }
-        let problem =
-            extension.map_or_else(|| "it has no extension".to_owned(), |e| format!("unknown extension `{e}`"));
-        let known = listed(EXTENSIONS.map(|(name, _)| name.to_owned()), "and");
-        Err(ImageError::unwritable(path, format!("{problem}; known are {known}")))
+        Kind::of(path).map(|kind| kind.format)
     }
 }
 
@@ -73,11 +101,25 @@ pub fn check_writable(path: &Path) -> Result<Format, ImageError> {
     Ok(format)
 }
 
+/// Checks that the format has room for a picture of this size; makes nothing.
+///
+/// # Errors
+/// [`ImageError::Write`].
+pub fn check_size(path: &Path, width: usize, height: usize) -> Result<(), ImageError> {
+    match Kind::of(path)? {
+        Kind { extension, most: Some(most), .. } if width.max(height) > *most => {
+            let problem = format!("{width} x {height} pixels: .{extension} has room for {most} across and down");
+            Err(ImageError::unwritable(path, problem))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes colours in the format that the extension names. `row` is asked for every row from the top and fills in
 /// associated linear RGBA.
 ///
-/// EXR, Radiance and TIFF get linear floats, and alpha if `display.alpha` (Radiance has none); `display` is for the
-/// others only.
+/// EXR, Radiance and TIFF get linear floats; the rest of `display` is for the others only. Alpha is written if
+/// `display.alpha`; formats without it (JPEG, PPM, Radiance) get the picture over black.
 ///
 /// # Errors
 /// [`ImageError::Write`]; then nothing has been left behind.
@@ -88,11 +130,12 @@ pub fn write_colors(
     display: &Display,
     mut row: impl FnMut(usize, &mut [[f32; 4]]),
 ) -> Result<(), ImageError> {
-    let format = Format::of(path)?;
-    let is_radiance = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
-    let channels = if display.alpha && !is_radiance { 4 } else { 3 };
+    check_size(path, width, height)?;
+    let &Kind { format, alpha, .. } = Kind::of(path)?;
+    let display = Display { alpha: display.alpha && alpha, ..*display };
+    let channels = if display.alpha { 4 } else { 3 };
     match format {
-        Format::Png => return png::write(path, width, height, display, row),
+        Format::Png => return png::write(path, width, height, &display, row),
         Format::Exr => {
             let channels = ["R", "G", "B", "A"][..channels].iter().map(|name| ChannelSpec::new(*name, Sample::F32));
             let layout = ExrLayout::new(width, height, channels.collect());

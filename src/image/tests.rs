@@ -480,6 +480,35 @@ mod with_openimageio {
         assert_eq!(entries(directory.path()), ["picture.hdr", "picture.tif"], "nothing else");
     }
 
+    /// Where a format has no alpha, the picture stands over black, as without it.
+    #[test]
+    fn formats_hold_what_they_have_room_for() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let alpha = Display { alpha: true, ..Display::default() };
+        for name in ["a.jpg", "a.ppm", "a.webp", "a.tga", "a.bmp"] {
+            let path = directory.path().join(name);
+            let of = |display: &Display| {
+                output::write_colors(&path, 16, 8, display, |_, row| row.fill([0.1, 0.25, 0.05, 0.5])).expect(name);
+                read(&path).expect(name)
+            };
+            let (with, without) = (of(&alpha), of(&Display::default()));
+            let has_alpha = with.channels.len() == 4;
+            assert_eq!(has_alpha, !["a.jpg", "a.ppm"].contains(&name), "{name}");
+            if !has_alpha {
+                assert_eq!(with.rgb().expect(name), without.rgb().expect(name), "{name}");
+            }
+        }
+        for (name, size) in [("w.jpg", 65_501), ("w.JPEG", 65_501), ("w.webp", 16_384), ("w.tga", 65_536)] {
+            let path = directory.path().join(name);
+            let told = [output::check_size(&path, 1, size), output::write_colors(&path, size, 1, &alpha, |_, _| {})];
+            for told in told.map(|told| told.expect_err(name).to_string()) {
+                assert!(told.contains(&format!("has room for {}", size - 1)), "{told}");
+            }
+            assert_eq!(output::check_size(&path, size - 1, 1), Ok(()), "{name}");
+        }
+        assert_eq!(output::check_size(Path::new("w.exr"), 1 << 20, 1), Ok(()));
+    }
+
     #[test]
     fn formats_for_a_screen_carry_the_srgb_curve() {
         let directory = tempfile::tempdir().expect("a directory");

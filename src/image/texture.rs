@@ -37,10 +37,13 @@ impl Texture {
             .prefix("yarnray-texture-")
             .tempdir()
             .map_err(|e| failed(format!("no place for a copy with smaller levels: {e}")))?;
-        let file = TextureFile::open(path, &folder.path().join("texture.exr")).map_err(|error| match error {
-            OiioError::Missing(_) => ImageError::Unsupported { path: path.into(), reason: error.to_string() },
-            _ => failed(error.to_string()),
-        })?;
+        let file =
+            TextureFile::open(path, &folder.path().join("texture.exr"), super::SAMPLE_LIMIT).map_err(|error| {
+                match error {
+                    OiioError::Missing(_) => ImageError::Unsupported { path: path.into(), reason: error.to_string() },
+                    _ => failed(error.to_string()),
+                }
+            })?;
         Ok(Self { file, hash, _folder: folder })
     }
 

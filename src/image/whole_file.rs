@@ -17,12 +17,13 @@ use crate::input::system::in_words;
 /// # Errors
 /// [`ImageError::Write`].
 pub fn check(path: &Path) -> Result<(), ImageError> {
-    check_target(path)?;
-    if is_special(path) {
+    let target = behind_links(path);
+    check_target(&target)?;
+    if is_special(&target) {
         return Ok(());
     }
     // Dropped at once, and with that removed.
-    temporary(path).map(drop)
+    temporary(&target).map(drop)
 }
 
 /// Writes a file so that it is seen whole or not at all: the content goes to a temporary file beside it, which takes

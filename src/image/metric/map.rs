@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{EPSILON, Pair};
+use super::{Pair, relative_square};
 use crate::image::{ImageError, png, png::srgb_to_linear};
 
 /// Height of the strip with the scale, in pixels.
@@ -10,12 +10,12 @@ const STRIP: usize = 26;
 /// Edge of a dot of a figure, in pixels.
 const DOT: usize = 2;
 
-/// |test - reference| / sqrt(reference^2 + [`EPSILON`]) at every pixel, the root of the mean over channels of its square:
-/// the root of a pixel's relMSE. 0 where a pixel does not count.
+/// |test - reference| / sqrt(reference^2 + [`EPSILON`](super::EPSILON)) at every pixel, the root of the mean over channels of
+/// its square: the root of a pixel's relMSE. 0 where a pixel does not count.
 pub fn relative_error(pair: &Pair) -> Vec<f32> {
     let mut out = vec![0.0; pair.counted.len()];
     for (i, test, reference) in pair.pixels() {
-        let square = |k: usize| (test[k] - reference[k]).powi(2) / (reference[k] * reference[k] + EPSILON);
+        let square = |k: usize| relative_square(test[k], reference[k]);
         out[i] = ((0..3).map(square).sum::<f64>() / 3.0).sqrt() as f32;
     }
     out
