@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     obj,
-    stage::{PrimPattern, Stage},
+    stage::{MeshChoice, Stage},
 };
 use crate::geometry::mesh::Mesh;
 
@@ -39,7 +39,7 @@ impl MeshFacts {
     /// # Errors
     /// What is wrong with the stage.
     pub(crate) fn of_stage(stage: &Stage) -> Result<Option<Self>, String> {
-        let polygons = stage.mesh(&PrimPattern::all(), None).map_err(|e| e.to_string())?;
+        let polygons = stage.mesh(&MeshChoice::all(), None).map_err(|e| e.to_string())?;
         let groups = polygons.groups.iter().map(|group| group.name.clone()).collect();
         Ok(Self::of(&polygons.to_mesh(), groups, stage.unit_mm()))
     }

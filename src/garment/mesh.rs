@@ -142,10 +142,13 @@ impl GarmentMesh {
             return Err(GarmentError::at(0, "a mesh without texture coordinates", hint));
         }
         let mut mesh = Self { points: given.points.clone(), notes: given.notes.clone(), ..Self::default() };
-        // Which group and which material's subset each face is in, from 1.
+        // Which group and which second one each face is in first, from 1.
         let mut names = vec![[0; 2]; given.counts.len()];
         for (group, number) in given.groups.iter().zip(1..) {
-            group.faces.iter().for_each(|&f| names[f as usize][usize::from(group.of_material)] = number);
+            for &face in &group.faces {
+                let own = &mut names[face as usize][usize::from(group.is_second)];
+                *own = if *own == 0 { number } else { *own };
+            }
         }
         let name = |number: usize| given.groups.get(number.wrapping_sub(1)).map_or("", |group| &group.name);
         let mut parts: HashMap<[usize; 2], u32> = HashMap::new();

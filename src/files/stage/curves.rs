@@ -103,7 +103,7 @@ impl Batch {
             if kind.basis == StageBasis::Bezier && !kind.bezier_count_fits(count) {
                 let rule =
                     if kind.wrap == Wrap::Periodic { "a multiple of 3" } else { "one more than a multiple of 3" };
-                return Err(Problem::new(format!("curve {i} has {count} points; of a bezier curve it is {rule}")));
+                return Err(Problem::unknown(format!("curve {i} has {count} points; of a bezier curve it is {rule}")));
             }
             total = total.saturating_add(count);
         }

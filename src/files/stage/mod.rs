@@ -22,8 +22,8 @@ use std::{
 use glam::DMat4;
 
 pub use polygons::{FaceGroup, PolygonMesh};
-pub use select::PrimPattern;
 pub(crate) use select::glob;
+pub use select::{MeshChoice, PrimPattern};
 #[cfg(feature = "usd")]
 pub use usd::write::{CurvesOut, Interpolated, write};
 
@@ -57,11 +57,18 @@ impl std::error::Error for StageError {}
 struct Problem {
     object: Option<String>,
     text: String,
+    /// Whether the object is of a kind that is not read, and sound as far as can be told.
+    unknown: bool,
 }
 
 impl Problem {
     fn new(text: impl Into<String>) -> Self {
-        Self { object: None, text: text.into() }
+        Self { object: None, text: text.into(), unknown: false }
+    }
+
+    /// Of an object of a kind that is not read: what is beside it is read all the same.
+    fn unknown(text: impl Into<String>) -> Self {
+        Self { unknown: true, ..Self::new(text) }
     }
 
     fn at(mut self, object: &str) -> Self {
@@ -140,8 +147,8 @@ trait Format: fmt::Debug {
 enum Take<'a> {
     /// The curves of one object, with its path and transform.
     Curves(&'a mut AddCurves<'a>),
-    /// One mesh, already in the space of the stage, with its path.
-    Meshes(&'a mut AddMesh<'a>),
+    /// One mesh, already in the space of the stage, with its path; and by which set of texture coordinates, where one is named.
+    Meshes(&'a mut AddMesh<'a>, Option<&'a str>),
 }
 
 /// Extensions of stages.
@@ -227,12 +234,12 @@ impl Stage {
         Ok((set, objects))
     }
 
-    /// All visible meshes that `pattern` chooses, as one, at a frame (at the earliest if `None`); faces of an object
-    /// without subsets are a group of its name.
+    /// All visible meshes that are chosen, as one, at a frame (at the earliest if `None`). Faces of an object, and of its
+    /// subsets, are groups of their names.
     ///
     /// # Errors
     /// What is chosen is damaged, or is more than is read at once.
-    pub fn mesh(&self, pattern: &PrimPattern, frame: Option<f64>) -> Result<PolygonMesh, StageError> {
+    pub fn mesh(&self, choice: &MeshChoice, frame: Option<f64>) -> Result<PolygonMesh, StageError> {
         let mut all = PolygonMesh::default();
         let mut add = |path: &str, mesh: PolygonMesh| {
             all.append(mesh);
@@ -241,7 +248,7 @@ impl Stage {
             }
             Ok(())
         };
-        let notes = self.format.visit(pattern, frame, &mut Take::Meshes(&mut add));
+        let notes = self.format.visit(&choice.prims, frame, &mut Take::Meshes(&mut add, choice.uv.as_deref()));
         all.warnings.extend(notes.map_err(|p| p.in_file(&self.path))?);
         Ok(all)
     }

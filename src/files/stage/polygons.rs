@@ -14,8 +14,9 @@ pub struct FaceGroup {
     pub name: String,
     /// Indices of faces.
     pub faces: Vec<u32>,
-    /// Whether it is there for a material to be bound to: the same faces may be in another group as well.
-    pub of_material: bool,
+    /// Whether its faces are in another group as well: it is there for a material to be bound to, or is an object of which each
+    /// face has a group.
+    pub is_second: bool,
 }
 
 /// Polygons, in the space of the stage.
@@ -145,26 +146,29 @@ impl PolygonMesh {
         Ok(())
     }
 
-    /// Puts faces of no group into one of this name.
+    /// Puts faces of no group into one of this name; where there are none such, all faces are a second group.
     pub(super) fn group_the_rest(&mut self, name: &str) {
         let mut taken = vec![false; self.counts.len()];
-        let own = self.groups.iter().filter(|group| !group.of_material);
+        let own = self.groups.iter().filter(|group| !group.is_second);
         own.flat_map(|group| &group.faces).for_each(|&f| taken[f as usize] = true);
         let rest: Vec<u32> = (0..self.counts.len() as u32).filter(|&f| !taken[f as usize]).collect();
-        if !rest.is_empty() {
-            self.groups.push(FaceGroup { name: name.to_owned(), faces: rest, of_material: false });
+        let is_second = rest.is_empty();
+        let faces: Vec<u32> = if is_second { (0..self.counts.len() as u32).collect() } else { rest };
+        let is_there = is_second && self.groups.iter().any(|group| group.name == name);
+        if !is_there && !faces.is_empty() {
+            self.groups.push(FaceGroup { name: name.to_owned(), faces, is_second });
         }
     }
 
-    /// Adds a group of these faces, or one `of_material`.
-    pub(super) fn add_group(&mut self, name: &str, faces: &[i64], of_material: bool) -> Result<(), Problem> {
+    /// Adds a group of these faces.
+    pub(super) fn add_group(&mut self, name: &str, faces: &[i64], is_second: bool) -> Result<(), Problem> {
         let count = self.counts.len();
         let known = |&face: &i64| {
             let face = usize::try_from(face).ok().filter(|&f| f < count).map(|f| f as u32);
             face.ok_or_else(|| Problem::new(format!("subset {name} names a face that is none of {count}")))
         };
         let faces = faces.iter().map(known).collect::<Result<_, _>>()?;
-        self.groups.push(FaceGroup { name: name.to_owned(), faces, of_material });
+        self.groups.push(FaceGroup { name: name.to_owned(), faces, is_second });
         Ok(())
     }
 
@@ -328,7 +332,7 @@ mod tests {
         all.append(bare);
         assert_eq!((all.points.len(), all.corners[4], all.uv_corners.len()), (8, 4, 8));
         assert_eq!(all.uvs[all.uv_corners[7] as usize], DVec2::ZERO);
-        assert_eq!(all.groups[1], FaceGroup { name: "b".into(), faces: vec![1], of_material: false });
+        assert_eq!(all.groups[1], FaceGroup { name: "b".into(), faces: vec![1], is_second: false });
     }
 
     #[test]

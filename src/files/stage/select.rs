@@ -55,6 +55,22 @@ impl PrimPattern {
     }
 }
 
+/// Which meshes of a stage are meant, and by which of their texture coordinates.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshChoice {
+    /// The meshes.
+    pub prims: PrimPattern,
+    /// Name of a set of texture coordinates, without `primvars:`; the usual one if absent.
+    pub uv: Option<String>,
+}
+
+impl MeshChoice {
+    /// Every mesh, by its usual texture coordinates.
+    pub fn all() -> Self {
+        Self { prims: PrimPattern::all(), uv: None }
+    }
+}
+
 /// Whether a path is one that the pattern means; what lies below it is chosen on the way down.
 fn path_matches(pattern: &[String], path: &str) -> bool {
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     files::{
         obj,
-        stage::{self, PolygonMesh, PrimPattern, Stage},
+        stage::{self, MeshChoice, PolygonMesh, PrimPattern, Stage},
     },
     geometry::{mesh::Mesh, polygon},
     image::texture::Texture,
@@ -127,7 +127,7 @@ struct MeshFile {
     /// Whether z points up, where the scene says so.
     z_up: Option<bool>,
     /// Which meshes of a stage.
-    prim: Option<PrimPattern>,
+    choice: MeshChoice,
     frame: u32,
 }
 
@@ -163,11 +163,12 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
             let span = table.span("path").unwrap_or(table.header());
             let unit = table.one_of("unit", &UNITS);
             let z_up = table.one_of("up", &[("y", false), ("z", true)]);
-            let prim = prim_pattern(&table, "prim");
+            let choice = mesh_choice(&table);
             smooth = table.bool_or("smooth", false);
             let path = context.resolve(path, span);
             refuse_prim(&table, "prim", &path);
-            Some(Source::File(MeshFile { path, span, unit, z_up, prim, frame }))
+            refuse_prim(&table, "uv", &path);
+            Some(Source::File(MeshFile { path, span, unit, z_up, choice, frame }))
         }
         (None, true) => shape(&table, context),
         (None, false) => {
@@ -242,12 +243,14 @@ fn profile(table: &Reader<'_>, context: &Context<'_>) -> Option<Vec<DVec2>> {
 fn of_stage(
     (context, span): (&Context<'_>, Span),
     path: &Path,
-    prim: Option<&PrimPattern>,
+    choice: &MeshChoice,
     frame: f64,
 ) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
     let stage = context.stages.open(path).map_err(|e| e.to_string())?;
-    let mesh = polygons(&stage, path, prim, Some(frame))?;
+    let mesh = polygons(&stage, path, choice, Some(frame))?;
     warn(&mesh, path, (context, span));
+    // A garment's are in its report.
+    tell(&mesh.notes, path, (context, span));
     Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
 }
 
@@ -255,10 +258,10 @@ fn of_stage(
 pub(super) fn polygons(
     stage: &Stage,
     path: &Path,
-    prim: Option<&PrimPattern>,
+    choice: &MeshChoice,
     frame: Option<f64>,
 ) -> Result<PolygonMesh, String> {
-    let mesh = stage.mesh(prim.unwrap_or(&PrimPattern::all()), frame).map_err(|e| e.to_string())?;
+    let mesh = stage.mesh(choice, frame).map_err(|e| e.to_string())?;
     if mesh.counts.is_empty() {
         let known = stage.contents().map_err(|e| e.to_string())?.meshes;
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
@@ -271,9 +274,19 @@ pub(super) fn polygons(
 
 /// Says once what makes a mesh of this file other than it is meant.
 pub(super) fn warn(mesh: &PolygonMesh, path: &Path, (context, span): (&Context<'_>, Span)) {
-    for warning in &mesh.warnings {
+    tell(&mesh.warnings, path, (context, span));
+}
+
+fn tell(warnings: &[String], path: &Path, (context, span): (&Context<'_>, Span)) {
+    for warning in warnings {
         context.warning_once(span, format!("{}: {warning}", path.display()));
     }
+}
+
+/// `prim` and `uv`: which meshes of a stage, and by which texture coordinates.
+pub(super) fn mesh_choice(table: &Reader<'_>) -> MeshChoice {
+    let prims = prim_pattern(table, "prim").unwrap_or_else(PrimPattern::all);
+    MeshChoice { prims, uv: table.string("uv").map(str::to_owned) }
 }
 
 /// `prim`, or another key: which objects of a stage.
@@ -291,8 +304,14 @@ pub(super) fn prim_pattern(table: &Reader<'_>, key: &str) -> Option<PrimPattern>
 /// Refuses `prim`, or another key, of a file that has none.
 pub(super) fn refuse_prim(table: &Reader<'_>, key: &str, path: &Path) {
     if table.has(key) && !stage::is_stage(path) {
-        let problem = format!("`{key}` chooses meshes of a USD or Alembic file, which {} is not", path.display());
-        let hint = "leave it out: all faces of an OBJ file are taken, and `group` of a [[fabric.panel]] chooses panels";
+        let (what, hint) = match key {
+            "uv" => ("texture coordinates", "leave it out: an OBJ file has one set of them"),
+            _ => (
+                "meshes",
+                "leave it out: all faces of an OBJ file are taken, and `group` of a [[fabric.panel]] chooses panels",
+            ),
+        };
+        let problem = format!("`{key}` chooses {what} of a USD or Alembic file, which {} is not", path.display());
         table.error_at(key, problem, Some(hint));
     }
 }
@@ -368,7 +387,7 @@ impl MeshFile {
     fn read(&self, frame: u32, context: &Context<'_>) -> Option<(PathBuf, Mesh)> {
         let path = self.of_frame(frame);
         let read = if stage::is_stage(&path) {
-            of_stage((context, self.span), &path, self.prim.as_ref(), f64::from(frame))
+            of_stage((context, self.span), &path, &self.choice, f64::from(frame))
         } else {
             obj::read(&path).map(|mesh| (mesh, None, None)).map_err(|error| error.to_string())
         };

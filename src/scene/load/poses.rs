@@ -12,7 +12,7 @@ use super::{
 use crate::{
     files::{
         obj,
-        stage::{self, PolygonMesh, PrimPattern, Stage},
+        stage::{self, MeshChoice, PolygonMesh, Stage},
     },
     garment::{GarmentError, GarmentMesh},
     geometry::mesh::Mesh,
@@ -46,7 +46,7 @@ impl Moment {
     /// The garment, +y up, and millimetres per unit where the file says so.
     pub(super) fn garment(
         &self,
-        prim: Option<&PrimPattern>,
+        choice: &MeshChoice,
         z_up: Option<bool>,
         at: (&Context<'_>, Span),
     ) -> Result<(GarmentMesh, Option<f64>), GarmentError> {
@@ -59,14 +59,14 @@ impl Moment {
         }
         let stage = at.0.stages.open(&self.path).map_err(|error| GarmentError::new(error.to_string(), ""))?;
         let fail = |problem: String| GarmentError::new(problem, "a mesh with texture coordinates; `prim` chooses one");
-        let (mesh, unit) = self.of_stage(&stage, prim, z_up, at).map_err(fail)?;
+        let (mesh, unit) = self.of_stage(&stage, choice, z_up, at).map_err(fail)?;
         Ok((GarmentMesh::from_polygons(&mesh).map_err(|e| e.of(&self.path))?, unit))
     }
 
     /// The body, likewise.
     pub(super) fn body(
         &self,
-        prim: Option<&PrimPattern>,
+        choice: &MeshChoice,
         z_up: Option<bool>,
         at: (&Context<'_>, Span),
     ) -> Result<(Mesh, Option<f64>), String> {
@@ -78,18 +78,18 @@ impl Moment {
             return Ok((mesh, None));
         }
         let stage = at.0.stages.open(&self.path).map_err(|e| e.to_string())?;
-        let (mesh, unit) = self.of_stage(&stage, prim, z_up, at)?;
+        let (mesh, unit) = self.of_stage(&stage, choice, z_up, at)?;
         Ok((mesh.to_mesh(), unit))
     }
 
     fn of_stage(
         &self,
         stage: &Stage,
-        prim: Option<&PrimPattern>,
+        choice: &MeshChoice,
         z_up: Option<bool>,
         at: (&Context<'_>, Span),
     ) -> Result<(PolygonMesh, Option<f64>), String> {
-        let mut mesh = polygons(stage, &self.path, prim, self.frame.map(f64::from_bits))?;
+        let mut mesh = polygons(stage, &self.path, choice, self.frame.map(f64::from_bits))?;
         warn(&mesh, &self.path, at);
         if z_up.unwrap_or(stage.up_axis() == Some(2)) {
             mesh.points.iter_mut().chain(&mut mesh.normals).for_each(upright);

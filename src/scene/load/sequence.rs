@@ -101,30 +101,57 @@ fn of_stage(
     context: &Context<'_>,
     read: &mut impl FnMut(&Path, Option<f64>) -> Option<Curves>,
 ) -> Option<(PathBuf, Curves, FabricMotion)> {
-    let tell = |problem: String| {
-        let message = format!("{}: {problem}", file.path.display());
-        context.error(file.span, message, Some("yarns keep their points from frame to frame".to_owned()));
+    let path = file.path.display();
+    let tell = |time: f64, problem: String| {
+        let message = format!("{path}: at frame {time}: {problem}");
+        let hint =
+            "yarns keep their points while the shutter is open; shutter = [0, 0] shows them at the frame's own time";
+        context.error(file.span, message, Some(hint.to_owned()));
     };
     let Times { all: times, shown } = Times::of(detail);
     let curves = read(&file.path, Some(times[0]))?;
-    let mut later = Vec::with_capacity(times.len() - 1);
-    for &time in &times[1..] {
+    let mut later = Vec::with_capacity(shown - 1);
+    for &time in &times[1..shown] {
         let pose = read(&file.path, Some(time))?;
-        same_shape(&curves, &pose).map_err(tell).ok()?;
+        same_shape(&curves, &pose).map_err(|problem| tell(time, problem)).ok()?;
         later.push(points_of(pose));
     }
     let first = points_of(curves.clone());
-    let flow = moving_on(later.split_off(shown - 1));
+    // What is seen from the next frame on does not move until then.
+    let mut flow = Vec::new();
+    for &time in &times[shown..] {
+        let pose = read(&file.path, Some(time))?;
+        match same_shape(&curves, &pose) {
+            Ok(()) => flow.push(points_of(pose)),
+            Err(problem) => {
+                let message =
+                    format!("{path}: at frame {time}: {problem}: the layer of motion takes its yarns to stand still");
+                context.warning_once(file.span, message);
+                flow.clear();
+                break;
+            }
+        }
+    }
+    let flow = moving_on(flow);
     if later.iter().all(|points| *points == first) {
         later.clear();
     }
     check_moves(&later, &flow, file.span, detail, context)?;
-    let rest = match &file.rest {
-        Some(path) => read(path, None)?,
-        None => read(&file.path, None)?,
+    let rest = read(file.rest.as_deref().unwrap_or(&file.path), None)?;
+    let rest = match (same_shape(&curves, &rest), &file.rest) {
+        (Ok(()), _) => points_of(rest),
+        (Err(problem), Some(rest)) => {
+            let message = format!("{}: {problem}", rest.display());
+            context.error(file.span, message, Some("yarns at rest have the points that they have here".to_owned()));
+            return None;
+        }
+        (Err(problem), None) => {
+            let message = format!("{path}: in its first frame {problem}: plies wind as in the frame that is shown");
+            context.warning_once(file.span, message);
+            first.clone()
+        }
     };
-    same_shape(&curves, &rest).map_err(tell).ok()?;
-    let rest = Some(points_of(rest)).filter(|rest| *rest != first || !later.is_empty());
+    let rest = Some(rest).filter(|rest| *rest != first || !later.is_empty());
     Some((file.path.clone(), curves, FabricMotion { later, rest, flow }))
 }
 

@@ -10,7 +10,7 @@ use super::{
         motion::Aim,
         view::{CameraSetup, Focus, LensSetup},
     },
-    Context, Reader, Y_UP, motion,
+    Context, Reader, UNITS, Y_UP, motion,
 };
 use crate::files::stage::{Stage, StageCamera, StageError};
 
@@ -58,6 +58,8 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
     let path = table.required_string("path").map(|p| context.resolve(p, table.span("path").unwrap_or(table.header())));
     let prim = table.string("prim").map(str::to_owned);
     let fallback = Projection::Perspective(defaults::FIELD_OF_VIEW.to_radians());
+    let unit = table.one_of("unit", &UNITS);
+    let z_up = table.one_of("up", &[("y", false), ("z", true)]);
     let own_motion = motion::read(table, context, None, fallback);
     let path = path?;
     let [open, close] = own_motion.shutter.unwrap_or_default();
@@ -66,7 +68,10 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
         Some(prim) => prim,
         None => only_camera(&stage, table)?,
     };
-    match poses(&stage, &prim, f64::from(frame), [open, close]) {
+    // USD says both, Alembic neither.
+    let unit = unit.or(stage.unit_mm()).unwrap_or(context.unit);
+    let space = (unit, z_up.unwrap_or(stage.up_axis() == Some(2)));
+    match poses(&stage, &prim, f64::from(frame), [open, close], space) {
         Ok((own, around)) => {
             let Some(mut setup) = CameraSetup::aimed(own.aim, own.projection) else {
                 table.error_at("prim", "the camera has no direction", None);
@@ -117,9 +122,8 @@ fn poses(
     prim: &str,
     frame: f64,
     [open, close]: [f64; 2],
+    (unit, z_up): (f64, bool),
 ) -> Result<(Pose, Vec<(f64, Pose)>), StageError> {
-    let unit = stage.unit_mm().unwrap_or(1.0);
-    let z_up = stage.up_axis() == Some(2);
     let at = |frame: f64| stage.camera(prim, Some(frame)).map(|camera| Pose::new(&camera, unit, z_up));
     let own = at(frame)?;
     let first = (frame + open).floor() as i64 - FRAMES_AROUND;

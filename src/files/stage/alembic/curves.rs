@@ -37,14 +37,22 @@ impl Archive {
             (0, 1) => StageBasis::Bezier,
             (0, 2) => StageBasis::BSpline,
             (0, 3) => StageBasis::CatmullRom,
-            (0, other) => return Err(Problem::new(format!("cubic curves of basis {other} are not read"))),
+            (0, other) => return Err(Problem::unknown(format!("cubic curves of basis {other} are not read"))),
             (other, _) => {
-                return Err(Problem::new(format!("curves of type {other} are not read; linear and cubic are")));
+                return Err(Problem::unknown(format!("curves of type {other} are not read; linear and cubic are")));
             }
         };
         let wrap = if code(1) == 1 { Wrap::Periodic } else { Wrap::NonPeriodic };
-        let spread = spread_of(geometry.metadata("width"), Spread::Constant);
-        let widths = self.values(&geometry, "width", 1, time)?.map(|values| (values, spread));
+        let widths = self.values(&geometry, "width", 1, time)?.map(|values| {
+            // Some programs do not say how they are spread: then their number does.
+            let by_number = match values.len() {
+                1 => Spread::Constant,
+                n if 3 * n == points.len() => Spread::Vertex,
+                n if n == counts.len() => Spread::Uniform,
+                _ => Spread::Varying,
+            };
+            (values, spread_of(geometry.metadata("width"), by_number))
+        });
         let Labels { colors, ids, plies } = self.labels(&geometry, time)?;
         Ok(Some(Batch { basis, wrap, counts, points: vectors(&points, "P")?, widths, colors, ids, plies }))
     }
@@ -91,7 +99,7 @@ impl Archive {
     }
 
     /// How many numbers one value of a parameter has, however it is kept.
-    fn extent(&self, own: &Compound<'_>, name: &str) -> Result<Option<usize>, Problem> {
+    pub(super) fn extent(&self, own: &Compound<'_>, name: &str) -> Result<Option<usize>, Problem> {
         Ok(match own.compound(name, &self.metadata)? {
             Some(indexed) => indexed.extent(".vals"),
             None => own.extent(name),

@@ -1,7 +1,8 @@
 //! Alembic archives in the Ogawa container: curves and polygon meshes with their transforms.
 //!
 //! The layout was taken from the sources of Alembic 1.8 (lib/Alembic/AbcCoreOgawa and lib/Alembic/Ogawa). Archives have
-//! neither unit nor up axis; times are seconds, which count [`FRAMES_PER_SECOND`] frames here.
+//! neither unit nor up axis. Times are seconds; how many frames one has is what the archive says (`FramesPerTimeUnit`), or what
+//! the distance of its samples tells, or else [`FRAMES_PER_SECOND`].
 
 mod curves;
 mod ogawa;
@@ -21,8 +22,10 @@ use ogawa::{Bytes, Cursor, Group};
 pub(super) use ogawa::{HDF5_MAGIC, MAGIC};
 use property::Compound;
 
-/// Frames of a second where the archive does not say.
+/// Frames of a second where nothing tells them.
 const FRAMES_PER_SECOND: f64 = 24.0;
+/// Rates at which films and games run: samples so far apart are frames.
+const RATES: [f64; 8] = [24000.0 / 1001.0, 24.0, 25.0, 30000.0 / 1001.0, 30.0, 50.0, 60000.0 / 1001.0, 60.0];
 /// Objects that are read at most.
 const MAX_OBJECTS: usize = 1 << 22;
 
@@ -68,6 +71,7 @@ pub(super) struct Archive {
     samplings: Vec<TimeSampling>,
     /// Words that many headers share.
     metadata: Vec<String>,
+    frames_per_second: f64,
 }
 
 impl fmt::Debug for Archive {
@@ -96,7 +100,8 @@ impl Archive {
                 "is Alembic in the HDF5 container, which is not supported: convert it with `abcconvert -toOgawa IN OUT`",
             ));
         }
-        let mut archive = Self { bytes, samplings: Vec::new(), metadata: vec![String::new()] };
+        let mut archive =
+            Self { bytes, samplings: Vec::new(), metadata: vec![String::new()], frames_per_second: FRAMES_PER_SECOND };
         let root = Bytes(&archive.bytes).root()?;
         let mut samplings = Vec::new();
         let mut cursor = Cursor::new(root.data(4)?);
@@ -118,6 +123,8 @@ impl Archive {
             let length = cursor.u8()?;
             metadata.push(cursor.text(length.into())?);
         }
+        let of_archive = root.data(3).map(|own| String::from_utf8_lossy(own).into_owned()).unwrap_or_default();
+        archive.frames_per_second = frames_per_second(&of_archive, &samplings);
         (archive.samplings, archive.metadata) = (samplings, metadata);
         Ok(archive)
     }
@@ -141,7 +148,7 @@ impl Format for Archive {
             for (schema, name) in [(".geom", "P"), (".xform", ".vals")] {
                 let Some(own) = properties.compound(schema, &self.metadata)? else { continue };
                 if let Some((sampling, samples)) = own.times(name, &self.samplings).filter(|(_, n)| *n > 1) {
-                    let [first, last] = [0, samples - 1].map(|i| sampling.time(i) * FRAMES_PER_SECOND);
+                    let [first, last] = [0, samples - 1].map(|i| to_frame(sampling.time(i) * self.frames_per_second));
                     ends = Some(ends.map_or([first, last], |e| [e[0].min(first), e[1].max(last)]));
                 }
             }
@@ -166,26 +173,48 @@ impl Format for Archive {
     }
 
     fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem> {
-        let time = frame.map(|f| f / FRAMES_PER_SECOND);
+        let time = frame.map(|f| f / self.frames_per_second);
+        let mut notes = Vec::new();
         self.walk(pattern, time, &mut |object, visible| {
             let at = |p: Problem| p.at(&object.path);
             match (&mut *take, object.schema) {
-                (Take::Curves(add), CURVES) if visible => match self.batch(object, time).map_err(at)? {
-                    Some(batch) => add(&object.path, batch, &object.to_stage),
-                    None => Ok(()),
-                },
-                (Take::Meshes(add), MESH) if visible => match self.mesh(object, time).map_err(at)? {
+                (Take::Curves(add), CURVES) if visible => {
+                    let added = self.batch(object, time).and_then(|batch| match batch {
+                        Some(batch) => add(&object.path, batch, &object.to_stage),
+                        None => Ok(()),
+                    });
+                    match added.map_err(at) {
+                        Err(problem) if problem.unknown => {
+                            notes.push(format!("{} is left out: {}", object.path, problem.text));
+                            Ok(())
+                        }
+                        added => added,
+                    }
+                }
+                (Take::Meshes(add, uv), MESH) if visible => match self.mesh(object, time, *uv).map_err(at)? {
                     Some(mesh) => add(&object.path, mesh),
                     None => Ok(()),
                 },
                 _ => Ok(()),
             }
         })?;
-        Ok(Vec::new())
+        Ok(notes)
     }
 
-    fn camera(&self, _: &str, _: Option<f64>) -> Result<StageCamera, Problem> {
-        Err(Problem::new("cameras are read from USD, not from Alembic"))
+    fn camera(&self, path: &str, frame: Option<f64>) -> Result<StageCamera, Problem> {
+        let time = frame.map(|f| f / self.frames_per_second);
+        let mut found = None;
+        self.walk(&PrimPattern::all(), time, &mut |object, _| {
+            if object.schema == CAMERA && object.path == path {
+                found = self.lens(object, time).map_err(|p| p.at(path))?;
+            }
+            Ok(())
+        })?;
+        found.ok_or_else(|| {
+            let cameras = self.contents().map(|contents| contents.cameras).unwrap_or_default();
+            let known = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
+            Problem::new(format!("no camera at {path}; cameras here: {known}"))
+        })
     }
 }
 
@@ -197,7 +226,30 @@ impl Archive {
         walk.children(top, "", DMat4::IDENTITY, [false, true], 0, visit)
     }
 
-    fn mesh(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<PolygonMesh>, Problem> {
+    /// The camera that an object is; none where it has no lens.
+    fn lens(&self, object: &Object<'_>, time: Option<f64>) -> Result<Option<StageCamera>, Problem> {
+        let Some(geometry) = self.geometry(object)? else { return Ok(None) };
+        let Some(lens) = self.numbers(&geometry, ".core", time)? else { return Ok(None) };
+        // Millimetres, centimetres of aperture and offset across and up, and behind squeeze and overscan f-number and focus.
+        let &[focal_length, across, aside, up, above, _, _, _, _, _, f_stop, focus, ..] = lens.as_slice() else {
+            return Err(Problem::new(format!("a camera of {} numbers; 16 are expected", lens.len())));
+        };
+        if [focal_length, across, up].iter().any(|v| !(v.is_finite() && *v > 0.0)) || !(aside + above).is_finite() {
+            return Err(Problem::new("expected apertures and a focal length above 0"));
+        }
+        let axis = |i: usize| object.to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
+        Ok(Some(StageCamera {
+            to_stage: DMat4::from_cols(axis(0), axis(1), axis(2), object.to_stage.w_axis),
+            aperture: [10.0 * across, 10.0 * up],
+            offset: [10.0 * aside, 10.0 * above],
+            focal_length: Some(focal_length),
+            film_unit: 0.1,
+            f_stop: if f_stop.is_finite() { f_stop.max(0.0) } else { 0.0 },
+            focus_distance: if focus.is_finite() { focus.max(0.0) } else { 0.0 },
+        }))
+    }
+
+    fn mesh(&self, object: &Object<'_>, time: Option<f64>, set: Option<&str>) -> Result<Option<PolygonMesh>, Problem> {
         let Some(geometry) = self.geometry(object)? else { return Ok(None) };
         let integers = |name: &str| -> Result<Vec<i64>, Problem> {
             let around = geometry.at(name, time, &self.samplings)?;
@@ -205,9 +257,22 @@ impl Archive {
         };
         let points = vectors(&self.numbers(&geometry, "P", time)?.unwrap_or_default(), "P")?;
         let mut mesh = PolygonMesh::new(points, &integers(".faceCounts")?, &integers(".faceIndices")?)?;
-        if let Some(uv) = self.indexed(&geometry, "uv", time)? {
+        let sets = self.uv_sets(&geometry)?;
+        let chosen = match set {
+            Some(set) => Some(sets.iter().find(|(name, _)| name == set).ok_or_else(|| {
+                let known: Vec<&str> = sets.iter().map(|(name, _)| name.as_str()).collect();
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                Problem::new(format!("no texture coordinates `{set}`; there are: {known}"))
+            })?),
+            None => sets.first(),
+        };
+        if let Some((name, more)) = chosen
+            && let own = more.as_ref().unwrap_or(&geometry)
+            && let property = if more.is_some() { name.as_str() } else { "uv" }
+            && let Some(uv) = self.indexed(own, property, time)?
+        {
             let values = uv.values.chunks_exact(2).map(|p| DVec2::new(p[0], p[1])).collect();
-            let spread = spread_of(geometry.metadata("uv"), Spread::FaceVarying);
+            let spread = spread_of(own.metadata(property), Spread::FaceVarying);
             mesh.set_uvs(at_corners(&mesh, "uv", AtCorners { values, indices: uv.indices }, spread)?)?;
         }
         if let Some(n) = self.indexed(&geometry, "N", time)? {
@@ -230,6 +295,23 @@ impl Archive {
         // Alembic winds its faces clockwise.
         mesh.place(&object.to_stage, true)?;
         Ok(Some(mesh))
+    }
+
+    /// Sets of texture coordinates, the usual one first: their names, and where those are that programs add.
+    fn uv_sets<'a>(&self, geometry: &Compound<'a>) -> Result<Vec<(String, Option<Compound<'a>>)>, Problem> {
+        let mut sets = Vec::new();
+        if self.extent(geometry, "uv")?.is_some() {
+            let given = word(geometry.metadata("uv"), "sourceName").unwrap_or("uv");
+            sets.push((given.to_owned(), None));
+        }
+        if let Some(more) = geometry.compound(".arbGeomParams", &self.metadata)? {
+            for name in more.names() {
+                if self.extent(&more, name)? == Some(2) {
+                    sets.push((name.to_owned(), geometry.compound(".arbGeomParams", &self.metadata)?));
+                }
+            }
+        }
+        Ok(sets)
     }
 
     fn geometry<'a>(&self, object: &Object<'a>) -> Result<Option<Compound<'a>>, Problem> {
@@ -326,6 +408,23 @@ impl Archive {
         }
         Ok((matrix, inherits))
     }
+}
+
+/// How many frames a second has, by what an archive says of itself and by its times.
+fn frames_per_second(of_archive: &str, samplings: &[TimeSampling]) -> f64 {
+    let sound = |rate: &f64| rate.is_finite() && (1e-3..=1e6).contains(rate);
+    if let Some(told) = word(of_archive, "FramesPerTimeUnit").and_then(|rate| rate.trim().parse().ok()).filter(sound) {
+        return told;
+    }
+    // The first sampling is that of what does not change: a second long.
+    let even = samplings.iter().skip(1).filter(|s| s.times.len() == 1 && s.cycle > 0.0).map(|s| 1.0 / s.cycle);
+    let film = |rate: f64| RATES.into_iter().find(|known| (rate / known - 1.0).abs() < 1e-5);
+    even.filter_map(film).next().unwrap_or(FRAMES_PER_SECOND)
+}
+
+/// A frame; one that is whole but for rounding is whole.
+fn to_frame(frame: f64) -> f64 {
+    if (frame - frame.round()).abs() < 1e-6 * frame.abs().max(1.0) { frame.round() } else { frame }
 }
 
 const CURVES: &str = "AbcGeom_Curve_v2";

@@ -80,6 +80,11 @@ impl<'a> Compound<'a> {
         self.find(name).map_or("", |(_, header)| &header.metadata)
     }
 
+    /// The names of all properties.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.headers.iter().map(|header| header.name.as_str())
+    }
+
     /// How many numbers one value of a property has.
     pub(super) fn extent(&self, name: &str) -> Option<usize> {
         self.find(name).filter(|(_, h)| h.kind != Kind::Compound).map(|(_, header)| header.extent)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::super::{Contents, PrimPattern, Stage, StageError};
+use super::super::{Contents, MeshChoice, PrimPattern, Stage, StageError};
 use crate::geometry::curve::Basis;
 
 fn data() -> PathBuf {
@@ -90,13 +90,39 @@ fn curves_have_colours_and_numbers() {
 #[test]
 fn meshes_have_sides_groups_and_coordinates() {
     let stage = Stage::open(&data()).unwrap();
-    let mesh = stage.mesh(&PrimPattern::all(), None).unwrap();
+    let mesh = stage.mesh(&MeshChoice::all(), None).unwrap();
     assert_eq!((mesh.points.len(), mesh.counts.as_slice()), (5, [4, 3].as_slice()));
     // Alembic winds its faces the other way.
     assert_eq!(mesh.corners, [3, 2, 1, 0, 2, 4, 1]);
     assert_eq!(mesh.uv_corners, [3, 2, 1, 0, 2, 0, 1]);
     let groups: Vec<(&str, &[u32])> = mesh.groups.iter().map(|g| (g.name.as_str(), g.faces.as_slice())).collect();
     assert_eq!(groups, [("collar", [1].as_slice()), ("panels", [0].as_slice())]);
+}
+
+/// By what an archive says, else by the distance of its samples where that is one of film, else 24.
+#[test]
+fn archives_have_their_own_frames() {
+    use super::{TimeSampling, frames_per_second};
+    let even = |cycle: f64| TimeSampling { cycle, times: vec![0.0] };
+    let still = even(1.0);
+    let of = |words: &str, own: &[TimeSampling]| frames_per_second(words, &[std::slice::from_ref(&still), own].concat());
+    assert_eq!(of("_ai_Application=x;FramesPerTimeUnit=25.000000;_ai_Description=y", &[even(1.0 / 30.0)]), 25.0);
+    assert_eq!(of("", &[even(1.0 / 30.0)]), 30.0);
+    assert_eq!(of("", &[even(1001.0 / 24000.0)]), 24000.0 / 1001.0);
+    for own in [vec![], vec![even(0.37)], vec![TimeSampling { cycle: 1e200, times: vec![0.0, 0.04] }]] {
+        assert_eq!(of("FramesPerTimeUnit=none", &own), 24.0);
+    }
+    // Samples at frames are at frames, whatever the rate.
+    assert_eq!(
+        Stage::open(&data()).unwrap().frames(),
+        Stage::open(&data()).unwrap().frames().map(|f| f.map(f64::round))
+    );
+}
+
+#[test]
+fn cameras_that_are_not_there_are_told() {
+    let problem = Stage::open(&data()).unwrap().camera("/none", None).unwrap_err().to_string();
+    assert!(problem.contains("no camera at /none; cameras here: "), "{problem}");
 }
 
 #[test]
@@ -115,7 +141,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Contents, StageError> {
     std::fs::write(path, bytes).unwrap();
     let stage = Stage::open(path)?;
     stage.curves(&PrimPattern::all(), Some(1.0))?;
-    stage.mesh(&PrimPattern::all(), Some(1.0))?;
+    stage.mesh(&MeshChoice::all(), Some(1.0))?;
     stage.contents()
 }
 

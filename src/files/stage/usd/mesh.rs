@@ -9,22 +9,57 @@ use crate::files::stage::{
     polygons::{AtCorners, PolygonMesh},
 };
 
-/// Texture coordinates go by many names; the first of these that a mesh has counts.
-const UV_NAMES: [&str; 5] = ["primvars:st", "primvars:UVMap", "primvars:uv", "primvars:map1", "primvars:st0"];
+/// Texture coordinates go by many names; the first of these that a mesh has counts, before all others.
+const UV_NAMES: [&str; 5] = ["st", "UVMap", "uv", "map1", "st0"];
 
-/// Reads one prim into the space of the stage.
-pub(super) fn read(values: &Values<'_>, to_stage: &DMat4) -> Result<PolygonMesh, Problem> {
+/// Names of all sets of texture coordinates of a mesh, the usual one first.
+fn uv_sets(values: &Values<'_>) -> Result<Vec<String>, Problem> {
+    let mut sets = Vec::new();
+    for name in values.prim.property_names()? {
+        let Some(own) = name.as_str().strip_prefix("primvars:").filter(|own| !own.contains(':')) else { continue };
+        let kind = values.prim.attribute(name.as_str()).type_name()?;
+        let is_meant = kind.is_some_and(|kind| kind.as_str().starts_with("texCoord2"));
+        if is_meant || (UV_NAMES.contains(&own) && values.pairs(name.as_str())?.is_some()) {
+            sets.push(own.to_owned());
+        }
+    }
+    let place = |set: &String| UV_NAMES.iter().position(|name| name == set).unwrap_or(UV_NAMES.len());
+    sets.sort_by_cached_key(|set| (place(set), set.clone()));
+    Ok(sets)
+}
+
+/// Gives a mesh the texture coordinates of a set, or the usual ones.
+fn set_uvs(values: &Values<'_>, mesh: &mut PolygonMesh, asked: Option<&str>) -> Result<(), Problem> {
+    let sets = uv_sets(values)?;
+    let chosen = match asked {
+        Some(asked) if !sets.iter().any(|set| set == asked) => {
+            let known = if sets.is_empty() { "none".to_owned() } else { sets.join(", ") };
+            return Err(Problem::new(format!("no texture coordinates `{asked}`; there are: {known}")));
+        }
+        Some(asked) => asked,
+        None => {
+            let Some(first) = sets.first() else { return Ok(()) };
+            if sets.len() > 1 {
+                let (path, all) = (values.prim.path().as_str(), sets.join(", "));
+                mesh.notes
+                    .push(format!("{path}: of the texture coordinates {all} `{first}` are taken; `uv` names others"));
+            }
+            first
+        }
+    };
+    let name = format!("primvars:{chosen}");
+    let Some(uvs) = values.pairs(&name)? else { return Ok(()) };
+    let spread = at_corners(values, &name, uvs, mesh, Spread::Constant)?;
+    mesh.set_uvs(spread).map_err(|p| Problem::new(format!("`{name}`: {}", p.text)))
+}
+
+/// Reads one prim into the space of the stage, with the texture coordinates of this name, if one is given.
+pub(super) fn read(values: &Values<'_>, to_stage: &DMat4, uv: Option<&str>) -> Result<PolygonMesh, Problem> {
     let points = values.vectors("points")?.unwrap_or_default();
     let counts = values.integers("faceVertexCounts")?.unwrap_or_default();
     let corners = values.integers("faceVertexIndices")?.unwrap_or_default();
     let mut mesh = PolygonMesh::new(points, &counts, &corners)?;
-    for name in UV_NAMES {
-        if let Some(uvs) = values.pairs(name)? {
-            let spread = at_corners(values, name, uvs, &mesh, Spread::Constant)?;
-            mesh.set_uvs(spread).map_err(|p| Problem::new(format!("`{name}`: {}", p.text)))?;
-            break;
-        }
-    }
+    set_uvs(values, &mut mesh, uv)?;
     for name in ["primvars:normals", "normals"] {
         if let Some(normals) = values.vectors(name)? {
             let spread = at_corners(values, name, normals, &mesh, Spread::Vertex)?;
@@ -38,6 +73,14 @@ pub(super) fn read(values: &Values<'_>, to_stage: &DMat4) -> Result<PolygonMesh,
         if is_subset && own.token("elementType")?.is_none_or(|e| e == "face") {
             let of_material = own.token("familyName")?.is_some_and(|family| family == "materialBind");
             mesh.add_group(name_of(&child), &own.integers("indices")?.unwrap_or_default(), of_material)?;
+        }
+    }
+    // A material may be bound to all of it.
+    if let Some(material) = values.prim.relationship("material:binding").targets()?.first() {
+        let name = material.as_str().rsplit('/').next().unwrap_or_default();
+        if !mesh.groups.iter().any(|group| group.name == name) {
+            let all: Vec<i64> = (0..counts.len() as i64).collect();
+            mesh.add_group(name, &all, true)?;
         }
     }
     mesh.group_the_rest(name_of(values.prim));

@@ -127,7 +127,7 @@ impl Format for UsdStage {
                 let at = |p: Problem| p.at(&prim.path);
                 match (&mut *take, prim.kind.as_str()) {
                     (Take::Curves(add), "BasisCurves") => add(&prim.path, batch(values).map_err(at)?, to_stage)?,
-                    (Take::Meshes(add), "Mesh") => add(&prim.path, mesh::read(values, to_stage).map_err(at)?)?,
+                    (Take::Meshes(add, uv), "Mesh") => add(&prim.path, mesh::read(values, to_stage, *uv).map_err(at)?)?,
                     _ => return Ok(()),
                 }
                 if deformed(values).map_err(at)? {
@@ -292,6 +292,7 @@ impl Walk<'_> {
         let positions = values.vectors("positions")?.unwrap_or_default();
         let turns = values.rotations("orientations")?.unwrap_or_default();
         let scales = values.vectors("scales")?.unwrap_or_default();
+        // The crate has no way to `inactiveIds`, which is a metadatum.
         let hidden: HashSet<i64> = values.integers("invisibleIds")?.unwrap_or_default().into_iter().collect();
         let ids = values.integers("ids")?.unwrap_or_default();
         let count = indices.len();
@@ -353,9 +354,11 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
             return Err(Problem::new(format!("`wrap` is \"{other}\", expected nonperiodic, periodic or pinned")));
         }
     };
-    let widths = match values.numbers("widths")? {
-        Some(widths) => Some((widths, values.spread("widths", Spread::Vertex)?)),
-        None => None,
+    // The primvar wins over the attribute, as in USD's schema.
+    let widths = values.primvar("widths", |own, name| own.numbers(name), Spread::Constant)?;
+    let widths = match (widths, values.numbers("widths")?) {
+        (None, Some(widths)) => Some((widths, values.spread("widths", Spread::Vertex)?)),
+        (widths, _) => widths,
     };
     Ok(Batch {
         colors: colors(values)?,
@@ -371,25 +374,14 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
 
 /// `displayColor`, linear as USD has it.
 fn colors(values: &Values<'_>) -> Result<Option<(Vec<DVec3>, Spread)>, Problem> {
-    const NAME: &str = "primvars:displayColor";
-    let Some(colors) = values.vectors(NAME)? else { return Ok(None) };
-    let spread = values.spread(NAME, Spread::Constant)?;
-    let Some(indices) = values.integers("primvars:displayColor:indices")? else { return Ok(Some((colors, spread))) };
-    let known = |&index: &i64| usize::try_from(index).ok().and_then(|i| colors.get(i)).copied();
-    let given = indices.iter().map(known).collect::<Option<Vec<DVec3>>>();
-    let given = given.ok_or_else(|| Problem::new(format!("`{NAME}:indices` names none of {} values", colors.len())))?;
-    Ok(Some((given, spread)))
+    values.primvar("displayColor", |own, name| own.vectors(name), Spread::Constant)
 }
 
 fn ids(values: &Values<'_>, names: &[&str]) -> Result<Option<(Vec<i64>, Spread)>, Problem> {
-    for name in names {
-        let name = format!("primvars:{name}");
-        // Other programs keep other things under such names.
-        if let Ok(Some(ids)) = values.integers(&name) {
-            return Ok(Some((ids, values.spread(&name, Spread::Constant)?)));
-        }
-    }
-    Ok(None)
+    // Other programs keep other things under such names.
+    Ok(names
+        .iter()
+        .find_map(|name| values.primvar(name, |own, name| own.integers(name), Spread::Constant).ok().flatten()))
 }
 
 /// Any prim as one with a transform; where it has none, that is the identity.

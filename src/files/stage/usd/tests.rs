@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     files::{
         curve_file::{self, ReadOptions},
-        stage::Stage,
+        stage::{MeshChoice, Stage},
     },
     geometry::{
         chain::Chain,
@@ -301,12 +301,74 @@ fn holes_are_no_faces_and_skeletons_are_told() {
          interpolation = \"faceVarying\"\n)\nint[] primvars:skel:jointIndices = [0, 0, 0, 0, 0]\n\
          def GeomSubset \"a\" {\nint[] indices = [0, 1]\n}\ndef GeomSubset \"b\" {\nint[] indices = [1]\n}\n}\n",
     );
-    let mesh = stage.mesh(&PrimPattern::all(), None).unwrap();
+    let mesh = stage.mesh(&MeshChoice::all(), None).unwrap();
     assert_eq!((mesh.counts.as_slice(), mesh.corners.as_slice()), ([3, 3].as_slice(), [0, 1, 2, 0, 4, 1].as_slice()));
     assert_eq!(mesh.uvs[mesh.uv_corners[3] as usize].x, 7.0);
     let groups: Vec<(&str, &[u32])> = mesh.groups.iter().map(|g| (g.name.as_str(), g.faces.as_slice())).collect();
     assert_eq!(groups, [("a", [0].as_slice()), ("m", [1].as_slice())]);
     assert!(mesh.warnings.len() == 1 && mesh.warnings[0].starts_with("/m is as modelled"), "{:?}", mesh.warnings);
+}
+
+/// Sets of any name; the usual one unless another is asked for. A material bound to all faces names them all.
+#[test]
+fn texture_coordinates_are_chosen_and_materials_name_meshes() {
+    let mesh = |name: &str, sets: &[&str], more: &str| {
+        let set = |(i, name): (usize, &&str)| {
+            format!("texCoord2f[] primvars:{name} = [({i},0), (1,0), (0,1)] (\ninterpolation = \"vertex\"\n)\n")
+        };
+        let sets: String = sets.iter().enumerate().map(set).collect();
+        format!(
+            "def Mesh \"{name}\" {{\nint[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n\
+             point3f[] points = [(0,0,0), (1,0,0), (1,1,0)]\nuniform token subdivisionScheme = \"none\"\n{sets}{more}}}\n"
+        )
+    };
+    let stage = of_text(&format!(
+        "{}{}{}",
+        mesh("two", &["pattern", "st"], "rel material:binding = </looks/wool>\n"),
+        mesh("odd", &["flat"], ""),
+        mesh("none", &[], "")
+    ));
+    let read = |prim: &str, uv: Option<&str>| {
+        let choice = MeshChoice { prims: PrimPattern::parse(prim).unwrap(), uv: uv.map(str::to_owned) };
+        stage.mesh(&choice, None)
+    };
+    let usual = read("/two", None).unwrap();
+    assert_eq!((usual.uvs[0].x, usual.notes.len()), (1.0, 1));
+    assert!(usual.notes[0].contains("of the texture coordinates st, pattern `st` are taken"), "{:?}", usual.notes);
+    let groups: Vec<(&str, bool)> = usual.groups.iter().map(|g| (g.name.as_str(), g.is_second)).collect();
+    assert_eq!(groups, [("wool", true), ("two", false)]);
+    let asked = read("/two", Some("pattern")).unwrap();
+    assert_eq!((asked.uvs[0].x, asked.notes.len()), (0.0, 0));
+    assert_eq!(read("/odd", None).unwrap().uvs.len(), 3);
+    assert!(read("/none", None).unwrap().uvs.is_empty());
+    let wrong = read("/two", Some("uv")).unwrap_err().to_string();
+    assert!(wrong.ends_with("/two: no texture coordinates `uv`; there are: st, pattern"), "{wrong}");
+}
+
+/// The primvar of widths wins over the attribute, and what a prim above has of one value is of all below it.
+#[test]
+fn primvars_come_from_above() {
+    let curve = |name: &str, more: &str| {
+        format!(
+            "def BasisCurves \"{name}\" {{\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+             point3f[] points = [(0,0,0), (1,0,0)]\n{more}}}\n"
+        )
+    };
+    let constant = "(\ninterpolation = \"constant\"\n)\n";
+    let stage = of_text(&format!(
+        "def Xform \"top\" {{\ncolor3f[] primvars:displayColor = [(1, 0, 0)] {constant}float[] primvars:widths = [0.5] {constant}\
+         int[] primvars:yarnId = [9] {constant}{}{}def Xform \"own\" {{\ncolor3f[] primvars:displayColor = [(0, 1, 0)] (\n\
+         interpolation = \"vertex\"\n)\n{}}}\n}}\n",
+        curve("a", ""),
+        curve("b", "float[] widths = [0.1]\nfloat[] primvars:widths = [0.2]\nint[] primvars:yarnId = [3]\n"),
+        curve("c", "float[] widths = [0.1]\n")
+    ));
+    let (set, _) = stage.curves(&PrimPattern::all(), None).unwrap();
+    let radii: Vec<f64> = set.curves.iter().map(|c| c.radii.as_ref().unwrap()[0]).collect();
+    assert!(radii.iter().zip([0.25, 0.1, 0.25]).all(|(a, b)| (a - b).abs() < 1e-6), "{radii:?}");
+    assert_eq!(set.ids, [Some(9), Some(3), Some(9)]);
+    // Values along another prim's points are its own.
+    assert_eq!(set.colors, [Some([1.0, 0.0, 0.0]), Some([1.0, 0.0, 0.0]), None]);
 }
 
 #[test]
@@ -356,11 +418,14 @@ fn cameras_stand_where_they_are() {
 #[test]
 fn meshes_keep_corners_groups_and_sides() {
     let stage = open("mesh.usda");
-    let mesh = |pattern: &str| stage.mesh(&PrimPattern::parse(pattern).unwrap(), None).unwrap();
+    let mesh = |pattern: &str| {
+        stage.mesh(&MeshChoice { prims: PrimPattern::parse(pattern).unwrap(), uv: None }, None).unwrap()
+    };
     let panels = mesh("/panels");
     assert_eq!((panels.counts.as_slice(), panels.points.len()), ([4, 5, 3].as_slice(), 7));
     let groups: Vec<(&str, &[u32])> = panels.groups.iter().map(|g| (g.name.as_str(), g.faces.as_slice())).collect();
-    assert_eq!(groups, [("body", [0, 1].as_slice()), ("collar", [2].as_slice())]);
+    assert_eq!(groups, [("body", [0, 1].as_slice()), ("collar", [2].as_slice()), ("panels", [0, 1, 2].as_slice())]);
+    assert_eq!(panels.groups.iter().map(|g| g.is_second).collect::<Vec<_>>(), [false, false, true]);
     assert_eq!(panels.uv_corners, [0, 1, 2, 3, 1, 4, 5, 6, 2, 3, 7, 6]);
     assert_eq!(panels.uvs[7], glam::DVec2::new(7.0, 14.0));
     let flat = mesh("/flat");
@@ -434,7 +499,7 @@ fn damaged_files_are_errors() {
         std::fs::write(&path, bytes).unwrap();
         let read = |stage: Stage| {
             stage.curves(&PrimPattern::all(), None)?;
-            stage.mesh(&PrimPattern::all(), None)?;
+            stage.mesh(&MeshChoice::all(), None)?;
             stage.contents()
         };
         Stage::open(&path).and_then(read).map_err(|e| e.to_string())

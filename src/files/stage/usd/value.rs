@@ -112,6 +112,36 @@ impl Values<'_> {
         })
     }
 
+    /// A primvar and how its values are spread (`otherwise` where it does not say): without its indices, and that of the
+    /// nearest prim above where this one has none and that one's is constant.
+    pub(super) fn primvar<T: Copy>(
+        &self,
+        name: &str,
+        read: impl for<'b> Fn(&Values<'b>, &str) -> Result<Option<Vec<T>>, Problem>,
+        otherwise: Spread,
+    ) -> Result<Option<(Vec<T>, Spread)>, Problem> {
+        let name = format!("primvars:{name}");
+        if let Some(values) = read(self, &name)? {
+            let spread = self.spread(&name, otherwise)?;
+            let Some(indices) = self.integers(&format!("{name}:indices"))? else { return Ok(Some((values, spread))) };
+            let known = |&index: &i64| usize::try_from(index).ok().and_then(|i| values.get(i)).copied();
+            let given = indices.iter().map(known).collect::<Option<Vec<T>>>();
+            let wrong = || Problem::new(format!("`{name}:indices` names none of {} values", values.len()));
+            return Ok(Some((given.ok_or_else(wrong)?, spread)));
+        }
+        let mut above = self.prim.path().parent();
+        while let Some(path) = above.filter(|path| !path.is_abs_root()) {
+            let prim = self.prim.stage().prim(path.clone());
+            let own = Values { prim: &prim, time: self.time };
+            if let Some(values) = read(&own, &name)? {
+                let constant = own.spread(&name, Spread::Constant)? == Spread::Constant;
+                return Ok(constant.then_some((values, Spread::Constant)));
+            }
+            above = path.parent();
+        }
+        Ok(None)
+    }
+
     /// How a primvar's values are spread; `otherwise` where it does not say.
     pub(super) fn spread(&self, name: &str, otherwise: Spread) -> Result<Spread, Problem> {
         let written = self.prim.attribute(name).get_metadata::<Value>("interpolation")?.as_ref().and_then(token);

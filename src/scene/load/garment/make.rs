@@ -166,7 +166,7 @@ impl GarmentPlan {
         let mut read = BTreeMap::new();
         let mut own_unit = None;
         for moment in frames.moments() {
-            let found = moment.garment(self.prims[0].as_ref(), self.z_up, (context, self.span));
+            let found = moment.garment(&self.choices[0], self.z_up, (context, self.span));
             let (mesh, unit) = found.map_err(|error| self.tell(error, context)).ok()?;
             own_unit = unit;
             read.insert(moment.clone(), mesh);
@@ -357,7 +357,7 @@ impl GarmentPlan {
         let own = Frames::find(path, detail);
         let mut read: BTreeMap<Moment, Mesh> = BTreeMap::new();
         for moment in own.moments() {
-            match moment.body(self.prims[1].as_ref(), self.z_up, (context, *span)) {
+            match moment.body(&self.choices[1], self.z_up, (context, *span)) {
                 Ok((mut mesh, own_unit)) => {
                     // A body without a unit of its own has the garment's.
                     let own = context.unit_of((path, *span), own_unit, self.unit);

@@ -11,12 +11,15 @@ use super::{
     color::{self, ColorPlan},
     gauge::{per, stitch},
     known_yarns::{KnownYarns, thickness},
-    mesh::{prim_pattern, refuse_prim},
+    mesh::{mesh_choice, prim_pattern, refuse_prim},
     pattern::{self, Stranding},
     weave,
 };
 use crate::{
-    files::{curve_file, stage::PrimPattern},
+    files::{
+        curve_file,
+        stage::{MeshChoice, PrimPattern},
+    },
     garment::{Hem, HemKind, PanelChoice, SeamKind},
     input::diagnostic::Span,
     pattern::{
@@ -133,7 +136,7 @@ pub(super) struct GarmentPlan {
     near: Option<(DVec3, f64)>,
     body: Option<(PathBuf, Span)>,
     /// Which meshes of a stage are the garment, and which its body.
-    prims: [Option<PrimPattern>; 2],
+    choices: [MeshChoice; 2],
     /// Whether z points up, where the scene says so.
     z_up: Option<bool>,
     rules: Vec<Rule>,
@@ -151,7 +154,8 @@ pub(super) fn garment(
     let span = source.span("path").unwrap_or(source.header());
     let scale = source.f64_or("scale", 1.0, Range::POSITIVE);
     let unit = source.one_of("unit", &UNITS);
-    let prims = [prim_pattern(source, "prim"), prim_pattern(source, "body_prim")];
+    let body_prims = prim_pattern(source, "body_prim").unwrap_or_else(PrimPattern::all);
+    let choices = [mesh_choice(source), MeshChoice { prims: body_prims, uv: None }];
     let z_up = source.one_of("up", &[("y", false), ("z", true)]);
     let uv_unit = source.one_of("uv_unit", &UNITS);
     let seam = source.one_of("seam", &SEAMS);
@@ -163,6 +167,7 @@ pub(super) fn garment(
     });
     if let Some(path) = &path {
         refuse_prim(source, "prim", path);
+        refuse_prim(source, "uv", path);
         refuse_prim(source, "body_prim", body.as_ref().map_or(path, |(body, _)| body));
     }
     let near = source.table("near").and_then(|table| {
@@ -244,7 +249,7 @@ pub(super) fn garment(
     for panel in panels {
         rules.push(panel?);
     }
-    Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, near, body, prims, z_up, rules })
+    Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, near, body, choices, z_up, rules })
 }
 
 /// `group` or `panel` of a `[[fabric.panel]]`.
