@@ -27,11 +27,9 @@ impl Integrator<'_> {
         scratch: &mut Scratch,
         counters: &mut Counters,
     ) -> (bool, bool) {
-        if path.bounces >= self.max_bounces {
-            return (false, false);
-        }
         let here = place.centre + place.radius * hit.normal;
         if path.bounces == 0 {
+            sample.alpha = 1.0;
             sample.normal = hit.normal;
             sample.depth = (path.from - here).dot(self.back);
             self.sees(sample, here);
@@ -41,6 +39,9 @@ impl Integrator<'_> {
             self.describe(sample, fibers.fabric, fibers.material_index_at(hit.segment, hit.u), fibers.ply, || {
                 fibers.yarn_of(hit.segment)
             });
+        }
+        if path.bounces >= self.max_bounces {
+            return (false, false);
         }
         let [u_choice, u_x, u_y, u_roulette] = path.sampler.next4();
         let u = path.sampler.next4();

@@ -189,7 +189,6 @@ impl<'a> Integrator<'a> {
             }
             let hit = self.cloth.world().intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
-            let first = path.bounces == 0;
             if !self.area_lights.is_empty() {
                 let end = hit.as_ref().map_or(f32::INFINITY, |h| h.t).min(ground.map_or(f32::INFINITY, |g| g.1));
                 if self.area_lights(&path, end, &mut sample) {
@@ -217,9 +216,6 @@ impl<'a> Integrator<'a> {
                     };
                     if scattered {
                         cloth_events += 1;
-                        if first {
-                            sample.alpha = 1.0;
-                        }
                     }
                     go_on
                 }
@@ -339,12 +335,10 @@ impl<'a> Integrator<'a> {
             path.ray = Ray { done, ..Ray::new(behind, path.ray.direction) };
             return (path.passes < MOST_PASSES, false);
         }
-        if path.bounces >= self.max_bounces {
-            return (false, false);
-        }
         if path.bounces == 0
             && let Some(front) = scratch.crossings.first()
         {
+            sample.alpha = 1.0;
             sample.normal = section.to_world(front.normal(yarn.shape(), section));
             let point = section.point_on_ray(front.enter);
             sample.depth = (path.from - point).dot(self.back);
@@ -352,6 +346,9 @@ impl<'a> Integrator<'a> {
             let ply = yarns.first_ply + front.ply;
             let index = yarns.strands.material_index_at(hit.segment, hit.u);
             self.describe(sample, yarns.fabric, index, ply, || yarns.strands.yarn_of(hit.segment));
+        }
+        if path.bounces >= self.max_bounces {
+            return (false, false);
         }
         let u = path.sampler.next4();
         let [u_roulette, u_component, u_x, u_y] = path.sampler.next4();
