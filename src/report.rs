@@ -181,6 +181,7 @@ pub(crate) fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)>
     ]
     .map(|(name, value)| (format!("yarnray.{name}"), Attribute::Text(value)))
     .into_iter()
+    .chain(scene.render.frame.map(|frame| ("yarnray.frame".to_owned(), Attribute::Whole(frame as i32))))
     .chain(of_camera(scene))
     .collect()
 }

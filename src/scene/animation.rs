@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use crate::math::special::hermite;
 
-/// A path with the number of a frame in it: `####` becomes `0007`, `{frame}` becomes `7`. `None` for a path that has
-/// no place for a number, and so is the same for all frames.
+/// A path with the number of a frame in it: `####`, `%04d` and `$F4` become `0007`, `{frame}`, `%d` and `$F` become `7`. `None`
+/// for a path that has no place for a number, and so is the same for all frames.
 pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
-    let text = path.to_str()?;
+    let text = as_signs(path.to_str()?);
     if !text.contains('#') && !text.contains("{frame}") {
         return None;
     }
@@ -25,6 +25,41 @@ pub(crate) fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     }
     out.push_str(rest);
     Some(out.into())
+}
+
+/// A name whose places for numbers are all written with signs: `#` for each digit, `{frame}` for as many as there are.
+fn as_signs(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find(['%', '$']) {
+        let own = &rest[start..];
+        let (signs, length) = match place_of_number(own) {
+            Some((0 | 1, length)) => ("{frame}".to_owned(), length),
+            Some((digits, length)) => ("#".repeat(digits), length),
+            None => (own[..1].to_owned(), 1),
+        };
+        out.push_str(&rest[..start]);
+        out.push_str(&signs);
+        rest = &own[length..];
+    }
+    out.push_str(rest);
+    out
+}
+
+/// The digits that `%04d` or `$F4` at the beginning of a text asks for, and its length.
+fn place_of_number(text: &str) -> Option<(usize, usize)> {
+    const MOST: usize = 16;
+    let (after, around) = match text.strip_prefix("$F") {
+        Some(after) => (after, 2),
+        None => (text.strip_prefix('%')?, 2),
+    };
+    let digits = after.len() - after.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let ends = |rest: &str| !rest.starts_with(|c: char| c.is_ascii_alphabetic());
+    if text.starts_with('%') && !after[digits..].strip_prefix('d').is_some_and(ends) {
+        return None;
+    }
+    let width = if digits == 0 { 1 } else { after[..digits].parse().ok()? };
+    (width <= MOST).then_some((width, around + digits))
 }
 
 /// A sequence of numbered files, about one of its frames.
@@ -122,7 +157,13 @@ mod tests {
         let of = |path: &str| numbered(Path::new(path), 7).map(|p| p.display().to_string());
         assert_eq!(of("out/hat.####.exr").as_deref(), Some("out/hat.0007.exr"));
         assert_eq!(of("#/hat_{frame}.exr").as_deref(), Some("7/hat_7.exr"));
-        assert_eq!(of("hat.exr"), None);
+        for name in ["hat.%04d.exr", "hat.$F4.exr"] {
+            assert_eq!(of(name).as_deref(), Some("hat.0007.exr"));
+        }
+        assert_eq!(of("hat.%d.$F.exr").as_deref(), Some("hat.7.7.exr"));
+        for name in ["hat.exr", "100%.exr", "50%deep.exr", "$HOME.exr", "%99d.exr", "%04", "%", "$"] {
+            assert_eq!(of(name), None, "{name}");
+        }
         assert_eq!(numbered(Path::new("a#.b"), 1234), Some("a1234.b".into()));
     }
 
