@@ -284,6 +284,35 @@ fn time_stops_a_render() {
     assert!((0.9..3.0).contains(&seconds), "{seconds}");
     let (least, most) = (stats["image"]["spp_min"].as_u64().unwrap(), stats["image"]["spp_max"].as_u64().unwrap());
     assert!(least >= 1 && most < 1_000_000, "{least} {most}");
+    // No picture is no success.
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let run = yarnray(directory.path(), &["render", "s.toml", "--time", "1e-9", "-o", "x.png"]);
+    assert!(run.status == Some(2) && run.stderr.contains("no sample was taken in the time"), "{}", run.stderr);
+}
+
+/// A name that is no text is no reason to lose a render.
+#[test]
+fn names_need_not_be_text() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let directory = directory();
+    write(directory.path(), "s.toml", SWATCH);
+    let out = std::ffi::OsStr::from_bytes(b"o\xff.exr");
+    let status = program(directory.path()).args(["render", "s.toml", "-q", "--spp", "1", "-o"]).arg(out).status();
+    assert!(status.unwrap().success() && directory.path().join(out).exists());
+    let status = program(directory.path()).args(["compare"]).args([out, out]).stdout(Stdio::null()).status();
+    assert!(status.unwrap().success());
+}
+
+/// What cloth covers does not depend on whether light is followed.
+#[test]
+fn without_bounces_there_is_still_alpha() {
+    let scene = SWATCH.replace("fov = 25", "fov = 25\nmargin = 0.25");
+    let of = |bounces: &str| render(&scene, &["--spp", "4", "--max-bounces", bounces]);
+    let (dark, lit) = (of("0"), of("1"));
+    for channel in ["A", "depth.Z"] {
+        assert_eq!(dark.channel(channel), lit.channel(channel), "{channel}");
+    }
 }
 
 #[test]
@@ -403,6 +432,8 @@ fn numbers_below_zero_are_answered_by_the_option() {
     for (args, message) in [
         ("--spp -1", "invalid value '-1' for '--spp <N>'"),
         ("--crop -1,0,4,4", "invalid value '-1,0,4,4' for '--crop <X0,Y0,X1,Y1>': expected four whole numbers"),
+        ("--crop 5,5,2,2", "--crop 5,5,2,2: error"),
+        ("--shard -1/2", "invalid value '-1/2' for '--shard <I/N>'"),
         ("--frames -5..5", "invalid value '-5..5' for '--frames <A..B>': expected one frame or the first and the last"),
         ("--time -1", "`time` must be above 0, found -1"),
         ("--exposure nan", "expected a number of stops from -100 to 100"),
@@ -425,8 +456,24 @@ fn a_curve_file_is_no_scene() {
     for command in ["render", "converge"] {
         let run = yarnray(directory.path(), &[command, "g.bcc"]);
         assert_eq!(run.status, Some(2));
-        assert!(run.stderr.contains("g.bcc: error: a curve file is no scene\n"), "{}", run.stderr);
+        assert!(run.stderr.contains("g.bcc: error: a file of curves or meshes is no scene\n"), "{}", run.stderr);
         assert!(run.stderr.contains("--curves g.bcc"), "{}", run.stderr);
+    }
+    write(directory.path(), "g.usda", "#usda 1.0\n");
+    let run = yarnray(directory.path(), &["render", "g.usda"]);
+    assert!(
+        run.status == Some(2) && run.stderr.contains("g.usda: error: a file of curves or meshes"),
+        "{}",
+        run.stderr
+    );
+    // Options of scenes are for scenes.
+    for args in [["g.bcc", "--spp", "7"], ["g.bcc", "--set", "a=1"], ["s.toml", "--radius", "2"]] {
+        let run = yarnray(directory.path(), &[&["info"], &args[..]].concat());
+        assert!(
+            run.status == Some(2) && run.stderr.contains(&format!("{}: only", args[1])),
+            "{args:?}: {}",
+            run.stderr
+        );
     }
     let run = yarnray(directory.path(), &["render", "s.toml", "--curves", "t.obj", "-o", "x.png"]);
     assert_eq!(run.status, Some(2));

@@ -16,6 +16,7 @@ use crate::{
     image::{
         self, Image,
         metric::{Comparison, Pair, flip, map},
+        output::Format,
     },
     report::{
         compare::{METRICS, exceeds, metric, to_html, to_json, to_text},
@@ -154,9 +155,11 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
 
 /// The picture for a screen and the one of radiance, where the two are not of one kind.
 fn of_different_kinds(paths: [&PathBuf; 2]) -> Option<(String, String)> {
-    let is = |path: &Path, kinds: &[&str]| kinds.iter().any(|kind| has_extension(path, kind));
-    let shown = paths.map(|path| is(path, &["png", "jpg", "jpeg", "bmp", "tga"]));
-    let linear = paths.map(|path| is(path, &["exr", "hdr", "pfm"]));
+    let format = |path: &Path| Format::of(path).ok();
+    let shown = paths.map(|path| matches!(format(path), Some(Format::Png | Format::Screen)));
+    // A TIFF may be either.
+    let linear =
+        paths.map(|path| format(path) == Some(Format::Exr) || ["hdr", "pfm"].iter().any(|e| has_extension(path, e)));
     let (a, b) = match (shown, linear) {
         ([true, _], [_, true]) => (0, 1),
         ([_, true], [true, _]) => (1, 0),

@@ -69,6 +69,16 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<(), Failure> {
     if !(args.target.is_finite() && args.target > 0.0) {
         return Err(Failure::Input(format!("error: --target must be above 0, found {}", args.target)));
     }
+    let ignored = [
+        ("--mode", args.options.mode.is_some(), "--method MODE[:MODEL]"),
+        ("--noise", args.options.noise.is_some(), "--target says to which error times are told"),
+    ];
+    if let Some((option, _, hint)) = ignored.into_iter().find(|(_, given, _)| *given) {
+        return Err(Failure::hinted(
+            format!("{option}: `converge` measures methods at rising numbers of samples"),
+            hint,
+        ));
+    }
     let reference = match args.reference.as_str() {
         "none" => None,
         text => Some(Method::parse(text).map_err(|e| Failure::Input(format!("error: --reference {text}: {e}")))?),

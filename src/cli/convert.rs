@@ -117,8 +117,10 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
 
 pub(super) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     refuse_unknown(std::slice::from_ref(&args.output))?;
-    Files::default().reads("input", [&args.input]).writes("output", [&args.output]).check(args.quiet)?;
+    let files = Files::default().reads("input", [&args.input]).writes("output", [&args.output]);
+    files.refuse()?;
     let mut set = read(args)?;
+    files.check(args.quiet)?;
     if set.up_axis == Some(2) {
         // Files of this program have y up: a quarter turn about x.
         let points = set.curves.iter_mut().flat_map(|c| &mut c.points);

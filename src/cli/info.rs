@@ -60,6 +60,13 @@ pub(super) struct InfoArgs {
 
 pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let is_scene = has_extension(&args.file, "toml");
+    if let Some(option) = args.options.given().filter(|_| !is_scene) {
+        let problem = format!("{option}: only scenes take it, and {} is none", args.file.display());
+        return Err(Failure::hinted(problem, "leave it out, or name a scene (.toml)"));
+    }
+    if args.radius.is_some() && is_scene {
+        return Err(Failure::hinted("--radius: only files of curves take it", "--set yarn.NAME.radius=R"));
+    }
     let (report, text) = if film_file::is_film(&args.file) || is_film_path(&args.file) {
         film_report(&args.file)?
     } else if is_scene {

@@ -5,15 +5,24 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{
-    Failure,
+    Failure, command_line,
     files::{Attempts, Files},
     log::LogArgs,
-    render::is_film_path,
+    named,
+    render::{is_film_path, stops},
+    thread_pool,
 };
 use crate::{
-    image::{output, whole_file},
+    ffi::oidn::Denoiser,
+    image::{output, png::ToneMap, whole_file},
     math::words::counted,
-    render::{film_file, merge::merge, picture},
+    render::{
+        Job,
+        denoise::Denoised,
+        film_file::{self, About},
+        merge::merge,
+        picture,
+    },
     report,
 };
 
@@ -35,13 +44,29 @@ pub(super) struct MergeArgs {
     /// Merge what there is, even if samples or pixels are missing.
     #[arg(long)]
     partial: bool,
+    /// Add a denoised picture, by Open Image Denoise, as `render` does: of parts that were rendered with --denoise, or with the
+    /// layers albedo and normal.
+    #[arg(long)]
+    denoise: bool,
+    /// Curve of the picture for a screen, in place of the scene's.
+    #[arg(long, value_parser = named(&ToneMap::NAMES))]
+    tone_map: Option<ToneMap>,
+    /// Exposure of the picture for a screen, in stops, in place of the scene's.
+    #[arg(long, value_name = "STOPS", value_parser = stops)]
+    exposure: Option<f32>,
     #[command(flatten)]
     log: LogArgs,
 }
 
 pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     args.log.start();
-    Files::default().reads("PART", &args.parts).writes("-o", &args.out).check(false)?;
+    let beside: Vec<PathBuf> = args
+        .out
+        .iter()
+        .filter(|path| args.denoise && !is_film_path(path))
+        .filter_map(|p| picture::denoised_path(p))
+        .collect();
+    Files::default().reads("PART", &args.parts).writes("-o", &args.out).writes("--denoise", &beside).check(false)?;
     for path in &args.out {
         if is_film_path(path) {
             whole_file::check(path)?;
@@ -55,16 +80,25 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
             output::check_writable(path)?;
         }
     }
-    let (about, job) = merge(&args.parts, args.partial).map_err(|error| Failure::Input(format!("error: {error}")))?;
-    let command = std::env::args().collect::<Vec<_>>().join(" ");
+    let (mut about, job) =
+        merge(&args.parts, args.partial).map_err(|error| Failure::Input(format!("error: {error}")))?;
+    about.frame.display.tone_map = args.tone_map.unwrap_or(about.frame.display.tone_map);
+    about.frame.display.exposure = args.exposure.unwrap_or(about.frame.display.exposure);
+    let clean = if args.denoise { Some(denoised(&about, &job)?) } else { None };
+    let command = command_line();
     let attributes = report::merged_attributes(&about.metadata, &job, args.parts.len(), &command);
     let mut attempts = Attempts::default();
     for path in &args.out {
         let result = if is_film_path(path) {
             film_file::write(path, &about, &job)
         } else {
-            picture::write(path, &about.frame, &job.film, None, &attributes)
+            picture::write(path, &about.frame, &job.film, clean.as_ref(), &attributes)
         };
+        if let (Some(clean), Some(path)) = (&clean, picture::denoised_path(path).filter(|_| !is_film_path(path)))
+            && attempts.note(picture::write_denoised(&path, &about.frame, &job.film, clean))
+        {
+            tracing::info!(path = %path.display(), "wrote {}", path.display());
+        }
         if attempts.note(result) {
             tracing::info!(path = %path.display(), "wrote {}", path.display());
         }
@@ -84,4 +118,14 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
         tracing::warn!("some pixels have no sample: they are black");
     }
     attempts.finish()
+}
+
+/// The film without noise, if it holds what guides a denoiser.
+fn denoised(about: &About, job: &Job) -> Result<Denoised, Failure> {
+    if !(about.collected.albedo && about.collected.normal) {
+        let hint = "parts that are rendered with --denoise hold them, or those of a scene with both layers";
+        return Err(Failure::hinted("--denoise: the parts hold no albedo and normal", hint));
+    }
+    let (_, threads) = thread_pool(None)?;
+    Ok(Denoised::new(&Denoiser::new(threads)?, &job.film)?)
 }

@@ -184,7 +184,7 @@ fn thread_pool(threads: Option<usize>) -> Result<(rayon::ThreadPool, usize), Fai
 }
 
 /// Names of values that are numbers, as `--help` shows them.
-const NUMBERS: [&str; 16] = [
+const NUMBERS: [&str; 20] = [
     "N",
     "L",
     "R",
@@ -201,6 +201,10 @@ const NUMBERS: [&str; 16] = [
     "RELMSE",
     "A..B",
     "X0,Y0,X1,Y1",
+    "RATIO",
+    "WALES,COURSES",
+    "N,M",
+    "I/N",
 ];
 
 /// Lets every option that takes a number take `-1` as well: its own message tells what is expected, where clap would look
@@ -338,6 +342,31 @@ fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValues
 }
 
 impl SceneArgs {
+    /// The first of these options that is given, as it is spelled.
+    fn given(&self) -> Option<&'static str> {
+        let Self { mode, model, spp, time, noise, width, height, adaptive, crop, max_bounces, threads, .. } = self;
+        let Self { max_memory, seed, set, curves, frame, .. } = self;
+        let all = [
+            ("--mode", mode.is_some()),
+            ("--model", model.is_some()),
+            ("--spp", spp.is_some()),
+            ("--time", time.is_some()),
+            ("--noise", noise.is_some()),
+            ("--width", width.is_some()),
+            ("--height", height.is_some()),
+            ("--adaptive", *adaptive),
+            ("--crop", crop.is_some()),
+            ("--max-bounces", max_bounces.is_some()),
+            ("--threads", threads.is_some()),
+            ("--max-memory", max_memory.is_some()),
+            ("--seed", seed.is_some()),
+            ("--set", !set.is_empty()),
+            ("--curves", curves.is_some()),
+            ("--frame", *frame),
+        ];
+        all.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+
     /// Loads a scene with these options, and shows that it does unless `quiet`.
     fn load(&self, path: &std::path::Path, quiet: bool) -> Result<Scene, LoadError> {
         self.load_or_survey(path, quiet, false)
@@ -379,12 +408,17 @@ impl SceneArgs {
             set(key, value, shown);
         }
         if let Some(crop) = &self.crop {
-            let [x0, y0, x1, y1] = crop;
-            options.assignments.push(format!("render.crop=[{x0},{y0},{x1},{y1}]"));
+            let shown = crop.map(|v| v.to_string()).join(",");
+            options.settings.push(("render.crop".to_owned(), Value::from(*crop), format!("--crop {shown}")));
         }
         let _working = Working::on(format!("loading {}", path.display()), quiet);
         load(path, &options)
     }
+}
+
+/// The command as it was given, for metadata; what is not UTF-8 in it is replaced.
+fn command_line() -> String {
+    std::env::args_os().map(|arg| arg.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
 }
 
 /// Writes text to a file that appears whole or not at all.

@@ -1,7 +1,7 @@
 //! SIGINT, SIGTERM and SIGHUP (the terminal closed): the first one is told to whoever works, a second one ends the process at once.
 
 use std::sync::{
-    Arc, LazyLock,
+    Arc, LazyLock, OnceLock,
     atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
@@ -10,8 +10,20 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 /// The number of the signal that came.
 static WHICH: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsize::new(SIGINT as usize)));
 
-/// Raised by the first signal.
+/// Raised by the first signal, once the program asked to be told.
+static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// Raised by the first signal: from the first call on signals are caught, and all callers have the same flag.
 pub(super) fn interrupt_flag() -> Arc<AtomicBool> {
+    Arc::clone(FLAG.get_or_init(registered))
+}
+
+/// Whether a signal came since the program first asked to be told.
+pub(super) fn interrupted() -> bool {
+    FLAG.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+}
+
+fn registered() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|&signal| signal != SIGHUP || !ignored(signal)) {
         // Registration fails only for signals that cannot be caught.

@@ -10,10 +10,10 @@ use std::{
 };
 
 use super::{
-    Failure,
+    Failure, command_line,
     files::{Attempts, Files},
     log,
-    signals::interrupt_flag,
+    signals::{interrupt_flag, interrupted},
     thread_pool, write_text,
 };
 use crate::{
@@ -33,14 +33,13 @@ use crate::{
 };
 use checkpoint::{Lock, Saver, check_shard, old_checkpoint, resumed};
 use options::Outputs;
-pub(super) use options::{RenderArgs, is_film_path};
+pub(super) use options::{RenderArgs, is_film_path, stops};
 use progress::{bar, show, summary, warn};
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.log.start();
     let Some(frames) = &args.frames else { return run_one(args) };
-    let each: Vec<RenderArgs> = frames.0.clone().map(|frame| args.of_frame(frame)).collect::<Result<_, _>>()?;
-    each.iter().try_for_each(run_one)
+    frames.0.clone().try_for_each(|frame| run_one(&args.of_frame(frame)?))
 }
 
 fn run_one(args: &RenderArgs) -> Result<(), Failure> {
@@ -59,13 +58,18 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let old = old_checkpoint(args)?;
     let load = started.elapsed();
     log::phase("load", load);
+    // Of a sequence: what came while a later frame was loaded.
+    if interrupted() {
+        return Err(Failure::Interrupted);
+    }
     pool.install(|| {
         // Making it takes the curves.
         let yarns: Vec<usize> = scene.fabrics.iter().map(|f| f.curves.len()).collect();
         let (cloth, made) = Cloth::consuming(&mut scene, threads, memory.limit, memory.bytes())?;
         let world = cloth.world();
         warn(args, &scene, world, &yarns);
-        let denoiser = if scene.denoise { Some(Denoiser::new(threads)?) } else { None };
+        // A film keeps what guides it, for a merge of all parts.
+        let denoiser = if scene.denoise && !outputs.pictures.is_empty() { Some(Denoiser::new(threads)?) } else { None };
         log::phase("generate", made.generate);
         log::phase("build", made.build);
         let about = About::new(&scene, &world.embree_version(), report::metadata(&scene, world), args.shard);
@@ -84,7 +88,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let denoise = if scene.denoise { denoising.elapsed() } else { Duration::ZERO };
         let mut phases = Phases { denoise, load, made, render, ..Phases::default() };
         let writing = Instant::now();
-        let command = std::env::args().collect::<Vec<_>>().join(" ");
+        let command = command_line();
         let record = |phases| RunRecord { scene: &scene, world, rendered: &rendered, phases, threads };
         let attributes = record(phases).attributes(&command);
         // What was rendered is kept even if the denoiser fails.
@@ -109,7 +113,13 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
             let problem = format!("{} of {} samples are not finite", counters.invalid, counters.camera);
             return Err(Failure::hinted(problem, "lights too bright, or places too far, for single precision"));
         }
-        if rendered.stop == Stop::Interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+        match rendered.stop {
+            Stop::Interrupted => Err(Failure::Interrupted),
+            Stop::Time if counters.camera == 0 => {
+                Err(Failure::hinted("no sample was taken in the time", "a longer --time"))
+            }
+            _ => Ok(()),
+        }
     })
 }
 
@@ -137,6 +147,8 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
     let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
     for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
+        let [x0, y0, x1, y1] = scene.render.crop.map(|v| v as usize);
+        image::output::check_size(path, x1 - x0, y1 - y0)?;
     }
     for path in outputs.films.iter().chain(&args.checkpoint).chain(&args.stats) {
         image::whole_file::check(path)?;

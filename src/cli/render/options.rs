@@ -87,7 +87,7 @@ impl RenderArgs {
 }
 
 /// Reads a number of stops.
-fn stops(text: &str) -> Result<f32, String> {
+pub(in crate::cli) fn stops(text: &str) -> Result<f32, String> {
     text.parse()
         .ok()
         .filter(|s| (-100.0..=100.0).contains(s))

@@ -150,10 +150,10 @@ impl<'a> Hair<'a> {
     /// The radius of which the thickness stands at a byte.
     fn radius(&self, at: usize) -> Result<f64, CurveFileError> {
         let thickness = f64::from(f32_at(self.bytes, at));
-        if thickness > 0.0 && thickness.is_finite() {
+        if thickness >= 0.0 && thickness.is_finite() {
             Ok(0.5 * thickness)
         } else {
-            Err(CurveFileError::byte(at, format!("expected a thickness above 0, found {thickness}")))
+            Err(CurveFileError::byte(at, format!("expected a thickness of 0 or more, found {thickness}")))
         }
     }
 }
@@ -255,6 +255,13 @@ mod tests {
     }
 
     #[test]
+    fn ends_may_have_no_thickness() {
+        let mut set = set();
+        set.curves[0].radii = Some(vec![0.5, 0.25, 0.0]);
+        assert_eq!(parse(&written(&set), &ReadOptions::default()).unwrap(), set);
+    }
+
+    #[test]
     fn strands_without_an_array_of_segments_are_equally_long() {
         let mut bytes = b"HAIR".to_vec();
         for value in [2_u32, 4, 2, 1] {
@@ -287,7 +294,7 @@ mod tests {
             ),
             (with(130, &[200]), "byte 130: strand 1 has 200 segments but only 8 points are left for it"),
             (with(134, &f32::NAN.to_le_bytes()), "byte 134: expected a finite number for x, found NaN"),
-            (with(good.len() - 4, &[0; 4]), "byte 306: expected a thickness above 0, found 0"),
+            (with(good.len() - 4, &(-1.0_f32).to_le_bytes()), "byte 306: expected a thickness of 0 or more, found -1"),
         ] {
             assert_eq!(parse(&bytes, &ReadOptions::default()).unwrap_err().to_string(), message);
         }

@@ -350,9 +350,9 @@ pub fn parse(bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Curv
     Ok(set)
 }
 
-/// Whether a file is named as those that [`read`] reads.
+/// Whether a file is named as those that [`read`] reads, stages (which may hold no curves) among them.
 pub fn can_read(path: &Path) -> bool {
-    recognise(&[], path).is_some() || has_extension(path, "smobj")
+    recognise(&[], path).is_some() || has_extension(path, STITCH_MESH) || stage::is_stage(path)
 }
 
 /// The format that a file's name asks for, if it can be written.

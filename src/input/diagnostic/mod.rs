@@ -31,6 +31,9 @@ pub struct Span {
 }
 
 impl Span {
+    /// Of what has no place yet.
+    pub(super) const NONE: Self = Self { source: SourceId(0), start: u32::MAX, end: u32::MAX };
+
     /// The bytes from `start` up to but without `end`.
     pub fn new(source: SourceId, start: usize, end: usize) -> Span {
         let offset = |byte: usize| u32::try_from(byte).unwrap_or(u32::MAX - 1);

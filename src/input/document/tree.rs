@@ -56,6 +56,13 @@ impl From<i64> for Value {
     }
 }
 
+impl<const N: usize> From<[u32; N]> for Value {
+    fn from(values: [u32; N]) -> Value {
+        // They get the place of the whole where it is set.
+        Value::Array(values.map(|value| Node { value: value.into(), span: Span::NONE }).into())
+    }
+}
+
 impl From<u32> for Value {
     fn from(value: u32) -> Value {
         Value::Integer(value.into())

@@ -2,9 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, sync::LazyLock};
 
-use super::{
-    super::Yarn, Context, LoadError, LoadOptions, UNITS, color, merge_libraries, read_text, yarns, yarns::Library,
-};
+use super::{super::Yarn, Context, LoadError, LoadOptions, UNITS, color, complete, read_text, yarns, yarns::Library};
 use crate::{
     input::{
         diagnostic::{Diagnostics, Sources, hinted, unknown_name},
@@ -133,13 +131,7 @@ pub fn load_definitions(path: Option<&Path>, options: &LoadOptions) -> Result<De
         }
     };
     let definitions = Document::parse(&name, &text, &mut sources, &diagnostics).and_then(|mut document| {
-        merge_libraries(&mut document, &mut sources, &diagnostics);
-        for (key, value, label) in &options.settings {
-            document.set(key, value.clone(), label, &mut sources, &diagnostics);
-        }
-        for assignment in &options.assignments {
-            document.apply_option(assignment, &mut sources, &diagnostics);
-        }
+        complete(&mut document, options, &mut sources, &diagnostics);
         if diagnostics.has_errors() {
             return None;
         }

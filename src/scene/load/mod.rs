@@ -143,14 +143,15 @@ impl Context<'_> {
     /// Tells which files of numbered ones are missing for some of these frames.
     fn tell_missing_frames(&self, frames: &RangeInclusive<u32>) {
         for (path, span) in self.named.borrow().iter().filter(|(path, _)| !path.exists()) {
-            let missing = frames.clone().filter_map(|frame| numbered(path, frame)).filter(|file| !file.exists());
-            let missing: Vec<PathBuf> = missing.collect();
-            if let [first, others @ ..] = missing.as_slice() {
-                let more = match others.len() {
+            /// Of more it is told that there are so many.
+            const MANY: usize = 1000;
+            let mut missing = frames.clone().filter_map(|frame| numbered(path, frame)).filter(|file| !file.exists());
+            if let Some(first) = missing.next() {
+                let (others, of) = (missing.take(MANY).count(), format!("{} to {}", frames.start(), frames.end()));
+                let more = match others {
                     0 => String::new(),
-                    count => {
-                        format!(", and {} of frames {} to {}", counted(count, "other"), frames.start(), frames.end())
-                    }
+                    MANY => format!(", and {MANY} or more others of frames {of}"),
+                    _ => format!(", and {} of frames {of}", counted(others, "other")),
                 };
                 self.error(*span, format!("{}: no such file{more}", first.display()), None);
             }
@@ -229,7 +230,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
             "`yarnray render SCENE.toml --curves {name}` renders it in a scene, such as scenes/glove.toml; `yarnray info {name}` tells \
              what it holds\n"
         );
-        return Err(LoadError(hinted(format!("{name}: error: a curve file is no scene"), hint)));
+        return Err(LoadError(hinted(format!("{name}: error: a file of curves or meshes is no scene"), hint)));
     }
     let text = read_text(path).map_err(|problem| LoadError(format!("{name}: error: {problem}\n")))?;
     parse(&name, &text, options)
@@ -328,12 +329,18 @@ fn load_text(
     diagnostics: &Diagnostics,
 ) -> Option<Scene> {
     let mut document = Document::parse(name, text, sources, diagnostics)?;
+    let libraries_are_read = complete(&mut document, options, sources, diagnostics);
+    build(name, &document, options, sources, diagnostics, libraries_are_read)
+}
+
+/// Adds the libraries of a document and what the command line says. Whether all libraries could be read.
+fn complete(document: &mut Document, options: &LoadOptions, sources: &mut Sources, diagnostics: &Diagnostics) -> bool {
     // Which libraries there are is said before they are read, and of their tables what is said after.
     let (of_libraries, others): (Vec<String>, _) = options.assignments.iter().cloned().partition(|a| is_of_library(a));
-    apply_options(&mut document, &[], &of_libraries, sources, diagnostics);
-    let libraries_are_read = merge_libraries(&mut document, sources, diagnostics);
-    apply_options(&mut document, &options.settings, &others, sources, diagnostics);
-    build(name, &document, options, sources, diagnostics, libraries_are_read)
+    apply_options(document, &[], &of_libraries, sources, diagnostics);
+    let libraries_are_read = merge_libraries(document, sources, diagnostics);
+    apply_options(document, &options.settings, &others, sources, diagnostics);
+    libraries_are_read
 }
 
 /// Whether an assignment of the command line is of the scene's key `library`.
