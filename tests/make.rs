@@ -474,6 +474,16 @@ fn make_knit_warns_as_a_scene_does() {
     );
     let quiet = yarnray(d, &[&made[..], &["--quiet"]].concat()).good().stderr;
     assert!(quiet.is_empty(), "{quiet}");
+    // A repeat that does not go into its rounds.
+    let tube = |stitches: &str| {
+        let made =
+            ["make", "knit", "--pattern", "rib2x2", "--form", "tube", "--rows", "4", "-o", "b.bcc", "--stitches"];
+        yarnray(d, &[&made[..], &[stitches]].concat()).good().stderr
+    };
+    let told = tube("30");
+    let breaks = "the pattern repeats after 4 stitches and breaks where rounds of 30 begin; 28 or 32 would hold it";
+    assert!(told.contains(&format!("warning: {breaks}\n")), "{told}");
+    assert!(!tube("32").contains("warning"));
     // What finds no room.
     let made = ["make", "knit", "--stitches", "24", "--rows", "12", "--chart", "8: k24", "--chart", "12/12lc"];
     let size = ["--stitch-width", "3", "--row-height", "2.2", "-o", "b.bcc"];

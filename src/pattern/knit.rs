@@ -166,6 +166,19 @@ impl Knit {
         (rows < all).then(|| format!("{rows} rows are knitted of a chart of {all}"))
     }
 
+    /// That the repeat of the chart does not go into its rounds, if so, for people.
+    pub(crate) fn breaks_in_rounds(&self) -> Option<String> {
+        let Repeat { wide, .. } = self.form.is_round().then(|| self.repeat_in(Whole::default()))??;
+        let count = self.stitches;
+        let fits = match count / wide * wide {
+            0 => format!("{wide} would hold it"),
+            fewer => format!("{fewer} or {} would hold it", fewer + wide),
+        };
+        let told =
+            || format!("the pattern repeats after {wide} stitches and breaks where rounds of {count} begin; {fits}");
+        (!count.is_multiple_of(wide)).then(told)
+    }
+
     fn size(&self) -> [Option<f64>; 2] {
         [self.stitch_width, self.row_height]
     }

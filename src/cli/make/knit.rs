@@ -232,7 +232,7 @@ impl KnitArgs {
         let curves: Vec<(&Curve, &[f64])> =
             strands.iter().zip(&evens).map(|(s, radii)| (&s.curve, radii.as_slice())).collect();
         let cut_off = piece.cut_off().filter(|_| !self.chart.is_empty());
-        for told in cut_off.into_iter().chain(piece.crowded(yarn, &curves, spelled)) {
+        for told in cut_off.into_iter().chain(piece.breaks_in_rounds()).chain(piece.crowded(yarn, &curves, spelled)) {
             log::say(&format!("warning: {told}"));
         }
     }

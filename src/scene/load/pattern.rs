@@ -67,7 +67,8 @@ impl KnitPlan {
         self.knit = self.sizes.apply(&self.knit, &self.yarn, context)?;
         self.told(self.knit.widths(), context)?;
         let cut_off = self.knit.cut_off().filter(|_| !self.lines.is_empty());
-        warnings.extend(cut_off.map(|told| format!("{}: {told}", self.name)));
+        let told = cut_off.into_iter().chain(self.knit.breaks_in_rounds());
+        warnings.extend(told.map(|told| format!("{}: {told}", self.name)));
         Some(self)
     }
 
