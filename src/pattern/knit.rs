@@ -237,7 +237,17 @@ impl Knit {
     }
 
     fn cell(&self, Repeat { chart, wide }: &Repeat, size: [Option<f64>; 2], points: u32) -> Cell {
-        Cell::relaxed(chart, *wide, self.yarn(size), points, size)
+        let yarn = self.yarn(size);
+        let is_whole = *wide == self.stitches && self.edges != Edges::Tile && !self.form.is_round();
+        // Of a piece with borders of its own, rows are as high as the pattern between them makes them: beside other stitches,
+        // loops that are held would draw them down.
+        let middle = if is_whole && size[1].is_none() { chart.middle(*wide) } else { None };
+        let own_height = |(own, stitches): (Chart, u32)| {
+            let own = own.smallest(Whole::default());
+            Cell::relaxed(&own, stitches, yarn, points, size).gauge()[1]
+        };
+        let height = middle.map(own_height);
+        Cell::relaxed(chart, *wide, yarn, points, [size[0], size[1].or(height)])
     }
 
     /// A repeat of the chart as it relaxes: what a [`super::tile::Tile`] is made of. It is large enough that no yarn is

@@ -36,7 +36,61 @@ impl Chart {
     }
 }
 
+/// The most stitches of both borders together.
+const MOST_BORDER: u32 = 32;
+
+/// Stitches left and right of what repeats, and those of a repeat.
+#[derive(Clone, Copy)]
+struct Sides {
+    left: u32,
+    right: u32,
+    own: u32,
+}
+
+impl Chart {
+    /// What repeats between borders of its own, as most patterns are written, and how many stitches that has: at least half of all
+    /// `wide` are between both borders. `None` where there are no borders, or nothing repeats.
+    pub(in super::super) fn middle(&self, wide: u32) -> Option<(Self, u32)> {
+        // The narrowest borders, and of these the narrowest repeat.
+        for borders in 1..=(wide / 2).min(MOST_BORDER) {
+            let middle = wide - borders;
+            for own in (1..=middle / 2).filter(|own| middle.is_multiple_of(*own)) {
+                for left in 0..=borders {
+                    let sides = Sides { left, right: borders - left, own };
+                    let of_row = |row: &Row| Some(Row { steps: row.between(wide, sides)?, line: row.line });
+                    if let Some(rows) = self.rows.iter().map(of_row).collect() {
+                        return Some((Self { rows }, own));
+                    }
+                }
+            }
+        }
+        None
+    }
+}
+
 impl Row {
+    /// The steps of one repeat between borders, of a row of so many stitches.
+    fn between(&self, wide: u32, Sides { left, right, own }: Sides) -> Option<Arc<[super::Step]>> {
+        let (takes, makes) = self.takes_and_makes();
+        if self.is_short() || takes == 0 || takes != makes || !wide.is_multiple_of(takes) {
+            return None;
+        }
+        // Steps repeat until all stitches are worked.
+        let steps: Vec<super::Step> = self.steps.repeat((wide / takes) as usize);
+        let mut worked = Vec::with_capacity(steps.len() + 1);
+        let mut at = (0, 0);
+        for step in &steps {
+            worked.push(at);
+            let (takes, makes) = step.takes_and_makes();
+            at = (at.0 + takes, at.1 + makes);
+        }
+        worked.push(at);
+        let [first, next, end] = [left, left + own, wide - right].map(|n| worked.iter().position(|at| *at == (n, n)));
+        let (middle, count) = (&steps[first?..end?], next? - first?);
+        let repeats = middle.len().is_multiple_of(count) && middle.iter().zip(&middle[count..]).all(|(a, b)| a == b);
+        repeats.then(|| Arc::from(&middle[..count]))
+    }
+
     /// The steps of its smallest repeat, on a row of so many stitches if it is there once.
     fn smallest(&self, stitches: Option<u32>) -> Arc<[super::Step]> {
         let all = self.steps.len();
@@ -83,6 +137,27 @@ mod tests {
         assert_eq!(smallest(&rows, [Some(10), Some(6)]), [5, 1, 5, 1, 5]);
         // A repeat is seen twice at least: sides of their own are none.
         assert_eq!(smallest(&["k p p p k"], [Some(5), None]), [5]);
+    }
+
+    #[test]
+    fn what_repeats_between_borders_is_found() {
+        let middle = |rows: &[&str], wide: u32| {
+            let found = Chart::parse(rows).unwrap().middle(wide);
+            found.map(|(chart, own)| (chart.rows.iter().map(|row| row.steps.len()).collect::<Vec<_>>(), own))
+        };
+        let linen = ["k2 k sl k sl k sl k2", "p2 p sl p sl p sl p2"];
+        assert_eq!(middle(&linen, 10), Some((vec![2, 2], 2)));
+        // Borders of garter stitch beside plain knit, and lace, whose steps take and make different numbers.
+        assert_eq!(middle(&["k10", "k2 p6 k2"], 10), Some((vec![1, 1], 1)));
+        assert_eq!(middle(&["k3 yo k2tog yo k2tog yo k2tog k2", "k3 p6 k2"], 11), Some((vec![2, 2], 2)));
+        // A repeat that borders cut in two begins beside them.
+        assert_eq!(middle(&["p k6 p k6 p k6 p", "k p6 k p6 k p6 k"], 22), Some((vec![7, 7], 7)));
+        for (rows, wide) in
+            [(&["k p p p k2 p k"][..], 8), (&["k2 p2 k2 p2"], 8), (&["k2tog k3 yo"], 5), (&["k4 -4"], 8)]
+        {
+            let found = middle(rows, wide);
+            assert!(found.is_none(), "{rows:?}: {found:?}");
+        }
     }
 
     #[test]
