@@ -16,15 +16,18 @@ pub(super) fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartErr
     for token in text.split([' ', ',', '\t']).filter(|t| !t.is_empty()) {
         // Books write `K2 P2` and `C4F`.
         let word = token.to_ascii_lowercase();
-        let (count, step) = parse_step(&word).ok_or_else(|| {
-            let shown: String = token.chars().take(20).collect();
-            let hint = match PATTERNS.iter().any(|(name, _)| *name == word) {
-                true => format!(
-                    "that is the name of a pattern: pattern = \"{word}\" in a scene, `--pattern {word}` of `make knit`"
-                ),
-                false => STEPS.to_owned(),
+        let (count, step) = parse_step(&word).map_err(|wrong| {
+            let shown: String = token.chars().take(20).flat_map(char::escape_debug).collect();
+            let (problem, hint) = match wrong {
+                Wrong::Count => ("no step", format!("steps are counted from 1 to {MOST_STEPS}")),
+                Wrong::Cable => ("no cable", format!("cables have 2 to {WIDEST_CABLE} stitches")),
+                Wrong::Unknown if PATTERNS.iter().any(|(name, _)| *name == word) => {
+                    let hint = "that is the name of a pattern: pattern =";
+                    ("unknown step", format!("{hint} \"{word}\" in a scene, `--pattern {word}` of `make knit`"))
+                }
+                Wrong::Unknown => ("unknown step", STEPS.to_owned()),
             };
-            ChartError::new(Some(line), format!("unknown step \"{}\"", shown.escape_debug()), hint)
+            ChartError::new(Some(line), format!("{problem} \"{shown}\""), hint)
         })?;
         if steps.len() + count > MOST_STEPS {
             return Err(ChartError::new(Some(line), format!("more than {MOST_STEPS} steps in a row"), "steps repeat"));
@@ -37,7 +40,17 @@ pub(super) fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartErr
     Ok(steps)
 }
 
-fn parse_step(token: &str) -> Option<(usize, Step)> {
+/// What is wrong with a word.
+enum Wrong {
+    /// It is no step.
+    Unknown,
+    /// It is a step, so often as none is.
+    Count,
+    /// It is a cable of no width that there is.
+    Cable,
+}
+
+fn parse_step(token: &str) -> Result<(usize, Step), Wrong> {
     let plain = |purl, twisted| Step::Plain { purl, twisted };
     let together = |take, purl, top| Step::Together { take, purl, top };
     let named = match token {
@@ -59,13 +72,16 @@ fn parse_step(token: &str) -> Option<(usize, Step)> {
         "m1lp" | "m1p" => Step::MakeOne { left: true, purl: true },
         "m1rp" => Step::MakeOne { left: false, purl: true },
         "mb" | "bobble" => Step::Bobble,
-        _ => return parse_cable(token).map(|step| (1, step)).or_else(|| parse_counted(token, &plain)),
+        _ => {
+            let cable = parse_cable(token).map(|cable| cable.map(|step| (1, step)));
+            return cable.or_else(|| parse_counted(token, &plain)).unwrap_or(Err(Wrong::Unknown));
+        }
     };
-    Some((1, named))
+    Ok((1, named))
 }
 
 /// Steps that may be counted: `k4`, `sl2`, `ktbl3`, `bo4`.
-fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usize, Step)> {
+fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<Result<(usize, Step), Wrong>> {
     let word = token.trim_end_matches(|c: char| c.is_ascii_digit());
     let step = match word {
         "k" | "brk" => plain(false, false),
@@ -82,19 +98,25 @@ fn parse_counted(token: &str, plain: &dyn Fn(bool, bool) -> Step) -> Option<(usi
         _ => return None,
     };
     let digits = &token[word.len()..];
-    let count = if digits.is_empty() { 1 } else { digits.parse().ok().filter(|n| (1..=MOST_STEPS).contains(n))? };
-    Some((count, step))
+    let count = if digits.is_empty() { Some(1) } else { digits.parse().ok() };
+    Some(count.filter(|n| (1..=MOST_STEPS).contains(n)).map(|count| (count, step)).ok_or(Wrong::Count))
 }
 
 /// `c4f`, `t3b`, `2/1lc`, `2/2rpc`.
-fn parse_cable(token: &str) -> Option<Step> {
-    let cable = |front: u8, back: u8, left, purl| {
-        let fits = front > 0 && back > 0 && front.checked_add(back)? <= WIDEST_CABLE;
-        fits.then_some(Step::Cable { front, back, left, purl })
+fn parse_cable(token: &str) -> Option<Result<Step, Wrong>> {
+    let cable = |front: u32, back: u32, left, purl| {
+        let fits = front > 0 && back > 0 && front.saturating_add(back) <= WIDEST_CABLE.into();
+        let step = Step::Cable { front: front as u8, back: back as u8, left, purl };
+        Some(if fits { Ok(step) } else { Err(Wrong::Cable) })
+    };
+    // More digits than fit are more stitches than fit.
+    let number = |digits: &str| {
+        let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+        is_number.then(|| digits.parse().unwrap_or(u32::MAX))
     };
     if let Some((front, rest)) = token.split_once('/') {
         let word = rest.trim_start_matches(|c: char| c.is_ascii_digit());
-        let back = rest[..rest.len() - word.len()].parse().ok()?;
+        let back = number(&rest[..rest.len() - word.len()])?;
         let (left, purl) = match word {
             "lc" => (true, false),
             "rc" => (false, false),
@@ -102,10 +124,10 @@ fn parse_cable(token: &str) -> Option<Step> {
             "rpc" => (false, true),
             _ => return None,
         };
-        return cable(front.parse().ok()?, back, left, purl);
+        return cable(number(front)?, back, left, purl);
     }
     let purl = token.starts_with('t');
     let left = token.ends_with('f');
-    let size: u8 = token.strip_prefix(['c', 't'])?.strip_suffix(['f', 'b'])?.parse().ok()?;
+    let size = number(token.strip_prefix(['c', 't'])?.strip_suffix(['f', 'b'])?)?;
     cable(size.div_ceil(2), size / 2, left, purl)
 }

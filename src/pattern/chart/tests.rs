@@ -112,11 +112,13 @@ fn plain_rows_may_be_cut_and_others_not() {
 fn mistakes_are_explained() {
     for (rows, problem) in [
         (&["k2 q"][..], "unknown step \"q\""),
-        (&["c1f"], "unknown step \"c1f\""),
-        (&["c26f"], "unknown step \"c26f\""),
-        (&["2/0lc"], "unknown step \"2/0lc\""),
-        (&["k0"], "unknown step \"k0\""),
-        (&["k99999999999999999999"], "unknown step \"k9999999999999999999\""),
+        (&["c1f"], "no cable \"c1f\""),
+        (&["c26f"], "no cable \"c26f\""),
+        (&["2/0lc"], "no cable \"2/0lc\""),
+        (&["k0"], "no step \"k0\""),
+        (&["c99999999999f"], "no cable \"c99999999999f\""),
+        (&["c/2lc"], "unknown step \"c/2lc\""),
+        (&["k99999999999999999999"], "no step \"k9999999999999999999\""),
         (&["yo"], "a row that takes no stitch of the row below"),
         (&[""], "a row that takes no stitch of the row below"),
         (&["x: k"], "expected a number of rows before the colon, found \"x\""),

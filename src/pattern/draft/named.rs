@@ -1,7 +1,7 @@
 //! Weaves with a name.
 
 use super::{Draft, DraftError, LARGEST, Pile};
-use crate::input::diagnostic::nearest;
+use crate::input::diagnostic::{listed, nearest};
 
 /// How each weave with a name is written.
 pub const NAMES: &[&str] = &[
@@ -38,19 +38,27 @@ struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    fn read(text: &'a str) -> Option<Self> {
+    /// Reads them; what is wrong with a number is told, `None` is of what is no name of a weave.
+    fn read(text: &'a str) -> Result<Self, Option<DraftError>> {
         let mut words = Self { name: String::new(), groups: Vec::new(), left: false, step: None, text };
         let mut parts = text.split_whitespace();
         while let Some(part) = parts.next() {
             let part = part.to_lowercase();
             let part = part.as_str();
-            let number = |n: &str| n.parse().ok().filter(|n| (1..=LARGEST).contains(n));
+            let number = |n: &str| match n.parse() {
+                Ok(n) if (1..=LARGEST).contains(&n) => Ok(n),
+                _ if n.is_empty() || n.contains(|c: char| !c.is_ascii_digit()) => Err(None),
+                _ => {
+                    let problem = format!("{n} in the weave \"{}\"", shown(text));
+                    Err(Some(wrong(problem, format!("numbers are from 1 to {LARGEST}"))))
+                }
+            };
             match part {
                 "left" => words.left = true,
                 "right" => words.left = false,
-                "step" => words.step = Some(parts.next().and_then(number)?),
+                "step" => words.step = Some(number(parts.next().unwrap_or_default())?),
                 _ if part.starts_with(|c: char| c.is_ascii_digit()) => {
-                    words.groups.push(part.split('/').map(number).collect::<Option<_>>()?);
+                    words.groups.push(part.split('/').map(number).collect::<Result<_, _>>()?);
                 }
                 _ => {
                     if !words.name.is_empty() {
@@ -60,13 +68,18 @@ impl<'a> Words<'a> {
                 }
             }
         }
-        Some(words)
+        Ok(words)
     }
 
     /// Whether there are words that only twills have.
     fn turned(&self) -> bool {
         self.left || self.step.is_some()
     }
+}
+
+/// As much of a name as a message shows.
+fn shown(text: &str) -> String {
+    text.chars().take(30).flat_map(char::escape_debug).collect()
 }
 
 fn wrong(problem: String, hint: String) -> DraftError {
@@ -198,18 +211,21 @@ impl Draft {
     /// No such weave, or numbers that make none.
     pub fn named(text: &str) -> Result<Self, DraftError> {
         let unknown = || {
-            let shown: String = text.chars().take(30).collect();
-            let problem = format!("unknown weave \"{}\"", shown.escape_debug());
+            let problem = format!("unknown weave \"{}\"", shown(text));
             // Numbers are the user's own.
             let word = |name: &str| name.trim_end_matches(|c: char| !c.is_alphabetic()).to_lowercase();
             let known: Vec<String> = NAMES.iter().map(|name| word(name)).collect();
             let hint = match nearest(&word(text), known.iter().map(String::as_str)) {
                 Some(name) if name != word(text) => format!("did you mean \"{name}\"?"),
+                Some(name) if !name.is_empty() => {
+                    let own = NAMES.iter().filter(|known| known.split(' ').next() == name.split(' ').next());
+                    format!("it is written as {}", listed(own.map(|known| format!("\"{known}\"")), "or"))
+                }
                 _ => format!("weaves are {}", NAMES.join(", ")),
             };
             wrong(problem, hint)
         };
-        let words = Words::read(text).ok_or_else(unknown)?;
+        let words = Words::read(text).map_err(|problem| problem.unwrap_or_else(unknown))?;
         let groups: Vec<&[usize]> = words.groups.iter().map(Vec::as_slice).collect();
         if words.turned() && words.name != "twill" {
             return Err(unknown());
@@ -346,6 +362,9 @@ mod tests {
             "twill 2/2 step 4",
             "double",
             "twill 900/900",
+            "satin 99999",
+            "basket 0",
+            "twill 2/2 step 0",
         ] {
             assert!(Draft::named(text).is_err(), "{text}");
         }
@@ -355,6 +374,9 @@ mod tests {
         assert!(told("jersey").starts_with("unknown weave \"jersey\"; weaves are plain, basket 2, "));
         assert_eq!(told("satin 6"), "there is no satin of 6 shafts; a satin has 5 shafts or more, but not 6");
         assert_eq!(told("sateen 8/2"), "there is no sateen of 8 shafts and step 2; steps of 8 shafts are 3, 5");
+        assert_eq!(told("satin 99999"), "99999 in the weave \"satin 99999\"; numbers are from 1 to 1024");
+        assert_eq!(told("twill 2/2 step 0"), "0 in the weave \"twill 2/2 step 0\"; numbers are from 1 to 1024");
+        assert_eq!(told("basket"), "unknown weave \"basket\"; it is written as \"basket 2\" or \"basket 3/2\"");
         assert_eq!(told("twill 2/2 step 4"), "a twill of 4 wefts has no step of 4; steps are 1 to 3");
     }
 }

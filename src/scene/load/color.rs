@@ -59,18 +59,7 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
     let known = |name: &str, span: Span| {
         context.check_yarn(span, name, library);
     };
-    let names = |key: &str| -> Vec<String> {
-        let entries = table.strings(key);
-        if entries.is_empty() && table.has(key) {
-            table.error_at(key, format!("`{key}` names no yarn"), None);
-        }
-        let turns = entries.into_iter().flat_map(|(entry, span)| {
-            let names = in_turns(entry);
-            names.first().inspect(|name| known(name, span));
-            names
-        });
-        turns.collect()
-    };
+    let names = |key: &str| in_turns(table, key, context, &known);
     let layout = Layout {
         rows: names("rows"),
         columns: names("columns"),
@@ -89,16 +78,39 @@ pub(super) fn plan(table: &Reader<'_>, context: &Context<'_>, library: &Library)
     ColorPlan { layout, tint, variation, header: table.header() }
 }
 
-/// `"navy"`, or `"4 navy"` for four of them.
-pub(super) fn in_turns(entry: &str) -> Vec<String> {
-    let (count, name) = turn(entry);
-    vec![name.to_owned(); count]
+/// The yarns under a key: `"navy"`, or `"4 navy"` for four of them. `known` tells of names that no yarn has.
+pub(super) fn in_turns(
+    table: &Reader<'_>,
+    key: &str,
+    context: &Context<'_>,
+    known: &dyn Fn(&str, Span),
+) -> Vec<String> {
+    let entries = table.strings(key);
+    if entries.is_empty() && table.has(key) {
+        table.error_at(key, format!("`{key}` names no yarn"), None);
+    }
+    let mut names = Vec::new();
+    for (entry, span) in entries {
+        let (count, name) = turn(entry);
+        known(name, span);
+        match count {
+            Some(count) => names.extend(std::iter::repeat_n(name.to_owned(), count)),
+            None => context.error(span, format!("expected 1 to {MOST_IN_TURN} of a yarn in turn"), None),
+        }
+    }
+    names
 }
 
-/// How many of which yarn `"4 navy"` is; one of what has no count.
-pub(super) fn turn(entry: &str) -> (usize, &str) {
-    let counted = entry.split_once(' ').and_then(|(count, name)| Some((count.parse::<usize>().ok()?, name.trim())));
-    counted.filter(|(count, _)| (1..=10_000).contains(count)).unwrap_or((1, entry))
+/// The most of one yarn that an entry stands for.
+const MOST_IN_TURN: usize = 10_000;
+
+/// How many of which yarn `"4 navy"` is; one of what has no count, `None` of what may not be counted so.
+pub(super) fn turn(entry: &str) -> (Option<usize>, &str) {
+    let is_count = |text: &&str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    match entry.split_once(' ').filter(|(count, _)| is_count(count)) {
+        Some((count, name)) => (count.parse().ok().filter(|n| (1..=MOST_IN_TURN).contains(n)), name.trim()),
+        None => (Some(1), entry),
+    }
 }
 
 const SAME_BUILD: &str = "yarns that take turns within a fabric differ in their fibres only";

@@ -33,7 +33,9 @@ pub(super) struct WeavePlan {
     pub(super) colors: [Vec<[f64; 3]>; 2],
     name: String,
     header: Span,
-    /// Whether spacings of warps and wefts are those of the draft's file.
+    /// Where the spacings of warps and wefts are given.
+    setting: [Span; 2],
+    /// Whether they are those of the draft's file.
     filed: [bool; 2],
     /// Whether the scene asks for hems.
     hems: bool,
@@ -96,14 +98,14 @@ impl WeavePlan {
                         hint,
                     );
                 } else {
-                    let count = if warp { "ends_per_cm" } else { "picks_per_cm" };
+                    let (count, threads) = if warp { ("ends_per_cm", "ends") } else { ("picks_per_cm", "picks") };
                     let most = 10.0 / (least * context.unit);
-                    wrong(
-                        format!(
-                            "`{key}` (or `{count}`) leaves the yarns no room to pass: at least {least:.4} (at most {most:.1}) here"
-                        ),
-                        "thinner yarns, another `crimp`, or no spacing at all for the tightest",
+                    let problem = format!(
+                        "`{key}` (or `{count}`) leaves the yarns no room to pass: at least {least:.4} apart here, at most {most:.1} \
+                         {threads} a centimetre"
                     );
+                    let hint = "thinner yarns, another `crimp`, or no spacing at all for the tightest";
+                    context.error(self.setting[usize::from(!warp)], problem, Some(hint.to_owned()));
                 }
             }
             Err(Impossible::TooMuchCover { most }) => wrong(
@@ -160,22 +162,16 @@ pub(super) fn weave(
 ) -> Option<WeavePlan> {
     let (name, drafted) = draft(table, context);
     let wif = drafted.as_ref().and_then(|d| d.wif.as_ref());
-    let check = |key: &str, name: &str| {
-        context.check_yarn(table.span(key).unwrap_or(table.header()), name, yarns.library);
-    };
+    let known = |name: &str, span: Span| context.check_yarn(span, name, yarns.library);
     let weft_yarn = table.string("weft_yarn").filter(|name| *name != yarns.name());
-    weft_yarn.inspect(|name| check("weft_yarn", name));
-    let order = ["warp_order", "weft_order"].map(|key| {
-        let order: Vec<String> = table.strings(key).into_iter().flat_map(|(entry, _)| in_turns(entry)).collect();
-        order.iter().for_each(|name| check(key, name));
-        order
-    });
+    weft_yarn.inspect(|name| known(name, table.span("weft_yarn").unwrap_or(table.header())));
+    let order = ["warp_order", "weft_order"].map(|key| in_turns(table, key, context, &known));
     let written = |side: usize| wif.and_then(|w| w.radius[side]).filter(|_| !yarns.has_radius());
     let weft_of_its_own = weft_yarn.and_then(|name| yarns.library.yarns.get(name));
     let radius = [yarns.radius(), weft_of_its_own.map_or(yarns.radius(), |y| y.radius)];
     let half_width = [yarns.half_width(), weft_of_its_own.map_or(yarns.half_width(), Yarn::half_width)];
     let half_rooms = [0, 1].map(|side| written(side).unwrap_or(radius[side]) * half_width[side]);
-    let Setting { spacing: [warp_spacing, weft_spacing], filed, cover } = setting(table, fabric, context, wif);
+    let Setting { spacing: [warp_spacing, weft_spacing], spans, filed, cover } = setting(table, fabric, context, wif);
     let count = drafted.as_ref().map_or([weave::YARNS; 2], Drafted::count);
     let warps = extent(table, context, "warps", "width", count[0]);
     let wefts = extent(table, context, "wefts", "height", count[1]);
@@ -223,6 +219,7 @@ pub(super) fn weave(
         colors,
         name,
         header: table.header(),
+        setting: spans,
         filed,
         hems: edges == Edges::Finished && table.has("edges"),
     })
@@ -232,6 +229,8 @@ pub(super) fn weave(
 struct Setting {
     /// From the middle of a yarn to that of the next, mm.
     spacing: [Option<f64>; 2],
+    /// Where the scene gives it, or else what is woven.
+    spans: [Span; 2],
     /// Whether that is of a draft's file and not of the scene.
     filed: [bool; 2],
     /// The share of the plane that yarns cover.
@@ -245,13 +244,16 @@ fn setting(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>, wif: 
     let asked =
         [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
     let gauge = gauge(table, fabric, &asked);
+    let of_gauge = table.span("gauge").or(fabric.span("gauge"));
+    let spans = [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")]
+        .map(|(k, n)| table.span(k).or(table.span(n)).or(of_gauge).unwrap_or(table.header()));
     let asked = [0, 1].map(|side| asked[side].or(gauge.map(|g| g[side])));
     let filed = [0, 1].map(|side| asked[side].is_none() && in_file(side).is_some());
     let spacing = [0, 1].map(|side| asked[side].or_else(|| in_file(side)));
     if cover.is_some() && spacing.iter().all(Option::is_some) {
         table.error_at("cover", "spacings both ways are given, and a cover", Some("leave one of them out"));
     }
-    Setting { spacing, filed, cover }
+    Setting { spacing, spans, filed, cover }
 }
 
 /// Thickness of a thread over the mean from which on cloth is not hemmed unless asked.
@@ -269,7 +271,10 @@ fn has_unequal_threads(wif: &WovenWif) -> bool {
 
 /// How far a fringe or a pile stands out, mm, where a warp takes twice `half_room`.
 fn standing(table: &Reader<'_>, context: &Context<'_>, key: &str, half_room: f64) -> Option<f64> {
-    let longest = Range::above(0.0).and_at_most(weave::longest(half_room) / context.unit);
+    // As a round number, for messages.
+    let longest = weave::longest(half_room) / context.unit;
+    let digits = 10f64.powf(longest.log10().floor() - 2.0);
+    let longest = Range::above(0.0).and_at_most((longest / digits).floor() * digits);
     table.f64(key, longest).map(|length| length * context.unit)
 }
 

@@ -68,8 +68,11 @@ pub(super) fn motif(table: Reader<'_>, context: &Context<'_>, known: &dyn Fn(&st
             Some(Cells::Signs(rows.into_iter().map(|(row, _)| row.to_owned()).collect()))
         }
         (None, true) => {
-            if !table.has("rows") && !table.has("image") {
-                table.error("missing key `rows` or `image` in the motif", Some("rows = [\".#.\", \"###\"]"));
+            let hint = Some("rows = [\".#.\", \"###\"]");
+            if table.has("rows") {
+                table.error_at("rows", "a motif has one row or more", hint);
+            } else if !table.has("image") {
+                table.error("missing key `rows` or `image` in the motif", hint);
             }
             None
         }
