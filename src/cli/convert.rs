@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{
     Failure,
-    curve_files::{abilities, refuse_unknown, write_curves},
+    curve_files::{refuse_unknown, write_curves},
     files::Files,
     level::LevelArgs,
     log, positive,
@@ -81,7 +81,7 @@ fn millimetres(unit: &str) -> f64 {
 
 /// What is lost on the way to a file, and what it needs and was not given, one line each.
 fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
-    let can = abilities(path);
+    let can = curve_file::abilities(path);
     let mut lost = Vec::new();
     if !can.radii && set.curves.iter().any(|c| c.radii.is_some()) {
         lost.push("radii are lost: the format has none".to_owned());

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, files::Attempts, log, working::Working};
 use crate::{
-    files::{curve_file, extension},
+    files::curve_file,
     geometry::curve::{Basis, CurveSet},
     image::whole_file,
     math::words::counted,
@@ -21,38 +21,9 @@ pub(super) fn refuse_unknown(paths: &[PathBuf]) -> Result<(), Failure> {
     }
 }
 
-/// What a format can say.
-pub(super) struct Abilities {
-    pub(super) radii: bool,
-    /// Whether radii change along a curve.
-    pub(super) varying: bool,
-    /// Whether it has a unit; such a format needs radii as well.
-    pub(super) unit: bool,
-    pub(super) colors: bool,
-    pub(super) ids: bool,
-    pub(super) bases: &'static [Basis],
-}
-
-/// By the extension of a file that can be written.
-pub(super) fn abilities(path: &Path) -> Abilities {
-    let all = &[Basis::CatmullRom, Basis::BSpline, Basis::Linear];
-    let least = Abilities { radii: true, varying: true, unit: false, colors: false, ids: false, bases: &[] };
-    let extension = extension(path);
-    match extension.as_deref() {
-        Some("bcc") => Abilities { radii: false, bases: all, ..least },
-        Some("hair") => Abilities { bases: &[Basis::CatmullRom], ..least },
-        Some("obj") => Abilities { radii: false, ..least },
-        Some("yarns") => {
-            Abilities { varying: false, colors: true, bases: &[Basis::CatmullRom, Basis::BSpline], ..least }
-        }
-        Some("usd" | "usda" | "usdc") => Abilities { unit: true, colors: true, ids: true, bases: all, ..least },
-        _ => least,
-    }
-}
-
 /// Whether a file would be read as other curves than B-splines that go into it.
 fn leaves_out_splines(path: &Path, set: &CurveSet) -> bool {
-    let can = abilities(path);
+    let can = curve_file::abilities(path);
     set.curves.iter().any(|c| c.basis == Basis::BSpline && !can.bases.contains(&c.basis))
 }
 

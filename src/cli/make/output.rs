@@ -75,7 +75,7 @@ impl Output {
         if self.level.level != LEVELS[0] {
             return Ok(());
         }
-        let most = |path: &PathBuf| curve_file::most_points(path).filter(|most| points > *most as u64);
+        let most = |path: &PathBuf| curve_file::abilities(path).most_points.filter(|most| points > *most as u64);
         let Some((path, most)) = self.out.iter().find_map(|path| Some((path, most(path)?))) else { return Ok(()) };
         let extension = path.extension().unwrap_or_default().display();
         Err(Failure::hinted(
@@ -108,7 +108,7 @@ pub(super) fn write(
     if set.colors.iter().all(Option::is_none) {
         set.colors = Vec::new();
     }
-    let plain = output.out.iter().find(|path| !curve_file::holds_colors(path));
+    let plain = output.out.iter().find(|path| !curve_file::abilities(path).colors);
     if let Some(path) = plain.filter(|_| !set.colors.is_empty() && !output.quiet) {
         log::say(&format!("{}: its format holds no colours; .usdc, .usda and .yarns do", path.display()));
     }

@@ -6,6 +6,7 @@
 //! file's size, and small defects are repaired with a note for the user. Radii, units and the direction of up are only
 //! passed on; nothing is smoothed, scaled or sampled here.
 
+mod abilities;
 mod bcc;
 mod faces;
 mod hair;
@@ -39,6 +40,7 @@ use crate::{
     pattern::tile::Tile,
 };
 
+pub(crate) use abilities::abilities;
 pub use bcc::write_bcc;
 pub use hair::write_hair;
 pub use obj_lines::write_obj_lines;
@@ -367,25 +369,6 @@ pub fn can_write(path: &Path) -> bool {
         return true;
     }
     written_as(path).is_some()
-}
-
-/// The most control points that a curve has in a file that [`write()`] makes by this name, where the format has a limit that a
-/// closed curve reaches one point earlier.
-pub(crate) fn most_points(path: &Path) -> Option<usize> {
-    match written_as(path)? {
-        Format::Bcc => Some(bcc::MOST_POINTS),
-        Format::Hair => Some(hair::MOST_POINTS),
-        Format::Obj | Format::Pyp | Format::Text | Format::Yarns => None,
-    }
-}
-
-/// Whether a file that [`write()`] makes by this name holds the colours of curves.
-pub(crate) fn holds_colors(path: &Path) -> bool {
-    #[cfg(feature = "usd")]
-    if layer::can_write(path) {
-        return true;
-    }
-    written_as(path) == Some(Format::Yarns)
 }
 
 /// Writes curves in the format that the extension of `path` names (`.bcc`, `.hair`, `.obj`, `.yarns`, `.txt`,

@@ -105,7 +105,8 @@ fn archives_have_their_own_frames() {
     use super::{TimeSampling, frames_per_second};
     let even = |cycle: f64| TimeSampling { cycle, times: vec![0.0] };
     let still = even(1.0);
-    let of = |words: &str, own: &[TimeSampling]| frames_per_second(words, &[std::slice::from_ref(&still), own].concat());
+    let of =
+        |words: &str, own: &[TimeSampling]| frames_per_second(words, &[std::slice::from_ref(&still), own].concat());
     assert_eq!(of("_ai_Application=x;FramesPerTimeUnit=25.000000;_ai_Description=y", &[even(1.0 / 30.0)]), 25.0);
     assert_eq!(of("", &[even(1.0 / 30.0)]), 30.0);
     assert_eq!(of("", &[even(1001.0 / 24000.0)]), 24000.0 / 1001.0);
