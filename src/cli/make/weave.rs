@@ -10,7 +10,7 @@ use crate::{
     pattern::{
         PatternStrand,
         draft::{Draft, DraftError},
-        weave::{self, Edges, Extent, Impossible, Measures, Weave, whole_pairs},
+        weave::{self, Cloth, Edges, Extent, Impossible, Measures, Weave, whole_pairs},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Yarn, drawn_draft::Legend, palette},
@@ -78,93 +78,131 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
-    let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
-    let drawn = drawn(args)?;
-    let whole = drawn.as_ref().map(|draft| [draft.warps() as u32, draft.wefts() as u32]);
-    let (draft, file) = match (drawn, args.draft.as_slice()) {
-        (Some(draft), _) => (draft, None),
-        (None, [path]) if path.to_lowercase().ends_with(".wif") => {
-            wif_draft(path).map(|file| (file.draft.clone(), Some(file)))?
-        }
-        (None, [name]) if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
-        (None, rows) => (Draft::matrix(rows).map_err(wrong)?, None),
-    };
+    let (draft, file) = args.draft()?;
     let yarn = args.output.checked()?;
-    let [warps, wefts] = file.as_ref().map(|f| f.count).or(whole).unwrap_or([weave::YARNS; 2]);
-    let own = |given: Option<f64>, side: usize| given.or(file.as_ref().and_then(|f| f.radius[side]));
-    let otherwise = yarn.as_ref().map_or(RADIUS, |y| y.radius);
-    let radius = own(args.output.radius, 0).unwrap_or(otherwise);
-    let spaced = |side: usize| file.as_ref().and_then(|f| f.spacing[side]).filter(|_| args.cover.is_none());
-    let weft_radius = own(args.weft_radius, 1).unwrap_or(radius);
-    let half_width = yarn.as_ref().map_or(1.0, Yarn::half_width);
-    let half_rooms = [radius, weft_radius].map(|radius| radius * half_width);
-    let piece = Weave {
-        warps: args.width.map_or(Extent::Yarns(args.warps.unwrap_or(warps)), Extent::Length),
-        wefts: args.height.map_or(Extent::Yarns(args.wefts.unwrap_or(wefts)), Extent::Length),
-        half_rooms,
-        half_width: [half_width; 2],
-        warp_spacing: args.warp_spacing.or_else(|| spaced(0)),
-        weft_spacing: args.weft_spacing.or_else(|| spaced(1)),
-        cover: args.cover,
-        crimp: args.crimp,
-        // Curve files know round yarns only.
-        flatten: 1.0,
-        points: args.points,
-        edges: args.edges.map_or(Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
-        pile_height: args.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
-        draft,
-        shuttles: file.as_ref().map(|f| weave::shuttles(&f.colors[1])).unwrap_or_default(),
-        threads: file.as_ref().map(|f| f.threads.clone()).unwrap_or_default(),
-        tile: args.tile,
-    };
-    if args.pile_height.is_some() && piece.draft.pile().is_none() {
-        let hint = "--draft terry, velvet or corduroy, or leave it out";
-        return Err(Failure::hinted("--pile-height: this draft has no pile", hint));
-    }
-    if let Err((problem, instead)) = piece.edges.suit(&piece.draft) {
-        return Err(Failure::hinted(problem, format!("--edges {}", instead.name())));
-    }
+    let (piece, radii) = args.piece(draft, file.as_ref(), yarn.as_ref());
+    args.check(&piece)?;
+    let quiet = args.output.quiet;
+    args.output.hold(piece.least_points())?;
     let repeat = [piece.draft.warps(), piece.draft.wefts()];
     let task = format!("bringing a repeat of {} x {} threads to equilibrium", repeat[0], repeat[1]);
-    let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
-    let most = weave::longest(half_rooms[0]);
-    if piece.pile_height > most {
-        return Err(Failure::Input(format!(
-            "error: --pile-height is at most {most}, five hundred times a warp's width"
-        )));
-    }
-    args.output.hold(piece.least_points())?;
-    if !args.output.quiet && repeat[0] * repeat[1] > LONG_REPEAT {
+    if !quiet && repeat[0] * repeat[1] > LONG_REPEAT {
         log::say(&task);
     }
-    let working = Working::on(task, args.output.quiet);
+    let working = Working::on(task, quiet);
+    let given = [args.warp_spacing, args.weft_spacing].map(|s| s.is_some());
     let cloth = piece.relax().map_err(|why| not_woven(&why, given))?;
     drop(working);
     args.output.hold(cloth.least_points())?;
-    if let Some(problem) = piece.draft.loose_in_words().filter(|_| !args.output.quiet) {
-        log::say(&format!("note: {problem}; warps count from the left, wefts from the bottom"));
-    }
-    let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     let strands = cloth.strands();
-    if !args.output.quiet {
-        cloth.too_low_for_hems(1.0).into_iter().chain(cloth.crowded(&strands)).for_each(|told| {
-            log::say(&format!("warning: {told}"));
-        });
+    if !quiet {
+        warn(&piece, &cloth, &strands);
     }
-    let [warp, weft] = weave::yarn_lengths(&strands);
-    write(strands, &args.output, [radius, weft_radius], yarn.as_ref(), color)?;
-    if !args.output.quiet {
-        let Measures { spacing, see_through, crimp, thickness, size, .. } = cloth.measures();
+    let length = weave::yarn_lengths(&strands);
+    let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
+    write(strands, &args.output, radii, yarn.as_ref(), color)?;
+    if !quiet {
+        args.report(&cloth.measures(), length);
+    }
+    Ok(())
+}
+
+impl WeaveArgs {
+    /// The draft, and the file of a weaving program that it is of.
+    fn draft(&self) -> Result<(Draft, Option<WovenWif>), Failure> {
+        let wrong = |error: DraftError| Failure::Input(format!("error: {error}"));
+        Ok(match (drawn(self)?, self.draft.as_slice()) {
+            (Some(draft), _) => (draft, None),
+            (None, [path]) if path.to_lowercase().ends_with(".wif") => {
+                wif_draft(path).map(|file| (file.draft.clone(), Some(file)))?
+            }
+            (None, [name]) if !name.contains(['#', '.']) => (Draft::named(name).map_err(wrong)?, None),
+            (None, rows) => (Draft::matrix(rows).map_err(wrong)?, None),
+        })
+    }
+
+    /// The picture that the draft is, if it is one.
+    fn picture(&self) -> Option<&str> {
+        match self.draft.as_slice() {
+            [path] if path.to_lowercase().ends_with(".png") => Some(path),
+            _ => None,
+        }
+    }
+
+    /// What is to be woven, and the radii of its yarns.
+    fn piece(&self, draft: Draft, file: Option<&WovenWif>, yarn: Option<&Yarn>) -> (Weave, [f64; 2]) {
+        // Of a picture all is woven.
+        let whole = self.picture().map(|_| [draft.warps() as u32, draft.wefts() as u32]);
+        let [warps, wefts] = file.map(|f| f.count).or(whole).unwrap_or([weave::YARNS; 2]);
+        let own = |given: Option<f64>, side: usize| given.or(file.and_then(|f| f.radius[side]));
+        let otherwise = yarn.map_or(RADIUS, |y| y.radius);
+        let radius = own(self.output.radius, 0).unwrap_or(otherwise);
+        let radii = [radius, own(self.weft_radius, 1).unwrap_or(radius)];
+        let spaced = |side: usize| file.and_then(|f| f.spacing[side]).filter(|_| self.cover.is_none());
+        let half_width = yarn.map_or(1.0, Yarn::half_width);
+        let half_rooms = radii.map(|radius| radius * half_width);
+        let piece = Weave {
+            warps: self.width.map_or(Extent::Yarns(self.warps.unwrap_or(warps)), Extent::Length),
+            wefts: self.height.map_or(Extent::Yarns(self.wefts.unwrap_or(wefts)), Extent::Length),
+            half_rooms,
+            half_width: [half_width; 2],
+            warp_spacing: self.warp_spacing.or_else(|| spaced(0)),
+            weft_spacing: self.weft_spacing.or_else(|| spaced(1)),
+            cover: self.cover,
+            crimp: self.crimp,
+            // Curve files know round yarns only.
+            flatten: 1.0,
+            points: self.points,
+            edges: self.edges.map_or(Edges::Live, |edges| edges(weave::fringe(half_rooms[0]))),
+            pile_height: self.pile_height.unwrap_or_else(|| weave::pile_height(&draft, half_rooms[0])),
+            draft,
+            shuttles: file.map(|f| weave::shuttles(&f.colors[1])).unwrap_or_default(),
+            threads: file.map(|f| f.threads.clone()).unwrap_or_default(),
+            tile: self.tile,
+        };
+        (piece, radii)
+    }
+
+    /// Refuses options that do not go together.
+    fn check(&self, piece: &Weave) -> Result<(), Failure> {
+        if self.pile_height.is_some() && piece.draft.pile().is_none() {
+            let hint = "--draft terry, velvet or corduroy, or leave it out";
+            return Err(Failure::hinted("--pile-height: this draft has no pile", hint));
+        }
+        if let Err((problem, instead)) = piece.edges.suit(&piece.draft) {
+            return Err(Failure::hinted(problem, format!("--edges {}", instead.name())));
+        }
+        let most = weave::longest(piece.half_rooms[0]);
+        if piece.pile_height > most {
+            return Err(Failure::Input(format!(
+                "error: --pile-height is at most {most}, five hundred times a warp's width"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Says what was woven, with the length of yarn of warp and weft.
+    fn report(&self, measures: &Measures, [warp, weft]: [f64; 2]) {
+        let Measures { spacing, see_through, crimp, thickness, size, .. } = *measures;
         log::say(&format!("{:.4} from warp to warp, {:.4} from weft to weft", spacing[0], spacing[1]));
         log::say(&format!("crimp {:.1} % of the warp, {:.1} % of the weft", 100.0 * crimp[0], 100.0 * crimp[1]));
         log::say(&format!("{:.1} % see-through, {thickness:.3} thick", 100.0 * see_through));
-        let extent = match args.tile {
+        let extent = match self.tile {
             true => format!("period {:.6} across, {:.6} up", size[0], size[1]),
             false => format!("{:.3} wide, {:.3} high", size[0], size[1]),
         };
         log::say(&format!("{extent}; {warp:.1} of warp, {weft:.1} of weft"));
     }
-    Ok(())
+}
+
+/// Says what a scene would warn of.
+fn warn(piece: &Weave, cloth: &Cloth<'_>, strands: &[PatternStrand]) {
+    if let Some(problem) = piece.draft.loose_in_words() {
+        log::say(&format!("note: {problem}; warps count from the left, wefts from the bottom"));
+    }
+    for told in cloth.too_low_for_hems(1.0).into_iter().chain(cloth.crowded(strands)) {
+        log::say(&format!("warning: {told}"));
+    }
 }
 
 /// Why a weave cannot be; a spacing is the command line's or the file's.
@@ -218,10 +256,10 @@ fn colored(text: &str) -> Result<(Vec3, Draft), String> {
 
 /// The draft that is a picture, if one is given.
 fn drawn(args: &WeaveArgs) -> Result<Option<Draft>, Failure> {
-    let path = match args.draft.as_slice() {
-        [path] if path.to_lowercase().ends_with(".png") => path,
-        _ if args.weave.is_empty() => return Ok(None),
-        _ => return Err(Failure::hinted("--weave without a picture".to_owned(), "--draft FILE.png".to_owned())),
+    let path = match args.picture() {
+        Some(path) => path,
+        None if args.weave.is_empty() => return Ok(None),
+        None => return Err(Failure::hinted("--weave without a picture".to_owned(), "--draft FILE.png".to_owned())),
     };
     let legend = if args.weave.is_empty() { Legend::Up(Vec3::ZERO) } else { Legend::Weaves(args.weave.clone()) };
     let told = |(problem, hint): (String, Option<String>)| match hint {
