@@ -55,7 +55,7 @@ fn set_uvs(values: &Values<'_>, mesh: &mut PolygonMesh, asked: Option<&str>) -> 
 
 /// Reads one prim into the space of the stage, with the texture coordinates of this name, if one is given.
 pub(super) fn read(values: &Values<'_>, to_stage: &DMat4, uv: Option<&str>) -> Result<PolygonMesh, Problem> {
-    let points = values.vectors("points")?.unwrap_or_default();
+    let points = values.points()?;
     let counts = values.integers("faceVertexCounts")?.unwrap_or_default();
     let corners = values.integers("faceVertexIndices")?.unwrap_or_default();
     let mut mesh = PolygonMesh::new(points, &counts, &corners)?;

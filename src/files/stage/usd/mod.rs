@@ -367,7 +367,7 @@ fn batch(values: &Values<'_>) -> Result<Batch, Problem> {
         basis,
         wrap,
         counts: values.integers("curveVertexCounts")?.unwrap_or_default(),
-        points: values.vectors("points")?.unwrap_or_default(),
+        points: values.points()?,
         widths,
     })
 }

@@ -371,6 +371,30 @@ fn primvars_come_from_above() {
     assert_eq!(set.colors, [Some([1.0, 0.0, 0.0]), Some([1.0, 0.0, 0.0]), None]);
 }
 
+/// Points with velocities go on from the sample before, whose number of points counts.
+#[test]
+fn velocities_move_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sim.usda");
+    let text = "#usda 1.0\n(\n    timeCodesPerSecond = 25\n)\ndef BasisCurves \"c\" {\nuniform token type = \"linear\"\n\
+                int[] curveVertexCounts.timeSamples = { 1: [2], 2: [3] }\n\
+                point3f[] points.timeSamples = { 1: [(0,0,0), (1,0,0)], 2: [(0,1,0), (1,1,0), (2,1,0)] }\n\
+                vector3f[] velocities.timeSamples = { 1: [(0,25,0), (0,50,0)], 2: [(0,0,0), (0,0,0), (0,0,25)] }\n}\n";
+    std::fs::write(&path, text).unwrap();
+    let stage = Stage::open(&path).unwrap();
+    let at = |frame: f64| stage.curves(&PrimPattern::all(), Some(frame)).unwrap().0.curves[0].points.clone();
+    for (frame, want) in [
+        (0.5, vec![[0.0, -0.5, 0.0], [1.0, -1.0, 0.0]]),
+        (1.0, vec![[0.0; 3], [1.0, 0.0, 0.0]]),
+        (1.5, vec![[0.0, 0.5, 0.0], [1.0, 1.0, 0.0]]),
+        (2.5, vec![[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 1.0, 0.5]]),
+    ] {
+        let found = at(frame);
+        assert_eq!(found.len(), want.len(), "{frame}");
+        assert!(found.iter().zip(&want).all(|(p, w)| p.distance(DVec3::from(*w)) < 1e-5), "{frame}: {found:?}");
+    }
+}
+
 #[test]
 fn prims_are_chosen_by_path_and_material_and_times_by_frame() {
     let stage = open("scene.usda");

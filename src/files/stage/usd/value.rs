@@ -93,6 +93,28 @@ impl Values<'_> {
         })
     }
 
+    /// The points of curves or of a mesh. Where they have velocities (in units a second), they go on by these from the last sample
+    /// before the time, so that what changes from sample to sample moves as well.
+    pub(super) fn points(&self) -> Result<Vec<DVec3>, Problem> {
+        let between = || Ok(self.vectors("points")?.unwrap_or_default());
+        if self.time.is_earliest_time() || self.value("velocities")?.is_none() {
+            return between();
+        }
+        let (time, samples) = (self.time.value(), self.prim.attribute("points").time_sample_times()?);
+        // Times that were rounded are meant.
+        let last = samples.partition_point(|sample| *sample <= time + 1e-6).max(1);
+        let Some(&sample) = samples.get(last - 1) else { return between() };
+        let there = Values { prim: self.prim, time: TimeCode::new(sample) };
+        let (points, velocities) = (there.vectors("points")?, there.vectors("velocities")?.unwrap_or_default());
+        match points.filter(|points| points.len() == velocities.len()) {
+            Some(points) => {
+                let seconds = (time - sample) / self.prim.stage().time_codes_per_second();
+                Ok(points.iter().zip(velocities).map(|(p, v)| *p + v * seconds).collect())
+            }
+            None => between(),
+        }
+    }
+
     pub(super) fn rotations(&self, name: &str) -> Result<Option<Vec<DQuat>>, Problem> {
         let turn = |x: f64, y: f64, z: f64, w: f64| DQuat::from_xyzw(x, y, z, w);
         let unit = |q: DQuat| if q.length_squared() > 1e-12 { q.normalize() } else { DQuat::IDENTITY };
