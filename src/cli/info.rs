@@ -1,36 +1,28 @@
-//! `yarnray info`
+//! `yarnray info`: what a file is, for people and for programs.
 
-use std::{
-    borrow::Cow,
-    path::{Path, PathBuf},
-};
+mod curves;
+mod scene;
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{Failure, SceneArgs, folds_in_words, overlap_in_words, positive, render::is_film_path, terminal::print};
+use self::{curves::CurveFacts, scene::SceneFacts};
+use super::{Failure, SceneArgs, overlap_in_words, positive, render::is_film_path, terminal::print};
 use crate::{
-    cloth::{self, Estimate},
     files::{
         curve_file::{self, ReadOptions},
         has_extension,
         mesh_file::MeshFacts,
         stage::{self, Stage},
     },
-    geometry::{
-        curve::{Basis, Curve, CurveSet},
-        length::length,
-        overlap::{Overlap, TOLERATED, overlap, overlap_of_plied},
-        proposal::{self, Proposal},
-        strand::Folds,
-    },
+    geometry::overlap::{Overlap, TOLERATED},
     image::output::Format,
     input::diagnostic::listed,
-    math::words::{bytes_in_words, counted},
-    plan::{Feature, Memory, Plan},
+    math::words::counted,
     render::film_file,
-    scene::{CurveKind, Fabric, GarmentFacts, Scene, Tufts},
 };
 
 const EXAMPLES: &str = "Examples:
@@ -71,7 +63,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
         film_report(&args.file)?
     } else if is_scene {
         let scene = args.options.load_or_survey(&args.file, args.quiet, true)?;
-        scene_report(&scene)
+        let facts = SceneFacts::new(&scene);
+        (facts.json(), facts.text())
     } else {
         file_report(&args.file, args.radius)?
     };
@@ -99,7 +92,11 @@ fn file_report(path: &Path, radius: Option<f64>) -> Result<(Value, String), Fail
     };
     let own = match facts {
         Some(facts) => mesh_report(path, &facts),
-        None => curves_report(path, &read.map_err(|e| Failure::Input(format!("error: {e}")))?, radius),
+        None => {
+            let set = read.map_err(|e| Failure::Input(format!("error: {e}")))?;
+            let facts = CurveFacts::new(path, &set, radius);
+            (facts.json(), facts.text())
+        }
     };
     Ok(match &stage {
         Some(stage) => with_stage(stage, own),
@@ -207,9 +204,6 @@ impl std::fmt::Display for Figure {
     }
 }
 
-/// The diameter by which overlap of scenes and garments is measured: yarns of several plies count as wide as they are in the mean.
-const MEAN_WIDTH: &str = "mean width of plied yarn";
-
 /// Overlap as JSON: shares of the length and mean diameters, and which diameter that is.
 fn overlap_json(found: Option<Overlap>, diameter: &str) -> Value {
     found.map_or(Value::Null, |o| {
@@ -220,363 +214,4 @@ fn overlap_json(found: Option<Overlap>, diameter: &str) -> Value {
 
 fn overlap_line(found: Option<Overlap>, by: &str, tufts: bool) -> String {
     found.map_or(String::new(), |o| format!("  overlap   {}\n", overlap_in_words(&o, by, tufts)))
-}
-
-fn curves_report(path: &Path, set: &CurveSet, radius: Option<f64>) -> (Value, String) {
-    // The radius that is asked for, or the curve's own.
-    fn radii(curve: &Curve, radius: Option<f64>) -> Option<Cow<'_, [f64]>> {
-        radius.map(|r| Cow::Owned(vec![r; curve.points.len()])).or(curve.radii.as_deref().map(Cow::Borrowed))
-    }
-    let with_radii = set.curves.iter().map(|c| Some((c, radii(c, radius)?))).collect::<Option<Vec<_>>>();
-    let found = with_radii.and_then(|list| overlap(list.iter().map(|(c, r)| (*c, &**r))));
-    let points: usize = set.curves.iter().map(|c| c.points.len()).sum();
-    let closed = set.curves.iter().filter(|c| c.closed).count();
-    let open = set.curves.len() - closed;
-    let all = || set.curves.iter().flat_map(|c| &c.points);
-    let low = all().copied().reduce(DVec3::min).unwrap_or_default();
-    let high = all().copied().reduce(DVec3::max).unwrap_or_default();
-    // A sum of nothing is -0.
-    let length = set.curves.iter().map(length).fold(0.0, |a, b| a + b);
-    let basis = match set.curves.first().map(|c| c.basis) {
-        Some(Basis::CatmullRom) => "catmull-rom",
-        Some(Basis::BSpline) => "b-spline",
-        Some(Basis::Linear) => "linear",
-        None => "none",
-    };
-    let radii = set.curves.iter().any(|c| c.radii.is_some());
-    let colored = set.colors.iter().flatten().count();
-    let distinct: std::collections::BTreeSet<[u32; 3]> =
-        set.colors.iter().flatten().map(|c| c.map(f32::to_bits)).collect();
-    let numbered: std::collections::BTreeSet<i64> = set.ids.iter().flatten().copied().collect();
-    let of_plies: std::collections::BTreeSet<i64> = set.plies.iter().flatten().copied().collect();
-    let up = set.up_axis.map(|a| ["x", "y", "z"][usize::from(a.min(2))]);
-    // Of its yarn a file knows no more.
-    let by = if radius.is_some() { "radius asked for" } else { "radius in the file" };
-    // What the file does not say, and nobody has.
-    let proposal = if radii || radius.is_some() { None } else { Proposal::new(set) };
-    let sizes = proposal::sizes(set);
-    let report = json!({
-        "file": path.display().to_string(),
-        "proposal": proposal.map(|p| json!({
-            "radius": p.radius, "unit": p.unit.0, "overlap": overlap_json(Some(p.overlap), "radius proposed"),
-            "bend_radius": {"p1": p.bends[0], "p50": p.bends[1]},
-        })),
-        "size_cm": sizes.iter().map(|(unit, size)| ((*unit).to_owned(), list(*size))).collect::<serde_json::Map<_, Value>>(),
-        "curves": set.curves.len(), "closed": closed, "open": open,
-        "points": points, "basis": basis, "radii": radii, "up": up,
-        "unit_mm": set.unit_mm, "length": length, "overlap": overlap_json(found, by),
-        "bounds": [list(low), list(high)], "notes": set.notes,
-        "colored": colored, "colors": distinct.len(), "ids": numbered.len(),
-        "plies": of_plies.len(),
-    });
-    let mut text = format!(
-        "{}\n  curves    {} ({closed} closed, {open} open), {basis}\n  points    {points}\n  length    {length:.6}\n  bounds    {low:.4} to {high:.4}\n  radii     {}\n  unit      {}\n",
-        path.display(),
-        set.curves.len(),
-        if radii { "in the file" } else { "none: the scene's yarn gives them" },
-        unit_in_words(set.unit_mm),
-    );
-    if colored > 0 {
-        let how = "`colors = true` in a scene's source dyes the yarns";
-        text += &format!("  colours   {} on {}; {how}\n", distinct.len(), counted(colored, "curve"));
-    }
-    if let (Some(first), Some(last)) = (numbered.first(), numbered.last()) {
-        text += &format!("  ids       {} from {first} to {last}\n", numbered.len());
-    }
-    if !of_plies.is_empty() {
-        text += &format!("  plies     {}: curves are plies or fibres of yarns\n", of_plies.len());
-    }
-    let nestle =
-        if radius.is_some() || of_plies.is_empty() { ": plied yarns that nestle count as overlapping" } else { "" };
-    text += &overlap_line(found, &format!("by the {by}{nestle}"), false);
-    if let Some(p) = proposal {
-        text += &format!(
-            "  proposal  radius {:.3}: at it {:.1} % of the length overlaps; one bend in a hundred is tighter than {:.3}, \
-             half are tighter than {:.3}\n            unit \"{}\": the yarn would be {:.2} mm thick\n",
-            Figure(p.radius),
-            100.0 * p.overlap.share,
-            Figure(p.bends[0]),
-            Figure(p.bends[1]),
-            p.unit.0,
-            2.0 * p.radius * p.unit.1
-        );
-    }
-    if set.unit_mm.is_none() {
-        let size = |(unit, v): &(&str, DVec3)| {
-            format!("{unit}: {:.3} x {:.3} x {:.3} cm", Figure(v.x), Figure(v.y), Figure(v.z))
-        };
-        text += &format!("  size      if it is in {}\n", sizes.iter().map(size).collect::<Vec<_>>().join("; in "));
-    }
-    for note in &set.notes {
-        text += &format!("  note      {note}\n");
-    }
-    (report, text)
-}
-
-/// Length of a fabric's curves, millimetres.
-fn length_of(fabric: &Fabric) -> f64 {
-    fabric.curves.iter().map(|(c, _)| length(c)).sum()
-}
-
-/// A garment for programs: all that is known of it.
-fn garment_json(facts: &GarmentFacts) -> Value {
-    let numbered = facts.panels.iter().zip(1..);
-    let panels: Vec<Value> = numbered
-        .map(|((name, stitches), number)| json!({"number": number, "panel": name, "stitches": stitches}))
-        .collect();
-    let [p5, p50, p95] = facts.uv_ratio;
-    json!({
-        "path": facts.path, "cloth": facts.cloth, "stitches": facts.stitches, "panels": panels,
-        "near": facts.near.map(|(at, radius)| json!({"at_mm": at.to_array(), "radius_mm": radius})),
-        "yarn_length_mm": facts.yarn_length, "weight_g": facts.weight,
-        "overlap": facts.overlap.map(|o| json!({"share": o.share, "deepest": o.deepest, "diameter": MEAN_WIDTH})),
-        "control_points": facts.control_points,
-        "uv_ratio": {"p5": p5, "p50": p50, "p95": p95}, "uv_unit_mm": facts.uv_mm, "stretched": facts.stretched,
-        "compressed": facts.compressed, "sewn_mm": facts.sewn, "free_mm": facts.free,
-        "repairs": facts.repairs,
-    })
-}
-
-fn garment_lines(facts: &GarmentFacts) -> String {
-    let [p5, p50, p95] = facts.uv_ratio;
-    let mut text = format!(
-        "  garment   {}: {} of {} in {}, about {:.1} m of yarn, {}\n  stretch   3-D over \
-         flat lengths {p5:.3} to {p95:.3} (5 to 95 % of the cloth), median {p50:.3}; {:.1} % of the cloth is stretched by more \
-         than a tenth, {:.1} % is compressed by more than a tenth\n",
-        facts.path,
-        counted(facts.stitches, "stitch"),
-        facts.cloth,
-        counted(facts.panels.len(), "panel"),
-        facts.yarn_length / 1000.0,
-        counted(facts.control_points, "control point"),
-        100.0 * facts.stretched,
-        100.0 * facts.compressed
-    );
-    text += &panel_lines(&facts.panels);
-    text += &format!("  edges     {:.0} mm sewn, {:.0} mm free, as cut\n", facts.sewn, facts.free);
-    if let Some((at, radius)) = facts.near {
-        text += &format!("  near      only what lies within {radius:.3} mm of {at:.3} mm\n");
-    }
-    if let Some(weight) = facts.weight {
-        text += &format!("  weight    {weight:.1} g of yarn\n");
-    }
-    if let Some(Overlap { share, deepest, .. }) = facts.overlap {
-        let (share, deepest) = (100.0 * share, 100.0 * deepest);
-        text += &format!(
-            "  loops     {share:.1} % of the yarn overlaps where it lies flat, by at most {deepest:.0} % of its diameter\n"
-        );
-    }
-    for repair in &facts.repairs {
-        text += &format!("  repair    {repair}\n");
-    }
-    text
-}
-
-/// Panels with the numbers by which a scene may choose them, for people.
-fn panel_lines(panels: &[(String, u64)]) -> String {
-    const MOST: usize = 24;
-    let mut text = String::new();
-    for ((name, stitches), number) in panels.iter().take(MOST).zip(1..) {
-        let label = if number == 1 { "panels" } else { "" };
-        let name = if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
-        text += &format!("  {label:<9} {number:>2} {name}: {}\n", counted(*stitches, "stitch"));
-    }
-    if panels.len() > MOST {
-        let others = counted((panels.len() - MOST) as u64, "other");
-        text += &format!("  {:<9} and {others}, which `--json` lists\n", "");
-    }
-    text
-}
-
-/// What is told of a scene.
-struct SceneFacts<'a> {
-    scene: &'a Scene,
-    /// What each fabric takes, and all of them.
-    estimates: Vec<Estimate>,
-    total: Estimate,
-    /// What is told of it as a render would.
-    warnings: Vec<String>,
-    plan: Plan,
-    memory: Memory,
-    /// The box around all cloth, millimetres, where the scene's file has it.
-    bounds: [DVec3; 2],
-    /// How far yarns run into each other.
-    overlap: Option<Overlap>,
-}
-
-fn scene_report(scene: &Scene) -> (Value, String) {
-    let facts = SceneFacts::new(scene);
-    (facts.json(), facts.text())
-}
-
-/// How far the yarns of a scene run into each other, each as wide as it is in the mean; `None` where nothing lies near.
-/// Without the strands of tufts, which are crowded in them as fibres are.
-fn overlap_of<'s>(scene: &'s Scene) -> Option<Overlap> {
-    let half_width = |fabric: &Fabric| match fabric.kind {
-        CurveKind::Yarn(yarn) => scene.yarns[yarn].half_width(),
-        CurveKind::Fiber(_) => 1.0,
-    };
-    let of_fabric = |fabric: &'s Fabric| {
-        let half_width = half_width(fabric);
-        let yarns = fabric.curves.iter().enumerate().filter(|(i, _)| !fabric.tufts.has(*i));
-        yarns.map(move |(_, (curve, radii))| (curve, radii.as_slice(), half_width))
-    };
-    (scene.fabrics.iter().any(|f| !f.curves.is_empty()))
-        .then(|| overlap_of_plied(scene.fabrics.iter().flat_map(of_fabric)))
-        .flatten()
-}
-
-impl<'a> SceneFacts<'a> {
-    fn new(scene: &'a Scene) -> Self {
-        let (estimates, folds): (Vec<Estimate>, Vec<_>) = cloth::surveyed(scene).into_iter().unzip();
-        let folded = scene.fabrics.iter().zip(folds).filter_map(|(fabric, folds)| {
-            let folds = folds.filter(Folds::are_seen)?;
-            Some(folds_in_words(scene, fabric, &folds, fabric.curves.len()))
-        });
-        let warnings = scene.warnings.iter().cloned().chain(folded).collect();
-        let total: Estimate = estimates.iter().copied().sum();
-        let laid = scene.bounds().map(|(a, b)| (a + scene.middle, b + scene.middle));
-        let meshes = scene.garments.iter().map(|g| g.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let (low, high) = laid.or(meshes).unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        // Of garments that are not laid only their tile is measured.
-        let overlap = overlap_of(scene);
-        let (plan, memory) = (Plan::new(scene), Memory::new(scene));
-        Self { scene, estimates, total, warnings, plan, memory, bounds: [low, high], overlap }
-    }
-
-    /// Features that are used, or those left out.
-    fn features(&self, used: bool) -> impl Iterator<Item = &Feature> {
-        self.plan.features.iter().filter(move |f| f.used == used)
-    }
-
-    /// Fabrics with curves.
-    fn laid(&self) -> impl Iterator<Item = (&Fabric, &Estimate)> {
-        self.scene.fabrics.iter().zip(&self.estimates).filter(|(f, _)| !f.curves.is_empty())
-    }
-
-    /// By which diameter overlap is measured.
-    fn diameter(&self) -> &'static str {
-        let scene = self.scene;
-        let is_plied = |f: &Fabric| matches!(f.kind, CurveKind::Yarn(yarn) if scene.yarns[yarn].half_width() < 1.0);
-        if scene.fabrics.iter().any(is_plied) { MEAN_WIDTH } else { "radius of the yarn" }
-    }
-
-    fn json(&self) -> Value {
-        let Self { scene, total, memory, .. } = self;
-        let render = &scene.render;
-        let fabrics = self.laid().map(|(f, estimate)| {
-            let (kind, number, name) = match f.kind {
-                CurveKind::Yarn(yarn) => ("yarn", "yarns", &scene.yarns[yarn].name),
-                CurveKind::Fiber(fiber) => ("fiber", "fibers", &scene.fibers[fiber].0),
-            };
-            json!({
-                "source": f.origin, kind: name, number: f.curves.len(), "given_points": f.control_points(),
-                "segments": estimate.segments, "length_mm": length_of(f), "tight_bends": estimate.tight_bends,
-            })
-        });
-        let fabrics: Vec<Value> = fabrics.collect();
-        let reasons = |used: bool| -> Vec<Value> {
-            self.features(used).map(|f| json!({"name": f.name, "reason": f.reason, "bytes": f.bytes})).collect()
-        };
-        let garments: Vec<Value> = scene.garments.iter().map(garment_json).collect();
-        let pixels = u64::from(render.crop[2] - render.crop[0]) * u64::from(render.crop[3] - render.crop[1]);
-        json!({
-            "scene": scene.path, "fingerprint": scene.fingerprint,
-            "mode": render.mode.name(), "model": render.model.name(),
-            "image": {"width": render.width, "height": render.height, "spp": render.spp},
-            "fabrics": fabrics, "garments": garments, "overlap": overlap_json(self.overlap, self.diameter()),
-            "bounds_mm": self.bounds.map(list),
-            "memory": {
-                "geometry_bytes": total.geometry_bytes, "bvh_bytes": total.bvh_bytes, "film_bytes": memory.film,
-                "texture_bytes": memory.textures, "denoiser_bytes": memory.denoiser, "limit_bytes": memory.limit,
-            },
-            "pixels": pixels,
-            "used": reasons(true), "left_out": reasons(false),
-            "warnings": self.warnings,
-        })
-    }
-
-    fn text(&self) -> String {
-        let scene = self.scene;
-        let render = &scene.render;
-        let [low, high] = self.bounds;
-        let mut text = format!(
-            "{}\n  picture   {} x {}, {} spp, mode {}, model {}\n  bounds    {low:.3} to {high:.3} mm\n",
-            scene.path,
-            render.width,
-            render.height,
-            render.spp,
-            render.mode.name(),
-            render.model.name()
-        );
-        for (fabric, estimate) in self.laid() {
-            text += &fabric_line(scene, fabric, estimate);
-        }
-        for facts in &scene.garments {
-            text += &garment_lines(facts);
-        }
-        let by = format!("by the {}", self.diameter());
-        text += &overlap_line(self.overlap, &by, scene.fabrics.iter().any(|f| f.tufts.yarns > 0));
-        text += &self.memory_lines();
-        for used in [true, false] {
-            text += if used { "  used\n" } else { "  left out\n" };
-            for f in self.features(used) {
-                let verb = if used { "takes" } else { "saves" };
-                let memory = f.bytes.filter(|b| *b > 0).map(|b| format!(" ({verb} {})", bytes_in_words(b)));
-                text += &format!("    {:18}{}{}\n", f.name, f.reason, memory.unwrap_or_default());
-            }
-        }
-        for warning in &self.warnings {
-            text += &format!("  warning   {warning}\n");
-        }
-        text
-    }
-
-    fn memory_lines(&self) -> String {
-        let Self { total, memory, .. } = self;
-        let beside = |bytes: u64, what: &str| match bytes {
-            0 => String::new(),
-            _ => format!(", {} of {what}", bytes_in_words(bytes)),
-        };
-        let mut text = format!(
-            "  memory    about {} of curves, {} of BVH, {} of film{}{}\n",
-            bytes_in_words(total.geometry_bytes),
-            bytes_in_words(total.bvh_bytes),
-            bytes_in_words(memory.film),
-            beside(memory.textures, "textures"),
-            beside(memory.denoiser, "the denoiser"),
-        );
-        if let Some(limit) = memory.limit.filter(|limit| total.bytes() + memory.bytes() > *limit) {
-            text += &format!(
-                "            more than the {} that it may take: `render` would refuse it\n",
-                bytes_in_words(limit)
-            );
-        }
-        text
-    }
-}
-
-fn fabric_line(scene: &Scene, fabric: &Fabric, estimate: &Estimate) -> String {
-    let (noun, of) = match fabric.kind {
-        CurveKind::Yarn(yarn) => {
-            let yarn = &scene.yarns[yarn];
-            let tufts = match &fabric.tufts {
-                Tufts { yarns: 0, .. } => String::new(),
-                Tufts { yarns, strands } => {
-                    format!("and {} ({}) ", counted(*yarns, "cut tuft"), counted(strands.len(), "strand"))
-                }
-            };
-            let (plies, fibers) = (counted(yarn.plies.len(), "ply"), counted(yarn.plies[0].fibers, "fibre"));
-            ("yarn", format!("{tufts}of `{}` ({plies} of {fibers})", yarn.name))
-        }
-        CurveKind::Fiber(fiber) => ("fibre", format!("of `{}`", scene.fibers[fiber].0)),
-    };
-    format!(
-        "  fabric    {}: {} {of}, {:.1} m, {} given, {} to make\n",
-        fabric.origin,
-        counted(fabric.curves.len() - fabric.tufts.strands.len(), noun),
-        length_of(fabric) / 1000.0,
-        counted(fabric.control_points(), "point"),
-        counted(estimate.segments, "segment")
-    )
 }
