@@ -186,70 +186,78 @@ pub(super) fn garment(
             None
         }
     };
-    let (gauge, per) = (stitch(fabric, None), per(fabric));
-    let grain = grain(fabric);
-    let rule = |cloth| Rule {
+    let knitted = own.as_ref().is_none_or(|c| !matches!(c.pattern, Pattern::Weave { .. }));
+    let seam = seam.unwrap_or(if knitted { SeamKind::Mattress } else { SeamKind::Overlock });
+    let whole =
+        WholeFabric { cloth: own, stitch: stitch(fabric, None), per: per(fabric), grain: grain(fabric), hem_keys };
+    let first = whole.cloth.clone().map(|cloth| Rule {
         panels: None,
         name: None,
         span,
         cloth,
-        stitch: gauge,
-        grain,
+        stitch: whole.stitch,
+        grain: whole.grain,
         yarn: None,
         color: None,
         seam: None,
         hem,
         hems_itself: false,
-    };
-    let first = own.clone().map(rule);
-    let panels: Vec<Option<Rule>> = fabric
-        .tables("panel")
-        .into_iter()
-        .map(|table| {
-            let panels = chosen(&table);
-            let name = table.string("name").map(str::to_owned);
-            if name.as_ref().is_some_and(String::is_empty) {
-                table.error_at("name", "the name of a panel cannot be empty", None);
-            }
-            let own_cloth = table.table("cloth").map(|t| cloth(t, context));
-            let yarn = table.string("yarn").map(str::to_owned);
-            if let Some(name) = &yarn {
-                context.check_yarn(table.span("yarn").unwrap_or(table.header()), name, yarns.library);
-            }
-            let colored = ["rows", "columns", "motif", "tint", "vary"].iter().any(|k| table.has(k));
-            let color = color::plan(&table, context, yarns.library);
-            if color.tension().is_some() {
-                table.error_at("vary", "`tension` is of the whole garment", Some("`vary` of the fabric"));
-            }
-            let own_hem = HemKeys::read(&table, context);
-            let hem = own_hem.hem(&table, Some(hem_keys));
-            let rule = Rule {
-                panels: Some(panels?),
-                name,
-                span: table.span("group").or(table.span("panel")).unwrap_or(table.header()),
-                stitch: stitch(&table, Some(per)).or(gauge),
-                grain: if table.has("grain") { self::grain(&table) } else { grain },
-                cloth: match own_cloth {
-                    Some(cloth) => cloth?,
-                    None => own.clone()?,
-                },
-                yarn,
-                color: colored.then_some(color),
-                seam: table.one_of("seam", &SEAMS),
-                hem,
-                hems_itself: own_hem.kind.is_some(),
-            };
-            table.finish();
-            Some(rule)
-        })
-        .collect();
-    let knitted = own.as_ref().is_none_or(|c| !matches!(c.pattern, Pattern::Weave { .. }));
-    let seam = seam.unwrap_or(if knitted { SeamKind::Mattress } else { SeamKind::Overlock });
-    let mut rules = vec![first?];
-    for panel in panels {
-        rules.push(panel?);
-    }
+    });
+    let panels: Vec<Option<Rule>> =
+        fabric.tables("panel").into_iter().map(|table| whole.panel(table, context, yarns)).collect();
+    let rules = std::iter::once(first).chain(panels).collect::<Option<Vec<Rule>>>()?;
     Some(GarmentPlan { path: path?, span, unit, scale, uv_unit, seam, near, body, choices, z_up, rules })
+}
+
+/// What panels have where they say nothing else.
+struct WholeFabric {
+    cloth: Option<ClothPlan>,
+    /// Of the `gauge`, and the length that it counts in.
+    stitch: Option<DVec2>,
+    per: f64,
+    grain: f64,
+    hem_keys: HemKeys,
+}
+
+impl WholeFabric {
+    /// Reads a `[[fabric.panel]]`.
+    fn panel(&self, table: Reader<'_>, context: &Context<'_>, yarns: &KnownYarns<'_>) -> Option<Rule> {
+        let panels = chosen(&table);
+        let name = table.string("name").map(str::to_owned);
+        if name.as_ref().is_some_and(String::is_empty) {
+            table.error_at("name", "the name of a panel cannot be empty", None);
+        }
+        let own_cloth = table.table("cloth").map(|t| cloth(t, context));
+        let yarn = table.string("yarn").map(str::to_owned);
+        if let Some(name) = &yarn {
+            context.check_yarn(table.span("yarn").unwrap_or(table.header()), name, yarns.library);
+        }
+        let colored = ["rows", "columns", "motif", "tint", "vary"].iter().any(|k| table.has(k));
+        let color = color::plan(&table, context, yarns.library);
+        if color.tension().is_some() {
+            table.error_at("vary", "`tension` is of the whole garment", Some("`vary` of the fabric"));
+        }
+        let own_hem = HemKeys::read(&table, context);
+        let hem = own_hem.hem(&table, Some(self.hem_keys));
+        let rule = Rule {
+            panels: Some(panels?),
+            name,
+            span: table.span("group").or(table.span("panel")).unwrap_or(table.header()),
+            stitch: stitch(&table, Some(self.per)).or(self.stitch),
+            grain: if table.has("grain") { grain(&table) } else { self.grain },
+            cloth: match own_cloth {
+                Some(cloth) => cloth?,
+                None => self.cloth.clone()?,
+            },
+            yarn,
+            color: colored.then_some(color),
+            seam: table.one_of("seam", &SEAMS),
+            hem,
+            hems_itself: own_hem.kind.is_some(),
+        };
+        table.finish();
+        Some(rule)
+    }
 }
 
 /// `group` or `panel` of a `[[fabric.panel]]`.
