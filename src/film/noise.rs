@@ -1,6 +1,7 @@
 //! How far a picture is from its limit.
 
-/// What is added to the squared mean in relative errors, so that black pixels do not count without end.
+/// What is added to the squared mean in relative errors, so that black pixels do not count without end; in the square of the
+/// unit in which a film sums up light.
 pub(super) const NOISE_OFFSET: f64 = 0.01;
 
 /// Sums of an estimate of noise.
@@ -13,7 +14,8 @@ pub(super) struct NoiseSums {
 }
 
 /// An estimate of a picture's relative mean square error: the mean over pixels and channels of the variance of the
-/// mean over (mean^2 + 0.01).
+/// mean over (mean^2 + 0.01). Where lights are very faint or very strong, 0.01 is relative to them
+/// ([`Scene::light_scale`](crate::scene::Scene::light_scale)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// The estimate.
