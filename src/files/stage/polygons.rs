@@ -202,13 +202,18 @@ impl PolygonMesh {
         Ok(())
     }
 
-    /// Adds another one. Where one of them has no texture coordinates its own are zero; normals are kept where both have
+    /// Adds another one. Where one of them has no texture coordinates its own are zero, which is noted; normals are kept where both have
     /// them.
     pub(super) fn append(&mut self, mut other: Self) {
         let (first_point, first_face) = (self.points.len() as u32, self.counts.len() as u32);
         if !self.uv_corners.is_empty() || !other.uv_corners.is_empty() {
             let zero = |mesh: &mut Self| {
                 if mesh.uv_corners.is_empty() && !mesh.corners.is_empty() {
+                    let names: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
+                    mesh.notes.push(format!(
+                        "without texture coordinates beside meshes that have some: {}",
+                        names.join(", ")
+                    ));
                     mesh.uvs = vec![DVec2::ZERO];
                     mesh.uv_corners = vec![0; mesh.corners.len()];
                 }
@@ -332,6 +337,7 @@ mod tests {
         all.append(bare);
         assert_eq!((all.points.len(), all.corners[4], all.uv_corners.len()), (8, 4, 8));
         assert_eq!(all.uvs[all.uv_corners[7] as usize], DVec2::ZERO);
+        assert_eq!(all.notes, ["without texture coordinates beside meshes that have some: b"]);
         assert_eq!(all.groups[1], FaceGroup { name: "b".into(), faces: vec![1], is_second: false });
     }
 

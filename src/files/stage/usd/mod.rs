@@ -122,12 +122,16 @@ impl Format for UsdStage {
 
     fn visit(&self, pattern: &PrimPattern, frame: Option<f64>, take: &mut Take<'_>) -> Result<Vec<String>, Problem> {
         guarded(|| {
-            let mut at_rest = Vec::new();
+            let (mut at_rest, mut unknown) = (Vec::new(), Vec::new());
             self.walk(pattern, frame, &mut |prim, to_stage, values| {
                 let at = |p: Problem| p.at(&prim.path);
                 match (&mut *take, prim.kind.as_str()) {
                     (Take::Curves(add), "BasisCurves") => add(&prim.path, batch(values).map_err(at)?, to_stage)?,
                     (Take::Meshes(add, uv), "Mesh") => add(&prim.path, mesh::read(values, to_stage, *uv).map_err(at)?)?,
+                    (Take::Curves(_), "NurbsCurves" | "HermiteCurves") => {
+                        unknown.push(format!("{} is left out: {} are not read, BasisCurves are", prim.path, prim.kind));
+                        return Ok(());
+                    }
                     _ => return Ok(()),
                 }
                 if deformed(values).map_err(at)? {
@@ -136,6 +140,7 @@ impl Format for UsdStage {
                 Ok(())
             })?;
             let mut notes = self.notes();
+            notes.append(&mut unknown);
             if !at_rest.is_empty() {
                 notes.push(format!(
                     "{} is as modelled, in no pose: skeletons and blend shapes are not applied; bake them into `points`",

@@ -371,6 +371,18 @@ fn primvars_come_from_above() {
     assert_eq!(set.colors, [Some([1.0, 0.0, 0.0]), Some([1.0, 0.0, 0.0]), None]);
 }
 
+#[test]
+fn curves_of_other_kinds_are_named() {
+    let stage = of_text(
+        "def NurbsCurves \"n\" {\n}\ndef BasisCurves \"b\" {\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+         point3f[] points = [(0,0,0), (1,0,0)]\n}\n",
+    );
+    let (set, _) = stage.curves(&PrimPattern::all(), None).unwrap();
+    assert_eq!(set.curves.len(), 1);
+    assert_eq!(set.notes, ["/n is left out: NurbsCurves are not read, BasisCurves are"]);
+    assert!(stage.mesh(&MeshChoice::all(), None).unwrap().warnings.is_empty());
+}
+
 /// Points with velocities go on from the sample before, whose number of points counts.
 #[test]
 fn velocities_move_points() {
