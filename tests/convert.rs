@@ -36,6 +36,20 @@ fn what_is_lost_is_said_and_nothing_is_half_written() {
     );
     let said = yarnray(at, &["convert", "a.bcc", "g.usda", "--unit", "cm", "--radius", "0.1"]).good().stderr;
     assert!(!said.contains("millimetres") && !said.contains("radius"), "{said}");
+    // Numbers that only some curves have.
+    let curve = |name: &str, more: &str| {
+        format!(
+            "def BasisCurves \"{name}\" {{\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+             point3f[] points = [(0,0,0), (1,0,0)]\nfloat[] widths = [1, 1]\n{more}}}\n"
+        )
+    };
+    let numbered = curve("a", "int[] primvars:yarnId = [50]\n");
+    write(at, "some.usda", format!("#usda 1.0\n{numbered}{}", curve("b", "")));
+    write(at, "all.usda", format!("#usda 1.0\n{numbered}"));
+    for (from, lost) in [("some.usda", true), ("all.usda", false)] {
+        let said = yarnray(at, &["convert", from, "g.usda"]).good().stderr;
+        assert_eq!(said.contains("ids are lost: not all curves have one"), lost, "{from}: {said}");
+    }
     for name in ["a.bcc", "g.usda"] {
         fs::remove_file(at.join(name)).unwrap();
     }

@@ -93,6 +93,9 @@ fn losses(path: &Path, set: &CurveSet) -> Vec<String> {
     if !can.colors && set.colors.iter().any(Option::is_some) {
         lost.push("colours are lost: the format has none".to_owned());
     }
+    if can.ids && set.ids.iter().any(Option::is_some) && set.ids.iter().any(Option::is_none) {
+        lost.push("ids are lost: not all curves have one, so that all are numbered as they come".to_owned());
+    }
     if !can.ids && set.ids.iter().any(Option::is_some) {
         lost.push("ids are lost: curves are numbered as they come".to_owned());
     }
