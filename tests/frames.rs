@@ -286,6 +286,25 @@ fn sequences_that_do_not_fit_together_say_why() {
         ],
     );
     refused(&["--frames", "7"], &["y.7.txt: no such file"]);
+    // Curves of a stage come and go from frame to frame, not while the shutter is open.
+    let curve = |name: &str, y: u32, more: &str| {
+        format!(
+            "def BasisCurves \"{name}\" {{\nuniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n\
+             point3f[] points = [(-5,{y},0), (5,{y},0)]\nfloat[] widths = [1, 1]\n{more}}}\n"
+        )
+    };
+    let hidden = "token visibility.timeSamples = { 1: \"invisible\", 3: \"inherited\" }\n";
+    write(d, "shot.usda", format!("#usda 1.0\n{}{}", curve("a", 0, ""), curve("b", 1, hidden)));
+    write(d, "t.toml", scene(camera, "type = \"file\", path = \"shot.usda\""));
+    let frame = |number: &str| yarnray(d, &["render", "t.toml", "-o", "t.exr", "--frames", number]);
+    let told = frame("3").good().stderr;
+    assert!(told.contains("in its first frame 1 curves, where another frame has 2: plies wind as in"), "{told}");
+    let told = frame("2..2").good().stderr;
+    assert!(!told.contains("curves, where"), "{told}");
+    write(d, "t.toml", scene(&camera.replace("0.5]", "1.5]"), "type = \"file\", path = \"shot.usda\""));
+    let told = frame("2");
+    assert_eq!(told.status, Some(2));
+    assert!(told.stderr.contains("shot.usda: at frame 3.125: 2 curves, where another frame has 1"), "{}", told.stderr);
     // Of several frames before the first is rendered.
     write(d, "y.2.txt", straight(20.0, 1.0));
     write(d, "y.4.txt", straight(20.0, 3.0));
