@@ -10,7 +10,7 @@ mod tests;
 
 use std::{cell::RefCell, fmt::Write as _};
 
-pub(crate) use names::{listed, shortened};
+pub(crate) use names::{excerpt, listed, shortened};
 pub(crate) use names::{nearest, unknown_name};
 pub(crate) use show::hinted;
 use show::render_one;

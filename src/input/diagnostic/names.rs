@@ -85,6 +85,11 @@ pub(crate) fn listed(words: impl IntoIterator<Item = String>, last: &str) -> Str
     if words.is_empty() { end } else { format!("{} {last} {end}", words.join(", ")) }
 }
 
+/// So many letters of the user's own text, as they stand between quotes: on one line.
+pub(crate) fn excerpt(text: &str, most: usize) -> String {
+    text.chars().take(most).collect::<String>().escape_debug().to_string()
+}
+
 /// The user's own text, cut to a length that fits into a message.
 pub(crate) fn shortened(text: &str) -> String {
     const MOST: usize = 60;

@@ -1,6 +1,7 @@
 //! The words of a chart's row.
 
 use super::{ChartError, PATTERNS, Step, Top};
+use crate::input::diagnostic::excerpt;
 
 /// Most steps of a row that a chart may have.
 const MOST_STEPS: usize = 20_000;
@@ -17,7 +18,7 @@ pub(super) fn parse_steps(text: &str, line: usize) -> Result<Vec<Step>, ChartErr
         // Books write `K2 P2` and `C4F`.
         let word = token.to_ascii_lowercase();
         let (count, step) = parse_step(&word).map_err(|wrong| {
-            let shown: String = token.chars().take(20).flat_map(char::escape_debug).collect();
+            let shown = excerpt(token, 20);
             let (problem, hint) = match wrong {
                 Wrong::Count => ("no step", format!("steps are counted from 1 to {MOST_STEPS}")),
                 Wrong::Cable => ("no cable", format!("cables have 2 to {WIDEST_CABLE} stitches")),

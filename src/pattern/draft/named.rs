@@ -1,7 +1,7 @@
 //! Weaves with a name.
 
 use super::{Draft, DraftError, LARGEST, Pile};
-use crate::input::diagnostic::{listed, nearest};
+use crate::input::diagnostic::{excerpt, listed, nearest};
 
 /// How each weave with a name is written.
 pub const NAMES: &[&str] = &[
@@ -49,7 +49,7 @@ impl<'a> Words<'a> {
                 Ok(n) if (1..=LARGEST).contains(&n) => Ok(n),
                 _ if n.is_empty() || n.contains(|c: char| !c.is_ascii_digit()) => Err(None),
                 _ => {
-                    let problem = format!("{n} in the weave \"{}\"", shown(text));
+                    let problem = format!("{n} in the weave \"{}\"", excerpt(text, 30));
                     Err(Some(wrong(problem, format!("numbers are from 1 to {LARGEST}"))))
                 }
             };
@@ -75,11 +75,6 @@ impl<'a> Words<'a> {
     fn turned(&self) -> bool {
         self.left || self.step.is_some()
     }
-}
-
-/// As much of a name as a message shows.
-fn shown(text: &str) -> String {
-    text.chars().take(30).flat_map(char::escape_debug).collect()
 }
 
 fn wrong(problem: String, hint: String) -> DraftError {
@@ -211,7 +206,7 @@ impl Draft {
     /// No such weave, or numbers that make none.
     pub fn named(text: &str) -> Result<Self, DraftError> {
         let unknown = || {
-            let problem = format!("unknown weave \"{}\"", shown(text));
+            let problem = format!("unknown weave \"{}\"", excerpt(text, 30));
             // Numbers are the user's own.
             let word = |name: &str| name.trim_end_matches(|c: char| !c.is_alphabetic()).to_lowercase();
             let known: Vec<String> = NAMES.iter().map(|name| word(name)).collect();

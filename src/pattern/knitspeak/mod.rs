@@ -20,6 +20,7 @@ pub use rows::EveryFew;
 use rows::{Again, Until, written};
 
 use super::chart::{Act, Chart};
+use crate::input::diagnostic::excerpt;
 
 /// Why instructions could not be followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -632,5 +633,5 @@ fn other_face(name: &str) -> Option<&'static str> {
 
 /// A piece of the text for a message.
 fn short(text: &str) -> String {
-    text.trim().chars().take(30).collect::<String>().escape_debug().to_string()
+    excerpt(text.trim(), 30)
 }
