@@ -38,6 +38,7 @@ pub use self::{
 use super::{
     PatternStrand,
     chart::{Act, Chart, ChartError, Stitch, Whole},
+    period::counts_that_hold,
     revolution::Revolution,
     tile::RelaxedRows,
 };
@@ -170,12 +171,12 @@ impl Knit {
     pub(crate) fn breaks_in_rounds(&self) -> Option<String> {
         let Repeat { wide, .. } = self.form.is_round().then(|| self.repeat_in(Whole::default()))??;
         let count = self.stitches;
-        let fits = match count / wide * wide {
-            0 => format!("{wide} would hold it"),
-            fewer => format!("{fewer} or {} would hold it", fewer + wide),
+        let told = || {
+            let fits = counts_that_hold(wide, count);
+            format!(
+                "the pattern repeats after {wide} stitches and breaks where rounds of {count} begin; {fits} would hold it"
+            )
         };
-        let told =
-            || format!("the pattern repeats after {wide} stitches and breaks where rounds of {count} begin; {fits}");
         (!count.is_multiple_of(wide)).then(told)
     }
 

@@ -15,7 +15,7 @@ mod crowded;
 pub mod draft;
 pub mod knit;
 pub mod knitspeak;
-mod period;
+pub(crate) mod period;
 mod relax;
 pub mod revolution;
 mod rods;

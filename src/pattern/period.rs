@@ -16,6 +16,14 @@ pub(super) fn period(count: usize, same: impl Fn(usize, usize) -> bool) -> usize
     if 2 * period <= count { period } else { count }
 }
 
+/// The counts next to one that hold a repeat of so many a whole number of times, for people: what to ask for where it does not.
+pub(crate) fn counts_that_hold(wide: u32, count: u32) -> String {
+    match count / wide * wide {
+        0 => wide.to_string(),
+        fewer => format!("{fewer} or {}", fewer + wide),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -26,5 +34,13 @@ mod tests {
             let text = text.as_bytes();
             assert_eq!(period(text.len(), |i, j| text[i] == text[j]), want);
         }
+    }
+
+    #[test]
+    fn counts_hold_whole_repeats() {
+        assert_eq!(
+            [(2, 1), (2, 13), (4, 30), (12, 5)].map(|(w, n)| counts_that_hold(w, n)),
+            ["2", "12 or 14", "28 or 32", "12"]
+        );
     }
 }

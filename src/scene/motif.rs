@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 use super::palette::{self, hex};
+use crate::pattern::period::counts_that_hold;
 
 /// Whether a picture is drawn once over the whole fabric, not a pixel for each stitch, by its name.
 pub(crate) const FITS: [(&str, bool); 2] = [("stitch", false), ("fabric", true)];
@@ -90,11 +91,10 @@ impl CellMap {
             self.again[0] && count % wide != 0 && (1..wide).any(|column| at(column) != at(0))
         };
         let (row, count) = widths.iter().enumerate().find(|of| breaks(*of))?;
-        let fits = match count / wide * wide {
-            0 => format!("{wide} would hold it"),
-            fewer => format!("{fewer} or {} would hold it", fewer + wide),
-        };
-        Some(format!("the motif is {wide} stitches wide and breaks where round {} of {count} begins; {fits}", row + 1))
+        let (round, fits) = (row + 1, counts_that_hold(wide, *count));
+        Some(format!(
+            "the motif is {wide} stitches wide and breaks where round {round} of {count} begins; {fits} would hold it"
+        ))
     }
 
     /// The yarn of each stitch of rows of so many.

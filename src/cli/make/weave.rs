@@ -10,7 +10,8 @@ use crate::{
     pattern::{
         PatternStrand,
         draft::{Draft, DraftError},
-        weave::{self, Cloth, Edges, Extent, Impossible, Measures, Weave, whole_pairs},
+        period::counts_that_hold,
+        weave::{self, Cloth, Edges, Extent, Impossible, Measures, Weave},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Yarn, drawn_draft::Legend, palette},
@@ -95,14 +96,15 @@ pub(super) fn run(args: &WeaveArgs) -> Result<(), Failure> {
     drop(working);
     args.output.hold(cloth.least_points())?;
     let strands = cloth.strands();
+    let measures = cloth.measures();
     if !quiet {
-        warn(&piece, &cloth, &strands);
+        warn(&cloth, &piece, &measures, &strands);
     }
     let length = weave::yarn_lengths(&strands);
     let color = |strand: &PatternStrand| file.as_ref().and_then(|f| f.color_of(strand));
     write(strands, &args.output, radii, yarn.as_ref(), color)?;
     if !quiet {
-        args.report(&cloth.measures(), length);
+        args.report(&measures, length);
     }
     Ok(())
 }
@@ -196,11 +198,12 @@ impl WeaveArgs {
 }
 
 /// Says what a scene would warn of.
-fn warn(piece: &Weave, cloth: &Cloth<'_>, strands: &[PatternStrand]) {
+fn warn(cloth: &Cloth<'_>, piece: &Weave, measures: &Measures, strands: &[PatternStrand]) {
     if let Some(problem) = piece.draft.loose_in_words() {
         log::say(&format!("note: {problem}; warps count from the left, wefts from the bottom"));
     }
-    for told in cloth.too_low_for_hems(1.0).into_iter().chain(cloth.crowded(strands)) {
+    let low = if piece.edges == Edges::Finished { measures.too_low_for_hems(1.0) } else { None };
+    for told in low.into_iter().chain(cloth.crowded(strands)) {
         log::say(&format!("warning: {told}"));
     }
 }
@@ -238,7 +241,7 @@ fn not_woven(why: &Impossible, given: [bool; 2]) -> Failure {
         Impossible::Unpaired { warps } => {
             return Failure::hinted(
                 format!("this weave twines its warps in pairs: of {warps} one is left alone"),
-                format!("--warps {}", whole_pairs(warps)),
+                format!("--warps {}", counts_that_hold(2, warps)),
             );
         }
         Impossible::TooLarge => "error: more than 2^27 control points; fewer warps, wefts or points".to_owned(),

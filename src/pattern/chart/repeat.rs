@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Chart, Row};
+use super::{Chart, Row, Step};
 use crate::pattern::period::period;
 
 /// The piece that a chart is written out for, where a border may cut its repeat.
@@ -39,7 +39,7 @@ impl Chart {
 /// The most stitches of both borders together.
 const MOST_BORDER: u32 = 32;
 
-/// Stitches left and right of what repeats, and those of a repeat.
+/// Where what repeats begins and ends, in stitches of a row, and how many a repeat has.
 #[derive(Clone, Copy)]
 struct Sides {
     left: u32,
@@ -51,15 +51,16 @@ impl Chart {
     /// What repeats between borders of its own, as most patterns are written, and how many stitches that has: at least half of all
     /// `wide` are between both borders. `None` where there are no borders, or nothing repeats.
     pub(in super::super) fn middle(&self, wide: u32) -> Option<(Self, u32)> {
+        let rows: Vec<Worked> = self.rows.iter().map(|row| row.worked(wide)).collect::<Option<_>>()?;
         // The narrowest borders, and of these the narrowest repeat.
         for borders in 1..=(wide / 2).min(MOST_BORDER) {
             let middle = wide - borders;
             for own in (1..=middle / 2).filter(|own| middle.is_multiple_of(*own)) {
                 for left in 0..=borders {
-                    let sides = Sides { left, right: borders - left, own };
-                    let of_row = |row: &Row| Some(Row { steps: row.between(wide, sides)?, line: row.line });
-                    if let Some(rows) = self.rows.iter().map(of_row).collect() {
-                        return Some((Self { rows }, own));
+                    let sides = Sides { left, right: left + middle, own };
+                    if let Some(steps) = rows.iter().map(|row| row.between(sides)).collect::<Option<Vec<_>>>() {
+                        let row = |(steps, row): (&[Step], &Row)| Row { steps: Arc::from(steps), line: row.line };
+                        return Some((Self { rows: steps.into_iter().zip(&self.rows).map(row).collect() }, own));
                     }
                 }
             }
@@ -68,31 +69,43 @@ impl Chart {
     }
 }
 
+/// The steps of a row over all of its stitches.
+struct Worked {
+    steps: Vec<Step>,
+    /// How many stitches the steps before each of them take and make, and all of them.
+    before: Vec<(u32, u32)>,
+}
+
+impl Worked {
+    /// The steps of one repeat between borders.
+    fn between(&self, Sides { left, right, own }: Sides) -> Option<&[Step]> {
+        let at = |stitches: u32| self.before.binary_search(&(stitches, stitches)).ok();
+        let (first, next, end) = (at(left)?, at(left + own)?, at(right)?);
+        let (middle, count) = (&self.steps[first..end], next - first);
+        let repeats = middle.len().is_multiple_of(count) && middle.iter().zip(&middle[count..]).all(|(a, b)| a == b);
+        repeats.then(|| &middle[..count])
+    }
+}
+
 impl Row {
-    /// The steps of one repeat between borders, of a row of so many stitches.
-    fn between(&self, wide: u32, Sides { left, right, own }: Sides) -> Option<Arc<[super::Step]>> {
+    /// Its steps on so many stitches, of which it takes as many as it makes; `None` where it does not go into them.
+    fn worked(&self, wide: u32) -> Option<Worked> {
         let (takes, makes) = self.takes_and_makes();
         if self.is_short() || takes == 0 || takes != makes || !wide.is_multiple_of(takes) {
             return None;
         }
-        // Steps repeat until all stitches are worked.
-        let steps: Vec<super::Step> = self.steps.repeat((wide / takes) as usize);
-        let mut worked = Vec::with_capacity(steps.len() + 1);
-        let mut at = (0, 0);
-        for step in &steps {
-            worked.push(at);
+        let steps = self.steps.repeat((wide / takes) as usize);
+        let sums = steps.iter().scan((0, 0), |sum, step| {
             let (takes, makes) = step.takes_and_makes();
-            at = (at.0 + takes, at.1 + makes);
-        }
-        worked.push(at);
-        let [first, next, end] = [left, left + own, wide - right].map(|n| worked.iter().position(|at| *at == (n, n)));
-        let (middle, count) = (&steps[first?..end?], next? - first?);
-        let repeats = middle.len().is_multiple_of(count) && middle.iter().zip(&middle[count..]).all(|(a, b)| a == b);
-        repeats.then(|| Arc::from(&middle[..count]))
+            *sum = (sum.0 + takes, sum.1 + makes);
+            Some(*sum)
+        });
+        let before = std::iter::once((0, 0)).chain(sums).collect();
+        Some(Worked { steps, before })
     }
 
     /// The steps of its smallest repeat, on a row of so many stitches if it is there once.
-    fn smallest(&self, stitches: Option<u32>) -> Arc<[super::Step]> {
+    fn smallest(&self, stitches: Option<u32>) -> Arc<[Step]> {
         let all = self.steps.len();
         // A short row is written for its stitches.
         if self.is_short() {

@@ -1,6 +1,6 @@
-//! What is told of a weave that did not find the room that it needs.
+//! What is told of a weave whose yarns run into each other.
 
-use super::{Cloth, Edges, PatternStrand, StrandKind};
+use super::{Cloth, PatternStrand, StrandKind};
 use crate::pattern::crowded::{Measured, crowding, in_words};
 
 impl Cloth<'_> {
@@ -28,17 +28,5 @@ impl Cloth<'_> {
             "yarns of so different thickness or ways find no room beside each other; a wider setting"
         };
         Some(in_words(&found, why))
-    }
-
-    /// That it is too low for the hems that it is to have, for people, with heights in a unit of so many of its own.
-    pub(crate) fn too_low_for_hems(&self, unit: f64) -> Option<String> {
-        let measures = self.measures();
-        let [least, height] = [measures.least_hemmed(), measures.size[1]].map(|length| length / unit);
-        let is_hemmed = self.weave.edges == Edges::Finished;
-        (is_hemmed && height < least).then(|| {
-            format!(
-                "hems take a height of {least:.3} at least, and the cloth is {height:.3} high: it has selvedges alone"
-            )
-        })
     }
 }

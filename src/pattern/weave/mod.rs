@@ -119,15 +119,6 @@ pub enum Impossible {
     TooLarge,
 }
 
-/// The numbers of warps next to an odd one that are whole pairs: what to ask for in place of one that is
-/// [unpaired](Impossible::Unpaired).
-pub(crate) fn whole_pairs(warps: u32) -> String {
-    match warps {
-        0 | 1 => "2".to_owned(),
-        _ => format!("{} or {}", warps - 1, warps + 1),
-    }
-}
-
 /// What a weave came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
@@ -149,6 +140,17 @@ impl Measures {
     /// How high the cloth is at least when it is [hemmed](Edges::Finished); lower cloth has selvedges.
     pub fn least_hemmed(&self) -> f64 {
         edges::least_hemmed(self.thickness)
+    }
+
+    /// That it is too low for hems, if it is, for people, with heights in a unit of so many of its own.
+    pub(crate) fn too_low_for_hems(&self, unit: f64) -> Option<String> {
+        let [least, height] = [self.least_hemmed(), self.size[1]].map(|length| length / unit);
+        let told = || {
+            format!(
+                "hems take a height of {least:.3} at least, and the cloth is {height:.3} high: it has selvedges alone"
+            )
+        };
+        (height < least).then(told)
     }
 }
 

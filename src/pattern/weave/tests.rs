@@ -300,7 +300,7 @@ fn a_leno_has_whole_pairs() {
     let of = |warps| Weave { warps, ..weave("leno") };
     let odd = of(Extent::Yarns(13));
     assert!(matches!(odd.relax(), Err(Impossible::Unpaired { warps: 13 })));
-    assert_eq!([1, 13].map(whole_pairs), ["2", "12 or 14"]);
+    assert_eq!([1, 13].map(|warps| crate::pattern::period::counts_that_hold(2, warps)), ["2", "12 or 14"]);
     // What fills a width does.
     for width in [9.0, 11.0, 13.0, 15.0] {
         let filled = of(Extent::Length(width));

@@ -16,7 +16,8 @@ use crate::{
     pattern::{
         PatternStrand, StrandKind,
         draft::{Draft, DraftError},
-        weave::{self, Edges, Extent, Impossible, Measures, Weave, shuttles, whole_pairs},
+        period::counts_that_hold,
+        weave::{self, Edges, Extent, Impossible, Measures, Weave, shuttles},
         wif::{self, WifUse, WovenWif},
     },
     scene::{Tufts, Yarn},
@@ -71,13 +72,14 @@ impl WeavePlan {
         match self.weave.relax() {
             Ok(cloth) => {
                 let strands = cloth.strands();
-                let low = cloth.too_low_for_hems(context.unit).filter(|_| self.hems);
+                let measures = cloth.measures();
+                let low = if self.hems { measures.too_low_for_hems(context.unit) } else { None };
                 let told = low.into_iter().chain(cloth.crowded(&strands));
                 warnings.extend(told.map(|told| format!("{}: {told}", self.name)));
                 let length = weave::yarn_lengths(&strands).map(|mm| mm / 1000.0);
                 let (warps, wefts): (Vec<PatternStrand>, Vec<PatternStrand>) =
                     strands.into_iter().partition(|s| s.kind == StrandKind::Warp);
-                let origin = self.origin(cloth.count(), &cloth.measures(), length);
+                let origin = self.origin(cloth.count(), &measures, length);
                 let tufts = [&warps, &wefts].map(|side| {
                     let strands = || side.iter().enumerate().filter(|(_, s)| s.is_of_tuft());
                     let yarns = strands().map(|(_, s)| s.share).sum::<f64>().round() as usize;
@@ -129,7 +131,7 @@ impl WeavePlan {
             ),
             Err(Impossible::Unpaired { warps }) => wrong(
                 format!("this weave twines its warps in pairs: of {warps} one is left alone"),
-                &format!("`warps` of {}", whole_pairs(warps)),
+                &format!("`warps` of {}", counts_that_hold(2, warps)),
             ),
             Err(Impossible::TooLarge) => {
                 wrong("more than 2^27 control points".to_owned(), "fewer warps, wefts or points");
@@ -225,6 +227,9 @@ pub(super) fn weave(
     })
 }
 
+/// Distance of warps and of wefts, and how many there are to 10 mm.
+const DISTANCES: [(&str, &str); 2] = [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")];
+
 /// How closely yarns are set, of warp and weft.
 struct Setting {
     /// From the middle of a yarn to that of the next, mm.
@@ -241,12 +246,11 @@ struct Setting {
 fn setting(table: &Reader<'_>, fabric: &Reader<'_>, context: &Context<'_>, wif: Option<&WovenWif>) -> Setting {
     let cover = table.f64("cover", Range::between(0.01, 1.0));
     let in_file = |side: usize| wif.and_then(|w| w.spacing[side]).filter(|_| cover.is_none());
-    let asked =
-        [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")].map(|(k, n)| spacing(table, context, k, n));
+    let asked = DISTANCES.map(|(key, density)| spacing(table, context, key, density));
     let gauge = gauge(table, fabric, &asked);
     let of_gauge = table.span("gauge").or(fabric.span("gauge"));
-    let spans = [("warp_spacing", "ends_per_cm"), ("weft_spacing", "picks_per_cm")]
-        .map(|(k, n)| table.span(k).or(table.span(n)).or(of_gauge).unwrap_or(table.header()));
+    let span = |key: &str| table.span(key);
+    let spans = DISTANCES.map(|(key, density)| span(key).or(span(density)).or(of_gauge).unwrap_or(table.header()));
     let asked = [0, 1].map(|side| asked[side].or(gauge.map(|g| g[side])));
     let filed = [0, 1].map(|side| asked[side].is_none() && in_file(side).is_some());
     let spacing = [0, 1].map(|side| asked[side].or_else(|| in_file(side)));
