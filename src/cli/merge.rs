@@ -8,20 +8,20 @@ use super::{
     Failure, command_line,
     files::{Attempts, Files},
     log::LogArgs,
-    named,
-    render::{is_film_path, stops},
+    pictures::{DisplayArgs, denoised_beside, write_pictures},
+    render::is_film_path,
     thread_pool,
 };
 use crate::{
     ffi::oidn::Denoiser,
-    image::{output, png::ToneMap, whole_file},
+    image::{output, whole_file},
     math::words::counted,
     render::{
         Job,
         denoise::Denoised,
         film_file::{self, About},
         merge::merge,
-        picture,
+        picture::Picture,
     },
     report,
 };
@@ -48,24 +48,15 @@ pub(super) struct MergeArgs {
     /// layers albedo and normal.
     #[arg(long)]
     denoise: bool,
-    /// Curve of the picture for a screen, in place of the scene's.
-    #[arg(long, value_parser = named(&ToneMap::NAMES))]
-    tone_map: Option<ToneMap>,
-    /// Exposure of the picture for a screen, in stops, in place of the scene's.
-    #[arg(long, value_name = "STOPS", value_parser = stops)]
-    exposure: Option<f32>,
+    #[command(flatten)]
+    screen: DisplayArgs,
     #[command(flatten)]
     log: LogArgs,
 }
 
 pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     args.log.start();
-    let beside: Vec<PathBuf> = args
-        .out
-        .iter()
-        .filter(|path| args.denoise && !is_film_path(path))
-        .filter_map(|p| picture::denoised_path(p))
-        .collect();
+    let beside = if args.denoise { denoised_beside(&args.out) } else { Vec::new() };
     Files::default().reads("PART", &args.parts).writes("-o", &args.out).writes("--denoise", &beside).check(false)?;
     for path in &args.out {
         if is_film_path(path) {
@@ -82,24 +73,21 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), Failure> {
     }
     let (mut about, job) =
         merge(&args.parts, args.partial).map_err(|error| Failure::Input(format!("error: {error}")))?;
-    about.frame.display.tone_map = args.tone_map.unwrap_or(about.frame.display.tone_map);
-    about.frame.display.exposure = args.exposure.unwrap_or(about.frame.display.exposure);
+    args.screen.apply(&mut about.frame.display);
     let clean = if args.denoise { Some(denoised(&about, &job)?) } else { None };
     let command = command_line();
     let attributes = report::merged_attributes(&about.metadata, &job, args.parts.len(), &command);
     let mut attempts = Attempts::default();
+    let picture = Picture { frame: &about.frame, film: &job.film, denoised: clean.as_ref(), attributes: &attributes };
     for path in &args.out {
-        let result = if is_film_path(path) {
-            film_file::write(path, &about, &job)
+        let written = if !is_film_path(path) {
+            write_pictures(std::slice::from_ref(path), &picture, &mut attempts)
+        } else if attempts.note(film_file::write(path, &about, &job)) {
+            vec![path.clone()]
         } else {
-            picture::write(path, &about.frame, &job.film, clean.as_ref(), &attributes)
+            Vec::new()
         };
-        if let (Some(clean), Some(path)) = (&clean, picture::denoised_path(path).filter(|_| !is_film_path(path)))
-            && attempts.note(picture::write_denoised(&path, &about.frame, &job.film, clean))
-        {
-            tracing::info!(path = %path.display(), "wrote {}", path.display());
-        }
-        if attempts.note(result) {
+        for path in written {
             tracing::info!(path = %path.display(), "wrote {}", path.display());
         }
     }

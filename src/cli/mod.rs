@@ -15,6 +15,7 @@ mod log;
 mod make;
 mod manual;
 mod merge;
+mod pictures;
 mod render;
 mod scatter;
 mod signals;
@@ -342,56 +343,14 @@ fn names<T>(list: &'static [(&'static str, T)]) -> clap::builder::PossibleValues
 }
 
 impl SceneArgs {
-    /// The first of these options that is given, as it is spelled.
-    fn given(&self) -> Option<&'static str> {
-        let Self { mode, model, spp, time, noise, width, height, adaptive, crop, max_bounces, threads, .. } = self;
-        let Self { max_memory, seed, set, curves, frame, .. } = self;
-        let all = [
-            ("--mode", mode.is_some()),
-            ("--model", model.is_some()),
-            ("--spp", spp.is_some()),
-            ("--time", time.is_some()),
-            ("--noise", noise.is_some()),
-            ("--width", width.is_some()),
-            ("--height", height.is_some()),
-            ("--adaptive", *adaptive),
-            ("--crop", crop.is_some()),
-            ("--max-bounces", max_bounces.is_some()),
-            ("--threads", threads.is_some()),
-            ("--max-memory", max_memory.is_some()),
-            ("--seed", seed.is_some()),
-            ("--set", !set.is_empty()),
-            ("--curves", curves.is_some()),
-            ("--frame", *frame),
-        ];
-        all.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
-    }
-
-    /// Loads a scene with these options, and shows that it does unless `quiet`.
-    fn load(&self, path: &std::path::Path, quiet: bool) -> Result<Scene, LoadError> {
-        self.load_or_survey(path, quiet, false)
-    }
-
-    /// As [`Self::load`]; a survey lays no yarns on garments.
-    fn load_or_survey(&self, path: &std::path::Path, quiet: bool, survey: bool) -> Result<Scene, LoadError> {
-        let mut options = LoadOptions {
-            survey,
-            assignments: self.set.clone(),
-            curves: self.curves.clone(),
-            frame: self.frame,
-            frames: self.frames.clone(),
-            ..LoadOptions::default()
-        };
-        let mut set = |key: &str, value: Option<Value>, shown: String| {
-            if let Some(value) = value {
-                let option = format!("--{} {shown}", key.replace('_', "-")).trim_end().to_owned();
-                options.settings.push((format!("render.{key}"), value, option));
-            }
-        };
-        let text = |v: &Option<String>| (v.clone().map(Value::from), v.clone().unwrap_or_default());
-        let count = |v: Option<u32>| (v.map(|n| Value::Integer(n.into())), v.map_or(String::new(), |n| n.to_string()));
-        let number = |v: Option<f64>| (v.map(Value::Float), v.map_or(String::new(), |n| n.to_string()));
-        for (key, (value, shown)) in [
+    /// Keys of the scene that these options set, their values, and the options as they were given.
+    fn settings(&self) -> Vec<(String, Value, String)> {
+        type Given = (Option<Value>, String);
+        let text = |v: &Option<String>| -> Given { (v.clone().map(Value::from), v.clone().unwrap_or_default()) };
+        let count = |v: Option<u32>| -> Given { (v.map(Value::from), v.map_or(String::new(), |n| n.to_string())) };
+        let number = |v: Option<f64>| -> Given { (v.map(Value::Float), v.map_or(String::new(), |n| n.to_string())) };
+        let crop = self.crop.map_or(String::new(), |crop| crop.map(|v| v.to_string()).join(","));
+        let all: [(&str, Given); 13] = [
             ("mode", text(&self.mode)),
             ("model", text(&self.model)),
             ("spp", count(self.spp)),
@@ -404,13 +363,39 @@ impl SceneArgs {
             ("threads", count(self.threads)),
             ("seed", count(self.seed)),
             ("max_memory", number(self.max_memory)),
-        ] {
-            set(key, value, shown);
-        }
-        if let Some(crop) = &self.crop {
-            let shown = crop.map(|v| v.to_string()).join(",");
-            options.settings.push(("render.crop".to_owned(), Value::from(*crop), format!("--crop {shown}")));
-        }
+            ("crop", (self.crop.map(Value::from), crop)),
+        ];
+        let setting = |(key, (value, shown)): (&str, Given)| {
+            let option = format!("--{} {shown}", key.replace('_', "-")).trim_end().to_owned();
+            Some((format!("render.{key}"), value?, option))
+        };
+        all.into_iter().filter_map(setting).collect()
+    }
+
+    /// The first of these options that is given, as it is spelled.
+    fn given(&self) -> Option<String> {
+        let others = [("--set", !self.set.is_empty()), ("--curves", self.curves.is_some()), ("--frame", self.frame)];
+        let others = others.into_iter().filter(|(_, given)| *given).map(|(option, _)| option.to_owned());
+        let of_keys =
+            self.settings().into_iter().filter_map(|(_, _, option)| Some(option.split(' ').next()?.to_owned()));
+        of_keys.chain(others).next()
+    }
+
+    /// Loads a scene with these options, and shows that it does unless `quiet`.
+    fn load(&self, path: &std::path::Path, quiet: bool) -> Result<Scene, LoadError> {
+        self.load_or_survey(path, quiet, false)
+    }
+
+    /// As [`Self::load`]; a survey lays no yarns on garments.
+    fn load_or_survey(&self, path: &std::path::Path, quiet: bool, survey: bool) -> Result<Scene, LoadError> {
+        let options = LoadOptions {
+            survey,
+            assignments: self.set.clone(),
+            settings: self.settings(),
+            curves: self.curves.clone(),
+            frame: self.frame,
+            frames: self.frames.clone(),
+        };
         let _working = Working::on(format!("loading {}", path.display()), quiet);
         load(path, &options)
     }

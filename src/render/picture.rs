@@ -70,29 +70,56 @@ impl Frame {
     }
 }
 
-/// Writes the picture in the format that the path's extension names.
-///
-/// An EXR gets all layers of the frame and `attributes`, and a denoised picture as the layer `denoised`; other formats get
-/// the colours. A denoised picture in such a format is a file of its own ([`write_denoised`]).
-///
-/// # Errors
-/// What stands in the way of the file; then nothing is left of it.
-pub fn write(
-    path: &Path,
-    frame: &Frame,
-    film: &Film,
-    denoised: Option<&Denoised>,
-    attributes: &[(String, Attribute)],
-) -> Result<(), ImageError> {
-    if Format::of(path)? == Format::Exr {
-        return write_exr(path, frame, film, denoised, attributes);
-    }
-    output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
-        for (x, out) in row.iter_mut().enumerate() {
-            let p = film.pixel(x as u32, y as u32);
-            *out = [p.color[0], p.color[1], p.color[2], p.alpha];
+/// A picture that is done, and all that is written of it.
+#[derive(Clone, Copy)]
+pub struct Picture<'a> {
+    /// What is known of its scene.
+    pub frame: &'a Frame,
+    /// Its pixels.
+    pub film: &'a Film,
+    /// It without noise.
+    pub denoised: Option<&'a Denoised>,
+    /// Metadata of an EXR.
+    pub attributes: &'a [(String, Attribute)],
+}
+
+impl Picture<'_> {
+    /// Writes the picture in the format that the path's extension names.
+    ///
+    /// An EXR gets all layers of the frame and the attributes, and a denoised picture as the layer `denoised`; other
+    /// formats get the colours. A denoised picture in such a format is a file of its own ([`Self::write_denoised`]).
+    ///
+    /// # Errors
+    /// What stands in the way of the file; then nothing is left of it.
+    pub fn write(&self, path: &Path) -> Result<(), ImageError> {
+        if Format::of(path)? == Format::Exr {
+            return write_exr(path, self);
         }
-    })
+        let film = self.film;
+        output::write_colors(path, film.width as usize, film.height as usize, &self.frame.display, |y, row| {
+            for (x, out) in row.iter_mut().enumerate() {
+                let p = film.pixel(x as u32, y as u32);
+                *out = [p.color[0], p.color[1], p.color[2], p.alpha];
+            }
+        })
+    }
+
+    /// Writes the denoised picture as a file of its own beside `path`, where there is one and `path` has no room for it;
+    /// gives the file's name.
+    ///
+    /// # Errors
+    /// If the file cannot be written; then nothing is left behind.
+    pub fn write_denoised(&self, path: &Path) -> Result<Option<PathBuf>, ImageError> {
+        let (Some(denoised), Some(path)) = (self.denoised, denoised_path(path)) else { return Ok(None) };
+        let film = self.film;
+        output::write_colors(&path, film.width as usize, film.height as usize, &self.frame.display, |y, row| {
+            for (x, out) in row.iter_mut().enumerate() {
+                let [r, g, b] = denoised.pixel(x as u32, y as u32);
+                *out = [r, g, b, film.pixel(x as u32, y as u32).alpha];
+            }
+        })?;
+        Ok(Some(path))
+    }
 }
 
 /// The name of the denoised picture that belongs to `path`, where that is not an EXR: `a.denoised.png` for `a.png`.
@@ -104,26 +131,8 @@ pub fn denoised_path(path: &Path) -> Option<PathBuf> {
     Some(path.with_extension(format!("denoised.{extension}")))
 }
 
-/// Writes a denoised picture as a file of its own.
-///
-/// # Errors
-/// If the file cannot be written; then nothing is left behind.
-pub fn write_denoised(path: &Path, frame: &Frame, film: &Film, denoised: &Denoised) -> Result<(), ImageError> {
-    output::write_colors(path, film.width as usize, film.height as usize, &frame.display, |y, row| {
-        for (x, out) in row.iter_mut().enumerate() {
-            let [r, g, b] = denoised.pixel(x as u32, y as u32);
-            *out = [r, g, b, film.pixel(x as u32, y as u32).alpha];
-        }
-    })
-}
-
-fn write_exr(
-    path: &Path,
-    frame: &Frame,
-    film: &Film,
-    denoised: Option<&Denoised>,
-    attributes: &[(String, Attribute)],
-) -> Result<(), ImageError> {
+fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
+    let &Picture { frame, film, denoised, attributes } = picture;
     let mattes: Vec<MatteLayer> = if frame.layers.cryptomatte { MatteLayer::all(frame, film) } else { Vec::new() };
     let mut layers = exr_layers(frame, film, denoised, &mattes);
     let channels = layers.iter().flat_map(|layer| layer.channels.clone()).collect();

@@ -4,36 +4,34 @@ mod checkpoint;
 mod options;
 mod progress;
 
-use std::{
-    path::PathBuf,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use super::{
     Failure, command_line,
     files::{Attempts, Files},
     log,
+    pictures::{denoised_beside, write_pictures},
     signals::{interrupt_flag, interrupted},
     thread_pool, write_text,
 };
 use crate::{
     cloth::Cloth,
     ffi::oidn::Denoiser,
-    image::{self, Attribute, output::Format},
+    image::{self, output::Format},
     plan::Memory,
     render::{
         self, Checkpoints, Control, Job, Rendered, Stop,
         denoise::Denoised,
         film_file::About,
         live::LiveView,
-        picture::{self, Frame},
+        picture::{Frame, Picture},
     },
     report::{self, Phases, RunRecord},
     scene::{Layers, Scene},
 };
 use checkpoint::{Lock, Saver, check_shard, old_checkpoint, resumed};
 use options::Outputs;
-pub(super) use options::{RenderArgs, is_film_path, stops};
+pub(super) use options::{RenderArgs, is_film_path};
 use progress::{bar, show, summary, warn};
 
 pub(super) fn run(args: &RenderArgs) -> Result<(), Failure> {
@@ -95,7 +93,9 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
         let clean = denoised.as_ref().ok().and_then(Option::as_ref);
         // What one file's disk refuses, another's may take.
         let mut attempts = Attempts::default();
-        let mut written = write_pictures(&outputs.pictures, &scene, &rendered, clean, &attributes, &mut attempts);
+        let frame = Frame::new(&scene);
+        let picture = Picture { frame: &frame, film: &rendered.film, denoised: clean, attributes: &attributes };
+        let mut written = write_pictures(&outputs.pictures, &picture, &mut attempts);
         attempts.note(denoised.map(drop));
         phases.write = writing.elapsed();
         log::phase("write", phases.write);
@@ -136,18 +136,13 @@ fn files(args: &RenderArgs, outputs: &Outputs) -> Files {
 
 /// Refuses outputs that cannot be written, before any work, and lets options of the output win over the scene's.
 fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> Result<(), Failure> {
-    let denoised: Vec<PathBuf> = outputs
-        .pictures
-        .iter()
-        .filter(|_| args.denoise || scene.denoise)
-        .filter_map(|p| picture::denoised_path(p))
-        .collect();
+    let denoised = if args.denoise || scene.denoise { denoised_beside(&outputs.pictures) } else { Vec::new() };
     files(args, outputs).writes("--denoise", &denoised).check(false)?;
     // A film may become any picture.
     let mut layered = !outputs.films.is_empty() || args.checkpoint.is_some();
+    let [x0, y0, x1, y1] = scene.render.crop.map(|v| v as usize);
     for path in &outputs.pictures {
         layered |= image::output::check_writable(path)? == Format::Exr;
-        let [x0, y0, x1, y1] = scene.render.crop.map(|v| v as usize);
         image::output::check_size(path, x1 - x0, y1 - y0)?;
     }
     for path in outputs.films.iter().chain(&args.checkpoint).chain(&args.stats) {
@@ -158,12 +153,7 @@ fn check_and_apply(args: &RenderArgs, outputs: &Outputs, scene: &mut Scene) -> R
     if !layered {
         scene.layers = Layers::NONE;
     }
-    if let Some(tone_map) = args.tone_map {
-        scene.display.tone_map = tone_map;
-    }
-    if let Some(exposure) = args.exposure {
-        scene.display.exposure = exposure;
-    }
+    args.screen.apply(&mut scene.display);
     Ok(())
 }
 
@@ -197,28 +187,4 @@ fn render_shown(args: &RenderArgs, scene: &Scene, cloth: &Cloth, job: Job, saver
         tracing::warn!("the viewer at {address}: {problem}");
     }
     rendered
-}
-
-/// Writes all pictures, and those without noise beside them where a format has no room for both; gives those written.
-fn write_pictures(
-    paths: &[PathBuf],
-    scene: &Scene,
-    rendered: &Rendered,
-    clean: Option<&Denoised>,
-    attributes: &[(String, Attribute)],
-    attempts: &mut Attempts,
-) -> Vec<PathBuf> {
-    let (frame, film) = (Frame::new(scene), &rendered.film);
-    let mut written = Vec::new();
-    for path in paths {
-        if attempts.note(picture::write(path, &frame, film, clean, attributes)) {
-            written.push(path.clone());
-        }
-        if let (Some(clean), Some(path)) = (clean, picture::denoised_path(path))
-            && attempts.note(picture::write_denoised(&path, &frame, film, clean))
-        {
-            written.push(path);
-        }
-    }
-    written
 }

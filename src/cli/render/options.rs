@@ -7,8 +7,8 @@ use std::{
 
 use clap::Args;
 
-use super::super::{Failure, SceneArgs, log::LogArgs, named};
-use crate::{files::has_extension, image::png::ToneMap, render::Shard, scene::animation::numbered};
+use super::super::{Failure, SceneArgs, log::LogArgs, pictures::DisplayArgs};
+use crate::{files::has_extension, render::Shard, scene::animation::numbered};
 
 const EXAMPLES: &str = "Examples:
   yarnray render scenes/swatch.toml                                  writes out/swatch.exr
@@ -36,12 +36,8 @@ pub(in crate::cli) struct RenderArgs {
     /// Show the picture while it is made, in a running tev (its own address is 127.0.0.1:14158).
     #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
     pub(super) display: Option<String>,
-    /// Curve of the picture for a screen.
-    #[arg(long, value_parser = named(&ToneMap::NAMES))]
-    pub(super) tone_map: Option<ToneMap>,
-    /// Exposure of the picture for a screen, in stops.
-    #[arg(long, value_name = "STOPS", value_parser = stops)]
-    pub(super) exposure: Option<f32>,
+    #[command(flatten)]
+    pub(super) screen: DisplayArgs,
     /// Write statistics as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub(super) stats: Option<PathBuf>,
@@ -84,14 +80,6 @@ impl RenderArgs {
         args.options.frames = self.frames.as_ref().map(|frames| frames.0.clone()).filter(|all| *all.start() == frame);
         Ok(args)
     }
-}
-
-/// Reads a number of stops.
-pub(in crate::cli) fn stops(text: &str) -> Result<f32, String> {
-    text.parse()
-        .ok()
-        .filter(|s| (-100.0..=100.0).contains(s))
-        .ok_or_else(|| "expected a number of stops from -100 to 100".to_owned())
 }
 
 /// Numbers of frames, from the first to the last.
