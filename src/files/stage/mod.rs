@@ -19,7 +19,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 
 pub use polygons::{FaceGroup, PolygonMesh};
 pub(crate) use select::glob;
@@ -81,6 +81,17 @@ impl Problem {
     }
 }
 
+/// Names in a list, for what is there in place of what was asked for.
+pub(crate) fn listed_or_none(names: &[impl AsRef<str>]) -> String {
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// That there is no such camera, and which there are.
+fn no_camera(path: &str, cameras: &[String]) -> Problem {
+    Problem::new(format!("no camera at {path}; cameras here: {}", listed_or_none(cameras)))
+}
+
 /// The largest file that is read, and the most control points or corners of it.
 const MAX_BYTES: u64 = 1 << 32;
 const MAX_POINTS: usize = 1 << 28;
@@ -105,6 +116,14 @@ pub struct StageCamera {
     pub f_stop: f64,
     /// Distance in focus, stage units; 0 where none is given.
     pub focus_distance: f64,
+}
+
+impl StageCamera {
+    /// Where a camera stands, from its transform: the lens does not scale with its stand.
+    fn standing(to_stage: &DMat4) -> DMat4 {
+        let axis = |i: usize| to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
+        DMat4::from_cols(axis(0), axis(1), axis(2), to_stage.w_axis)
+    }
 }
 
 /// What a stage holds, by path.

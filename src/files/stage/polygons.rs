@@ -4,7 +4,7 @@ use std::{collections::HashMap, ops::Range};
 
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
-use super::{MAX_POINTS, Problem};
+use super::{MAX_POINTS, Problem, listed_or_none};
 use crate::geometry::{mesh::Mesh, polygon};
 
 /// Faces that belong together: a subset of an object, or the object.
@@ -104,6 +104,26 @@ impl PolygonMesh {
         Ok(())
     }
 
+    /// Which of an object's sets of texture coordinates is meant: the one that is asked for, or the first, which is noted where
+    /// there are more; `None` where there are none.
+    pub(super) fn choose_uvs(
+        &mut self,
+        object: &str,
+        sets: &[String],
+        asked: Option<&str>,
+    ) -> Result<Option<usize>, Problem> {
+        let all = listed_or_none(sets);
+        if let Some(asked) = asked {
+            let missing = || Problem::new(format!("no texture coordinates `{asked}`; there are: {all}"));
+            return sets.iter().position(|set| set == asked).map(Some).ok_or_else(missing);
+        }
+        if let [first, _, ..] = sets {
+            self.notes
+                .push(format!("{object}: of the texture coordinates {all} `{first}` are taken; `uv` names others"));
+        }
+        Ok((!sets.is_empty()).then_some(0))
+    }
+
     /// Gives it normals; none at all where one has no direction.
     pub(super) fn set_normals(&mut self, given: &AtCorners<DVec3>) {
         let at = |i: usize| given.indices.as_ref().map_or(given.values[i], |own| given.values[own[i] as usize]);
@@ -146,17 +166,24 @@ impl PolygonMesh {
         Ok(())
     }
 
+    /// Puts all faces into a second group of this name, unless there is one.
+    pub(super) fn group_all(&mut self, name: &str) {
+        if !self.counts.is_empty() && !self.groups.iter().any(|group| group.name == name) {
+            let faces = (0..self.counts.len() as u32).collect();
+            self.groups.push(FaceGroup { name: name.to_owned(), faces, is_second: true });
+        }
+    }
+
     /// Puts faces of no group into one of this name; where there are none such, all faces are a second group.
     pub(super) fn group_the_rest(&mut self, name: &str) {
         let mut taken = vec![false; self.counts.len()];
         let own = self.groups.iter().filter(|group| !group.is_second);
         own.flat_map(|group| &group.faces).for_each(|&f| taken[f as usize] = true);
         let rest: Vec<u32> = (0..self.counts.len() as u32).filter(|&f| !taken[f as usize]).collect();
-        let is_second = rest.is_empty();
-        let faces: Vec<u32> = if is_second { (0..self.counts.len() as u32).collect() } else { rest };
-        let is_there = is_second && self.groups.iter().any(|group| group.name == name);
-        if !is_there && !faces.is_empty() {
-            self.groups.push(FaceGroup { name: name.to_owned(), faces, is_second });
+        if rest.is_empty() {
+            self.group_all(name);
+        } else {
+            self.groups.push(FaceGroup { name: name.to_owned(), faces: rest, is_second: false });
         }
     }
 

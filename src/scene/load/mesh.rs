@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
     super::{AlbedoTexture, Material, Object, animation::numbered, defaults},
-    Context, Range, Reader, UNITS, Y_UP, placement,
+    Context, Range, Reader, UNITS, Y_UP, placement, z_up,
 };
 use crate::{
     files::{
@@ -162,7 +162,7 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
         (Some(path), false) => {
             let span = table.span("path").unwrap_or(table.header());
             let unit = table.one_of("unit", &UNITS);
-            let z_up = table.one_of("up", &[("y", false), ("z", true)]);
+            let z_up = z_up(&table);
             let choice = mesh_choice(&table);
             smooth = table.bool_or("smooth", false);
             let path = context.resolve(path, span);
@@ -248,8 +248,7 @@ fn of_stage(
 ) -> Result<(Mesh, Option<f64>, Option<u8>), String> {
     let stage = context.stages.open(path).map_err(|e| e.to_string())?;
     let mesh = polygons(&stage, path, choice, Some(frame))?;
-    warn(&mesh, path, (context, span));
-    // A garment's are in its report.
+    tell(&mesh.warnings, path, (context, span));
     tell(&mesh.notes, path, (context, span));
     Ok((mesh.to_mesh(), stage.unit_mm(), stage.up_axis()))
 }
@@ -264,20 +263,19 @@ pub(super) fn polygons(
     let mesh = stage.mesh(choice, frame).map_err(|e| e.to_string())?;
     if mesh.counts.is_empty() {
         let known = stage.contents().map_err(|e| e.to_string())?.meshes;
-        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         // What could not be composed may be what was meant.
         let missing: String = mesh.warnings.iter().map(|warning| format!("; {warning}")).collect();
-        return Err(format!("{}: no visible mesh is chosen; meshes here: {known}{missing}", path.display()));
+        return Err(format!(
+            "{}: no visible mesh is chosen; meshes here: {}{missing}",
+            path.display(),
+            stage::listed_or_none(&known)
+        ));
     }
     Ok(mesh)
 }
 
 /// Says once what makes a mesh of this file other than it is meant.
-pub(super) fn warn(mesh: &PolygonMesh, path: &Path, (context, span): (&Context<'_>, Span)) {
-    tell(&mesh.warnings, path, (context, span));
-}
-
-fn tell(warnings: &[String], path: &Path, (context, span): (&Context<'_>, Span)) {
+pub(super) fn tell(warnings: &[String], path: &Path, (context, span): (&Context<'_>, Span)) {
     for warning in warnings {
         context.warning_once(span, format!("{}: {warning}", path.display()));
     }

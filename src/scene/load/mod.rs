@@ -86,6 +86,11 @@ impl std::error::Error for LoadError {}
 /// From z up to y up: a quarter turn about x.
 const Y_UP: DMat3 = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
 
+/// `up`: whether z points up in a file, where the scene says so.
+fn z_up(table: &Reader<'_>) -> Option<bool> {
+    table.one_of("up", &[("y", false), ("z", true)])
+}
+
 /// What all parts of the loader share.
 struct Context<'a> {
     sources: &'a Sources,

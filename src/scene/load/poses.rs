@@ -6,7 +6,7 @@ use super::{
     super::animation::Files,
     Context, Y_UP,
     cloth::Detail,
-    mesh::{polygons, warn},
+    mesh::{polygons, tell},
     sequence::Times,
 };
 use crate::{
@@ -79,6 +79,8 @@ impl Moment {
         }
         let stage = at.0.stages.open(&self.path).map_err(|e| e.to_string())?;
         let (mesh, unit) = self.of_stage(&stage, choice, z_up, at)?;
+        // A garment's are in its report.
+        tell(&mesh.notes, &self.path, at);
         Ok((mesh.to_mesh(), unit))
     }
 
@@ -90,7 +92,7 @@ impl Moment {
         at: (&Context<'_>, Span),
     ) -> Result<(PolygonMesh, Option<f64>), String> {
         let mut mesh = polygons(stage, &self.path, choice, self.frame.map(f64::from_bits))?;
-        warn(&mesh, &self.path, at);
+        tell(&mesh.warnings, &self.path, at);
         if z_up.unwrap_or(stage.up_axis() == Some(2)) {
             mesh.points.iter_mut().chain(&mut mesh.normals).for_each(upright);
         }

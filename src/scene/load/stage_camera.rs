@@ -10,7 +10,7 @@ use super::{
         motion::Aim,
         view::{CameraSetup, Focus, LensSetup},
     },
-    Context, Reader, UNITS, Y_UP, motion,
+    Context, Reader, UNITS, Y_UP, motion, z_up,
 };
 use crate::files::stage::{Stage, StageCamera, StageError};
 
@@ -59,7 +59,7 @@ pub(super) fn camera(table: &Reader<'_>, context: &Context<'_>, frame: u32) -> O
     let prim = table.string("prim").map(str::to_owned);
     let fallback = Projection::Perspective(defaults::FIELD_OF_VIEW.to_radians());
     let unit = table.one_of("unit", &UNITS);
-    let z_up = table.one_of("up", &[("y", false), ("z", true)]);
+    let z_up = z_up(table);
     let own_motion = motion::read(table, context, None, fallback);
     let path = path?;
     let [open, close] = own_motion.shutter.unwrap_or_default();

@@ -15,7 +15,7 @@ use std::fmt;
 use glam::{DMat4, DVec2, DVec3};
 
 use super::{
-    Contents, Format, MAX_DEPTH, PolygonMesh, PrimPattern, Problem, StageCamera, Take, curves::Spread,
+    Contents, Format, MAX_DEPTH, PolygonMesh, PrimPattern, Problem, StageCamera, Take, curves::Spread, no_camera,
     polygons::AtCorners,
 };
 use ogawa::{Bytes, Cursor, Group};
@@ -212,8 +212,7 @@ impl Format for Archive {
         })?;
         found.ok_or_else(|| {
             let cameras = self.contents().map(|contents| contents.cameras).unwrap_or_default();
-            let known = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
-            Problem::new(format!("no camera at {path}; cameras here: {known}"))
+            no_camera(path, &cameras)
         })
     }
 }
@@ -237,9 +236,8 @@ impl Archive {
         if [focal_length, across, up].iter().any(|v| !(v.is_finite() && *v > 0.0)) || !(aside + above).is_finite() {
             return Err(Problem::new("expected apertures and a focal length above 0"));
         }
-        let axis = |i: usize| object.to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
         Ok(Some(StageCamera {
-            to_stage: DMat4::from_cols(axis(0), axis(1), axis(2), object.to_stage.w_axis),
+            to_stage: StageCamera::standing(&object.to_stage),
             aperture: [10.0 * across, 10.0 * up],
             offset: [10.0 * aside, 10.0 * above],
             focal_length: Some(focal_length),
@@ -257,23 +255,28 @@ impl Archive {
         };
         let points = vectors(&self.numbers(&geometry, "P", time)?.unwrap_or_default(), "P")?;
         let mut mesh = PolygonMesh::new(points, &integers(".faceCounts")?, &integers(".faceIndices")?)?;
-        let sets = self.uv_sets(&geometry)?;
-        let chosen = match set {
-            Some(set) => Some(sets.iter().find(|(name, _)| name == set).ok_or_else(|| {
-                let known: Vec<&str> = sets.iter().map(|(name, _)| name.as_str()).collect();
-                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-                Problem::new(format!("no texture coordinates `{set}`; there are: {known}"))
-            })?),
-            None => sets.first(),
-        };
-        if let Some((name, more)) = chosen
-            && let own = more.as_ref().unwrap_or(&geometry)
-            && let property = if more.is_some() { name.as_str() } else { "uv" }
-            && let Some(uv) = self.indexed(own, property, time)?
-        {
-            let values = uv.values.chunks_exact(2).map(|p| DVec2::new(p[0], p[1])).collect();
-            let spread = spread_of(own.metadata(property), Spread::FaceVarying);
-            mesh.set_uvs(at_corners(&mesh, "uv", AtCorners { values, indices: uv.indices }, spread)?)?;
+        // The usual set, and behind it those that programs add.
+        let more = geometry.compound(".arbGeomParams", &self.metadata)?;
+        let mut sets = Vec::new();
+        let has_own = self.extent(&geometry, "uv")?.is_some();
+        if has_own {
+            sets.push(word(geometry.metadata("uv"), "sourceName").unwrap_or("uv").to_owned());
+        }
+        for name in more.iter().flat_map(Compound::names) {
+            if more.as_ref().map_or(Ok(None), |more| self.extent(more, name))? == Some(2) {
+                sets.push(name.to_owned());
+            }
+        }
+        if let Some(chosen) = mesh.choose_uvs(&object.path, &sets, set)? {
+            let (own, name) = match &more {
+                Some(more) if chosen > 0 || !has_own => (more, sets[chosen].as_str()),
+                _ => (&geometry, "uv"),
+            };
+            if let Some(uv) = self.indexed(own, name, time)? {
+                let values = uv.values.chunks_exact(2).map(|p| DVec2::new(p[0], p[1])).collect();
+                let spread = spread_of(own.metadata(name), Spread::FaceVarying);
+                mesh.set_uvs(at_corners(&mesh, name, AtCorners { values, indices: uv.indices }, spread)?)?;
+            }
         }
         if let Some(n) = self.indexed(&geometry, "N", time)? {
             let values = vectors(&n.values, "N")?;
@@ -295,23 +298,6 @@ impl Archive {
         // Alembic winds its faces clockwise.
         mesh.place(&object.to_stage, true)?;
         Ok(Some(mesh))
-    }
-
-    /// Sets of texture coordinates, the usual one first: their names, and where those are that programs add.
-    fn uv_sets<'a>(&self, geometry: &Compound<'a>) -> Result<Vec<(String, Option<Compound<'a>>)>, Problem> {
-        let mut sets = Vec::new();
-        if self.extent(geometry, "uv")?.is_some() {
-            let given = word(geometry.metadata("uv"), "sourceName").unwrap_or("uv");
-            sets.push((given.to_owned(), None));
-        }
-        if let Some(more) = geometry.compound(".arbGeomParams", &self.metadata)? {
-            for name in more.names() {
-                if self.extent(&more, name)? == Some(2) {
-                    sets.push((name.to_owned(), geometry.compound(".arbGeomParams", &self.metadata)?));
-                }
-            }
-        }
-        Ok(sets)
     }
 
     fn geometry<'a>(&self, object: &Object<'a>) -> Result<Option<Compound<'a>>, Problem> {

@@ -31,23 +31,8 @@ fn uv_sets(values: &Values<'_>) -> Result<Vec<String>, Problem> {
 /// Gives a mesh the texture coordinates of a set, or the usual ones.
 fn set_uvs(values: &Values<'_>, mesh: &mut PolygonMesh, asked: Option<&str>) -> Result<(), Problem> {
     let sets = uv_sets(values)?;
-    let chosen = match asked {
-        Some(asked) if !sets.iter().any(|set| set == asked) => {
-            let known = if sets.is_empty() { "none".to_owned() } else { sets.join(", ") };
-            return Err(Problem::new(format!("no texture coordinates `{asked}`; there are: {known}")));
-        }
-        Some(asked) => asked,
-        None => {
-            let Some(first) = sets.first() else { return Ok(()) };
-            if sets.len() > 1 {
-                let (path, all) = (values.prim.path().as_str(), sets.join(", "));
-                mesh.notes
-                    .push(format!("{path}: of the texture coordinates {all} `{first}` are taken; `uv` names others"));
-            }
-            first
-        }
-    };
-    let name = format!("primvars:{chosen}");
+    let Some(chosen) = mesh.choose_uvs(values.prim.path().as_str(), &sets, asked)? else { return Ok(()) };
+    let name = format!("primvars:{}", sets[chosen]);
     let Some(uvs) = values.pairs(&name)? else { return Ok(()) };
     let spread = at_corners(values, &name, uvs, mesh, Spread::Constant)?;
     mesh.set_uvs(spread).map_err(|p| Problem::new(format!("`{name}`: {}", p.text)))
@@ -77,11 +62,7 @@ pub(super) fn read(values: &Values<'_>, to_stage: &DMat4, uv: Option<&str>) -> R
     }
     // A material may be bound to all of it.
     if let Some(material) = values.prim.relationship("material:binding").targets()?.first() {
-        let name = material.as_str().rsplit('/').next().unwrap_or_default();
-        if !mesh.groups.iter().any(|group| group.name == name) {
-            let all: Vec<i64> = (0..counts.len() as i64).collect();
-            mesh.add_group(name, &all, true)?;
-        }
+        mesh.group_all(material.as_str().rsplit('/').next().unwrap_or_default());
     }
     mesh.group_the_rest(name_of(values.prim));
     if let Some(holes) = values.integers("holeIndices")?.filter(|holes| !holes.is_empty()) {

@@ -32,6 +32,7 @@ use crate::files::has_extension;
 use super::{
     Contents, Format, MAX_DEPTH, PrimPattern, Problem, StageCamera, Take,
     curves::{Batch, ID_NAMES, PLY_NAMES, Spread, StageBasis, Wrap},
+    no_camera,
 };
 use resolver::LookingResolver;
 use value::{Values, token};
@@ -156,9 +157,7 @@ impl Format for UsdStage {
             let at = sdf::path(path).map_err(|e| Problem::new(format!("{path} is no path of a prim: {e:#}")))?;
             let prim = self.stage.prim(at.clone());
             if prim.type_name()?.is_none_or(|t| t != "Camera") {
-                let cameras = self.contents()?.cameras;
-                let known = if cameras.is_empty() { "none".to_owned() } else { cameras.join(", ") };
-                return Err(Problem::new(format!("no camera at {path}; cameras here: {known}")));
+                return Err(no_camera(path, &self.contents()?.cameras));
             }
             let values = Values { prim: &prim, time: time_code(frame) };
             let mut to_stage = DMat4::IDENTITY;
@@ -168,9 +167,6 @@ impl Format for UsdStage {
                 to_stage = local * to_stage;
                 above = if alone { None } else { path.parent() };
             }
-            // The lens does not scale with its stand.
-            let axis = |i: usize| to_stage.col(i).truncate().normalize_or(DVec3::AXES[i]).extend(0.0);
-            let to_stage = DMat4::from_cols(axis(0), axis(1), axis(2), to_stage.w_axis);
             let number = |name, otherwise| values.number(name).map(|v| v.unwrap_or(otherwise));
             let orthographic = values.token("projection")?.is_some_and(|p| p == "orthographic");
             let aperture = [number("horizontalAperture", 20.955)?, number("verticalAperture", 15.2908)?];
@@ -184,7 +180,7 @@ impl Format for UsdStage {
             }
             // USD measures film in tenths of a unit, that of orthographic pictures as well.
             Ok(StageCamera {
-                to_stage,
+                to_stage: StageCamera::standing(&to_stage),
                 aperture: if orthographic { aperture.map(|a| 0.1 * a) } else { aperture },
                 offset: if orthographic { offset.map(|a| 0.1 * a) } else { offset },
                 focal_length: (!orthographic).then_some(focal_length),

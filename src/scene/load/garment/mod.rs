@@ -13,7 +13,7 @@ use super::{
     known_yarns::{KnownYarns, thickness},
     mesh::{mesh_choice, prim_pattern, refuse_prim},
     pattern::{self, Stranding},
-    weave,
+    weave, z_up,
 };
 use crate::{
     files::{
@@ -156,7 +156,7 @@ pub(super) fn garment(
     let unit = source.one_of("unit", &UNITS);
     let body_prims = prim_pattern(source, "body_prim").unwrap_or_else(PrimPattern::all);
     let choices = [mesh_choice(source), MeshChoice { prims: body_prims, uv: None }];
-    let z_up = source.one_of("up", &[("y", false), ("z", true)]);
+    let z_up = z_up(source);
     let uv_unit = source.one_of("uv_unit", &UNITS);
     let seam = source.one_of("seam", &SEAMS);
     let hem_keys = HemKeys::read(source, context);
