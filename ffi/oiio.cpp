@@ -256,7 +256,7 @@ FACE int32_t yarnray_oiio_texture_open(const char *path, const char *copy, uint6
         const bool ready = levels && spec.tile_width > 0 && spec.nchannels >= 3 && spec.alpha_channel < 0
                            && !is_srgb_encoded(spec);
         if (!ready) {
-            // All of it is read at once, in four channels where it has more.
+            // All of it is read at once, as floats.
             if (uint64_t(spec.width) * uint64_t(spec.height) > sample_limit / uint64_t(spec.nchannels)) {
                 say(message, message_size, "too large to be read at once: make tiles and smaller levels of it with maketx");
                 return YARNRAY_OIIO_FAILED;

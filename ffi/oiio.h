@@ -54,9 +54,9 @@ int32_t yarnray_oiio_write(const char *path, int32_t width, int32_t height, int3
 typedef struct YarnrayOiioTexture YarnrayOiioTexture;
 
 /* Opens a texture. A file that is no mipmapped, tiled picture of linear colours is made into one, in the file `copy`,
- * which must stay until the texture is closed. `size` gets width and height. */
-int32_t yarnray_oiio_texture_open(const char *path, const char *copy, uint64_t sample_limit, YarnrayOiioTexture **texture, int32_t size[2],
-                                  char *message, size_t message_size);
+ * which must stay until the texture is closed, unless it has more than `sample_limit` samples. `size` gets width and height. */
+int32_t yarnray_oiio_texture_open(const char *path, const char *copy, uint64_t sample_limit,
+                                  YarnrayOiioTexture **texture, int32_t size[2], char *message, size_t message_size);
 
 /* The colour at (u, v), of which (0, 0) is the lower left corner and the picture repeats beyond 0 to 1, filtered over
  * `width` in the same units. From any number of threads. 1 if it could be read, else 0. */
