@@ -1,7 +1,8 @@
 //! How far flattened yarns run into each other: points of each yarn's surface, looked for inside the others.
 
 use glam::DVec3;
-use rstar::{AABB, RTree, RTreeObject};
+use rayon::prelude::*;
+use rstar::{AABB, RTree, primitives::GeomWithData, primitives::Rectangle};
 
 /// A cross-section: an ellipse about a yarn's centre.
 #[derive(Clone, Copy, Debug)]
@@ -21,51 +22,46 @@ const AROUND: usize = 16;
 /// Most sections whose surface is looked at: of larger cloth, each of so many.
 const MOST: usize = 1 << 15;
 
-/// From one section of a yarn to the next.
-struct Piece<'a> {
-    yarn: usize,
-    ends: &'a [Section],
-    /// How far its surface may be from its middle line.
-    widest: f64,
-}
+/// The box about what lies from one section of a yarn to the next, and of which yarn that is.
+type Piece<'a> = GeomWithData<Rectangle<[f64; 3]>, (usize, &'a [Section])>;
 
-impl RTreeObject for Piece<'_> {
-    type Envelope = AABB<[f64; 3]>;
-
-    fn envelope(&self) -> Self::Envelope {
-        let low = self.ends.iter().fold(DVec3::INFINITY, |m, s| m.min(s.at)) - self.widest;
-        let high = self.ends.iter().fold(DVec3::NEG_INFINITY, |m, s| m.max(s.at)) + self.widest;
-        AABB::from_corners(low.to_array(), high.to_array())
-    }
+/// The box about some sections, whichever way they lie.
+fn around(sections: &[Section]) -> AABB<[f64; 3]> {
+    // How far a surface may be from its middle line.
+    let widest = sections.iter().fold(0.0f64, |w, s| w.max(s.axes[0]).max(s.axes[1]));
+    let low = sections.iter().fold(DVec3::INFINITY, |m, s| m.min(s.at)) - widest;
+    let high = sections.iter().fold(DVec3::NEG_INFINITY, |m, s| m.max(s.at)) + widest;
+    AABB::from_corners(low.to_array(), high.to_array())
 }
 
 /// The deepest point of any yarn inside another, as a length, and the share of surface points deeper than `tolerated`.
 /// Yarns are chains of sections.
 pub(super) fn intrusion(yarns: &[Vec<Section>], tolerated: f64) -> (f64, f64) {
     let pieces = yarns.iter().enumerate().flat_map(|(yarn, sections)| {
-        sections.windows(2).map(move |ends| {
-            let widest = ends.iter().fold(0.0f64, |w, s| w.max(s.axes[0]).max(s.axes[1]));
-            Piece { yarn, ends, widest }
-        })
+        sections.windows(2).map(move |ends| Piece::new(around(ends).into(), (yarn, ends)))
     });
     let tree = RTree::bulk_load(pieces.collect());
-    let sections = || yarns.iter().enumerate().flat_map(|(yarn, sections)| sections.iter().map(move |s| (yarn, s)));
-    let every = sections().count().div_ceil(MOST).max(1);
-    let (mut deepest, mut deep, mut all) = (0.0f64, 0usize, 0usize);
-    for (yarn, section) in sections().step_by(every) {
+    let all: Vec<(usize, &Section)> = (0..).zip(yarns).flat_map(|(yarn, s)| s.iter().map(move |s| (yarn, s))).collect();
+    let some: Vec<(usize, &Section)> = all.iter().copied().step_by(all.len().div_ceil(MOST).max(1)).collect();
+    let of = |&(yarn, section): &(usize, &Section)| {
+        let near: Vec<&[Section]> = tree
+            .locate_in_envelope_intersecting(&around(std::slice::from_ref(section)))
+            .filter(|piece| piece.data.0 != yarn)
+            .map(|piece| piece.data.1)
+            .collect();
         let major = section.tangent.cross(section.minor);
-        for k in 0..AROUND {
+        let depth = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
             let point = section.at + major * (cos * section.axes[0]) + section.minor * (sin * section.axes[1]);
-            let near = tree.locate_in_envelope_intersecting(&AABB::from_point(point.to_array()));
-            let depth = near.filter(|piece| piece.yarn != yarn).map(|piece| depth_in(piece.ends, point));
-            let depth = depth.fold(0.0, f64::max);
-            deepest = deepest.max(depth);
-            deep += usize::from(depth > tolerated);
-            all += 1;
-        }
-    }
-    (deepest, deep as f64 / all.max(1) as f64)
+            near.iter().map(|ends| depth_in(ends, point)).fold(0.0, f64::max)
+        };
+        (0..AROUND).map(depth).fold((0.0f64, 0usize), |(deepest, deep), depth| {
+            (deepest.max(depth), deep + usize::from(depth > tolerated))
+        })
+    };
+    // The same of any number of threads: neither the greatest nor a count depends on the order.
+    let (deepest, deep) = some.par_iter().map(of).reduce(|| (0.0, 0), |a, b| (a.0.max(b.0), a.1 + b.1));
+    (deepest, deep as f64 / (some.len() * AROUND).max(1) as f64)
 }
 
 /// How deep a point is inside a yarn.
