@@ -83,7 +83,7 @@ impl Integrator<'_> {
         let distance = yarns.strands.distance_along(hit.segment, hit.u)?;
         let ply = (yarns.first_ply + front.ply) as u32;
         let key = hash2(hash2(yarns.fabric as u32, yarns.strands.yarn_of(hit.segment) as u32), ply);
-        Some(section.seen_fiber(shape, front, distance).numbers(key, [stream.next(), stream.next()]))
+        Some(section.seen_fiber(shape, front, distance).numbers(key, [stream.next(), stream.next(), stream.next()]))
     }
 
     /// Notes a place on a yarn, which may move: it keeps its place in the yarn's frame.

@@ -27,6 +27,10 @@ const TUFT: f32 = 4.0;
 const LENGTH: f32 = 100.0;
 /// What tells the second number of a fibre from the first.
 const SIDE: u32 = 1;
+/// What tells the lines of a rim from those of the surface.
+const RIM: u32 = 2;
+/// How far from a ply's edge its rim begins to be seen, and from where on it alone is, in widths of a fibre.
+const RIM_WIDTHS: [f32; 2] = [1.6, 0.7];
 
 /// A place on the surface of a ply, by its fibres.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +41,19 @@ pub struct SeenFiber {
     lines: f32,
     /// How far along the yarn, in widths of a fibre.
     along: f32,
+    rim: Option<Rim>,
+}
+
+/// A place at the edge of a ply. There the lines of the surface are seen from the side, as steps; the edge of fibres is
+/// that of those that pass their highest place near it, and has no steps.
+#[derive(Clone, Copy, Debug)]
+struct Rim {
+    /// The chance that it is met as a rim.
+    chance: f32,
+    /// The edge against a fibre at the surface, in turns.
+    turn: f32,
+    /// Fibres around the ply of which each is the highest for as long as it stays within its own width of the edge.
+    lines: f32,
 }
 
 impl Section<'_> {
@@ -44,22 +61,39 @@ impl Section<'_> {
     #[inline]
     pub fn seen_fiber(&self, shape: &YarnShape, front: &PlyCrossing, distance: f32) -> SeenFiber {
         let ply = &shape.plies[front.ply];
-        let at = self.inside(shape, self.point(front.enter), front.travel[0]).in_ply(shape, front.ply);
-        let angle = ply.direction.perp_dot(at).atan2(ply.direction.dot(at));
-        let along = distance + front.travel[0];
+        let turn_at = |depth: f32, travel: f32| {
+            let at = self.inside(shape, self.point(depth), travel).in_ply(shape, front.ply);
+            let angle = ply.direction.perp_dot(at).atan2(ply.direction.dot(at));
+            (angle - (ply.fiber_rate - shape.ply_rate) * (distance + travel)) / TAU
+        };
+        let width = 2.0 * ply.fiber_radius;
+        let inside = (ply.radius - front.offset.abs()) / (front.wide * width);
+        let [from, whole] = RIM_WIDTHS;
+        let chance = smooth(((from - inside) / (from - whole)).clamp(0.0, 1.0));
+        let rim = (chance > 0.0).then(|| Rim {
+            chance,
+            // The place on the ray that is next to the axis is that on the edge, but for its distance.
+            turn: turn_at(front.foot, front.travel_at(front.foot)),
+            lines: TAU / (1.0 - (width / ply.radius).min(1.0)).acos(),
+        });
         SeenFiber {
-            turn: (angle - (ply.fiber_rate - shape.ply_rate) * along) / TAU,
+            turn: turn_at(front.enter, front.travel[0]),
             lines: lines_for_each_width(ply.density() as f32) * PI * ply.radius / ply.fiber_radius,
-            along: along / (2.0 * ply.fiber_radius),
+            along: (distance + front.travel[0]) / width,
+            rim,
         }
     }
 }
 
 impl SeenFiber {
     /// Two numbers in [0, 1), even over all lines: the share of lines on which the first fibre is met before that of this one, and one that draws
-    /// on which side of the ray its middle is. `key` tells plies apart; two fresh numbers `u` blend one fibre into the next along a line.
+    /// on which side of the ray its middle is. `key` tells plies apart; three fresh numbers `u` blend one fibre into the next along a
+    /// line, and the surface into the rim.
     #[inline]
-    pub fn numbers(&self, key: u32, u: [f32; 2]) -> [f32; 2] {
+    pub fn numbers(&self, key: u32, u: [f32; 3]) -> [f32; 2] {
+        if let Some(rim) = self.rim.filter(|rim| u[2] < rim.chance) {
+            return rim.numbers(hash2(key, RIM), self.along);
+        }
         let wide = if u[0] < IN_TUFTS { TUFT } else { 1.0 };
         let lines = (self.lines / wide).round().max(1.0);
         // A turn of 1 may come of rounding.
@@ -68,10 +102,52 @@ impl SeenFiber {
         let along = self.along / (LENGTH * wide) + unit(key);
         let step = along.floor();
         let share = along - step;
-        let next = u[1] < share * share * (3.0 - 2.0 * share);
+        let next = u[1] < smooth(share);
         let fiber = hash2(key, (step as i32).wrapping_add(i32::from(next)) as u32);
         [unit(fiber), unit(hash2(fiber, SIDE))]
     }
+}
+
+impl Rim {
+    /// As [`SeenFiber::numbers`]: even, too, but without jumps from one line to the next.
+    fn numbers(&self, key: u32, along: f32) -> [f32; 2] {
+        let lines = self.lines.round().max(1.0);
+        let place = (self.turn - self.turn.floor()) * lines;
+        let (first, share) = (place.floor(), place.fract());
+        // The last line is beside the first.
+        let of_line = |next: f32, side: u32| {
+            let key = hash2(key, ((first + next) % lines) as u32);
+            let along = along / LENGTH + unit(key);
+            let step = along.floor();
+            let fiber = |next: i32| unit(hash2(hash2(key, (step as i32).wrapping_add(next) as u32), side));
+            blended([fiber(0), fiber(1)], smooth(along - step))
+        };
+        [0, SIDE].map(|side| blended([of_line(0.0, side), of_line(1.0, side)], smooth(share)))
+    }
+}
+
+/// From 0 to 1 without a slope at both.
+#[inline]
+fn smooth(share: f32) -> f32 {
+    share * share * (3.0 - 2.0 * share)
+}
+
+/// From one of two numbers that are even in [0, 1] to the other, by a share: the share of such pairs that come to less than these
+/// do, which is even again.
+#[inline]
+fn blended([from, to]: [f32; 2], share: f32) -> f32 {
+    let sum = from + share * (to - from);
+    let (more, less) = (share.max(1.0 - share), share.min(1.0 - share));
+    // The sum of two even numbers is even between two slopes.
+    let slope = |left: f32| 0.5 * left * left / (more * less).max(1e-9);
+    let even = if sum < less {
+        slope(sum)
+    } else if sum > more {
+        1.0 - slope(1.0 - sum)
+    } else {
+        (sum - 0.5 * less) / more
+    };
+    even.min(1.0 - f32::EPSILON)
 }
 
 #[cfg(test)]
@@ -119,20 +195,37 @@ mod tests {
     fn numbers_are_even_over_the_lines() {
         const BINS: usize = 16;
         const COUNT: usize = 40_000;
-        let mut bins = [[0u32; BINS]; 2];
-        let mut u = Stream::new(3);
-        for i in 0..COUNT {
-            let place = SeenFiber { turn: u.next(), lines: 47.3, along: 300.0 * i as f32 * 1.618 };
-            for (bins, number) in bins.iter_mut().zip(place.numbers(i as u32 % 40, [u.next(), u.next()])) {
-                assert!((0.0..1.0).contains(&number));
-                bins[(number * BINS as f32) as usize] += 1;
+        for chance in [0.0, 0.4, 1.0] {
+            let mut bins = [[0u32; BINS]; 2];
+            let mut u = Stream::new(3);
+            for i in 0..COUNT {
+                let rim = Some(Rim { chance, turn: u.next(), lines: 11.7 });
+                let place = SeenFiber { turn: u.next(), lines: 47.3, along: 300.0 * i as f32 * 1.618, rim };
+                for (bins, number) in bins.iter_mut().zip(place.numbers(i as u32 % 40, [(); 3].map(|()| u.next()))) {
+                    assert!((0.0..1.0).contains(&number));
+                    bins[(number * BINS as f32) as usize] += 1;
+                }
+            }
+            let mean = (COUNT / BINS) as f32;
+            for bins in bins {
+                let chi_square: f32 = bins.iter().map(|&n| (n as f32 - mean).powi(2) / mean).sum();
+                // 15 degrees of freedom: above 37.7 once in a thousand.
+                assert!(chi_square < 37.7, "a rim by {chance}: {chi_square}");
             }
         }
-        let mean = (COUNT / BINS) as f32;
-        for bins in bins {
-            let chi_square: f32 = bins.iter().map(|&n| (n as f32 - mean).powi(2) / mean).sum();
-            // 15 degrees of freedom: above 37.7 once in a thousand.
-            assert!(chi_square < 37.7, "{chi_square}");
+    }
+
+    #[test]
+    fn a_rim_has_no_steps() {
+        const STEPS: u32 = 20_000;
+        let numbers = |step: u32| {
+            let share = step as f32 / STEPS as f32;
+            Rim { chance: 1.0, turn: 3.0 * share, lines: 11.7 }.numbers(7, 500.0 * share)
+        };
+        for step in 0..STEPS {
+            let (here, next) = (numbers(step), numbers(step + 1));
+            // Three turns of twelve lines, in each of which a number goes from 0 to 1 at most, by two smooth steps.
+            assert!((0..2).all(|k| (here[k] - next[k]).abs() < 36.0 * 4.0 / STEPS as f32), "{step}: {here:?} {next:?}");
         }
     }
 
