@@ -11,7 +11,7 @@ pub(crate) mod table3;
 
 use std::time::Duration;
 
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use serde_json::{Value, json};
 
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
     image::{Attribute, exr},
     plan::Plan,
     render::{Job, Rendered},
-    scene::Scene,
+    scene::{Axes, Scene},
     trace::{CurveGeometry, World},
 };
 
@@ -186,15 +186,20 @@ pub(crate) fn metadata(scene: &Scene, world: &World) -> Vec<(String, Attribute)>
     .collect()
 }
 
-/// What OpenEXR has names for: colours, time, and the camera in the middle of the shutter's time. Lengths are
-/// millimetres.
+/// What OpenEXR has names for: colours, time, and the camera in the middle of the shutter's time; and the unit and the axes
+/// of places, as USD has them.
 fn of_camera(scene: &Scene) -> Vec<(String, Attribute)> {
     let rows = |m: DMat4| Attribute::Matrix(m.transpose().as_mat4().to_cols_array_2d());
     let aspect = f64::from(scene.render.width) / f64::from(scene.render.height);
+    let Axes { unit, z_up } = scene.axes;
+    let to_scene = scene.axes.to_scene();
+    let to_unit = DMat4::from_scale(DVec3::splat(1.0 / unit));
     let mut out = vec![
         ("chromaticities".to_owned(), exr::REC_709),
-        ("worldToCamera".to_owned(), rows(scene.camera.world_to_camera(scene.middle))),
-        ("worldToNDC".to_owned(), rows(scene.camera.world_to_ndc(scene.middle, aspect))),
+        ("worldToCamera".to_owned(), rows(to_unit * scene.camera.world_to_camera(scene.middle) * to_scene)),
+        ("worldToNDC".to_owned(), rows(scene.camera.world_to_ndc(scene.middle, aspect) * to_scene)),
+        ("yarnray.meters_per_unit".to_owned(), Attribute::Double(unit / 1000.0)),
+        ("yarnray.up_axis".to_owned(), Attribute::Text(if z_up { "Z" } else { "Y" }.to_owned())),
     ];
     if let Some(rate) = scene.frames_per_second {
         let [frames, seconds] = as_ratio(rate);

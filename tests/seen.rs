@@ -105,6 +105,51 @@ fn positions_fall_on_their_pixels_by_the_matrices_of_the_file() {
     }
 }
 
+/// A picture for a stage in metres with z up tells of the same places as one in millimetres with y up.
+#[test]
+fn places_are_told_in_the_unit_and_the_axes_of_the_stage() {
+    let text = scene(
+        VIEWS[0],
+        "[\"position\", \"depth\", \"normal\"]",
+        "type = \"straight\", count = 3, length = 40, spacing = 7",
+    );
+    let usual = render(&text, &[]).image;
+    let folder = directory();
+    write(folder.path(), "s.toml", &text);
+    let stage = ["--set", "output.unit=m", "--set", "output.up=z"];
+    let other = read(folder.path(), &stage);
+    assert_eq!(other.attribute("yarnray.meters_per_unit"), Some(&Attribute::Double(1.0)));
+    assert_eq!(other.attribute("yarnray.up_axis"), Some(&Attribute::Text("Z".to_owned())));
+    assert_eq!(usual.attribute("yarnray.meters_per_unit"), Some(&Attribute::Double(0.001)));
+    let (to_camera, to_ndc) = (matrix(&other, "worldToCamera"), matrix(&other, "worldToNDC"));
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-5 * (1.0 + b.abs());
+    let mut seen = 0;
+    for i in (0..60 * 40).filter(|&i| usual.channel("A").unwrap()[i] >= 1.0) {
+        seen += 1;
+        for (names, length) in [(["P.X", "P.Y", "P.Z"], 1000.0), (["N.X", "N.Y", "N.Z"], 1.0)] {
+            let [x, y, z] = triple(&usual, names, i).map(f64::from);
+            let turned = triple(&other, names, i).map(|v| length * f64::from(v));
+            assert!([x, -z, y].into_iter().zip(turned).all(|(a, b)| near(b, a)), "{names:?}, pixel {i}: {turned:?}");
+        }
+        let depth = f64::from(other.channel("depth.Z").unwrap()[i]);
+        assert!(near(1000.0 * depth, f64::from(usual.channel("depth.Z").unwrap()[i])), "pixel {i}");
+        let p = triple(&other, ["P.X", "P.Y", "P.Z"], i);
+        assert!((-apply(&to_camera, p)[2] - depth).abs() < 1e-3 * depth, "pixel {i}");
+        let [x, y, _, w] = apply(&to_ndc, p);
+        let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+        assert!(off.iter().all(|o| o.abs() < 0.5), "pixel {i}: {off:?} pixels off");
+    }
+    assert!(seen > 200, "{seen} pixels are covered");
+    // A film keeps both; what it is merged into tells the same.
+    yarnray(folder.path(), &[&["render", "s.toml", "-q", "-o", "part.film"], &stage[..]].concat()).good();
+    yarnray(folder.path(), &["merge", "part.film", "-o", "merged.exr"]).good();
+    let merged = image::read(&folder.path().join("merged.exr")).expect("a picture");
+    for name in ["P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z", "depth.Z"] {
+        assert_eq!(merged.channel(name), other.channel(name), "{name}");
+    }
+    assert_eq!(merged.attribute("worldToCamera"), other.attribute("worldToCamera"));
+}
+
 /// Still or on its way, the picture of a USD camera lies where `horizontalApertureOffset` and its like put it.
 #[test]
 fn the_film_of_a_camera_may_lie_beside_its_view() {

@@ -31,7 +31,7 @@ use crate::{
         whole_file,
     },
     integrator::Counters,
-    scene::{Layers, Scene, Storage, identity},
+    scene::{Axes, Layers, Scene, Storage, identity},
 };
 
 const MAGIC: &[u8; 8] = b"YARNFILM";
@@ -280,7 +280,7 @@ fn unreadable_or_short(path: &Path, error: &io::Error, at: u64) -> ImageError {
 }
 
 fn header_json(about: &About, job: &Job) -> Value {
-    let Frame { width, height, layers, storage, display, fabrics, middle } = about.frame.clone();
+    let Frame { width, height, layers, storage, axes, display, fabrics, middle } = about.frame.clone();
     let metadata: Vec<Value> = about
         .metadata
         .iter()
@@ -304,6 +304,8 @@ fn header_json(about: &About, job: &Job) -> Value {
             "layers": layer_names(layers),
             "compression": name_of(storage.compression, &Compression::NAMES),
             "half_lobes": storage.half_lobes,
+            "unit_bits": axes.unit.to_bits(),
+            "z_up": axes.z_up,
             "tone_map": name_of(display.tone_map, &ToneMap::NAMES),
             "exposure_bits": display.exposure.to_bits(),
             "alpha": display.alpha,
@@ -390,6 +392,14 @@ fn parse_frame(f: &Value) -> Option<Frame> {
         storage: Storage {
             compression: Compression::NAMES.iter().find(|(n, _)| f["compression"] == *n)?.1,
             half_lobes: f["half_lobes"].as_bool()?,
+        },
+        // Films of builds before have neither.
+        axes: match &f["unit_bits"] {
+            Value::Null => Axes::default(),
+            bits => Axes {
+                unit: Some(f64::from_bits(bits.as_u64()?)).filter(|unit| unit.is_normal() && *unit > 0.0)?,
+                z_up: f["z_up"].as_bool()?,
+            },
         },
         display: Display {
             tone_map: ToneMap::NAMES.iter().find(|(n, _)| f["tone_map"] == *n)?.1,

@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use glam::{DVec3, Vec3};
+
 use crate::{
     film::{ClothId, Film, LightParts, Pixel},
     image::{
@@ -13,7 +15,7 @@ use crate::{
         output::{self, Format},
         png::Display,
     },
-    scene::{Layers, Scene, Storage},
+    scene::{Axes, Layers, Scene, Storage},
 };
 
 use super::denoise::Denoised;
@@ -47,6 +49,8 @@ pub struct Frame {
     pub layers: Layers,
     /// How an EXR is stored.
     pub storage: Storage,
+    /// The unit and the axes of its places.
+    pub axes: Axes,
     /// How pictures for a screen are made.
     pub display: Display,
     /// Names of the fabrics, for Cryptomatte.
@@ -63,6 +67,7 @@ impl Frame {
             height: scene.render.height,
             layers: scene.layers,
             storage: scene.storage,
+            axes: scene.axes,
             display: scene.display,
             fabrics: scene.fabrics.iter().map(|f| f.name.clone()).collect(),
             middle: scene.middle.to_array(),
@@ -220,13 +225,16 @@ fn exr_layers<'a>(
             layers.push(layer);
         }
     };
-    let wanted = frame.layers;
-    add(wanted.depth, ExrLayer::new("depth", ["Z"], F32, |at| [at.pixel.depth]));
-    add(wanted.normal, ExrLayer::new("N", XYZ, F32, |at| at.pixel.normal));
+    let (wanted, axes) = (frame.layers, &frame.axes);
+    add(wanted.depth, ExrLayer::new("depth", ["Z"], F32, |at| [(f64::from(at.pixel.depth) / axes.unit) as f32]));
+    add(
+        wanted.normal,
+        ExrLayer::new("N", XYZ, F32, |at| axes.direction(Vec3::from(at.pixel.normal).as_dvec3()).as_vec3().to_array()),
+    );
     add(wanted.albedo, ExrLayer::new("albedo", RGB, F32, |at| at.pixel.albedo));
     add(wanted.variance, ExrLayer::new("variance", RGB, F32, |at| at.pixel.variance));
     add(wanted.samples, ExrLayer::new("samples", ["count"], U32, |at| [at.pixel.samples as f32]));
-    add(wanted.position, ExrLayer::new("P", XYZ, F32, |at| in_world(&at.pixel, frame.middle)));
+    add(wanted.position, ExrLayer::new("P", XYZ, F32, |at| in_world(&at.pixel, frame)));
     // As Nuke calls them.
     add(wanted.motion, ExrLayer::new("forward", ["u", "v"], F32, |at| at.pixel.motion));
     add(wanted.uv, ExrLayer::new("uv", ["U", "V"], F32, |at| at.pixel.uv));
@@ -241,9 +249,10 @@ fn exr_layers<'a>(
 }
 
 /// The place of a pixel in the world; the origin where nothing is.
-fn in_world(pixel: &Pixel, middle: [f64; 3]) -> [f32; 3] {
+fn in_world(pixel: &Pixel, frame: &Frame) -> [f32; 3] {
     if pixel.alpha > 0.0 {
-        std::array::from_fn(|k| (f64::from(pixel.position[k]) + middle[k]) as f32)
+        let at = Vec3::from(pixel.position).as_dvec3() + DVec3::from(frame.middle);
+        frame.axes.place(at).as_vec3().to_array()
     } else {
         [0.0; 3]
     }

@@ -5,8 +5,8 @@ use std::{collections::HashSet, f64::consts::TAU, fmt, path::Path};
 use glam::{DAffine3, DVec3};
 
 use super::{
-    CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene, Storage,
-    Taken, Tufts, Yarn, bounds, defaults, force, identity,
+    Axes, CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene,
+    Storage, Taken, Tufts, Yarn, bounds, defaults, force, identity,
     view::{CameraSetup, Views},
 };
 use crate::{
@@ -85,6 +85,8 @@ pub struct OutputSettings {
     pub layers: Layers,
     /// How an EXR is stored.
     pub storage: Storage,
+    /// The unit and the axes of its places.
+    pub axes: Axes,
     /// Whether a denoised picture is made as well.
     pub denoise: bool,
     /// Frames in a second of the sequence, if that is known: written to an EXR.
@@ -170,13 +172,14 @@ impl SceneBuilder {
             let height = ground.height.map_or(lowest, |h| h - middle.y);
             Ground { height: height as f32, material: ground.material }
         });
-        let OutputSettings { display, layers, storage, denoise, frames_per_second } = output;
+        let OutputSettings { display, layers, storage, axes, denoise, frames_per_second } = output;
         let mut scene = Scene {
             path: name,
             render,
             display,
             layers,
             storage,
+            axes,
             denoise,
             camera,
             camera_path: path,
@@ -222,6 +225,10 @@ impl SceneBuilder {
                 "expected at least one pixel and one sample: the crop is {:?} of {width} x {height} at {spp} spp",
                 self.render.crop
             ));
+        }
+        let unit = self.output.axes.unit;
+        if !(unit.is_normal() && unit > 0.0) {
+            return fail(format!("expected a unit of places above 0, found {unit} millimetres"));
         }
         for yarn in &self.yarns {
             if !(1..=MAX_PLIES).contains(&yarn.plies.len()) || yarn.plies.len() != yarn.fibers.len() {

@@ -30,6 +30,7 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
         display: _,
         layers: _,
         storage: _,
+        axes: _,
         denoise: _,
         camera,
         camera_path,

@@ -6,6 +6,7 @@
 //! Embree.
 
 pub(crate) mod animation;
+mod axes;
 pub mod builder;
 pub mod camera;
 pub mod defaults;
@@ -25,6 +26,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3, Vec2};
 use rayon::prelude::*;
 
+pub use axes::Axes;
 pub use builder::{SceneBuilder, SceneError};
 pub use camera::{Camera, Footprint};
 pub use fiber_detail::FiberDetail;
@@ -554,6 +556,8 @@ pub struct Scene {
     pub layers: Layers,
     /// How an EXR is stored.
     pub storage: Storage,
+    /// The unit and the axes of its places.
+    pub axes: Axes,
     /// Whether a denoised picture is made as well.
     pub denoise: bool,
     /// The view, in the middle of the shutter's time.

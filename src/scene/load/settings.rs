@@ -2,7 +2,7 @@
 
 use super::{
     super::{builder::OutputSettings, force::FORCEABLE, *},
-    Range, Reader,
+    Range, Reader, UNITS, z_up,
 };
 use crate::{image::png::ToneMap, input::diagnostic::shortened};
 
@@ -118,6 +118,10 @@ pub(super) fn output(table: Reader<'_>) -> OutputSettings {
             &[("float", false), ("half", true)],
         ),
     };
+    let axes = Axes {
+        unit: table.one_of_or("unit", otherwise.axes.unit, &UNITS),
+        z_up: z_up(&table).unwrap_or(otherwise.axes.z_up),
+    };
     let mut layers = otherwise.layers;
     if table.has("layers") {
         layers = Layers::NONE;
@@ -136,5 +140,5 @@ pub(super) fn output(table: Reader<'_>) -> OutputSettings {
     let denoise = table.bool_or("denoise", otherwise.denoise);
     let frames_per_second = table.f64("frames_per_second", Range::between(0.01, 10_000.0));
     table.finish();
-    OutputSettings { display, layers, storage, denoise, frames_per_second }
+    OutputSettings { display, layers, storage, axes, denoise, frames_per_second }
 }
