@@ -89,7 +89,13 @@ fn what_makes_no_scene_is_told() {
         change(&mut mesh);
         error(&|s| {
             let material = s.add_material(Material { surface: SurfaceMaterial::diffuse(Rgb::ONE), texture: None });
-            s.objects.push(Object { origin: "box".to_owned(), mesh: mesh.clone(), material, next: Vec::new() });
+            s.objects.push(Object {
+                name: "box".to_owned(),
+                origin: "box".to_owned(),
+                mesh: mesh.clone(),
+                material,
+                next: Vec::new(),
+            });
         })
     };
     assert!(mesh(&|m| m.points[3].y = f64::NAN).contains("mesh `box`: expected finite points"));

@@ -217,6 +217,36 @@ fn mattes_tell_fabrics_yarns_and_plies_apart() {
 }
 
 #[test]
+fn mattes_hold_meshes_and_the_ground() {
+    let scene = on_a_floor().replace("\"lobes\", \"albedo\"", "\"cryptomatte\"")
+        + "[[mesh]]\nshape = \"sphere\"\nradius = 4\ntranslate = [12, 0, 0]\n\
+           [[mesh]]\nname = \"head\"\nshape = \"box\"\nsize = [6, 6, 6]\ntranslate = [-12, 0, 0]\n";
+    let folder = directory();
+    write(folder.path(), "s.toml", scene);
+    let run = |args: &str| {
+        yarnray(folder.path(), &args.split_whitespace().collect::<Vec<_>>()).good();
+        let image = image::read(&folder.path().join("s.exr")).unwrap();
+        Picture { image, stats: serde_json::Value::Null }
+    };
+    let picture = run("render s.toml -q --spp 8 -o s.exr");
+    let [fabric, yarn, ply] = ["CryptoFabric", "CryptoYarn", "CryptoPly"].map(|layer| matte(&picture, layer));
+    let names: std::collections::BTreeSet<&str> = fabric.names.values().map(String::as_str).collect();
+    assert_eq!(names, ["wool3", "sphere", "head", "ground"].into());
+    assert!(yarn.names.values().chain(ply.names.values()).all(|name| name.starts_with("wool3/")));
+    let mut met = BTreeMap::new();
+    for (pixels, &covered) in fabric.pixels.iter().zip(picture.channel("A")) {
+        let sum: f32 = pixels.values().sum();
+        assert!((sum - covered).abs() < 1e-6, "{sum} of {covered}");
+        pixels.keys().for_each(|name| *met.entry(name.clone()).or_insert(0) += 1);
+    }
+    assert!(names.iter().all(|&name| met[name] > 10), "{met:?}");
+    // A film keeps their names.
+    yarnray(folder.path(), &["render", "s.toml", "-q", "--spp", "8", "-o", "s.film"]).good();
+    let merged = run("merge -q s.film -o s.exr");
+    assert_eq!(matte(&merged, "CryptoFabric").pixels, fabric.pixels);
+}
+
+#[test]
 fn a_denoised_picture_is_a_layer_or_a_file_of_its_own() {
     let directory = directory();
     let path = directory.path();

@@ -1,15 +1,15 @@
-//! Which cloth covers each pixel: counts of samples, from which Cryptomatte layers are made.
+//! What covers each pixel: counts of samples, from which Cryptomatte layers are made.
 
-use super::ClothId;
+use super::MatteId;
 
-/// For each pixel of a tile, how many samples met which ply.
+/// For each pixel of a tile, how many samples met which ply or surface.
 ///
 /// Counts are whole numbers, kept in the order of their ids: the same samples make the same matte in whatever order
 /// they come, and in whatever shares they were taken. All ids are kept, however small, so that none that grows later
 /// has been forgotten.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Matte {
-    pixels: Vec<Vec<(ClothId, u32)>>,
+    pixels: Vec<Vec<(MatteId, u32)>>,
 }
 
 impl Matte {
@@ -20,7 +20,7 @@ impl Matte {
 
     /// Counts `samples` more at a pixel; does nothing in a matte without pixels, which nobody asked for.
     #[inline]
-    pub fn add(&mut self, pixel: usize, id: ClothId, samples: u32) {
+    pub fn add(&mut self, pixel: usize, id: MatteId, samples: u32) {
         let Some(counts) = self.pixels.get_mut(pixel) else { return };
         match counts.binary_search_by_key(&id, |(id, _)| *id) {
             Ok(place) => counts[place].1 += samples,
@@ -29,7 +29,7 @@ impl Matte {
     }
 
     /// What covers a pixel and by how many samples, in the order of the ids.
-    pub fn counts(&self, pixel: usize) -> &[(ClothId, u32)] {
+    pub fn counts(&self, pixel: usize) -> &[(MatteId, u32)] {
         self.pixels.get(pixel).map_or(&[], Vec::as_slice)
     }
 
@@ -48,17 +48,17 @@ impl Matte {
         }
     }
 
-    /// Takes back what [`Self::save`] wrote for so many pixels, of a scene of so many fabrics: `None` if it is something else.
-    pub(super) fn load(&mut self, bytes: &[u8], fabrics: usize) -> Option<()> {
+    /// Takes back what [`Self::save`] wrote for so many pixels, of a scene of so many fabrics and surfaces: `None` if it is something else.
+    pub(super) fn load(&mut self, bytes: &[u8], things: usize) -> Option<()> {
         let (words, []) = bytes.as_chunks::<4>() else { return None };
         let mut words = words.iter().map(|w| u32::from_le_bytes(*w));
         for counts in &mut self.pixels {
             counts.clear();
             for _ in 0..words.next()? {
                 let mut word = || words.next();
-                counts.push((ClothId { fabric: word()?, yarn: word()?, ply: word()? }, word()?));
+                counts.push((MatteId { fabric: word()?, yarn: word()?, ply: word()? }, word()?));
             }
-            let known = counts.iter().all(|(id, _)| (id.fabric as usize) < fabrics);
+            let known = counts.iter().all(|(id, _)| (id.fabric as usize) < things);
             if !known || !counts.is_sorted_by_key(|(id, _)| *id) {
                 return None;
             }
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn counts_do_not_depend_on_their_order() {
-        let id = |yarn, ply| ClothId { fabric: 0, yarn, ply };
+        let id = |yarn, ply| MatteId { fabric: 0, yarn, ply };
         let met = [id(3, 1), id(0, 0), id(3, 0), id(3, 1), id(0, 0), id(7, 2), id(3, 1)];
         let mut forward = Matte::new(2);
         let mut backward = Matte::new(2);

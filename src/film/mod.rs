@@ -26,7 +26,7 @@ pub use matte::Matte;
 pub use noise::Noise;
 use noise::NoiseSums;
 pub use parts::LightParts;
-pub use sample::{ClothId, Sample};
+pub use sample::{MatteId, Sample};
 pub use tile::Tile;
 use tile::{TILE_BYTES, zeros};
 
@@ -122,7 +122,7 @@ impl Film {
     pub fn bytes(crop: [u32; 4], layers: Layers) -> u64 {
         let [width, height] = [crop[2] - crop[0], crop[3] - crop[1]].map(u64::from);
         let matte =
-            if layers.cryptomatte { size_of::<Vec<(ClothId, u32)>>() + 4 * size_of::<(ClothId, u32)>() } else { 0 };
+            if layers.cryptomatte { size_of::<Vec<(MatteId, u32)>>() + 4 * size_of::<(MatteId, u32)>() } else { 0 };
         let tiles = width.div_ceil(TILE.into()) * height.div_ceil(TILE.into());
         width * height * (Tile::bytes_per_pixel(layers) + matte) as u64 + tiles * TILE_BYTES
     }
@@ -208,7 +208,7 @@ impl Film {
     }
 
     /// What covers a pixel and by how many samples, in the order of the ids; nothing if the scene asks for no matte.
-    pub fn covering(&self, x: u32, y: u32) -> &[(ClothId, u32)] {
+    pub fn covering(&self, x: u32, y: u32) -> &[(MatteId, u32)] {
         let tile = &self.tiles[(y / TILE * self.columns + x / TILE) as usize];
         tile.matte.counts(((y % TILE) * tile.width + x % TILE) as usize)
     }

@@ -26,14 +26,14 @@ pub struct Sample {
     pub albedo: Rgb,
     /// The radiance by where it came from.
     pub parts: LightParts,
-    /// The cloth at which it first scattered, if that comes first and is asked for.
-    pub cloth: Option<ClothId>,
+    /// At what it first scattered, if that is asked for.
+    pub matte: Option<MatteId>,
 }
 
-/// A ply of a yarn of the scene.
+/// A ply of a yarn of the scene, or a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ClothId {
-    /// Index of the fabric.
+pub struct MatteId {
+    /// Index of the fabric; meshes are counted on from there, and then comes the ground. Those have one yarn and ply.
     pub fabric: u32,
     /// Index of the yarn within it.
     pub yarn: u32,

@@ -84,10 +84,10 @@ fn tiles_come_back_from_their_bytes() {
     assert_eq!(Tile::bytes_per_pixel(Layers::DEFAULT), 144);
     assert_eq!(Tile::bytes_per_pixel(layers), 528);
     let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
-    let cloth = Some(ClothId { fabric: 1, yarn: 70_000, ply: 2 });
+    let matte = Some(MatteId { fabric: 1, yarn: 70_000, ply: 2 });
     for x in 0..3 {
         let radiance = Rgb::splat(0.3 + x as f32);
-        tile.add(x, 1, &Sample { radiance, alpha: 1.0, depth: -2.5, normal: Vec3A::X, cloth, ..Sample::default() });
+        tile.add(x, 1, &Sample { radiance, alpha: 1.0, depth: -2.5, normal: Vec3A::X, matte, ..Sample::default() });
     }
     let mut bytes = Vec::new();
     tile.save(&mut bytes);

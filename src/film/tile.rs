@@ -185,8 +185,8 @@ impl Tile {
         if let Some(uv) = sums.uv.get_mut(i) {
             add_each(uv, sample.uv.to_array());
         }
-        if let Some(cloth) = sample.cloth {
-            self.matte.add(i, cloth, 1);
+        if let Some(id) = sample.matte {
+            self.matte.add(i, id, 1);
         }
         if let Some(parts) = sums.parts.get_mut(i) {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
@@ -296,16 +296,16 @@ impl Tile {
         self.matte.save(out);
     }
 
-    /// Takes back what [`Self::save`] wrote for a tile of this size and these layers, of a scene of so many fabrics: `None` if it
+    /// Takes back what [`Self::save`] wrote for a tile of this size and these layers, of a scene of so many fabrics and surfaces: `None` if it
     /// is something else.
-    pub fn load(&mut self, mut bytes: &[u8], fabrics: usize) -> Option<()> {
+    pub fn load(&mut self, mut bytes: &[u8], things: usize) -> Option<()> {
         let mut expected = 0;
         for_all_sums!(&self.sums, add_bytes, &mut expected);
         if bytes.len() < expected {
             return None;
         }
         for_all_sums!(&mut self.sums, load_all, &mut bytes);
-        self.matte.load(bytes, fabrics)
+        self.matte.load(bytes, things)
     }
 }
 

@@ -18,7 +18,7 @@ use self::{
 };
 use crate::{
     cloth::{Cloth, Met},
-    film::{ClothId, Sample},
+    film::{MatteId, Sample},
     geometry::{
         ray::{DoneWith, Ray},
         section::{Crossings, Section},
@@ -85,8 +85,10 @@ pub(crate) struct Integrator<'a> {
     max_bounces: u32,
     /// Albedo of one fibre of each ply, of each fabric's yarn and then of its variants; empty if no layer holds it.
     albedos: Vec<Vec<Vec<Rgb>>>,
-    /// Whether samples name the cloth they meet.
+    /// Whether samples name what they meet.
     identify: bool,
+    /// How many fabrics there are, and then how many meshes: the numbers of these and of the ground come after.
+    before_surfaces: [u32; 2],
     /// What else layers hold of the place seen first.
     layers: Layers,
     flow: Option<Flow>,
@@ -149,6 +151,7 @@ impl<'a> Integrator<'a> {
                 Vec::new()
             },
             identify: scene.layers.cryptomatte,
+            before_surfaces: [scene.fabrics.len(), scene.objects.len()].map(|count| count as u32),
             layers: scene.layers,
             flow: Flow::of(scene),
             back: Vec3A::from(scene.camera.back_f32()),
@@ -389,7 +392,7 @@ impl<'a> Integrator<'a> {
             sample.albedo = variants[index.map_or(0, |index| 1 + usize::from(index))][ply];
         }
         if self.identify {
-            sample.cloth = Some(ClothId { fabric: fabric as u32, yarn: yarn() as u32, ply: ply as u32 });
+            sample.matte = Some(MatteId { fabric: fabric as u32, yarn: yarn() as u32, ply: ply as u32 });
         }
     }
 }
@@ -426,6 +429,7 @@ fn on_ground(ground: &Ground, ray: &Ray, t: f32) -> SurfacePlace {
         uv: Vec2::ZERO,
         uv_per_length: 0.0,
         material: ground.material,
+        mesh: None,
     }
 }
 

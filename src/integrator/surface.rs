@@ -7,7 +7,7 @@ use super::{
     direct::{Response, Scattered},
 };
 use crate::{
-    film::Sample,
+    film::{MatteId, Sample},
     geometry::ray::{DoneWith, Ray},
     math::{Rgb, frame::orthonormal_basis},
     scattering::mis_weight,
@@ -38,6 +38,10 @@ impl Integrator<'_> {
         }
         if path.bounces == 0 {
             sample.alpha = 1.0;
+            if self.identify {
+                let [fabrics, meshes] = self.before_surfaces;
+                sample.matte = Some(MatteId { fabric: fabrics + place.mesh.unwrap_or(meshes), yarn: 0, ply: 0 });
+            }
             sample.depth = (path.from - place.point).dot(self.back);
             self.sees_moving(sample, place.point, place.next);
             sample.uv = place.uv;

@@ -147,6 +147,8 @@ pub(crate) fn read(path: &Path) -> Result<(About, Job), ImageError> {
     let (header, file) = open(path)?;
     let film = Film::new(header.crop, header.about.collected, header.light_scale);
     let mut film = film.map_err(|error| unreadable(path, &error.to_string()))?;
+    let frame = &header.about.frame;
+    let things = frame.fabrics.len() + frame.surfaces.len();
     let mut tiles = film.tiles_mut().iter_mut();
     read_tiles(path, &header, file, |bytes| {
         let Some(tile) = tiles.next() else { return false };
@@ -155,7 +157,7 @@ pub(crate) fn read(path: &Path) -> Result<(About, Job), ImageError> {
         tile.share = [12, 16].map(|k| f32::from_le_bytes(word(k)));
         let long = |k: usize| u64::from(u32::from_le_bytes(word(k + 4))) << 32 | u64::from(u32::from_le_bytes(word(k)));
         tile.rays = [20, 28].map(long);
-        tile.load(&bytes[TILE_EXTRA..], header.about.frame.fabrics.len()).is_some()
+        tile.load(&bytes[TILE_EXTRA..], things).is_some()
     })?;
     let job = Job {
         film,
@@ -280,7 +282,7 @@ fn unreadable_or_short(path: &Path, error: &io::Error, at: u64) -> ImageError {
 }
 
 fn header_json(about: &About, job: &Job) -> Value {
-    let Frame { width, height, layers, storage, axes, display, fabrics, middle } = about.frame.clone();
+    let Frame { width, height, layers, storage, axes, display, fabrics, surfaces, middle } = about.frame.clone();
     let metadata: Vec<Value> = about
         .metadata
         .iter()
@@ -310,6 +312,7 @@ fn header_json(about: &About, job: &Job) -> Value {
             "exposure_bits": display.exposure.to_bits(),
             "alpha": display.alpha,
             "fabrics": fabrics,
+            "surfaces": surfaces,
             "middle_bits": middle.map(f64::to_bits),
         },
         "collected": layer_names(about.collected),
@@ -407,6 +410,10 @@ fn parse_frame(f: &Value) -> Option<Frame> {
             alpha: f["alpha"].as_bool()?,
         },
         fabrics: f["fabrics"].as_array()?.iter().map(text).collect::<Option<_>>()?,
+        surfaces: match &f["surfaces"] {
+            Value::Null => Vec::new(),
+            names => names.as_array()?.iter().map(text).collect::<Option<_>>()?,
+        },
         middle: {
             let bits = f["middle_bits"].as_array()?.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?;
             <[u64; 3]>::try_from(bits).ok()?.map(f64::from_bits)
@@ -454,7 +461,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
 mod tests {
     use super::*;
     use crate::{
-        film::{ClothId, Sample},
+        film::{MatteId, Sample},
         scene::SceneBuilder,
     };
 
@@ -548,8 +555,8 @@ mod tests {
         scene.layers.cryptomatte = true;
         let about = About::new(&scene, "4.3.3", Vec::new(), None);
         let mut job = Job::new(&scene, None).unwrap();
-        let cloth = Some(ClothId { fabric: 7, yarn: 0, ply: 0 });
-        job.film.tiles_mut()[0].add(3, 0, &Sample { cloth, ..Sample::default() });
+        let matte = Some(MatteId { fabric: 7, yarn: 0, ply: 0 });
+        job.film.tiles_mut()[0].add(3, 0, &Sample { matte, ..Sample::default() });
         write(&path, &about, &job).unwrap();
         let told = read(&path).map(drop).unwrap_err().to_string();
         assert!(told.contains("tile 0 at byte"), "{told}");

@@ -8,7 +8,7 @@ use std::{
 use glam::{DVec3, Vec3};
 
 use crate::{
-    film::{ClothId, Film, LightParts, Pixel},
+    film::{Film, LightParts, MatteId, Pixel},
     image::{
         ImageError, cryptomatte,
         exr::{self, Attribute, ChannelSpec, ExrLayout, Line, Sample},
@@ -55,6 +55,8 @@ pub struct Frame {
     pub display: Display,
     /// Names of the fabrics, for Cryptomatte.
     pub fabrics: Vec<String>,
+    /// Names of the meshes and of the ground, if there is one.
+    pub surfaces: Vec<String>,
     /// Where the film's origin lies in the world, millimetres.
     pub middle: [f64; 3],
 }
@@ -70,6 +72,10 @@ impl Frame {
             axes: scene.axes,
             display: scene.display,
             fabrics: scene.fabrics.iter().map(|f| f.name.clone()).collect(),
+            surfaces: {
+                let ground = scene.ground.map(|_| "ground".to_owned());
+                scene.objects.iter().map(|object| object.name.clone()).chain(ground).collect()
+            },
             middle: scene.middle.to_array(),
         }
     }
@@ -269,28 +275,29 @@ enum Level {
 /// One Cryptomatte layer, with the names that are in the picture.
 struct MatteLayer {
     name: &'static str,
-    names: BTreeMap<ClothId, (String, u32)>,
+    names: BTreeMap<MatteId, (String, u32)>,
     level: Level,
 }
 
 impl MatteLayer {
-    /// The layers of a film: fabrics, yarns, plies.
+    /// The layers of a film: fabrics with all other surfaces, yarns, plies.
     fn all(frame: &Frame, film: &Film) -> Vec<Self> {
         let pixels = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
-        let seen: BTreeSet<ClothId> = pixels.flat_map(|(x, y)| film.covering(x, y)).map(|(id, _)| *id).collect();
+        let seen: BTreeSet<MatteId> = pixels.flat_map(|(x, y)| film.covering(x, y)).map(|(id, _)| *id).collect();
         [("CryptoFabric", Level::Fabric), ("CryptoYarn", Level::Yarn), ("CryptoPly", Level::Ply)]
             .map(|(name, level)| {
-                let named = |id: &ClothId| {
-                    let fabric = &frame.fabrics[id.fabric as usize];
-                    let text = match level {
-                        Level::Fabric => fabric.clone(),
-                        Level::Yarn => format!("{fabric}/yarn{}", id.yarn),
-                        Level::Ply => format!("{fabric}/yarn{}/ply{}", id.yarn, id.ply),
+                let named = |id: &MatteId| {
+                    let index = id.fabric as usize;
+                    let text = match (level, frame.fabrics.get(index)) {
+                        (Level::Fabric, Some(fabric)) => fabric.clone(),
+                        (Level::Fabric, None) => frame.surfaces.get(index - frame.fabrics.len())?.clone(),
+                        (Level::Yarn, fabric) => format!("{}/yarn{}", fabric?, id.yarn),
+                        (Level::Ply, fabric) => format!("{}/yarn{}/ply{}", fabric?, id.yarn, id.ply),
                     };
                     let hash = cryptomatte::id(&text);
-                    (level.of(*id), (text, hash))
+                    Some((level.of(*id), (text, hash)))
                 };
-                Self { name, names: seen.iter().map(named).collect(), level }
+                Self { name, names: seen.iter().filter_map(named).collect(), level }
             })
             .into()
     }
@@ -302,22 +309,22 @@ impl MatteLayer {
     /// The samples of a pixel, from what covers it.
     fn ranks(
         &self,
-        met: &[(ClothId, u32)],
+        met: &[(MatteId, u32)],
         samples: u32,
         buffer: &mut Vec<(u32, u32)>,
     ) -> [f32; 2 * cryptomatte::DEPTH] {
         buffer.clear();
-        buffer.extend(met.iter().map(|(id, count)| (self.names[&self.level.of(*id)].1, *count)));
+        buffer.extend(met.iter().filter_map(|(id, count)| Some((self.names.get(&self.level.of(*id))?.1, *count))));
         cryptomatte::rank(buffer, samples)
     }
 }
 
 impl Level {
     /// The id of what a ply is part of.
-    fn of(self, id: ClothId) -> ClothId {
+    fn of(self, id: MatteId) -> MatteId {
         match self {
-            Self::Fabric => ClothId { yarn: 0, ply: 0, ..id },
-            Self::Yarn => ClothId { ply: 0, ..id },
+            Self::Fabric => MatteId { yarn: 0, ply: 0, ..id },
+            Self::Yarn => MatteId { ply: 0, ..id },
             Self::Ply => id,
         }
     }

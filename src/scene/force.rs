@@ -166,7 +166,13 @@ fn force_around(scene: &mut Scene, name: &str) -> bool {
             }
             scene.materials.push(Material { surface: SurfaceMaterial::diffuse(Rgb::ZERO), texture: None });
             let material = scene.materials.len() - 1;
-            scene.objects.push(Object { origin: "forced".to_owned(), mesh, material, next: Vec::new() });
+            scene.objects.push(Object {
+                name: "forced".to_owned(),
+                origin: "forced".to_owned(),
+                mesh,
+                material,
+                next: Vec::new(),
+            });
         }
         _ => return false,
     }

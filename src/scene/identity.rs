@@ -81,7 +81,7 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
             texture.as_ref().map(|AlbedoTexture { texture, repeat }| (texture.size(), texture.hash(), repeat));
         keys.add(&format!("material.{i}"), &(surface, texture));
     }
-    for (i, Object { origin: _, mesh, material, next }) in objects.iter().enumerate() {
+    for (i, Object { name: _, origin: _, mesh, material, next }) in objects.iter().enumerate() {
         let Mesh { points, normals, uvs, triangles } = mesh;
         let mut hash = Hash::default();
         points.iter().chain(normals).for_each(|p| hash.numbers(&p.to_array()));

@@ -532,6 +532,8 @@ pub struct AlbedoTexture {
 /// A mesh of the scene.
 #[derive(Clone, Debug)]
 pub struct Object {
+    /// What mattes call it.
+    pub name: String,
     /// Its file or shape, for messages.
     pub origin: String,
     /// The triangles, millimetres, about the scene's middle.

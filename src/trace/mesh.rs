@@ -42,6 +42,8 @@ pub struct SurfacePlace {
     pub uv_per_length: f32,
     /// Index into the scene's materials.
     pub material: usize,
+    /// Index of the mesh; `None` for the ground.
+    pub mesh: Option<u32>,
 }
 
 impl TriangleMesh {
@@ -66,7 +68,7 @@ impl TriangleMesh {
     }
 
     /// What is at a hit.
-    pub(super) fn place(&self, ray: &Ray, hit: &RawHit) -> SurfacePlace {
+    pub(super) fn place(&self, index: usize, ray: &Ray, hit: &RawHit) -> SurfacePlace {
         let corners = self.triangles[hit.segment as usize].map(|i| i as usize);
         let [a, b, c] = corners.map(|i| self.points[i]);
         let (u, v) = (hit.u, hit.v);
@@ -93,7 +95,16 @@ impl TriangleMesh {
             uv = ta + u * (tb - ta) + v * (tc - ta);
             uv_per_length = ((tb - ta).perp_dot(tc - ta).abs() / across.length().max(1e-30)).sqrt();
         }
-        SurfacePlace { point, next, normal, shading, uv, uv_per_length, material: self.material }
+        SurfacePlace {
+            point,
+            next,
+            normal,
+            shading,
+            uv,
+            uv_per_length,
+            material: self.material,
+            mesh: Some(index as u32),
+        }
     }
 }
 
@@ -111,7 +122,7 @@ mod tests {
         let mesh = TriangleMesh::new(&mesh, &next, 3);
         let ray = Ray::new(Vec3A::new(0.0, 3.0, 0.0), Vec3A::NEG_Y);
         let hit = |u, v| RawHit { t: 3.0, normal: Vec3A::Y, u, v, segment: 0, geometry: 0 };
-        let place = mesh.place(&ray, &hit(0.25, 0.5));
+        let place = mesh.place(0, &ray, &hit(0.25, 0.5));
         assert!((place.point - Vec3A::new(1.0, 0.0, 0.0)).length() < 1e-6, "{place:?}");
         assert!((place.next - Vec3A::new(2.0, 0.0, 0.0)).length() < 1e-6, "{place:?}");
         assert!((place.uv - Vec2::new(0.75, 0.5)).length() < 1e-6);
@@ -119,7 +130,7 @@ mod tests {
         assert_eq!((place.normal, place.material), (Vec3A::Y, 3));
         assert!(place.shading.x > 0.05 && place.shading.y > 0.9);
         // From below both normals point down.
-        let below = mesh.place(&Ray::new(Vec3A::new(0.0, -3.0, 0.0), Vec3A::Y), &hit(0.25, 0.5));
+        let below = mesh.place(0, &Ray::new(Vec3A::new(0.0, -3.0, 0.0), Vec3A::Y), &hit(0.25, 0.5));
         assert!(below.normal == Vec3A::NEG_Y && below.shading.y < -0.9);
     }
 }

@@ -198,7 +198,10 @@ impl World {
                 HitPlace::Yarn(met.section)
             }
             Some(CurveGeometry::Fibers(fibers)) => HitPlace::Fiber(fibers.tubes.place(raw.segment, raw.u)),
-            None => HitPlace::Surface(self.meshes[geometry - self.geometries.len()].place(ray, &raw)),
+            None => {
+                let index = geometry - self.geometries.len();
+                HitPlace::Surface(self.meshes[index].place(index, ray, &raw))
+            }
         };
         let normal = raw.normal.normalize_or(-ray.direction);
         Hit { t: raw.t, geometry, segment: raw.segment, u: raw.u, normal, place }

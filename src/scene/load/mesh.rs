@@ -133,6 +133,8 @@ struct MeshFile {
 
 /// A mesh whose text is sound and whose file is not read yet.
 pub(super) struct MeshPlan {
+    /// Where the scene has one.
+    name: Option<String>,
     source: Source,
     smooth: bool,
     transform: DAffine3,
@@ -150,6 +152,10 @@ pub(super) fn meshes(
 }
 
 fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: u32) -> Option<MeshPlan> {
+    let name = table.string("name").map(str::to_owned);
+    if name.as_ref().is_some_and(|n| n.trim().is_empty()) {
+        table.error_at("name", "the name of a mesh cannot be empty", None);
+    }
     let transform = placement(&table, context);
     let material = material_of(&table, context, materials);
     let mut smooth = false;
@@ -182,7 +188,7 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
         }
     };
     table.finish();
-    Some(MeshPlan { source: source?, smooth, transform, material: material? })
+    Some(MeshPlan { name, source: source?, smooth, transform, material: material? })
 }
 
 fn shape(table: &Reader<'_>, context: &Context<'_>) -> Option<Source> {
@@ -323,8 +329,8 @@ impl MeshPlan {
         materials: &mut Vec<(MaterialPlan, Material)>,
     ) -> Option<Object> {
         let mut next = Vec::new();
-        let (origin, mut mesh) = match self.source {
-            Source::Shape(kind, mesh) => (kind.to_owned(), mesh),
+        let (usual, origin, mut mesh) = match self.source {
+            Source::Shape(kind, mesh) => (kind.to_owned(), kind.to_owned(), mesh),
             Source::File(file) => {
                 let (path, mut mesh) = file.read(file.frame, context)?;
                 if let Some(later) = flow.then(|| file.later(&path)).flatten() {
@@ -334,7 +340,9 @@ impl MeshPlan {
                 if self.smooth && mesh.normals.is_empty() {
                     mesh.smooth();
                 }
-                (path.display().to_string(), mesh)
+                // That of the scene, which is the same in every frame.
+                let usual = file.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                (usual, path.display().to_string(), mesh)
             }
         };
         mesh.transform(&self.transform);
@@ -344,7 +352,8 @@ impl MeshPlan {
         {
             context.error(*span, format!("{origin} has no texture coordinates for this texture"), None);
         }
-        Some(Object { origin, mesh, material: self.material.make(context, materials)?, next })
+        let name = self.name.unwrap_or(usual);
+        Some(Object { name, origin, mesh, material: self.material.make(context, materials)?, next })
     }
 }
 
