@@ -48,6 +48,25 @@ fn a_floor_has_the_irradiance_of_the_closed_forms() {
     assert!((got / sum - 1.0).abs() < 0.02, "all lights: {got}, not {sum}");
 }
 
+/// Light leaves a yarn beside the place where it came in; a ball no larger than the yarn is met from there in other directions,
+/// and must not count twice. From ten times its size away, it is a point.
+#[test]
+fn a_small_ball_near_a_yarn_is_a_point() {
+    let yarn = |light: &str| {
+        let scene = format!(
+            "render = {{ width = 64, height = 48, spp = 64, max_bounces = 1 }}\n\
+             camera = {{ type = \"orthographic\", position = [0, 0, 20], target = [0, 0, 0], size = 2 }}\n\
+             [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
+             [yarn.sample]\nradius = 1\nplies = 1\nfiber = \"white\"\nfibers = 100\ndensity = 0.4\n\
+             [[fabric]]\nyarn = \"sample\"\nsource = {{ type = \"straight\", length = 40 }}\n[[light]]\n{light}"
+        );
+        render(&scene, &[]).mean()[1]
+    };
+    let point = yarn("type = \"point\"\nposition = [0, 7.07, 7.07]\nintensity = 2.827433");
+    let ball = yarn("type = \"sphere\"\nposition = [0, 7.07, 7.07]\nradius = 0.3\nradiance = 10\nvisible = false");
+    assert!((ball / point - 1.0).abs() < 0.03, "{ball} of a ball, {point} of a point");
+}
+
 /// Angles of any size are angles.
 #[test]
 fn a_sky_turns_by_whole_rounds() {

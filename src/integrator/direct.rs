@@ -53,7 +53,9 @@ impl Integrator<'_> {
         if value.sum().max_channel() <= 0.0 {
             return;
         }
-        let ray = Ray { t_far: towards.distance, done, ..Ray::new(start, towards.direction) };
+        // The light is as far as from `at`.
+        let t_far = towards.distance - (start - at).dot(towards.direction);
+        let ray = Ray { t_far, done, ..Ray::new(start, towards.direction) };
         counters.shadow += 1;
         let passed = self.shadow(&ray, scratch);
         if passed <= 0.0 {

@@ -262,16 +262,13 @@ impl<'a> Integrator<'a> {
     /// camera sees one, which hides what is behind it.
     #[inline]
     fn area_lights(&self, path: &Path<'_>, end: f32, sample: &mut Sample) -> bool {
-        let met = |light: &AreaLight| {
-            let t = light.shape.intersect(path.ray.origin, path.ray.direction, light.two_sided);
-            t.filter(|&t| t < end)
-        };
+        let Ray { origin, direction, .. } = path.ray;
         if path.pdf == f32::INFINITY {
             let seen = self.area_lights.iter().filter(|(light, _)| light.visible);
             let nearest = seen.filter_map(|(light, _)| Some((met(light)?, light))).min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, light)) = nearest {
                 sample.alpha = 1.0;
-                let point = path.ray.origin + t * path.ray.direction;
+                let point = origin + t * direction;
                 sample.depth = (path.from - point).dot(self.back);
                 self.sees(sample, point);
                 add(sample, path.bounces, path, path.throughput * light.radiance);
@@ -279,9 +276,13 @@ impl<'a> Integrator<'a> {
             return nearest.is_some();
         }
         for &(light, index) in &self.area_lights {
-            if met(light).is_some() {
-                let other = self.lights.chance(index, path.from)
-                    * light.shape.pdf(path.from, path.ray.direction, light.two_sided);
+            let t = light.shape.intersect(path.from, direction, light.two_sided).map(|t| t - before);
+            if t.is_some_and(|t| t > 0.0 && t < end) {
+                let other =
+                    self.lights.chance(index, path.from) * light.shape.pdf(path.from, direction, light.two_sided);
+        // Light leaves cloth beside the place for which lights are chosen. Both ways to a light must count the same directions: those in
+        // which that place sees it.
+        let before = (origin - path.from).dot(direction);
                 let weight = mis_weight(path.pdf, other);
                 add(sample, path.bounces, path, path.throughput * light.radiance * weight);
             }
