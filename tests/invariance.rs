@@ -123,6 +123,31 @@ fn places_do_not_matter() {
     alike("moved by a kilometre", &here, &straight("mm", 1.0, 1e6, 15.0, ""), 2e-3, 0.05);
 }
 
+/// Far from the scene's middle single precision rounds places by more than a share of a thin yarn; what a ray has passed is behind it
+/// all the same.
+#[test]
+fn thin_yarns_far_out_are_passed_once() {
+    let rays = |place: f64| {
+        let at = format!("[{place}, {place}, {place}]");
+        let yarn = |at: &str| {
+            format!("[[fabric]]\nyarn = \"thin\"\ntranslate = {at}\nsource = {{ type = \"straight\", length = 9 }}\n")
+        };
+        let scene = format!(
+            "render = {{ width = 48, height = 36, spp = 8, max_bounces = 0 }}\n\
+             camera = {{ type = \"orthographic\", position = [{place}, {place}, {}], target = {at}, size = 0.15 }}\n\
+             [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
+             [yarn.thin]\nradius = 0.05\nplies = 1\nfiber = \"white\"\nfibers = 60\ndensity = 0.1\n{}{}\
+             [[light]]\ntype = \"environment\"\n",
+            place + 20.0,
+            yarn(&at),
+            yarn(&format!("[{0}, {0}, {0}]", -place)),
+        );
+        render(&scene, &[]).stats["rays"]["bounce"].as_f64().unwrap()
+    };
+    let [near, far] = [rays(10.0), rays(3000.0)];
+    assert!(near > 1000.0 && far < 1.2 * near, "{near} rays go on, far out {far}");
+}
+
 #[test]
 fn the_ways_to_intersect_plies_agree_where_they_must() {
     let way = |twist, name: &str| straight("mm", 1.0, 0.0, twist, &format!("ply_intersection = \"{name}\""));

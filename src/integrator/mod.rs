@@ -38,8 +38,10 @@ const ROULETTE_AFTER: u32 = 1;
 const ROULETTE_AFTER_FIBERS: u32 = 4;
 /// Most yarns a path may pass unscattered in a row: a guard against geometry that repeats a hit for ever.
 const MOST_PASSES: u32 = 10_000;
-/// Where a ray that passes a yarn starts again, in yarn radii behind the surface.
+/// Where a ray that passes a yarn starts again, in yarn radii behind the surface,
 const PASS_OFFSET: f32 = 1e-3;
+/// and at least in units of the distance from the origin, by which single precision rounds positions.
+const PASS_ROUNDING: f32 = 4e-7;
 
 /// What was done, for the statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -334,7 +336,9 @@ impl<'a> Integrator<'a> {
         if u_pass < unscattered {
             path.passes += 1;
             // Behind the surface, so that the same hit is not found again.
-            let behind = section.point_on_ray(0.0) - PASS_OFFSET * section.radius * hit.normal;
+            let entry = section.point_on_ray(0.0);
+            let offset = (PASS_OFFSET * section.radius).max(PASS_ROUNDING * entry.abs().max_element());
+            let behind = entry - offset * hit.normal;
             let done = path.ray.done.and(hit.yarn_place());
             path.ray = Ray { done, ..Ray::new(behind, path.ray.direction) };
             return (path.passes < MOST_PASSES, false);
