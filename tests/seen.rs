@@ -105,6 +105,23 @@ fn positions_fall_on_their_pixels_by_the_matrices_of_the_file() {
     }
 }
 
+/// A yarn's tube begins before its plies do: what lies between hides these.
+#[test]
+fn the_ground_hides_the_plies_behind_it() {
+    let text = "render = { width = 96, height = 48, spp = 4, max_bounces = 0 }\n\
+        camera = { type = \"orthographic\", position = [0, 6, 20], target = [0, 0, 0], size = 2.6 }\n\
+        output = { layers = [\"position\"] }\n\
+        ground = { height = 0, albedo = 0.5 }\n\
+        [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
+        [yarn.sample]\nradius = 1\nplies = 3\nply_twist = 25\nfiber = \"white\"\nfibers = 60\ndensity = 0.5\n\
+        [[fabric]]\nyarn = \"sample\"\nphase = 0\nsource = { type = \"straight\", length = 9 }\n\
+        [[light]]\ntype = \"environment\"\n";
+    let picture = render(text, &[]).image;
+    let lowest = picture.channel("P.Y").unwrap().iter().fold(f32::INFINITY, |low, y| low.min(*y));
+    let highest = picture.channel("P.Y").unwrap().iter().fold(0.0f32, |high, y| high.max(*y));
+    assert!(lowest > -1e-3 && highest > 0.8, "{lowest} to {highest}");
+}
+
 /// A picture for a stage in metres with z up tells of the same places as one in millimetres with y up.
 #[test]
 fn places_are_told_in_the_unit_and_the_axes_of_the_stage() {

@@ -195,13 +195,13 @@ impl<'a> Integrator<'a> {
             let hit = self.cloth.world().intersect(&path.ray);
             let ground = self.ground.and_then(|g| distance_to_ground(&g, &path.ray).map(|t| (g, t)));
             if !self.area_lights.is_empty() {
-                let end = hit.as_ref().map_or(f32::INFINITY, |h| h.t).min(ground.map_or(f32::INFINITY, |g| g.1));
+                let end = hit.as_ref().map_or(f32::INFINITY, |h| h.distance).min(ground.map_or(f32::INFINITY, |g| g.1));
                 if self.area_lights(&path, end, &mut sample) {
                     break;
                 }
             }
             let go_on = match (hit, ground) {
-                (hit, Some((ground, t))) if hit.is_none_or(|h| t < h.t) => {
+                (hit, Some((ground, t))) if hit.is_none_or(|h| t < h.distance) => {
                     let place = on_ground(&ground, &path.ray, t);
                     self.scatter_at_surface(&place, t, &mut path, &mut sample, scratch, counters)
                 }
@@ -267,6 +267,8 @@ impl<'a> Integrator<'a> {
         let Ray { origin, direction, .. } = path.ray;
         if path.pdf == f32::INFINITY {
             let seen = self.area_lights.iter().filter(|(light, _)| light.visible);
+            let met =
+                |light: &AreaLight| light.shape.intersect(origin, direction, light.two_sided).filter(|&t| t < end);
             let nearest = seen.filter_map(|(light, _)| Some((met(light)?, light))).min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, light)) = nearest {
                 sample.alpha = 1.0;
@@ -277,14 +279,14 @@ impl<'a> Integrator<'a> {
             }
             return nearest.is_some();
         }
+        // Light leaves cloth beside the place for which lights are chosen. Both ways to a light must count the same directions: those in
+        // which that place sees it.
+        let before = (origin - path.from).dot(direction);
         for &(light, index) in &self.area_lights {
             let t = light.shape.intersect(path.from, direction, light.two_sided).map(|t| t - before);
             if t.is_some_and(|t| t > 0.0 && t < end) {
                 let other =
                     self.lights.chance(index, path.from) * light.shape.pdf(path.from, direction, light.two_sided);
-        // Light leaves cloth beside the place for which lights are chosen. Both ways to a light must count the same directions: those in
-        // which that place sees it.
-        let before = (origin - path.from).dot(direction);
                 let weight = mis_weight(path.pdf, other);
                 add(sample, path.bounces, path, path.throughput * light.radiance * weight);
             }

@@ -177,6 +177,11 @@ impl<'a, 'r> GapFilter<'a, 'r> {
         Self { geometries, ray, nearest: f32::INFINITY, last: None }
     }
 
+    /// How far it is to what is met at the hit that stands, if one does.
+    pub(super) fn nearest(&self) -> f32 {
+        self.nearest
+    }
+
     /// The yarn at the hit that stands: as it was when it was accepted, or made anew.
     #[inline]
     pub(super) fn met(&self, yarns: &'a YarnGeometry, hit: &RawHit) -> Met<'a> {

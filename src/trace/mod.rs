@@ -89,8 +89,10 @@ pub struct World {
 /// A place where a ray meets cloth and does not slip between plies, or meets a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit<'a> {
-    /// Distance along the ray.
+    /// Distance along the ray to the tube or triangle.
     pub t: f32,
+    /// Distance to what is met there: in a yarn, about to its first ply.
+    pub distance: f32,
     /// Index into [`World::geometries`]; no index of it where a mesh was met.
     pub geometry: usize,
     /// Segment or triangle within it.
@@ -204,7 +206,7 @@ impl World {
             }
         };
         let normal = raw.normal.normalize_or(-ray.direction);
-        Hit { t: raw.t, geometry, segment: raw.segment, u: raw.u, normal, place }
+        Hit { t: raw.t, distance: filter.nearest(), geometry, segment: raw.segment, u: raw.u, normal, place }
     }
 
     /// The nearest hit and the transmittance of a ray, and how many hits Embree offered to the filter of each: what a ray
