@@ -24,6 +24,8 @@ pub fn unit(bits: u32) -> f32 {
 
 /// How many sets of four dimensions come from the Sobol sequence; later ones, deep in a path, are plain random.
 const SOBOL_SETS: u32 = 24;
+/// What keeps them apart from the streams of [`Sampler::position`].
+const BEYOND_SOBOL: u32 = 0x5eed_0000;
 /// The crate's sequence has 2^16 points; longer renders go on with another scrambling.
 const SOBOL_LENGTH: u32 = 1 << 16;
 
@@ -67,7 +69,7 @@ impl Sampler {
         if set < SOBOL_SETS {
             sobol_burley::sample_4d(self.index, set, self.pixel)
         } else {
-            let mut stream = self.stream(set);
+            let mut stream = self.stream(set ^ BEYOND_SOBOL);
             std::array::from_fn(|_| stream.next())
         }
     }
