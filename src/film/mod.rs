@@ -2,7 +2,7 @@
 //!
 //! All sums are exact ([`crate::math::exact`]): films of different samples of a picture, from threads, resumed runs or
 //! other machines, add up to the film of all of them, to the bit. A pixel takes 84 bytes (count, colour, squares,
-//! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from. Position takes 24, motion
+//! alpha), 144 with depth, normal and albedo, and 312 more for the light by where it came from. Position takes 36, motion
 //! and texture coordinates 16 each.
 
 mod matte;

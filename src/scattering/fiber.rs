@@ -71,11 +71,6 @@ impl FiberMaterial {
     fn albedo(&self, channel: usize) -> f64 {
         self.r[channel] + self.tt[channel] + self.d[channel]
     }
-
-    /// The largest r + tt + d of the three channels.
-    pub fn largest_albedo(&self) -> f64 {
-        (0..3).map(|c| self.albedo(c)).fold(0.0, f64::max)
-    }
 }
 
 /// What a half-space of isotropic scatterers reflects whose albedo is 1 - s^2.

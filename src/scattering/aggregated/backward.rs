@@ -246,9 +246,9 @@ impl Lobe {
         let start = self.start(view, &first.spot, w);
         let shift = Self::come_by_then(view, &first.spot, || start);
         let (open, met) = others_past(view, &first.spot, (shift, w), stream);
-        let (way, rest) = Taken::new(node, (start, w, value, pdf), open)?;
-        again.ways.push(way);
         again.meetings.push(first);
+        let Some((way, rest)) = Taken::new(node, (start, w, value, pdf), open) else { return Some(again) };
+        again.ways.push(way);
         if rest.max_channel() > 0.0 {
             let met = met.unwrap_or(Met { ply: first.spot.ply, distance: 0.0 });
             let from = (&first.spot.inside, shift, w, met);
