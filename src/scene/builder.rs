@@ -226,6 +226,9 @@ impl SceneBuilder {
                 self.render.crop
             ));
         }
+        if let Some(time) = self.render.time.filter(|time| time.is_nan() || *time < 0.0) {
+            return fail(format!("expected a time of 0 seconds or more, found {time}"));
+        }
         let unit = self.output.axes.unit;
         if !(unit.is_normal() && unit > 0.0) {
             return fail(format!("expected a unit of places above 0, found {unit} millimetres"));
@@ -264,6 +267,9 @@ impl SceneBuilder {
                         curve.points.len(),
                         radii.len()
                     ));
+                }
+                if curve.flattening.as_ref().is_some_and(|axes| axes.len() != curve.points.len()) {
+                    return fail(format!("fabric `{}`: expected as many flattenings as points", fabric.name));
                 }
             }
             if let Some(problem) = fabric.problem() {
