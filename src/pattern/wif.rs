@@ -118,6 +118,11 @@ impl Sections {
         self.sections.get(name)
     }
 
+    /// Whether there is a lift plan; some programs write its head alone.
+    fn has_lift_plan(&self) -> bool {
+        self.section("LIFTPLAN").is_some_and(|section| !section.is_empty())
+    }
+
     fn entry(&self, section: &str, key: &str) -> Option<&Entry> {
         self.section(section)?.get(key).filter(|e| !e.value.is_empty())
     }
@@ -193,7 +198,7 @@ pub fn parse(bytes: &[u8]) -> Result<Wif, WifError> {
     let shafts = file.count("WEAVING", "SHAFTS")?.unwrap_or(u64::MAX);
     let treadles = file.count("WEAVING", "TREADLES")?.unwrap_or(u64::MAX);
     let ends = threads(&file, "WARP", "THREADING")?;
-    let picks = threads(&file, "WEFT", if file.section("LIFTPLAN").is_some() { "LIFTPLAN" } else { "TREADLING" })?;
+    let picks = threads(&file, "WEFT", if file.has_lift_plan() { "LIFTPLAN" } else { "TREADLING" })?;
     if ends * picks > MAX_CROSSINGS {
         return Err(wrong(0, format!("{ends} ends and {picks} picks cross more than {MAX_CROSSINGS} times")));
     }
@@ -254,7 +259,7 @@ fn crossings(
     }
     let mut moved_at_pick: Vec<Vec<u64>> = vec![Vec::new(); picks];
     let within = |pick: u64| (1..=picks as u64).contains(&pick).then(|| pick as usize - 1);
-    if file.section("LIFTPLAN").is_some() {
+    if file.has_lift_plan() {
         for (pick, entry) in file.numbered("LIFTPLAN")? {
             if let Some(pick) = within(pick) {
                 moved_at_pick[pick] = list(entry, "LIFTPLAN", shafts, "shaft")?;
@@ -448,6 +453,9 @@ mod tests {
         assert_eq!(picture(&parse(lift.as_bytes()).unwrap()), ["#.#.", "....", "....", ".#.."]);
         let both = TWILL.replace("[TREADLING]\n1=1\n", "[TREADLING]\n1=1,3\n");
         assert_eq!(picture(&parse(both.as_bytes()).unwrap())[0], "####");
+        // Some programs write the head of a plan that is not there.
+        let empty = format!("{TWILL}\n[LIFTPLAN]\n");
+        assert_eq!(picture(&parse(empty.as_bytes()).unwrap()), picture(&parse(TWILL.as_bytes()).unwrap()));
         // What is said more than once counts once, and shafts without an end move nothing.
         let again = both
             .replace("1=1,3\n", "1=3,1,1,3\n")

@@ -31,7 +31,7 @@ pub(super) struct KnitArgs {
     #[arg(long, conflicts_with = "chart", value_parser = PATTERNS.iter().map(|(name, _)| *name).collect::<Vec<_>>())]
     pattern: Option<String>,
     /// A row of a chart, from the cast-on edge, as in 'k2 p2', '12: k' or 'k3 mb k3' (repeatable); docs/scenes.md lists the steps.
-    #[arg(long, value_name = "ROW")]
+    #[arg(long, value_name = "ROW", allow_hyphen_values = true)]
     chart: Vec<String>,
     /// Written instructions, as in 'Row 1 (RS): *k2, p2; rep from * to end.', over the stitches cast on; lines, or `@FILE`.
     #[arg(long, value_name = "TEXT", conflicts_with_all = ["pattern", "chart"])]
