@@ -247,6 +247,8 @@ impl Reading {
         let head = &mut self.head;
         match word {
             ":" | "." => return Ok(Then::EndBehind),
+            // "All even-numbered rows"
+            "-" if next == "numbered" => {}
             // "1st row - k2"
             "-" | "\u{2013}" | "\u{2014}" if !is_number(next) => return Ok(Then::EndBehind),
             "-" | "\u{2013}" | "\u{2014}" => self.range = true,
@@ -257,9 +259,14 @@ impl Reading {
                 head.round |= is_round(word);
                 self.goes_on |= head.rows.is_empty();
             }
-            word if word.starts_with(['(', '[']) && (side_of(word).is_some() || is_count(word)) => {}
+            word if word.starts_with(['(', '[']) && plain_words(word).iter().any(|w| is_all(w)) => {
+                self.and_all(&plain_words(word));
+            }
+            // "(RS)", "(24 sts)", "(dec row)"
+            word if word.starts_with(['(', '['])
+                && (side_of(word).is_some() || is_count(word) || plain_words(word).iter().any(|w| is_row(w))) => {}
             word if is_all(word) => head.all = head.all.or(Some(1)),
-            "ws" | "rs" | "wrong" | "right" | "side" | "alternate" | "alt" | "even" | "odd" | "other" | "numbered" => {
+            word if is_of_a_side(word) => {
                 if matches!(word, "even" | "odd") {
                     head.odd = Some(word == "odd");
                 }
@@ -270,6 +277,19 @@ impl Reading {
             _ => return Ok(Then::EndBefore),
         }
         Ok(Then::GoOn)
+    }
+
+    /// "(and all WS rows)", "(and every 4th row)".
+    fn and_all(&mut self, words: &[String]) {
+        let head = &mut self.head;
+        for word in words {
+            head.all = match (head.all, number(word)) {
+                (None, _) => is_all(word).then_some(1),
+                (Some(_), Some(apart)) => Some((apart as usize).max(1)),
+                (Some(_), None) if is_of_a_side(word) => Some(2),
+                (apart, None) => apart,
+            };
+        }
     }
 
     fn number(&mut self, word: &str, next: &str, line: usize) -> Result<Then> {
@@ -318,6 +338,14 @@ impl Reading {
 
 fn is_all(word: &str) -> bool {
     matches!(word, "all" | "every" | "each" | "foll" | "following")
+}
+
+/// Whether a word says that rows are those of one side, or every second one.
+fn is_of_a_side(word: &str) -> bool {
+    matches!(
+        word,
+        "ws" | "rs" | "wrong" | "right" | "side" | "alternate" | "alt" | "even" | "odd" | "other" | "numbered"
+    )
 }
 
 /// Whether brackets hold a number of stitches.
@@ -383,7 +411,14 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
         [name @ ("k" | "knit" | "p" | "purl"), all, row] if is_all(all) && is_row(row) => {
             Line::Row(Head { round: is_round(row), all: Some(1), ..Head::default() }, whole_row(name))
         }
-        ["cast", "on", n, ..] | ["co", n, ..] if number(n).is_some() => Line::CastOn(number(n).unwrap_or_default()),
+        ["cast", "on", n, ref behind @ ..] | ["co", n, ref behind @ ..] if number(n).is_some() => {
+            let is_more = |w: &[&str]| (number(w[0]).is_some() || w[0] == "next") && is_row(w[1]);
+            if behind.windows(2).any(is_more) {
+                let hint = "rows stand behind it, each with its head: Knit 4 rows; stitches that are cast on later, in their row";
+                return error(line, format!("\"{}\" is more than a cast-on", short(text)), hint);
+            }
+            Line::CastOn(number(n).unwrap_or_default())
+        }
         ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,
         ["break" | "cut", "yarn" | "the", ..] | ["weave", "in", ..] | ["worked", "over", ..] => Line::Nothing,
         ref words if binds_off(words) && !words.iter().any(|w| number(w).is_some()) => Line::BindOff,
@@ -413,9 +448,11 @@ pub(super) fn sentences(text: &str) -> Vec<&str> {
 
 /// Whether a text begins with a row or a repeat of rows.
 fn begins(text: &str) -> bool {
-    // Heads are short.
+    // Heads are short, and another sentence is no part of this one: "Knit 4 rows. Row 1: ..."
     let start: String = text.chars().take(200).collect();
-    !matches!(read(&start, 0), Ok(Line::More(_)))
+    let end = start.match_indices('.').map(|(at, _)| at + 1).find(|at| start[*at..].starts_with(char::is_whitespace));
+    let start = &start[..end.unwrap_or(start.len())];
+    !matches!(read(start, 0), Ok(Line::More(_)))
 }
 
 impl Copies {
@@ -434,9 +471,9 @@ impl Copies {
                     ["with" | "for" | "as" | "to", rest @ ..] => rest,
                     rest => rest,
                 };
-                match which(rest, text, line)? {
-                    Some(found) => (*verb, found),
-                    None => return Ok(None),
+                match (of_a_count(verb, rest, line)?, which(rest, text, line)?) {
+                    (Some(found), _) | (None, Some(found)) => (*verb, found),
+                    (None, None) => return Ok(None),
                 }
             }
             // "These 4 rows form the pattern."
@@ -461,6 +498,14 @@ impl Copies {
         // "Then bind off" goes without saying.
         let bound = (0..rest.len()).find(|&at| binds_off(&rest[at..])).unwrap_or(rest.len());
         let (rest, ending) = ending(&rest[..bound], line)?;
+        if let Some(at) = another(rest) {
+            let hint = "write what comes behind it as a line of its own";
+            return error(
+                line,
+                format!("\"{}\" stands behind the end of a repeat", short(&rest[at..].join(" "))),
+                hint,
+            );
+        }
         let height = measure(text);
         let often = match (verb, often(rest)) {
             ("work", Some(Often::More(n))) if !rest.contains(&"more") => Often::InAll(n),
@@ -471,6 +516,34 @@ impl Copies {
         };
         Ok(Some(Self { which, often, height, ending }))
     }
+}
+
+/// "Continue for 10 rows", "rep last", of rows that are counted: "4 rows" is no row 4.
+fn of_a_count<'a, 'w>(verb: &str, words: &'a [&'w str], line: usize) -> Result<Option<(Which, &'a [&'w str])>> {
+    let [n, "rows" | "rnds" | "rounds", behind @ ..] = words else { return Ok(None) };
+    let Ok(count) = n.parse::<usize>() else { return Ok(None) };
+    if matches!(verb, "rep" | "repeat") {
+        return Ok(Some((Which::Last(count), behind)));
+    }
+    let filler = |w: &&str| {
+        matches!(*w, "more" | "in" | "as" | "patt" | "pattern" | "pat" | "set" | "established" | "this" | "the")
+            || matches!(*w, "even" | "straight" | "above" | "before" | "manner" | "way" | "and" | "then")
+    };
+    if behind.iter().all(filler) {
+        return Ok(Some((Which::All, words)));
+    }
+    let problem = format!("\"{}\" does not say what is worked in them", short(&words.join(" ")));
+    error(line, problem, "as in Knit 4 rows; or rows with numbers, and Rep rows 1-4")
+}
+
+/// Where something else begins behind the end of a repeat: "twice, then rows 1-3 once more", "for 10 cm, then knit 4 rows".
+fn another(words: &[&str]) -> Option<usize> {
+    let verb = |w: &str| matches!(w, "rep" | "repeat" | "knit" | "purl" | "k" | "p" | "work" | "then");
+    (1..words.len()).find(|&at| {
+        let (first, behind) = words.split_at(at);
+        let has_end = || often(first).is_some() || measure(&format!("for {}", first.join(" "))).is_some();
+        verb(words[at]) && behind.iter().any(|w| is_row(w)) && has_end()
+    })
 }
 
 /// How repeats may end.
@@ -575,7 +648,8 @@ fn often(words: &[&str]) -> Option<Often> {
         }
         let rest = &words[i + 1..];
         // "until row 30 has been worked"
-        if let (true, [n, ..]) = (is_row(word), rest)
+        let is_start = i > 0 && words[i - 1] == "from";
+        if let (true, [n, ..]) = (is_row(word) && !is_start, rest)
             && let Some(n) = number(n)
         {
             return Some(Often::Through(n as usize));
@@ -625,6 +699,10 @@ fn measure(text: &str) -> Option<f64> {
         let digits = |c: char| c.is_ascii_digit() || "./\u{bc}\u{bd}\u{be}".contains(c);
         let (figure, behind) = word.split_at(word.find(|c| !digits(c)).unwrap_or(word.len()));
         let unit = if behind.is_empty() { words.get(i + 1)? } else { behind };
+        // "Rows 1 and 2 in pattern"
+        if unit == "in" && behind.is_empty() && !words[..i].iter().any(|w| is_of_length(w)) {
+            return None;
+        }
         let unit = match unit.trim_end_matches('.') {
             "mm" => 1.0,
             "cm" | "cms" | "centimetres" | "centimeters" => 10.0,
@@ -636,6 +714,13 @@ fn measure(text: &str) -> Option<f64> {
         let before = i.checked_sub(1).filter(|_| figure.contains('/')).and_then(|i| words[i].parse::<u32>().ok());
         Some((own + before.map_or(0.0, f64::from)) * unit).filter(|mm| mm.is_finite() && *mm > 0.0)
     })
+}
+
+/// Whether a length may come behind a word.
+fn is_of_length(word: &str) -> bool {
+    is_until(word)
+        || matches!(word, "for" | "about" | "approx" | "approximately" | "another" | "is")
+        || word.starts_with("measur")
 }
 
 /// "4", "4.5", "1/2", "4\u{bd}".

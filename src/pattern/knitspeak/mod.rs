@@ -547,8 +547,12 @@ impl Sequence {
                     if takes == 0 || room == 0 || !room.is_multiple_of(takes) {
                         let rest = room.checked_rem(takes).unwrap_or(0);
                         let problem = format!("repeats over {takes} stitches, but has {room} for it");
-                        return place
-                            .wrong(&problem, format!("{rest} fewer `stitches`, or {} more, fit", takes - rest));
+                        let fewer = if rest > 0 && room > rest {
+                            format!("{rest} fewer `stitches`, or ")
+                        } else {
+                            String::new()
+                        };
+                        return place.wrong(&problem, format!("{fewer}{} more `stitches` fit", takes - rest));
                     }
                     for _ in 0..room / takes {
                         sequence.follow(place)?;

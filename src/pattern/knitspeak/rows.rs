@@ -119,6 +119,10 @@ pub(super) fn written(text: &str) -> Result<Instructions> {
                     match other {
                         Line::Row(head, body) => row = Some((line, head, body)),
                         Line::Again(copies) => reading.again(line, &copies)?,
+                        Line::CastOn(_) if reading.last() > 0 => {
+                            let hint = "write them in their row, as in Row 5: cast on 3 sts, k to end; or another piece by itself";
+                            return error(line, "stitches are cast on behind rows that are written", hint);
+                        }
                         Line::CastOn(count) => reading.cast_on = reading.cast_on.or(Some(count)),
                         Line::BindOff => reading.ends = true,
                         Line::Nothing | Line::More(_) => {}
@@ -165,7 +169,13 @@ impl Reading {
         }
         self.round |= head.round;
         if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
-            self.first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+            let first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+            if self.is_sided && !self.round && first_side != self.first_side {
+                let side = if side == Side::Right { "right" } else { "wrong" };
+                let problem = format!("{} cannot be on the {side} side, as others are said to lie", self.name(first));
+                return error(line, problem, "rows go back and forth: every second one is on the right side");
+            }
+            self.first_side = first_side;
             self.is_sided = true;
         }
         if let Some(copied) = lines::copied(body, line)? {
@@ -189,12 +199,14 @@ impl Reading {
             // Rows of a side, of whichever numbers.
             let apart = head.all.unwrap_or(2);
             let first = match (head.odd, head.side) {
-                (Some(odd), _) => odd == self.set_up.is_multiple_of(2),
-                // "All rows", of either side.
-                (None, None) => apart == 1,
-                (None, side) => side == Some(self.first_side),
+                (Some(odd), _) if odd == self.set_up.is_multiple_of(2) => 1,
+                // "All rows", of either side, or "every 4th row".
+                (None, None) if apart == 1 => 1,
+                (None, None) => self.set_up + apart,
+                (None, side) if side == Some(self.first_side) => 1,
+                _ => 2,
             };
-            self.fill.push((if first { 1 } else { 2 }, apart, Written { count: None, ..row }));
+            self.fill.push((first, apart, Written { count: None, ..row }));
             return Ok(());
         }
         for &number in &head.rows {
@@ -261,6 +273,12 @@ impl Reading {
         let more = named.min(MOST_ROWS).saturating_sub(self.last());
         self.fill_up(more.max(self.last() % 2));
         let last = self.last();
+        if let Which::Last(count) = copies.which
+            && count > last
+        {
+            let problem = format!("{count} rows are to be repeated, and {last} are written");
+            return error(line, problem, "as many as are written at most");
+        }
         let rows: Vec<usize> = match &copies.which {
             Which::Rows(rows) => rows.iter().map(|row| self.place(*row)).collect(),
             Which::Last(count) => (last + 1 - (*count).min(last + 1)..=last).collect(),

@@ -421,3 +421,67 @@ fn all_rows_are_told_at_once() {
     assert_eq!(piece("RS rows: Knit. WS rows: Purl."), ["k4", "k4"]);
     assert_eq!(piece("Set-up row: Purl.\nSet-up row: Purl.\nAll rows: Knit.")[..4], ["p4", "k4", "k4", "p4"]);
 }
+
+#[test]
+fn what_stands_behind_is_never_left_out() {
+    let piece = |text: &str| Instructions::read(text).unwrap().work_piece(6, Asked::Nothing, 20).unwrap().0.rows;
+    let wrong = |text: &str| Instructions::read(text).map(|_| ()).unwrap_err().problem;
+    // Rows without a number behind a cast-on and behind repeats, in one line as in several.
+    for text in [
+        "Cast on 6 sts. Knit 4 rows. Row 1 (RS): knit. Row 2: purl. Rep rows 1-2 twice more. Bind off.",
+        "Cast on 6 sts.\nKnit 4 rows.\nRow 1 (RS): knit.\nRow 2: purl.\nRep rows 1-2 twice more.\nBind off.",
+        "Row 1: knit. Row 2: purl. Rep rows 1-2 twice more. Knit 4 rows. Bind off.",
+    ] {
+        assert_eq!(piece(text).len(), 10, "{text}");
+    }
+    assert!(wrong("Cast on 6 sts and knit 4 rows.\nRow 1: k").contains("more than a cast-on"));
+    let later = "Cast on 6 sts.\nKnit 10 rows.\nCast on 3 sts.\nKnit 10 rows.\nBind off.";
+    assert!(wrong(later).contains("cast on behind rows"));
+    assert!(piece("Cast on 6 sts, join to work in the round, being careful not to twist.\nRnd 1: k").len() == 1);
+    // One repeat in a sentence.
+    let four = "Row 1: k\nRow 2: p\nRow 3: k\nRow 4: p\n";
+    for end in [
+        "Rep rows 1-4 twice, then rows 1-3 once more. Bind off.",
+        "Rep rows 1-4 twice more, then rep rows 1 and 2 once more, then purl 5 rows. Bind off.",
+        "Rep rows 1-2 3 times more; work 4 rows in garter st.",
+        "Rep rows 1 and 2 for 10 cm, then knit 4 rows.",
+    ] {
+        let problem = wrong(&format!("{four}{end}"));
+        assert!(problem.contains("behind the end of a repeat"), "{end}: {problem}");
+    }
+    assert_eq!(piece(&format!("{four}Rep rows 1-4 twice more, then bind off.")).len(), 12);
+}
+
+#[test]
+fn counts_of_rows_are_no_rows() {
+    let read = |text: &str| Instructions::read(text);
+    let piece = |text: &str| read(text).unwrap().work_piece(6, Asked::Nothing, 20).unwrap().0.rows.len();
+    assert_eq!(piece("Rows 1-12: knit. Continue for 10 rows. Bind off."), 22);
+    assert_eq!(piece("Row 1: k\nRow 2: p\nWork 4 rows in pattern. Bind off."), 6);
+    let problem = read("Rows 1-6: knit. Work 4 rows in garter stitch. Bind off.").unwrap_err().problem;
+    assert!(problem.contains("what is worked in them"), "{problem}");
+    let problem = read("Rows 1-4: knit.\nRep last 10 rows once more.").unwrap_err().problem;
+    assert_eq!(problem, "10 rows are to be repeated, and 4 are written");
+    // "In" is no unit where no length is told of, and "row 1" no end of what is measured from there.
+    let height = |end: &str| read(&format!("Row 1: k\nRow 2: p\n{end}")).unwrap().height;
+    assert_eq!(height("Rep rows 1 and 2 in pattern."), None);
+    assert_eq!(height("Rep rows 1 and 2 for 2 in."), Some(50.8));
+    assert_eq!(height("Rep rows 1 and 2 until piece measures 3 cm from row 1."), Some(30.0));
+}
+
+#[test]
+fn rows_are_told_of_every_fourth_and_of_brackets() {
+    let made = |text: &str, stitches| Instructions::read(text).unwrap().work(stitches, 1).unwrap().rows;
+    let every = "Row 1: k\nRow 3: k\nRow 5: k\nEvery 4th row: p2tog, p to end\nAll WS rows: p\nBind off.";
+    assert_eq!(made(every, 6), ["k6", "k6", "k6", "k2tog k4", "k5", "k5"]);
+    assert_eq!(made("Rows 1-3: knit. Every 4th row: k2tog, k to end. Bind off.", 6).len(), 4);
+    for head in ["Row 2 (and all WS rows): Purl.", "Row 2 and all even-numbered rows: Purl."] {
+        assert_eq!(made(&format!("Row 1 (RS): k. {head} Row 3: p. Bind off."), 6), ["k6", "k6", "p6", "k6"], "{head}");
+    }
+    assert_eq!(made("Row 1: k\nRow 2: p\nRow 3 (dec row): k1, k2tog, k to end\nRow 4: p", 6)[2], "k3 k2tog k");
+    let problem = Instructions::read("Row 1 (RS): k. Row 2 (RS): p.").unwrap_err().problem;
+    assert_eq!(problem, "row 2 cannot be on the right side, as others are said to lie");
+    assert_eq!(rows("Row 1: (k1, p1) rep 3 times", 6), ["p k p k p k"]);
+    let problem = chart_rows("Row 1: k4, *k2; rep from * to end", 4).unwrap_err().to_string();
+    assert!(problem.contains("2 more `stitches` fit") && !problem.contains("fewer"), "{problem}");
+}

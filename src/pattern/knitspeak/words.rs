@@ -202,7 +202,12 @@ impl Parser<'_> {
             (None, _) => match out.0.pop() {
                 // "[k1, p1] rep to end"
                 Some(Item::Times(body, 1)) if !named => {
-                    return Ok(Item::Repeat(body, self.until()?.unwrap_or(0)));
+                    return Ok(match (self.until()?, self.times()?) {
+                        (Some(last), _) => Item::Repeat(body, last),
+                        // "(k1, p1) rep 3 times"
+                        (None, Some(times)) => Item::Times(body, times),
+                        (None, None) => Item::Repeat(body, 0),
+                    });
                 }
                 _ => return self.wrong("a repeat without a * where it begins", KNOWN),
             },
