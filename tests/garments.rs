@@ -404,6 +404,26 @@ fn panels_without_names_are_chosen_by_number() {
     assert!(own("group = \"left\"").stderr.contains(hint));
 }
 
+/// What finishes a knitted panel ends where a woven one begins, whose edges are overcast.
+#[test]
+fn free_edges_are_finished_as_their_panels_are() {
+    let folder = directory();
+    let d = folder.path();
+    write(d, "g.obj", mesh(&flat));
+    let woven = "[[fabric.panel]]\ngroup = \"right\"\ncloth = { type = \"weave\", draft = \"plain\" }\n[[light]]";
+    write(d, "s.toml", scene("path = \"g.obj\"", "", STILL).replacen("[[light]]", woven, 1));
+    let scene = load(&d.join("s.toml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let reach = |fabric: &yarnray::scene::Fabric| {
+        let points = fabric.curves.iter().flat_map(|(curve, _)| &curve.points);
+        points
+            .map(|p| p.x + scene.middle.x)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    };
+    let [knit, weave] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };
+    let [[_, knit_ends], [weave_begins, _]] = [reach(knit), reach(weave)];
+    assert!(knit_ends < 90.0 && weave_begins > 70.0, "{knit_ends} {weave_begins}");
+}
+
 /// A seam whose sides do not quite meet, or are divided in other ways, stays open: that is told with both panels.
 #[test]
 fn seams_that_stay_open_are_told() {

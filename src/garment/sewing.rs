@@ -276,15 +276,26 @@ impl Sewing {
             }
         }
         let mut out = Vec::new();
-        for way in ways(&free) {
-            let cloth = self.cloth[way.panel as usize];
-            let Trim { stitch, knitted, diameter: d, room, radius, .. } = &self.trims[cloth];
-            let finish = if *knitted {
-                Finish::Chain { link: stitch.x.max(2.9 * room), room: *room, radius: *radius }
-            } else {
-                Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
-            };
-            out.push(Edging::new(way, finish, cloth, first));
+        // An edge goes on from panel to panel as long as these are of one kind, of yarns as thick.
+        let kind = |panel: u32| {
+            let trim = &self.trims[self.cloth[panel as usize]];
+            (trim.knitted, trim.radius.to_bits())
+        };
+        let mut kinds: Vec<_> = free.iter().map(|edge| kind(edge.1)).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        for of in kinds {
+            let own: Vec<_> = free.iter().filter(|edge| kind(edge.1) == of).copied().collect();
+            for way in ways(&own) {
+                let cloth = self.cloth[way.panel as usize];
+                let Trim { stitch, knitted, diameter: d, room, radius, .. } = &self.trims[cloth];
+                let finish = if *knitted {
+                    Finish::Chain { link: stitch.x.max(2.9 * room), room: *room, radius: *radius }
+                } else {
+                    Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
+                };
+                out.push(Edging::new(way, finish, cloth, first));
+            }
         }
         // Ways of a seam keep to one pair of panels.
         let mut pairs: Vec<(u32, Option<u32>)> = sewn.iter().map(|s| (s.1, s.2)).collect();
