@@ -172,7 +172,8 @@ impl Reading {
             let first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
             if self.is_sided && !self.round && first_side != self.first_side {
                 let side = if side == Side::Right { "right" } else { "wrong" };
-                let problem = format!("{} cannot be on the {side} side, as others are said to lie", self.name(first));
+                let problem =
+                    format!("{} is said to be on the {side} side, and other rows say otherwise", self.name(first));
                 return error(line, problem, "rows go back and forth: every second one is on the right side");
             }
             self.first_side = first_side;

@@ -480,7 +480,7 @@ fn rows_are_told_of_every_fourth_and_of_brackets() {
     }
     assert_eq!(made("Row 1: k\nRow 2: p\nRow 3 (dec row): k1, k2tog, k to end\nRow 4: p", 6)[2], "k3 k2tog k");
     let problem = Instructions::read("Row 1 (RS): k. Row 2 (RS): p.").unwrap_err().problem;
-    assert_eq!(problem, "row 2 cannot be on the right side, as others are said to lie");
+    assert_eq!(problem, "row 2 is said to be on the right side, and other rows say otherwise");
     assert_eq!(rows("Row 1: (k1, p1) rep 3 times", 6), ["p k p k p k"]);
     let problem = chart_rows("Row 1: k4, *k2; rep from * to end", 4).unwrap_err().to_string();
     assert!(problem.contains("2 more `stitches` fit") && !problem.contains("fewer"), "{problem}");
