@@ -48,6 +48,7 @@ fn check(path: &Path, glove: Option<&Path>) -> Kind {
         curves = vec!["--curves".to_owned(), glove.to_string_lossy().into_owned()];
     }
     let curves: Vec<&str> = curves.iter().map(String::as_str).collect();
+    yarnray(folder, &[&["info", name.as_str()], &curves[..]].concat()).good();
     let small = ["--width", "32", "--height", "24", "--spp", "2"];
     sound(&render_file(path, &[&small, &curves[..]].concat()), &name);
     Kind::Scene
