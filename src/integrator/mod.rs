@@ -283,11 +283,10 @@ impl<'a> Integrator<'a> {
         // which that place sees it.
         let before = (origin - path.from).dot(direction);
         for &(light, index) in &self.area_lights {
-            let t = light.shape.intersect(path.from, direction, light.two_sided).map(|t| t - before);
-            if t.is_some_and(|t| t > 0.0 && t < end) {
-                let other =
-                    self.lights.chance(index, path.from) * light.shape.pdf(path.from, direction, light.two_sided);
-                let weight = mis_weight(path.pdf, other);
+            let Some((distance, pdf)) = light.shape.seen(path.from, direction, light.two_sided) else { continue };
+            let t = distance - before;
+            if t > 0.0 && t < end {
+                let weight = mis_weight(path.pdf, self.lights.chance(index, path.from) * pdf);
                 add(sample, path.bounces, path, path.throughput * light.radiance * weight);
             }
         }

@@ -171,12 +171,13 @@ impl Shape {
         }
     }
 
-    /// Density (1/steradian) with which [`Self::sample`] from `at` draws a direction; 0 if it never does.
+    /// How far the side that shines is from `at` in a unit direction, and the density (1/steradian) with which [`Self::sample`] from there
+    /// draws that direction.
     #[inline]
-    pub fn pdf(&self, at: Vec3A, direction: Vec3A, two_sided: bool) -> f32 {
-        let Some(t) = self.intersect(at, direction, two_sided) else { return 0.0 };
+    pub fn seen(&self, at: Vec3A, direction: Vec3A, two_sided: bool) -> Option<(f32, f32)> {
+        let t = self.intersect(at, direction, two_sided)?;
         let by_area = |normal: Vec3A, area: f32| t * t / (direction.dot(normal).abs() * area).max(1e-30);
-        match *self {
+        let pdf = match *self {
             Self::Rectangle { corner, x, y, size } => {
                 let solid_angle = SphericalRectangle::new(corner - at, x, y, size).solid_angle;
                 if solid_angle < SMALLEST_SOLID_ANGLE {
@@ -189,7 +190,8 @@ impl Shape {
             Self::Sphere { centre, radius } => {
                 cone_of_sphere((centre - at).length_squared(), radius).map_or(0.0, |c| 1.0 / (2.0 * PI * c))
             }
-        }
+        };
+        Some((t, pdf))
     }
 }
 
@@ -340,15 +342,14 @@ mod tests {
                 if let Some(s) = shape.sample(at, Vec2::new(stream.next(), stream.next()), false) {
                     assert!((s.direction.length() - 1.0).abs() < 1e-5);
                     // A direction to the very edge may pass beside it after rounding.
-                    if let Some(t) = shape.intersect(at, s.direction, false) {
+                    if let Some((t, pdf)) = shape.seen(at, s.direction, false) {
                         assert!((t / s.distance - 1.0).abs() < 2e-3, "{shape:?}: {t} {}", s.distance);
-                        let pdf = shape.pdf(at, s.direction, false);
                         assert!((pdf / s.pdf - 1.0).abs() < 1e-3, "{shape:?}: {pdf} {}", s.pdf);
                     }
                     by_own += s.direction / (s.pdf * 4.0 * N as f32);
                 }
                 let w = uniform_direction(&mut stream);
-                let pdf = shape.pdf(at, w, false);
+                let pdf = shape.seen(at, w, false).map_or(0.0, |(_, pdf)| pdf);
                 mass += pdf * 4.0 * PI / (4.0 * N as f32);
                 if pdf > 0.0 {
                     by_uniform += w * (4.0 * PI / (4.0 * N as f32));
