@@ -13,7 +13,10 @@ use super::{
     run::Run,
     strain::{Shape, Shapes, UNSTRAINED},
 };
-use crate::pattern::knit::{self, Colors, Work, caught, in_use};
+use crate::{
+    math::special::smooth_step_f32,
+    pattern::knit::{self, Colors, Work, caught, in_use},
+};
 
 /// Which yarn knits which stitch of a cloth, and how the others go on behind it.
 pub(crate) struct Stranded {
@@ -214,8 +217,7 @@ impl Lanes {
 
 /// How much of what leads to a joint is left at a share of a stitch from it.
 pub(super) fn led(share: f32) -> f32 {
-    let near = (1.0 - share / LED).max(0.0);
-    near * near * (3.0 - 2.0 * near)
+    smooth_step_f32(1.0 - share / LED)
 }
 
 /// A yarn's way through a panel: its runs, its colour, and the rows' colours where they have several.

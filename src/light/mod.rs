@@ -16,7 +16,7 @@ pub use chooser::LightChooser;
 pub use environment::{Environment, EnvironmentMap};
 pub use shape::Shape;
 
-use crate::math::{Rgb, frame::orthonormal_basis, warp};
+use crate::math::{Rgb, frame::orthonormal_basis, special::smooth_step_f32, warp};
 
 /// A light of the scene.
 #[derive(Clone, Debug)]
@@ -252,15 +252,13 @@ fn from_point(way: Vec3A, intensity: Rgb) -> Option<LightSample> {
     })
 }
 
-/// The share of its intensity that a spot sends at an angle from its axis: 1 inside, a smooth edge, 0 outside. In single
-/// precision, unlike [`smooth_step`](crate::math::special::smooth_step).
+/// The share of its intensity that a spot sends at an angle from its axis: 1 inside, a smooth edge, 0 outside.
 #[inline]
 fn spot_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     if cos >= cos_inner {
         return 1.0;
     }
-    let t = ((cos - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    smooth_step_f32((cos - cos_outer) / (cos_inner - cos_outer))
 }
 
 #[cfg(test)]

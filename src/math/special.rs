@@ -1,4 +1,4 @@
-//! Special functions in `f64`, for set-up and tables.
+//! Special functions in `f64`, for set-up and tables, and what of them rays need in `f32`.
 
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
@@ -6,6 +6,13 @@ use glam::DVec3;
 
 /// From 0 to 1 as x does, level at both ends and beyond them.
 pub(crate) fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// As [`smooth_step`], in single precision.
+#[inline]
+pub(crate) fn smooth_step_f32(x: f32) -> f32 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }

@@ -10,7 +10,10 @@ use std::f32::consts::{PI, TAU};
 use super::{PlyCrossing, Section};
 use crate::{
     geometry::yarn::YarnShape,
-    math::sampler::{hash2, unit},
+    math::{
+        sampler::{hash2, unit},
+        special::smooth_step_f32,
+    },
 };
 
 /// Lines for each width of a fibre around a ply of an area fraction: of fibres that lie over each other only a part is seen, more where
@@ -69,7 +72,7 @@ impl Section<'_> {
         let width = 2.0 * ply.fiber_radius;
         let inside = (ply.radius - front.offset.abs()) / (front.wide * width);
         let [from, whole] = RIM_WIDTHS;
-        let chance = smooth(((from - inside) / (from - whole)).clamp(0.0, 1.0));
+        let chance = smooth_step_f32((from - inside) / (from - whole));
         let rim = (chance > 0.0).then(|| Rim {
             chance,
             // The place on the ray that is next to the axis is that on the edge, but for its distance.
@@ -102,7 +105,7 @@ impl SeenFiber {
         let along = self.along / (LENGTH * wide) + unit(key);
         let step = along.floor();
         let share = along - step;
-        let next = u[1] < smooth(share);
+        let next = u[1] < smooth_step_f32(share);
         let fiber = hash2(key, (step as i32).wrapping_add(i32::from(next)) as u32);
         [unit(fiber), unit(hash2(fiber, SIDE))]
     }
@@ -120,16 +123,10 @@ impl Rim {
             let along = along / LENGTH + unit(key);
             let step = along.floor();
             let fiber = |next: i32| unit(hash2(hash2(key, (step as i32).wrapping_add(next) as u32), side));
-            blended([fiber(0), fiber(1)], smooth(along - step))
+            blended([fiber(0), fiber(1)], smooth_step_f32(along - step))
         };
-        [0, SIDE].map(|side| blended([of_line(0.0, side), of_line(1.0, side)], smooth(share)))
+        [0, SIDE].map(|side| blended([of_line(0.0, side), of_line(1.0, side)], smooth_step_f32(share)))
     }
-}
-
-/// From 0 to 1 without a slope at both.
-#[inline]
-fn smooth(share: f32) -> f32 {
-    share * share * (3.0 - 2.0 * share)
 }
 
 /// From one of two numbers that are even in [0, 1] to the other, by a share: the share of such pairs that come to less than these
