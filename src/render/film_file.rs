@@ -357,6 +357,10 @@ fn text(v: &Value) -> Option<String> {
     v.as_str().map(str::to_owned)
 }
 
+fn texts(v: &Value) -> Option<Vec<String>> {
+    v.as_array()?.iter().map(text).collect()
+}
+
 /// A name and its value.
 fn parse_attribute(item: &Value) -> Option<(String, Attribute)> {
     let value = match item[1].as_str()? {
@@ -409,10 +413,10 @@ fn parse_frame(f: &Value) -> Option<Frame> {
             exposure: f32::from_bits(word(&f["exposure_bits"])?),
             alpha: f["alpha"].as_bool()?,
         },
-        fabrics: f["fabrics"].as_array()?.iter().map(text).collect::<Option<_>>()?,
+        fabrics: texts(&f["fabrics"])?,
         surfaces: match &f["surfaces"] {
             Value::Null => Vec::new(),
-            names => names.as_array()?.iter().map(text).collect::<Option<_>>()?,
+            names => texts(names)?,
         },
         middle: {
             let bits = f["middle_bits"].as_array()?.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?;

@@ -568,6 +568,13 @@ impl Sequence {
 }
 
 impl Side {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "wrong",
+        }
+    }
+
     fn other(self) -> Self {
         match self {
             Self::Right => Self::Wrong,

@@ -171,9 +171,11 @@ impl Reading {
         if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
             let first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
             if self.is_sided && !self.round && first_side != self.first_side {
-                let side = if side == Side::Right { "right" } else { "wrong" };
-                let problem =
-                    format!("{} is said to be on the {side} side, and other rows say otherwise", self.name(first));
+                let problem = format!(
+                    "{} is said to be on the {} side, and other rows say otherwise",
+                    self.name(first),
+                    side.name()
+                );
                 return error(line, problem, "rows go back and forth: every second one is on the right side");
             }
             self.first_side = first_side;
@@ -362,7 +364,7 @@ impl Reading {
         };
         let count = rows.len();
         if self.again.is_none() && found.is_some_and(|ending| !ending.holds(count as u32)) {
-            let side = if rows[count - 1].side == Side::Right { "right" } else { "wrong" };
+            let side = rows[count - 1].side.name();
             let problem = format!("row {count} is the last and on the {side} side");
             return error(line, problem, "a row more or fewer, or leave out what it ends with");
         }
