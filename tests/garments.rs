@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3, Vec3};
 use yarnray::{
     cloth::Cloth,
     scene::{
-        Scene,
+        Fabric, Scene,
         load::{LoadOptions, load},
     },
     trace::CurveGeometry,
@@ -80,6 +80,14 @@ fn at_frame(path: &Path, frame: u32) -> Scene {
 fn points(scene: &Scene) -> Vec<Vec<Point>> {
     let place = |p: &glam::DVec3| (*p + scene.middle).to_array();
     scene.fabrics.iter().flat_map(|f| &f.curves).map(|(curve, _)| curve.points.iter().map(place).collect()).collect()
+}
+
+/// From where to where a fabric goes along x.
+fn across(scene: &Scene, fabric: &Fabric) -> [f64; 2] {
+    let points = fabric.curves.iter().flat_map(|(curve, _)| &curve.points);
+    points
+        .map(|p| p.x + scene.middle.x)
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// For each yarn whether it is closed, and the phase of the plies in the middle of each segment.
@@ -390,10 +398,7 @@ fn panels_without_names_are_chosen_by_number() {
         "{told}"
     );
     let scene = load(&d.join("s.toml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-    let left_of = |fabric: &yarnray::scene::Fabric| {
-        let points = fabric.curves.iter().flat_map(|(curve, _)| &curve.points);
-        points.map(|p| p.x + scene.middle.x).fold(f64::INFINITY, f64::min)
-    };
+    let left_of = |fabric: &Fabric| across(&scene, fabric)[0];
     let [stockinette, rib] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };
     assert!(rib.origin.ends_with("g.obj, 2, rib1x1"), "{}", rib.origin);
     assert!(left_of(stockinette) < 5.0 && left_of(rib) > 75.0, "{} {}", left_of(stockinette), left_of(rib));
@@ -413,14 +418,8 @@ fn free_edges_are_finished_as_their_panels_are() {
     let woven = "[[fabric.panel]]\ngroup = \"right\"\ncloth = { type = \"weave\", draft = \"plain\" }\n[[light]]";
     write(d, "s.toml", scene("path = \"g.obj\"", "", STILL).replacen("[[light]]", woven, 1));
     let scene = load(&d.join("s.toml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-    let reach = |fabric: &yarnray::scene::Fabric| {
-        let points = fabric.curves.iter().flat_map(|(curve, _)| &curve.points);
-        points
-            .map(|p| p.x + scene.middle.x)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    };
     let [knit, weave] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };
-    let [[_, knit_ends], [weave_begins, _]] = [reach(knit), reach(weave)];
+    let [[_, knit_ends], [weave_begins, _]] = [across(&scene, knit), across(&scene, weave)];
     assert!(knit_ends < 90.0 && weave_begins > 70.0, "{knit_ends} {weave_begins}");
 }
 

@@ -9,7 +9,7 @@ use yarnray::geometry::{
     yarn_frame::YarnFrame,
 };
 
-use crate::support::{difference, render};
+use crate::support::{WHITE_FIBER, difference, render};
 
 /// Straight yarns before a fixed camera, every length in `unit` of `per_unit` millimetres, all moved by `offset` mm.
 fn straight(unit: &str, per_unit: f64, offset: f64, ply_twist: f64, extra: &str) -> String {
@@ -127,7 +127,7 @@ fn thin_yarns_far_out_are_passed_once() {
         let scene = format!(
             "render = {{ width = 48, height = 36, spp = 8, max_bounces = 0 }}\n\
              camera = {{ type = \"orthographic\", position = [{place}, {place}, {}], target = {at}, size = 0.15 }}\n\
-             [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
+             {WHITE_FIBER}\
              [yarn.thin]\nradius = 0.05\nplies = 1\nfiber = \"white\"\nfibers = 60\ndensity = 0.1\n{}{}\
              [[light]]\ntype = \"environment\"\n",
             place + 20.0,

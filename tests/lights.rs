@@ -2,7 +2,7 @@
 
 use yarnray::image::exr::{self, ChannelSpec, ExrLayout, Line, Sample};
 
-use crate::support::{Picture, SWATCH, directory, render};
+use crate::support::{Picture, SWATCH, WHITE_FIBER, directory, render};
 
 /// The middle of a floor of albedo 0.8 at y = 0, seen straight from above; `more` are tables of lights.
 fn floor(more: &str, spp: u32) -> Picture {
@@ -56,7 +56,7 @@ fn a_small_ball_near_a_yarn_is_a_point() {
         let scene = format!(
             "render = {{ width = 64, height = 48, spp = 64, max_bounces = 1 }}\n\
              camera = {{ type = \"orthographic\", position = [0, 0, 20], target = [0, 0, 0], size = 2 }}\n\
-             [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
+             {WHITE_FIBER}\
              [yarn.sample]\nradius = 1\nplies = 1\nfiber = \"white\"\nfibers = 100\ndensity = 0.4\n\
              [[fabric]]\nyarn = \"sample\"\nsource = {{ type = \"straight\", length = 40 }}\n[[light]]\n{light}"
         );

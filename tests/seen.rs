@@ -4,7 +4,7 @@ use std::path::Path;
 
 use yarnray::image::{self, Attribute, Image};
 
-use crate::support::{SWATCH, directory, render, write, yarnray};
+use crate::support::{SWATCH, WHITE_FIBER, directory, render, write, yarnray};
 
 /// A yarn along x under an even sky, seen by a camera that the test gives.
 fn scene(camera: &str, layers: &str, source: &str) -> String {
@@ -68,6 +68,12 @@ fn apply(rows: &[[f32; 4]; 4], point: [f32; 3]) -> [f64; 4] {
     rows.map(|row| row.into_iter().zip(p).map(|(a, b)| f64::from(a) * b).sum())
 }
 
+/// By how many pixels a place falls beside the middle of pixel `i` of 60 x 40.
+fn off_pixel(to_ndc: &[[f32; 4]; 4], place: [f32; 3], i: usize) -> [f64; 2] {
+    let [x, y, _, w] = apply(to_ndc, place);
+    [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5]
+}
+
 fn read(directory: &Path, args: &[&str]) -> Image {
     yarnray(directory, &[&["render", "s.toml", "-q", "-o", "out.exr"], args].concat()).good();
     image::read(&directory.join("out.exr")).expect("a picture")
@@ -93,8 +99,7 @@ fn positions_fall_on_their_pixels_by_the_matrices_of_the_file() {
             }
             seen += 1;
             let p = triple(&picture, ["P.X", "P.Y", "P.Z"], i);
-            let [x, y, _, w] = apply(&to_ndc, p);
-            let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+            let off = off_pixel(&to_ndc, p, i);
             // The mean of samples all over the pixel is somewhere in it.
             assert!(off.iter().all(|o| o.abs() < 0.5), "{camera}, pixel {i}: {off:?} pixels off");
             let [_, _, z, _] = apply(&to_camera, p);
@@ -112,11 +117,10 @@ fn the_ground_hides_the_plies_behind_it() {
         camera = { type = \"orthographic\", position = [0, 6, 20], target = [0, 0, 0], size = 2.6 }\n\
         output = { layers = [\"position\"] }\n\
         ground = { height = 0, albedo = 0.5 }\n\
-        [fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\nbeta_r = 8\nbeta_tt = 8\nbeta_n = 40\n\
         [yarn.sample]\nradius = 1\nplies = 3\nply_twist = 25\nfiber = \"white\"\nfibers = 60\ndensity = 0.5\n\
         [[fabric]]\nyarn = \"sample\"\nphase = 0\nsource = { type = \"straight\", length = 9 }\n\
         [[light]]\ntype = \"environment\"\n";
-    let picture = render(text, &[]).image;
+    let picture = render(&(text.to_owned() + WHITE_FIBER), &[]).image;
     let lowest = picture.channel("P.Y").unwrap().iter().fold(f32::INFINITY, |low, y| low.min(*y));
     let highest = picture.channel("P.Y").unwrap().iter().fold(0.0f32, |high, y| high.max(*y));
     assert!(lowest > -1e-3 && highest > 0.8, "{lowest} to {highest}");
@@ -152,8 +156,7 @@ fn places_are_told_in_the_unit_and_the_axes_of_the_stage() {
         assert!(near(1000.0 * depth, f64::from(usual.channel("depth.Z").unwrap()[i])), "pixel {i}");
         let p = triple(&other, ["P.X", "P.Y", "P.Z"], i);
         assert!((-apply(&to_camera, p)[2] - depth).abs() < 1e-3 * depth, "pixel {i}");
-        let [x, y, _, w] = apply(&to_ndc, p);
-        let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+        let off = off_pixel(&to_ndc, p, i);
         assert!(off.iter().all(|o| o.abs() < 0.5), "pixel {i}: {off:?} pixels off");
     }
     assert!(seen > 200, "{seen} pixels are covered");
@@ -190,8 +193,7 @@ fn the_film_of_a_camera_may_lie_beside_its_view() {
         let covered: Vec<usize> = (0..60 * 40).filter(|&i| alpha[i] >= 1.0).collect();
         assert!(covered.len() > 50, "{way}: {} pixels are covered", covered.len());
         for i in covered {
-            let [x, y, _, w] = apply(&to_ndc, triple(&picture, ["P.X", "P.Y", "P.Z"], i));
-            let off = [60.0 * x / w - (i % 60) as f64 - 0.5, 40.0 * y / w - (i / 60) as f64 - 0.5];
+            let off = off_pixel(&to_ndc, triple(&picture, ["P.X", "P.Y", "P.Z"], i), i);
             assert!(off.iter().all(|o| o.abs() < 0.5), "{way}, pixel {i}: {off:?} pixels off");
         }
     }

@@ -10,6 +10,10 @@ use std::{
 use serde_json::Value;
 use yarnray::image::{self, Image};
 
+/// A fibre of which hardly any light is lost, as TOML.
+pub(crate) const WHITE_FIBER: &str = "[fiber.white]\nr = [0.3, 0.3, 0.3]\ntt = [0.5, 0.5, 0.5]\nd = [0.2, 0.2, 0.2]\n\
+    beta_r = 8\nbeta_tt = 8\nbeta_n = 40\n";
+
 /// How a run of the program ended.
 #[derive(Debug)]
 pub(crate) struct Run {
