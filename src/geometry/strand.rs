@@ -90,8 +90,8 @@ impl Folds {
 #[derive(Clone, Debug)]
 pub struct Strands {
     basis: Basis,
-    points: Arc<[Vec4]>,
-    segments: Arc<[u32]>,
+    points: Arc<Vec<Vec4>>,
+    segments: Arc<Vec<u32>>,
     frames: Vec<PointFrame>,
     /// The same points and frames at later times; empty where yarns stand still.
     later: Vec<Pose>,
@@ -112,7 +112,7 @@ pub struct Strands {
 /// All points of [`Strands`] at one time.
 #[derive(Clone, Debug)]
 struct Pose {
-    points: Arc<[Vec4]>,
+    points: Arc<Vec<Vec4>>,
     frames: Vec<PointFrame>,
 }
 
@@ -185,17 +185,17 @@ impl Strands {
     }
 
     /// Control points, radius in `w`.
-    pub fn points(&self) -> &Arc<[Vec4]> {
+    pub fn points(&self) -> &Arc<Vec<Vec4>> {
         &self.points
     }
 
     /// Control points at all times: once where yarns stand still.
-    pub fn points_in_time(&self) -> Vec<Arc<[Vec4]>> {
+    pub fn points_in_time(&self) -> Vec<Arc<Vec<Vec4>>> {
         std::iter::once(&self.points).chain(self.later.iter().map(|pose| &pose.points)).map(Arc::clone).collect()
     }
 
     /// The first of the four control points of each segment.
-    pub fn segments(&self) -> &Arc<[u32]> {
+    pub fn segments(&self) -> &Arc<Vec<u32>> {
         &self.segments
     }
 
@@ -224,9 +224,10 @@ impl Strands {
     pub fn folds(&self) -> Option<Folds> {
         let worst = *self.tight_bends.iter().max_by(|a, b| a.fold.total_cmp(&b.fold))?;
         // Yarns are as thick all along, or nearly.
-        const SOME: usize = 97;
-        let radii = || self.points.iter().step_by(SOME).map(|p| f64::from(p.w));
-        let radius = radii().sum::<f64>() / radii().count().max(1) as f64;
+        const SOME: usize = 4096;
+        let some = self.points.chunks(self.points.len() / SOME + 1);
+        let count = some.len().max(1) as f64;
+        let radius = some.map(|points| f64::from(points[0].w)).sum::<f64>() / count;
         Some(Folds {
             yarns: self.tight_bends.len(),
             places: self.tight_bends.iter().map(|bend| bend.places).sum(),
@@ -249,8 +250,8 @@ impl Strands {
 
     /// Bytes of points, segments and frames.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&*self.points)
-            + size_of_val(&*self.segments)
+        (size_of_val(self.points.as_slice())
+            + size_of_val(self.segments.as_slice())
             + size_of_val(&*self.frames)
             + size_of_val(&*self.flattening)
             + size_of_val(&*self.distances)
@@ -259,7 +260,7 @@ impl Strands {
                 .later
                 .iter()
                 .chain(&self.flow)
-                .map(|p| size_of_val(&*p.points) + size_of_val(&*p.frames))
+                .map(|p| size_of_val(p.points.as_slice()) + size_of_val(&*p.frames))
                 .sum::<usize>()
             + size_of_val(&*self.first_segments)) as u64
             + self.material_indices.bytes()

@@ -25,8 +25,8 @@ const LONGEST_CHORD: f32 = 6.0;
 #[derive(Clone, Debug)]
 pub struct Tubes {
     basis: Basis,
-    points: Arc<[Vec4]>,
-    segments: Arc<[u32]>,
+    points: Arc<Vec<Vec4>>,
+    segments: Arc<Vec<u32>>,
     /// The first segment of each tube, and the number of all segments at the end.
     first_segments: Vec<u32>,
 }
@@ -102,12 +102,12 @@ impl Tubes {
     }
 
     /// Control points, radius in `w`.
-    pub fn points(&self) -> &Arc<[Vec4]> {
+    pub fn points(&self) -> &Arc<Vec<Vec4>> {
         &self.points
     }
 
     /// The first of the four control points of each segment.
-    pub fn segments(&self) -> &Arc<[u32]> {
+    pub fn segments(&self) -> &Arc<Vec<u32>> {
         &self.segments
     }
 
@@ -128,7 +128,9 @@ impl Tubes {
 
     /// Bytes of points and segments.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&*self.points) + size_of_val(&*self.segments) + size_of_val(&*self.first_segments)) as u64
+        (size_of_val(self.points.as_slice())
+            + size_of_val(self.segments.as_slice())
+            + size_of_val(&*self.first_segments)) as u64
     }
 
     /// The axis at `u` (0 to 1) of a segment.

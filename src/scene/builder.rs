@@ -3,6 +3,7 @@
 use std::{collections::HashSet, f64::consts::TAU, fmt, path::Path};
 
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
 use super::{
     Axes, CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene,
@@ -257,20 +258,8 @@ impl SceneBuilder {
             if !known {
                 return fail(format!("fabric `{}`: the scene has no {:?}", fabric.name, fabric.kind));
             }
-            for (curve, radii) in &fabric.curves {
-                let finite =
-                    curve.points.iter().all(|p| p.is_finite()) && radii.iter().all(|r| *r >= 0.0 && r.is_finite());
-                if curve.points.len() < 2 || radii.len() != curve.points.len() || !finite {
-                    return fail(format!(
-                        "fabric `{}`: expected curves of two finite points or more and as many radii, found {} and {}",
-                        fabric.name,
-                        curve.points.len(),
-                        radii.len()
-                    ));
-                }
-                if curve.flattening.as_ref().is_some_and(|axes| axes.len() != curve.points.len()) {
-                    return fail(format!("fabric `{}`: expected as many flattenings as points", fabric.name));
-                }
+            if let Some(problem) = fabric.curves.par_iter().find_map_first(problem_of_curve) {
+                return fail(format!("fabric `{}`: {problem}", fabric.name));
             }
             if let Some(problem) = fabric.problem() {
                 return fail(format!("fabric `{}`: {problem}", fabric.name));
@@ -306,6 +295,20 @@ impl Default for FiberMaterial {
     }
 }
 
+/// What is wrong with a curve and its radii, if anything is.
+fn problem_of_curve((curve, radii): &(Curve, Vec<f64>)) -> Option<String> {
+    let points = curve.points.len();
+    let finite = curve.points.iter().all(|p| p.is_finite()) && radii.iter().all(|r| *r >= 0.0 && r.is_finite());
+    if points < 2 || radii.len() != points || !finite {
+        let radii = radii.len();
+        return Some(format!(
+            "expected curves of two finite points or more and as many radii, found {points} and {radii}"
+        ));
+    }
+    let flattened = curve.flattening.as_ref().is_none_or(|axes| axes.len() == points);
+    (!flattened).then(|| "expected as many flattenings as points".to_owned())
+}
+
 impl Fabric {
     /// What does not fit its curves, where that is so.
     fn problem(&self) -> Option<&'static str> {
@@ -319,7 +322,7 @@ impl Fabric {
         let of_variants =
             |indices: &Vec<u16>| !indices.is_empty() && indices.iter().all(|i| usize::from(*i) < self.variants.len());
         let colored = self.variants.is_empty()
-            || (self.material_indices.len() == self.curves.len() && self.material_indices.iter().all(of_variants));
+            || (self.material_indices.len() == self.curves.len() && self.material_indices.par_iter().all(of_variants));
         if !moves || !finite {
             Some("expected finite points at all times, as many as its curves have")
         } else if !self.uvs.is_empty() && !of_curves(&mut self.uvs.iter().map(Vec::len)) {

@@ -300,7 +300,7 @@ impl CurveGeometry {
     }
 
     /// Basis, control points with radii, and the first of the four points of each segment.
-    pub fn curves(&self) -> (Basis, &Arc<[Vec4]>, &Arc<[u32]>) {
+    pub fn curves(&self) -> (Basis, &Arc<Vec<Vec4>>, &Arc<Vec<u32>>) {
         match self {
             Self::Yarns(w) => (w.strands.basis(), w.strands.points(), w.strands.segments()),
             Self::Fibers(f) => (f.tubes.basis(), f.tubes.points(), f.tubes.segments()),
@@ -308,7 +308,7 @@ impl CurveGeometry {
     }
 
     /// Control points at all times: once for what stands still.
-    fn points_in_time(&self) -> Vec<Arc<[Vec4]>> {
+    fn points_in_time(&self) -> Vec<Arc<Vec<Vec4>>> {
         match self {
             Self::Yarns(w) => w.strands.points_in_time(),
             Self::Fibers(f) => vec![Arc::clone(f.tubes.points())],

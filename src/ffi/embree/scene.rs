@@ -4,6 +4,7 @@ use std::{any::Any, sync::Arc};
 
 use embree4_sys as sys;
 use glam::{Vec3A, Vec4};
+use rayon::prelude::*;
 
 use super::{CommittedScene, Device, EmbreeError, last_error};
 
@@ -77,15 +78,15 @@ impl SceneBuilder {
     pub(crate) fn add_round_curves(
         &mut self,
         basis: CurveBasis,
-        points: Vec<Arc<[Vec4]>>,
-        segments: Arc<[u32]>,
+        points: Vec<Arc<Vec<Vec4>>>,
+        segments: Arc<Vec<u32>>,
     ) -> Result<u32, EmbreeError> {
         assert!(
             !points.is_empty() && points.iter().all(|p| p.len() == points[0].len()),
             "curves have as many control points at all times"
         );
         assert!(
-            segments.iter().all(|&first| (first as usize) + 4 <= points[0].len()),
+            segments.par_iter().all(|&first| (first as usize) + 4 <= points[0].len()),
             "a curve segment reaches beyond its control points"
         );
         let kind = match basis {
@@ -140,7 +141,7 @@ impl SceneBuilder {
         triangles: Arc<[[u32; 3]]>,
     ) -> Result<u32, EmbreeError> {
         assert!(
-            triangles.iter().flatten().all(|&i| (i as usize) < points.len()),
+            triangles.par_iter().flatten_iter().all(|&i| (i as usize) < points.len()),
             "a triangle names a point that is not there"
         );
         let (corners, corner_count) = (points.as_ptr(), points.len());

@@ -8,8 +8,8 @@ use glam::{Vec3A, Vec4};
 use super::*;
 
 fn straight_yarn(device: &Arc<Device>) -> CommittedScene {
-    let points: Arc<[Vec4]> = (0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect();
-    let segments: Arc<[u32]> = (0..5).collect();
+    let points: Arc<Vec<Vec4>> = Arc::new((0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect());
+    let segments: Arc<Vec<u32>> = Arc::new((0..5).collect());
     let mut builder = SceneBuilder::new(device, BvhLayout::Compact).unwrap();
     builder.add_round_curves(CurveBasis::CatmullRom, vec![points], segments).unwrap();
     builder.commit().unwrap()
@@ -18,10 +18,10 @@ fn straight_yarn(device: &Arc<Device>) -> CommittedScene {
 #[test]
 fn a_ray_meets_a_moving_curve_where_it_is_at_its_time() {
     let device = Device::new(1).unwrap();
-    let at = |y: f32| -> Arc<[Vec4]> { (0..8).map(|i| Vec4::new(i as f32, y, 0.0, 0.25)).collect() };
+    let at = |y: f32| -> Arc<Vec<Vec4>> { Arc::new((0..8).map(|i| Vec4::new(i as f32, y, 0.0, 0.25)).collect()) };
     let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
     // Up by two, then back by one.
-    let segments: Arc<[u32]> = (0..5).collect();
+    let segments: Arc<Vec<u32>> = Arc::new((0..5).collect());
     builder.add_round_curves(CurveBasis::CatmullRom, vec![at(0.0), at(2.0), at(1.0)], segments).unwrap();
     let scene = builder.commit().unwrap();
     let mut filter = Counting { guard: 0, calls: 0, accept: true };
@@ -40,8 +40,8 @@ fn endless(origin: Vec3A, direction: Vec3A) -> RawRay {
 #[test]
 fn a_refused_geometry_keeps_its_buffers_and_harms_nothing() {
     let device = Device::new(1).unwrap();
-    let points: Arc<[Vec4]> = (0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect();
-    let segments: Arc<[u32]> = (0..5).collect();
+    let points: Arc<Vec<Vec4>> = Arc::new((0..8).map(|i| Vec4::new(i as f32, 0.0, 0.0, 0.25)).collect());
+    let segments: Arc<Vec<u32>> = Arc::new((0..5).collect());
     let mut builder = SceneBuilder::new(&device, BvhLayout::Compact).unwrap();
     let too_many = vec![Arc::clone(&points); 200];
     let error = builder.add_round_curves(CurveBasis::CatmullRom, too_many, Arc::clone(&segments)).unwrap_err();

@@ -19,7 +19,7 @@ use crate::geometry::{
 };
 
 /// Points of curves that are made into yarns at a time, so that what is not joined yet stays small.
-const BATCH: usize = 1 << 20;
+const BATCH: usize = 1 << 19;
 
 /// What [`Strands::with`] promises. Curves that are handed over are freed as yarns are made of them.
 pub(super) fn strands(
@@ -28,35 +28,44 @@ pub(super) fn strands(
     motion: StrandMotion<'_>,
     options: &StrandOptions,
 ) -> Strands {
+    let make = |yarn: usize, (curve, radii): &(Curve, Vec<f64>)| {
+        let given = Given {
+            curve,
+            radii,
+            along: along.of(yarn),
+            later: motion.later.iter().chain(motion.flow).map(|curves| curves[yarn].as_slice()).collect(),
+            rest: motion.rest.map(|curves| curves[yarn].as_slice()),
+            phase: if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] },
+        };
+        Strand::new(&given, options, yarn)
+    };
     let mut joined = Joined::new(curves.len(), motion.later.len() + motion.flow.len());
-    let mut first = 0;
+    let (mut first, mut made) = (0, Vec::new());
     while first < curves.len() {
         let end = first + batch(&curves[first..]);
-        let made: Vec<Strand> = (first..end)
-            .into_par_iter()
-            .map(|yarn| {
-                let (curve, radii) = &curves[yarn];
-                let given = Given {
-                    curve,
-                    radii,
-                    along: along.of(yarn),
-                    later: motion.later.iter().chain(motion.flow).map(|curves| curves[yarn].as_slice()).collect(),
-                    rest: motion.rest.map(|curves| curves[yarn].as_slice()),
-                    phase: if options.phases.is_empty() { 0.0 } else { options.phases[yarn % options.phases.len()] },
-                };
-                Strand::new(&given, options, yarn)
-            })
-            .collect();
-        if let Cow::Owned(curves) = &mut curves {
-            for (curve, radii) in &mut curves[first..end] {
-                *curve = Curve { points: Vec::new(), radii: None, flattening: None, ..*curve };
-                *radii = Vec::new();
+        // Yarns are joined one behind the other while the next ones are made.
+        let join = || made.drain(..).for_each(|strand| joined.push(strand));
+        let make_next = || -> Vec<Strand> {
+            let yarns = first..end;
+            match &mut curves {
+                Cow::Owned(curves) => yarns
+                    .into_par_iter()
+                    .zip(&mut curves[first..end])
+                    .map(|(yarn, curve)| make(yarn, &std::mem::replace(curve, (emptied(&curve.0), Vec::new()))))
+                    .collect(),
+                Cow::Borrowed(curves) => yarns.into_par_iter().map(|yarn| make(yarn, &curves[yarn])).collect(),
             }
-        }
-        made.into_iter().for_each(|strand| joined.push(strand));
+        };
+        ((), made) = rayon::join(join, make_next);
         first = end;
     }
+    made.into_iter().for_each(|strand| joined.push(strand));
     joined.finish(options.basis, motion.flow.len(), along.blended)
+}
+
+/// What is left of a curve whose points are taken.
+fn emptied(curve: &Curve) -> Curve {
+    Curve { points: Vec::new(), radii: None, flattening: None, ..*curve }
 }
 
 /// How many of the next curves are made at once: at least one.
@@ -279,10 +288,12 @@ impl Joined {
         } else {
             self.flattening.resize(self.poses[0].0.len(), ROUND);
         }
-        let pose = |(points, mut frames): (Vec<Vec4>, Vec<PointFrame>)| {
+        let pose = |(mut points, mut frames): (Vec<Vec4>, Vec<PointFrame>)| {
+            points.shrink_to_fit();
             frames.shrink_to_fit();
             Pose { points: points.into(), frames }
         };
+        self.segments.shrink_to_fit();
         self.distances.shrink_to_fit();
         self.flattening.shrink_to_fit();
         self.material_indices.shrink_to_fit();
