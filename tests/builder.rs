@@ -88,7 +88,8 @@ fn what_makes_no_scene_is_told() {
         let mut mesh = Mesh::cuboid(DVec3::ONE);
         change(&mut mesh);
         error(&|s| {
-            let material = s.add_material(Material { surface: SurfaceMaterial::diffuse(Rgb::ONE), texture: None });
+            let material =
+                s.add_material(Material { surface: SurfaceMaterial::diffuse(Rgb::ONE), texture: None, holdout: false });
             s.objects.push(Object {
                 name: "box".to_owned(),
                 origin: "box".to_owned(),

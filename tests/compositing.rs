@@ -60,6 +60,121 @@ fn the_parts_of_light_add_up_to_the_picture() {
     assert_eq!(half.channel("G"), picture.channel("G"));
 }
 
+/// The swatch on a floor under a sky, a lamp that the camera sees, a sun and a point, in three groups; every kind of light finds its way.
+fn in_groups() -> String {
+    let lights = "
+[[light]]
+type = \"environment\"
+radiance = [0.2, 0.3, 0.4]
+group = \"sky\"
+
+[[light]]
+type = \"rectangle\"
+position = [-30, 40, 30]
+size = [30, 30]
+radiance = 6
+group = \"key\"
+
+[[light]]
+type = \"distant\"
+towards = [0.5, 0.6, 0.4]
+irradiance = [1.5, 1.2, 0.9]
+
+[[light]]
+type = \"point\"
+position = [0, 40, 20]
+intensity = 600
+group = \"key\"
+";
+    let swatch = on_a_floor();
+    let (before, rest) = swatch.split_once("[[light]]").unwrap();
+    let after = rest.find("\n[").map_or("", |next| &rest[next..]);
+    format!("{before}{lights}{after}").replace("[\"lobes\", \"albedo\"]", "[\"light_groups\", \"lobes\"]")
+}
+
+#[test]
+fn groups_of_lights_add_up_to_the_picture() {
+    let picture = render(&in_groups(), &["--spp", "16"]);
+    let groups = ["sky", "key", "others"];
+    for c in ["R", "G", "B"] {
+        let layers = groups.map(|group| picture.channel(&format!("light_{group}.{c}")));
+        for (i, &total) in picture.channel(c).iter().enumerate() {
+            let sum: f64 = layers.iter().map(|layer| f64::from(layer[i])).sum();
+            let worst = (sum - f64::from(total)).abs() / (f64::from(total) + 0.01);
+            assert!(worst < 2e-6, "{c} of pixel {i}: {sum} of {total}");
+        }
+    }
+    // Each is what its lights give alone.
+    for (group, others) in [("sky", ["key", "others"]), ("key", ["sky", "others"]), ("others", ["sky", "key"])] {
+        let mut alone = in_groups();
+        for light in alone.clone().split("[[light]]").skip(1) {
+            let body = &light[..light.find("\n[").unwrap_or(light.len())];
+            let of = others.iter().any(|other| match *other {
+                "others" => !body.contains("group ="),
+                name => body.contains(&format!("group = \"{name}\"")),
+            });
+            if of {
+                alone = alone.replace(&format!("[[light]]{body}"), "");
+            }
+        }
+        let alone = render(&alone, &["--spp", "64"]);
+        let mean = |picture: &Picture, name: &str| {
+            let all = picture.channel(name);
+            f64::from(all.iter().sum::<f32>()) / all.len() as f64
+        };
+        let (part, whole) = (mean(&picture, &format!("light_{group}.G")), mean(&alone, "G"));
+        assert!(whole > 0.01 && (part / whole - 1.0).abs() < 0.05, "{group}: {part} beside {whole}");
+    }
+}
+
+#[test]
+fn a_film_keeps_groups_of_lights() {
+    let directory = directory();
+    write(directory.path(), "s.toml", in_groups());
+    let size = ["-q", "--spp", "4", "--width", "40", "--height", "30"];
+    let run = |args: &[&str]| yarnray(directory.path(), &[args, &size].concat());
+    run(&["render", "s.toml", "-o", "whole.exr"]).good();
+    for part in ["1/2", "2/2"] {
+        run(&["render", "s.toml", "--shard", part, "-o", &format!("{}.film", &part[..1])]).good();
+    }
+    yarnray(directory.path(), &["merge", "1.film", "2.film", "-o", "merged.exr"]).good();
+    let [whole, merged] = ["whole.exr", "merged.exr"].map(|name| image::read(&directory.path().join(name)).unwrap());
+    assert!(whole.channels.iter().any(|channel| channel.name == "light_key.G"));
+    assert!(whole.channels == merged.channels);
+    // Lights in other groups are another picture for it.
+    write(directory.path(), "s.toml", in_groups().replace("\"key\"", "\"fill\""));
+    run(&["render", "s.toml", "--shard", "2/2", "-o", "2.film"]).good();
+    let told = yarnray(directory.path(), &["merge", "1.film", "2.film", "-o", "merged.exr"]);
+    assert!(told.status != Some(0) && told.stderr.contains("light.group"), "{}", told.stderr);
+}
+
+#[test]
+fn a_holdout_takes_away_what_is_behind_it_and_lights_as_ever() {
+    let mesh = "
+[[mesh]]
+shape = \"box\"
+size = [6, 400, 6]
+translate = [0, 0, 25]
+albedo = 0.8
+";
+    let scene = |holdout: bool| format!("{}{mesh}holdout = {holdout}\n", on_a_floor());
+    let args = ["--spp", "16", "--set", "output.layers=[\"depth\"]"];
+    let [shown, held] = [false, true].map(|holdout| render(&scene(holdout), &args));
+    let [a, b] = [&shown, &held].map(|picture| picture.channel("A"));
+    let [c, d] = [&shown, &held].map(|picture| picture.channel("G"));
+    let depth = held.channel("depth.Z");
+    let mut gone = 0;
+    for i in 0..a.len() {
+        if b[i] == 0.0 && a[i] == 1.0 {
+            gone += 1;
+            assert_eq!((d[i], depth[i]), (0.0, 0.0), "nothing of what is there or behind is seen in pixel {i}");
+        } else if a[i] == b[i] {
+            assert_eq!(c[i], d[i], "light and shadow of it stay in pixel {i}");
+        }
+    }
+    assert!(gone > 20, "{gone} pixels");
+}
+
 #[test]
 fn direct_light_is_what_remains_with_one_scattering() {
     let args = ["--spp", "16", "--set", "render.max_bounces=1"];

@@ -19,7 +19,7 @@ use glam::Vec3A;
 
 use crate::{
     math::exact::{NarrowSum, Sum},
-    scene::Layers,
+    scene::{Layers, LightGroups},
 };
 
 pub use matte::Matte;
@@ -71,6 +71,8 @@ pub struct Pixel {
     pub uv: [f32; 2],
     /// Mean radiance of each of [`LightParts::to_array`].
     pub parts: [[f32; 3]; LightParts::COUNT],
+    /// Mean radiance of each group of lights.
+    pub lights: [[f32; 3]; LightGroups::MOST],
     /// Number of samples.
     pub samples: u32,
 }
@@ -189,6 +191,10 @@ impl Film {
         let of_cover = |sum: NarrowSum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let far_of_cover = |sum: Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
+        let mut lights = [[0.0; 3]; LightGroups::MOST];
+        for (light, sum) in lights.iter_mut().zip(sums.lights_of(i)) {
+            *light = color(sum).map(|c| c * tile.scale);
+        }
         Pixel {
             color: mean.map(|c| c as f32 * tile.scale),
             alpha: (alpha / n) as f32,
@@ -203,6 +209,7 @@ impl Film {
                 .parts
                 .get(i)
                 .map_or_else(Default::default, |p| std::array::from_fn(|k| color(&p[k]).map(|c| c * tile.scale))),
+            lights,
             samples,
         }
     }

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3A};
 
 use super::LightParts;
-use crate::math::Rgb;
+use crate::{math::Rgb, scene::LightGroups};
 
 /// The light of one path from the camera, and what it met first.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +26,8 @@ pub struct Sample {
     pub albedo: Rgb,
     /// The radiance by where it came from.
     pub parts: LightParts,
+    /// The radiance by the group of the light that it is of.
+    pub lights: [Rgb; LightGroups::MOST],
     /// At what it first scattered, if that is asked for.
     pub matte: Option<MatteId>,
 }

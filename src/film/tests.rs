@@ -82,7 +82,7 @@ fn tiles_come_back_from_their_bytes() {
     let layers = Layers::ALL;
     assert_eq!(Tile::bytes_per_pixel(Layers::NONE), 84);
     assert_eq!(Tile::bytes_per_pixel(Layers::DEFAULT), 144);
-    assert_eq!(Tile::bytes_per_pixel(layers), 528);
+    assert_eq!(Tile::bytes_per_pixel(layers), 720);
     let mut tile = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
     let matte = Some(MatteId { fabric: 1, yarn: 70_000, ply: 2 });
     for x in 0..3 {
@@ -91,7 +91,7 @@ fn tiles_come_back_from_their_bytes() {
     }
     let mut bytes = Vec::new();
     tile.save(&mut bytes);
-    assert_eq!(bytes.len(), 6 * 528 + 3 * 16);
+    assert_eq!(bytes.len(), 6 * 720 + 3 * 16);
     let mut again = Tile::new(0, 0, 3, 2, layers, 1.0).unwrap();
     assert_eq!(again.load(&bytes, usize::MAX), Some(()));
     assert_eq!((&again.sums, &again.matte), (&tile.sums, &tile.matte));
@@ -108,7 +108,7 @@ fn a_film_is_as_small_as_it_says() {
     let crop = [0, 0, 3840, 2160];
     let per_pixel = Film::bytes(crop, Layers::DEFAULT) as f64 / (3840.0 * 2160.0);
     assert!((144.0..150.0).contains(&per_pixel), "{per_pixel} bytes a pixel");
-    for layers in [Layers::NONE, Layers::DEFAULT, Layers { lobes: true, ..Layers::DEFAULT }] {
+    for layers in [Layers::NONE, Layers::DEFAULT, Layers { lobes: true, light_groups: 3, ..Layers::DEFAULT }] {
         let sums = Sums::new(5, layers).unwrap();
         let mut bytes = 0;
         for_all_sums!(&sums, add_bytes, &mut bytes);

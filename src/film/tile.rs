@@ -61,12 +61,14 @@ pub(super) struct Sums {
     pub(super) motion: Vec<[NarrowSum; 2]>,
     pub(super) uv: Vec<[NarrowSum; 2]>,
     pub(super) parts: Vec<[[NarrowSum; 3]; LightParts::COUNT]>,
+    /// Of each pixel one for each group of lights.
+    pub(super) lights: Vec<[NarrowSum; 3]>,
 }
 
 /// Does the same with every vector of sums.
 macro_rules! for_all_sums {
     ($sums:expr, $do:ident $(, $more:expr)*) => {{
-        let Sums { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts } = $sums;
+        let Sums { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts, lights } = $sums;
         $do(count $(, $more)*);
         $do(color $(, $more)*);
         $do(square $(, $more)*);
@@ -78,6 +80,7 @@ macro_rules! for_all_sums {
         $do(motion $(, $more)*);
         $do(uv $(, $more)*);
         $do(parts $(, $more)*);
+        $do(lights $(, $more)*);
     }};
 }
 #[cfg(test)]
@@ -98,6 +101,7 @@ impl Sums {
             motion: zeros(sized(layers.motion))?,
             uv: zeros(sized(layers.uv))?,
             parts: zeros(sized(layers.lobes))?,
+            lights: zeros(n * usize::from(layers.light_groups))?,
         })
     }
 
@@ -108,7 +112,7 @@ impl Sums {
                 sum.merge(more);
             }
         }
-        let Self { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts } = other;
+        let Self { count, color, square, alpha, depth, normal, albedo, position, motion, uv, parts, lights } = other;
         one(&mut self.count, i, count, j);
         one(&mut self.color, i, color, j);
         one(&mut self.square, i, square, j);
@@ -120,6 +124,18 @@ impl Sums {
         one(&mut self.motion, i, motion, j);
         one(&mut self.uv, i, uv, j);
         one(&mut self.parts, i, parts, j);
+        let groups = self.groups();
+        (0..groups).for_each(|k| one(&mut self.lights, groups * i + k, lights, groups * j + k));
+    }
+
+    /// Groups of lights.
+    fn groups(&self) -> usize {
+        self.lights.len() / self.count.len().max(1)
+    }
+
+    /// Those of a pixel's groups of lights.
+    pub(super) fn lights_of(&self, i: usize) -> &[[NarrowSum; 3]] {
+        &self.lights[self.groups() * i..self.groups() * (i + 1)]
     }
 }
 
@@ -192,6 +208,10 @@ impl Tile {
             for (sum, value) in parts.iter_mut().zip(sample.parts.to_array()) {
                 add_each(sum, (value * down).to_array());
             }
+        }
+        let groups = sums.groups();
+        for (sum, value) in sums.lights[groups * i..groups * (i + 1)].iter_mut().zip(sample.lights) {
+            add_each(sum, (value * down).to_array());
         }
         true
     }
@@ -287,6 +307,7 @@ impl Tile {
             + sized(layers.motion, <[NarrowSum; 2]>::BYTES)
             + sized(layers.uv, <[NarrowSum; 2]>::BYTES)
             + sized(layers.lobes, LightParts::COUNT * narrow)
+            + usize::from(layers.light_groups) * narrow
             + sized(layers.cryptomatte, size_of::<u32>())
     }
 

@@ -2,10 +2,11 @@
 
 use glam::{Vec2, Vec3A};
 
-use super::{Counters, Integrator, Path, Scratch, add, distance_to_ground};
+use super::{Counters, Integrator, Path, Scratch, distance_to_ground};
 use crate::{
     film::Sample,
     geometry::ray::{DoneWith, Ray},
+    light::Chosen,
     math::Rgb,
     scattering::LobeValues,
 };
@@ -45,7 +46,7 @@ impl Integrator<'_> {
         counters: &mut Counters,
         respond: impl FnOnce(Vec3A, f32) -> Option<Response>,
     ) {
-        let Some((light, chance)) = self.lights.choose(at, u[0]) else { return };
+        let Some(Chosen { index, light, chance }) = self.lights.choose(at, u[0]) else { return };
         let Some(towards) = light.sample(at, Vec2::new(u[1], u[2])) else { return };
         let Some(Response { value, weight, start, done }) = respond(towards.direction, towards.pdf * chance) else {
             return;
@@ -70,12 +71,13 @@ impl Integrator<'_> {
                     // The path's first scattering at cloth: the light belongs to this very vertex's lobes.
                     None => {
                         sample.radiance += found.sum();
+                        sample.lights[self.light_groups.of(index)] += found.sum();
                         sample.parts.add_lobes(events, found);
                     }
-                    Some(_) => add(sample, events, path, found.sum()),
+                    Some(_) => self.add(sample, events, path, index, found.sum()),
                 }
             }
-            Scattered::Surface(value) => add(sample, events, path, value * light),
+            Scattered::Surface(value) => self.add(sample, events, path, index, value * light),
         }
     }
 

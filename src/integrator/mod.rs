@@ -26,7 +26,7 @@ use crate::{
     light::{AreaLight, Environment, Light, LightChooser},
     math::{Rgb, sampler::Sampler},
     scattering::{Arrival, LobeValues, fiber::FiberMaterial, mis_weight, yarn::YarnScatterer},
-    scene::{CurveKind, Fabric, FiberDetail, Footprint, Ground, Layers, Material, Scene},
+    scene::{CurveKind, Fabric, FiberDetail, Footprint, Ground, Layers, LightGroups, Material, Scene},
     trace::{Hit, SurfacePlace, YarnGeometry},
 };
 
@@ -78,12 +78,13 @@ pub(crate) struct Integrator<'a> {
     cloth: &'a Cloth,
     ground: Option<Ground>,
     materials: &'a [Material],
-    /// Environment lights, each with its index in `lights`; several are added up.
-    environments: Vec<(&'a Environment, Option<usize>)>,
-    /// Surfaces that shine, each with its index in `lights`.
-    area_lights: Vec<(&'a AreaLight, Option<usize>)>,
+    /// Environment lights, each with its place among all lights; several are added up.
+    environments: Vec<(&'a Environment, usize)>,
+    /// Surfaces that shine, each with its place among all lights.
+    area_lights: Vec<(&'a AreaLight, usize)>,
     /// Lights for shadow rays.
     lights: LightChooser<'a>,
+    light_groups: &'a LightGroups,
     max_bounces: u32,
     /// Albedo of one fibre of each ply, of each fabric's yarn and then of its variants; empty if no layer holds it.
     albedos: Vec<Vec<Vec<Rgb>>>,
@@ -132,10 +133,10 @@ impl<'a> Integrator<'a> {
         let lights = LightChooser::new(&scene.lights);
         let mut environments = Vec::new();
         let mut area_lights = Vec::new();
-        for light in &scene.lights {
+        for (index, light) in scene.lights.iter().enumerate() {
             match light {
-                Light::Environment(environment) => environments.push((environment, lights.index_of(light))),
-                Light::Area(area) => area_lights.push((area, lights.index_of(light))),
+                Light::Environment(environment) => environments.push((environment, index)),
+                Light::Area(area) => area_lights.push((area, index)),
                 Light::Distant { .. } | Light::Point { .. } | Light::Spot { .. } => {}
             }
         }
@@ -146,6 +147,7 @@ impl<'a> Integrator<'a> {
             environments,
             area_lights,
             lights,
+            light_groups: &scene.light_groups,
             max_bounces: scene.render.max_bounces,
             albedos: if scene.collected().albedo {
                 scene.fabrics.iter().map(|f| ply_albedos(scene, f)).collect()
@@ -225,8 +227,7 @@ impl<'a> Integrator<'a> {
                     go_on
                 }
                 _ => {
-                    let light = self.environment(&path);
-                    add(&mut sample, path.bounces, &path, path.throughput * light);
+                    self.environment(&path, &mut sample);
                     false
                 }
             };
@@ -242,22 +243,32 @@ impl<'a> Integrator<'a> {
         sample
     }
 
-    /// What a ray that meets nothing sees, weighed against shadow rays towards the same environment lights.
+    /// Adds what a ray that meets nothing sees, weighed against shadow rays towards the same environment lights.
     #[inline]
-    fn environment(&self, path: &Path<'_>) -> Rgb {
-        let mut light = Rgb::ZERO;
+    fn environment(&self, path: &Path<'_>, sample: &mut Sample) {
         for &(environment, index) in &self.environments {
-            if path.pdf == f32::INFINITY {
-                if environment.visible {
-                    light += environment.radiance(path.ray.direction);
+            let weight = if path.pdf == f32::INFINITY {
+                if !environment.visible {
+                    continue;
                 }
-                continue;
-            }
-            let chance = self.lights.chance(index, path.from);
-            let other = if chance > 0.0 { chance * environment.pdf(path.ray.direction) } else { 0.0 };
-            light += environment.radiance(path.ray.direction) * mis_weight(path.pdf, other);
+                1.0
+            } else {
+                let chance = self.lights.chance(index, path.from);
+                let other = if chance > 0.0 { chance * environment.pdf(path.ray.direction) } else { 0.0 };
+                mis_weight(path.pdf, other)
+            };
+            let light = path.throughput * environment.radiance(path.ray.direction) * weight;
+            self.add(sample, path.bounces, path, index, light);
         }
-        light
+    }
+
+    /// Adds light of a light, by its place among all, that was scattered `events` times to a sample, to the part that it belongs to
+    /// and to its group.
+    #[inline]
+    fn add(&self, sample: &mut Sample, events: u32, path: &Path<'_>, index: usize, light: Rgb) {
+        sample.radiance += light;
+        sample.lights[self.light_groups.of(index)] += light;
+        sample.parts.add(events, path.shares.as_ref(), light);
     }
 
     /// Adds what comes from area lights nearer than `end`, weighed against shadow rays towards them. Whether the
@@ -269,13 +280,14 @@ impl<'a> Integrator<'a> {
             let seen = self.area_lights.iter().filter(|(light, _)| light.visible);
             let met =
                 |light: &AreaLight| light.shape.intersect(origin, direction, light.two_sided).filter(|&t| t < end);
-            let nearest = seen.filter_map(|(light, _)| Some((met(light)?, light))).min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((t, light)) = nearest {
+            let nearest = seen.filter_map(|(light, index)| Some((met(light)?, light, index)));
+            let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((t, light, index)) = nearest {
                 sample.alpha = 1.0;
                 let point = origin + t * direction;
                 sample.depth = (path.from - point).dot(self.back);
                 self.sees(sample, point);
-                add(sample, path.bounces, path, path.throughput * light.radiance);
+                self.add(sample, path.bounces, path, *index, path.throughput * light.radiance);
             }
             return nearest.is_some();
         }
@@ -287,7 +299,7 @@ impl<'a> Integrator<'a> {
             let t = distance - before;
             if t > 0.0 && t < end {
                 let weight = mis_weight(path.pdf, self.lights.chance(index, path.from) * pdf);
-                add(sample, path.bounces, path, path.throughput * light.radiance * weight);
+                self.add(sample, path.bounces, path, index, path.throughput * light.radiance * weight);
             }
         }
         false
@@ -412,13 +424,6 @@ fn ply_albedos(scene: &Scene, fabric: &Fabric) -> Vec<Vec<Rgb>> {
     let albedo = |m: &FiberMaterial| Rgb::from(std::array::from_fn(|c| m.r[c] + m.tt[c] + m.d[c]));
     let variants = fabric.variants.iter().map(|yarn| &yarn.fibers[..]);
     std::iter::once(fibers).chain(variants).map(|fibers| fibers.iter().map(|(_, m)| albedo(m)).collect()).collect()
-}
-
-/// Adds light that was scattered `events` times to a sample and to the part that it belongs to.
-#[inline]
-fn add(sample: &mut Sample, events: u32, path: &Path<'_>, light: Rgb) {
-    sample.radiance += light;
-    sample.parts.add(events, path.shares.as_ref(), light);
 }
 
 /// The place where a ray meets the ground at the distance `t`.

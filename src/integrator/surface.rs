@@ -29,6 +29,9 @@ impl Integrator<'_> {
         counters: &mut Counters,
     ) -> bool {
         let material = &self.materials[place.material];
+        if material.holdout && path.bounces == 0 {
+            return false;
+        }
         let mut albedo = material.surface.albedo();
         if let Some(picture) = &material.texture {
             // As wide as a pixel there: light that comes after other scattering sees no wider, which only costs noise.

@@ -9,23 +9,26 @@ use crate::math::sampler::OneOf;
 /// in the way. A light that gives nothing there is not chosen.
 #[derive(Clone, Debug)]
 pub struct LightChooser<'a> {
-    lights: Vec<&'a Light>,
+    /// Each with its place among all lights.
+    lights: Vec<(usize, &'a Light)>,
+}
+
+/// A light that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Chosen<'a> {
+    /// Its place among all lights.
+    pub index: usize,
+    /// The light.
+    pub light: &'a Light,
+    /// The chance that it had.
+    pub chance: f32,
 }
 
 impl<'a> LightChooser<'a> {
     /// Between those of `lights` that need shadow rays and shine.
     pub fn new(lights: &'a [Light]) -> Self {
-        Self {
-            lights: lights
-                .iter()
-                .filter(|light| light.needs_shadow_rays() && light.irradiance_at_middle() > 0.0)
-                .collect(),
-        }
-    }
-
-    /// The place of a light of these in [`Self::chance`]; `None` if shadow rays never look for it.
-    pub fn index_of(&self, light: &Light) -> Option<usize> {
-        self.lights.iter().position(|one| std::ptr::eq(*one, light))
+        let looked_for = |light: &Light| light.needs_shadow_rays() && light.irradiance_at_middle() > 0.0;
+        Self { lights: lights.iter().enumerate().filter(|(_, light)| looked_for(light)).collect() }
     }
 
     /// Whether there is none to choose: what light there is only paths find.
@@ -33,29 +36,29 @@ impl<'a> LightChooser<'a> {
         self.lights.is_empty()
     }
 
-    /// Draws a light for the place `at` by `u` in [0, 1), with the chance that it had; `None` if none gives anything.
+    /// Draws a light for the place `at` by `u` in [0, 1); `None` if none gives anything.
     #[inline]
-    pub fn choose(&self, at: Vec3A, u: f32) -> Option<(&'a Light, f32)> {
-        if let &[light] = self.lights.as_slice() {
-            return Some((light, 1.0));
+    pub fn choose(&self, at: Vec3A, u: f32) -> Option<Chosen<'a>> {
+        if let &[(index, light)] = self.lights.as_slice() {
+            return Some(Chosen { index, light, chance: 1.0 });
         }
         let mut one = OneOf::new(u);
-        for &light in &self.lights {
+        for &(index, light) in &self.lights {
             let given = light.most_at(at);
-            one.offer(given, (light, given));
+            one.offer(given, (index, light, given));
         }
-        one.drawn.map(|(light, given)| (light, given / one.total))
+        one.drawn.map(|(index, light, given)| Chosen { index, light, chance: given / one.total })
     }
 
-    /// The chance of a light, by [`Self::index_of`], in [`Self::choose`] at a place.
+    /// The chance of a light, by its place among all, in [`Self::choose`] at a place; 0 if shadow rays never look for it.
     #[inline]
-    pub fn chance(&self, index: Option<usize>, at: Vec3A) -> f32 {
-        let Some(index) = index else { return 0.0 };
+    pub fn chance(&self, index: usize, at: Vec3A) -> f32 {
+        let Some((_, light)) = self.lights.iter().find(|one| one.0 == index) else { return 0.0 };
         if self.lights.len() == 1 {
             return 1.0;
         }
-        let given = self.lights[index].most_at(at);
-        if given > 0.0 { given / self.lights.iter().map(|light| light.most_at(at)).sum::<f32>() } else { 0.0 }
+        let given = light.most_at(at);
+        if given > 0.0 { given / self.lights.iter().map(|(_, light)| light.most_at(at)).sum::<f32>() } else { 0.0 }
     }
 }
 
@@ -99,14 +102,12 @@ mod tests {
             let n = 200_000;
             let mut counts = [0; 6];
             for i in 0..n {
-                let (light, chance) =
-                    chooser.choose(at, (i as f32 + 0.5) / n as f32).expect("a point shines everywhere");
-                let index = chooser.index_of(light);
-                assert!((chooser.chance(index, at) / chance - 1.0).abs() < 1e-5);
-                counts[index.unwrap()] += 1;
+                let chosen = chooser.choose(at, (i as f32 + 0.5) / n as f32).expect("a point shines everywhere");
+                assert!((chooser.chance(chosen.index, at) / chosen.chance - 1.0).abs() < 1e-5);
+                counts[chosen.index] += 1;
             }
             for (index, count) in counts.into_iter().enumerate() {
-                let chance = chooser.chance(Some(index), at);
+                let chance = chooser.chance(index, at);
                 assert!(
                     (f64::from(count) / f64::from(n) - f64::from(chance)).abs() < 1e-3,
                     "{at}: {index} {count} {chance}"
@@ -114,9 +115,9 @@ mod tests {
             }
         }
         // A spot far beside, and the backs of disks.
-        assert_eq!(chooser.chance(Some(3), Vec3A::ZERO), 0.0);
-        assert_eq!(chooser.chance(Some(5), Vec3A::ZERO), 0.0);
-        assert_eq!(chooser.chance(Some(4), Vec3A::new(2.0, 6.0, 0.0)), 0.0);
+        assert_eq!(chooser.chance(3, Vec3A::ZERO), 0.0);
+        assert_eq!(chooser.chance(5, Vec3A::ZERO), 0.0);
+        assert_eq!(chooser.chance(4, Vec3A::new(2.0, 6.0, 0.0)), 0.0);
     }
 
     #[test]
@@ -128,7 +129,7 @@ mod tests {
             let at = Vec3A::new(stream.next(), stream.next(), stream.next()) * 24.0 - 12.0;
             for (index, light) in lights.iter().enumerate() {
                 let given = light.sample(at, Vec2::new(stream.next(), stream.next())).map_or(0.0, |s| s.weight.mean());
-                assert!(given <= 0.0 || chooser.chance(Some(index), at) > 0.0, "{light:?} at {at}");
+                assert!(given <= 0.0 || chooser.chance(index, at) > 0.0, "{light:?} at {at}");
             }
         }
     }

@@ -12,7 +12,7 @@ use std::f32::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3A};
 
-pub use chooser::LightChooser;
+pub use chooser::{Chosen, LightChooser};
 pub use environment::{Environment, EnvironmentMap};
 pub use shape::Shape;
 

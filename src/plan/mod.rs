@@ -209,6 +209,12 @@ impl List {
                 "no output holds it: the next frame is not read",
             ),
             ("uv_layer", asked.uv, Layers { uv: true, ..NONE }, NOBODY),
+            (
+                "light_groups",
+                asked.light_groups > 0,
+                Layers { light_groups: asked.light_groups, ..NONE },
+                "no light is in a group, or no output holds them",
+            ),
         ] {
             let bytes = Tile::bytes_per_pixel(alone) - Tile::bytes_per_pixel(NONE);
             let reason = if used { "asked for" } else { no };

@@ -65,6 +65,12 @@ impl About {
         let mut keys = vec![("yarnray".to_owned(), exr::SOFTWARE.to_owned()), ("embree".to_owned(), embree.to_owned())];
         keys.extend(scene.identity.iter().cloned());
         keys.push(("output.layers".to_owned(), layer_names(collected).join(", ")));
+        if collected.light_groups > 0 {
+            let groups = &scene.light_groups;
+            let of_lights: Vec<&str> =
+                (0..scene.lights.len()).map(|light| groups.names()[groups.of(light)].as_str()).collect();
+            keys.push(("light.group".to_owned(), of_lights.join(", ")));
+        }
         keys.push(("shard".to_owned(), shard_name(shard)));
         if shard.is_some() {
             keys.push(("render.spp".to_owned(), scene.render.spp.to_string()));
@@ -79,7 +85,8 @@ impl About {
 }
 
 fn layer_names(mut layers: Layers) -> Vec<&'static str> {
-    Layers::NAMES.iter().filter(|(_, of)| *of(&mut layers)).map(|(name, _)| *name).collect()
+    let groups = (layers.light_groups > 0).then_some(Layers::LIGHT_GROUPS);
+    Layers::NAMES.iter().filter(|(_, of)| *of(&mut layers)).map(|(name, _)| *name).chain(groups).collect()
 }
 
 fn shard_name(shard: Option<Shard>) -> String {
@@ -282,7 +289,8 @@ fn unreadable_or_short(path: &Path, error: &io::Error, at: u64) -> ImageError {
 }
 
 fn header_json(about: &About, job: &Job) -> Value {
-    let Frame { width, height, layers, storage, axes, display, fabrics, surfaces, middle } = about.frame.clone();
+    let Frame { width, height, layers, storage, axes, display, fabrics, surfaces, light_groups, middle } =
+        about.frame.clone();
     let metadata: Vec<Value> = about
         .metadata
         .iter()
@@ -313,6 +321,7 @@ fn header_json(about: &About, job: &Job) -> Value {
             "alpha": display.alpha,
             "fabrics": fabrics,
             "surfaces": surfaces,
+            "light_groups": light_groups,
             "middle_bits": middle.map(f64::to_bits),
         },
         "collected": layer_names(about.collected),
@@ -382,9 +391,15 @@ fn parse_attribute(item: &Value) -> Option<(String, Attribute)> {
     Some((text(&item[0])?, value))
 }
 
-fn parse_layers(names: &Value) -> Option<Layers> {
+/// Layers by their names, of a scene of so many groups of lights.
+fn parse_layers(names: &Value, groups: usize) -> Option<Layers> {
     let mut layers = Layers::NONE;
     for name in names.as_array()? {
+        if name == Layers::LIGHT_GROUPS {
+            layers.light_groups =
+                u8::try_from(groups).ok().filter(|count| (1..=Layers::ALL.light_groups).contains(count))?;
+            continue;
+        }
         let (_, of) = Layers::NAMES.iter().find(|(known, _)| name == known)?;
         *of(&mut layers) = true;
     }
@@ -392,10 +407,13 @@ fn parse_layers(names: &Value) -> Option<Layers> {
 }
 
 fn parse_frame(f: &Value) -> Option<Frame> {
+    // Films of builds before have none of the names but those of fabrics.
+    let named = |key: &str| if f[key].is_null() { Some(Vec::new()) } else { texts(&f[key]) };
+    let light_groups = named("light_groups")?;
     Some(Frame {
         width: word(&f["width"])?,
         height: word(&f["height"])?,
-        layers: parse_layers(&f["layers"])?,
+        layers: parse_layers(&f["layers"], light_groups.len())?,
         storage: Storage {
             compression: Compression::NAMES.iter().find(|(n, _)| f["compression"] == *n)?.1,
             half_lobes: f["half_lobes"].as_bool()?,
@@ -414,10 +432,8 @@ fn parse_frame(f: &Value) -> Option<Frame> {
             alpha: f["alpha"].as_bool()?,
         },
         fabrics: texts(&f["fabrics"])?,
-        surfaces: match &f["surfaces"] {
-            Value::Null => Vec::new(),
-            names => texts(names)?,
-        },
+        surfaces: named("surfaces")?,
+        light_groups,
         middle: {
             let bits = f["middle_bits"].as_array()?.iter().map(Value::as_u64).collect::<Option<Vec<_>>>()?;
             <[u64; 3]>::try_from(bits).ok()?.map(f64::from_bits)
@@ -432,6 +448,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let metadata = v.get("metadata").or_else(|| v.get("story"))?;
     let metadata = metadata.as_array()?.iter().map(parse_attribute).collect::<Option<_>>()?;
     let frame = parse_frame(&v["frame"])?;
+    let collected = parse_layers(&v["collected"], frame.light_groups.len())?;
     let shard = match words(&v["shard"]).as_deref() {
         None if v["shard"].is_null() => None,
         Some(&[index, count]) if 1 <= index && index <= count => Some(Shard { index, count }),
@@ -448,7 +465,7 @@ fn parse_header(v: &Value, length: u64) -> Option<Header> {
     let counters: Vec<u64> = v["counters"].as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
     let [camera, bounce, shadow, cloth_paths, events, invalid] = counters.try_into().ok()?;
     Some(Header {
-        about: About { keys, frame, collected: parse_layers(&v["collected"])?, metadata, spp: word(&v["spp"])?, shard },
+        about: About { keys, frame, collected, metadata, spp: word(&v["spp"])?, shard },
         crop,
         samples,
         next: words(&v["next"])?.try_into().ok()?,

@@ -57,6 +57,8 @@ pub struct Frame {
     pub fabrics: Vec<String>,
     /// Names of the meshes and of the ground, if there is one.
     pub surfaces: Vec<String>,
+    /// Names of the groups of lights, in the order of [`Pixel::lights`].
+    pub light_groups: Vec<String>,
     /// Where the film's origin lies in the world, millimetres.
     pub middle: [f64; 3],
 }
@@ -76,6 +78,7 @@ impl Frame {
                 let ground = scene.ground.map(|_| "ground".to_owned());
                 scene.objects.iter().map(|object| object.name.clone()).chain(ground).collect()
             },
+            light_groups: scene.light_groups.names().to_vec(),
             middle: scene.middle.to_array(),
         }
     }
@@ -247,6 +250,9 @@ fn exr_layers<'a>(
     let precision = if frame.storage.half_lobes { F16 } else { F32 };
     for (part, name) in PART_NAMES.into_iter().enumerate() {
         add(wanted.lobes, ExrLayer::new(name, RGB, precision, move |at| at.pixel.parts[part]));
+    }
+    for (group, name) in frame.light_groups.iter().take(wanted.light_groups.into()).enumerate() {
+        add(true, ExrLayer::new(&format!("light_{name}"), RGB, precision, move |at| at.pixel.lights[group]));
     }
     let denoised = denoised.map(|d| ExrLayer::new("denoised", RGB, F32, |at| d.pixel(at.x, at.y)));
     layers.extend(denoised);

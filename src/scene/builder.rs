@@ -6,8 +6,8 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    Axes, CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, Material, Object, RenderSettings, Scene,
-    Storage, Taken, Tufts, Yarn, bounds, defaults, force, identity,
+    Axes, CurveKind, Fabric, FabricMotion, GarmentFacts, Ground, Layers, LightGroups, Material, Object, RenderSettings,
+    Scene, Storage, Taken, Tufts, Yarn, bounds, defaults, force, identity,
     view::{CameraSetup, Views},
 };
 use crate::{
@@ -69,6 +69,8 @@ pub struct SceneBuilder {
     pub materials: Vec<Material>,
     /// The lights.
     pub lights: Vec<Light>,
+    /// The groups that they are in.
+    pub light_groups: LightGroups,
     /// The floor, if there is one.
     pub ground: Option<GroundSetup>,
     /// What is known of fabrics that are laid on garments.
@@ -147,8 +149,8 @@ impl SceneBuilder {
     pub fn build(self) -> Result<Scene, SceneError> {
         self.check()?;
         let Self { name, render, output, camera, yarns, fibers, mut fabrics, mut objects, materials, .. } = self;
-        let (mut lights, ground, warnings) = (self.lights, self.ground, self.warnings);
-        let garments = self.garments;
+        let (mut lights, light_groups) = (self.lights, self.light_groups);
+        let (ground, garments, warnings) = (self.ground, self.garments, self.warnings);
         tell_names_apart(&mut fabrics);
 
         // Single precision is kept for what is near: the middle of the cloth becomes the origin.
@@ -173,7 +175,8 @@ impl SceneBuilder {
             let height = ground.height.map_or(lowest, |h| h - middle.y);
             Ground { height: height as f32, material: ground.material }
         });
-        let OutputSettings { display, layers, storage, axes, denoise, frames_per_second } = output;
+        let OutputSettings { display, mut layers, storage, axes, denoise, frames_per_second } = output;
+        layers.light_groups = layers.light_groups.min(light_groups.names().len() as u8);
         let mut scene = Scene {
             path: name,
             render,
@@ -192,6 +195,7 @@ impl SceneBuilder {
             objects,
             materials,
             lights,
+            light_groups,
             ground,
             middle,
             garments,

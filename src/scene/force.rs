@@ -164,7 +164,11 @@ fn force_around(scene: &mut Scene, name: &str) -> bool {
             for p in &mut mesh.points {
                 *p += at;
             }
-            scene.materials.push(Material { surface: SurfaceMaterial::diffuse(Rgb::ZERO), texture: None });
+            scene.materials.push(Material {
+                surface: SurfaceMaterial::diffuse(Rgb::ZERO),
+                texture: None,
+                holdout: false,
+            });
             let material = scene.materials.len() - 1;
             scene.objects.push(Object {
                 name: "forced".to_owned(),

@@ -29,6 +29,7 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
         // How the picture is shown and stored, and which layers are beside it.
         display: _,
         layers: _,
+        light_groups: _,
         storage: _,
         axes: _,
         denoise: _,
@@ -76,10 +77,13 @@ pub(crate) fn identity(scene: &Scene) -> Vec<(String, String)> {
     for (i, light) in lights.iter().enumerate() {
         of_light(light, &format!("light.{i}"), &mut keys);
     }
-    for (i, Material { surface, texture }) in materials.iter().enumerate() {
+    for (i, Material { surface, texture, holdout }) in materials.iter().enumerate() {
         let texture =
             texture.as_ref().map(|AlbedoTexture { texture, repeat }| (texture.size(), texture.hash(), repeat));
         keys.add(&format!("material.{i}"), &(surface, texture));
+        if *holdout {
+            keys.add(&format!("material.{i}.holdout"), holdout);
+        }
     }
     for (i, Object { name: _, origin: _, mesh, material, next }) in objects.iter().enumerate() {
         let Mesh { points, normals, uvs, triangles } = mesh;

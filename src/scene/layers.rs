@@ -1,5 +1,7 @@
 //! Which layers an EXR has beside the picture.
 
+use super::LightGroups;
+
 /// Layers of an EXR beside the picture and its alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layers {
@@ -24,6 +26,8 @@ pub struct Layers {
     pub motion: bool,
     /// Its texture coordinates.
     pub uv: bool,
+    /// The light of so many groups of lights, each by itself.
+    pub light_groups: u8,
 }
 
 impl Default for Layers {
@@ -36,7 +40,9 @@ impl Default for Layers {
 pub type LayerName = (&'static str, fn(&mut Layers) -> &mut bool);
 
 impl Layers {
-    /// Every layer with its name in scene files.
+    /// The name of the layers of [`Self::light_groups`] in scene files.
+    pub const LIGHT_GROUPS: &str = "light_groups";
+    /// Every other layer with its name there.
     pub const NAMES: [LayerName; 10] = [
         ("lobes", |l| &mut l.lobes),
         ("depth", |l| &mut l.depth),
@@ -61,12 +67,25 @@ impl Layers {
         position: false,
         motion: false,
         uv: false,
+        light_groups: 0,
     };
     /// Those of a scene that names none. The light by where it came from is not among them, whose sums would take two
     /// thirds of the film, nor Cryptomatte, whose channels are many, nor what only some compositors want.
     pub const DEFAULT: Self =
         Self { depth: true, normal: true, albedo: true, variance: true, samples: true, ..Self::NONE };
-    /// All of them.
-    pub const ALL: Self =
-        Self { lobes: true, cryptomatte: true, position: true, motion: true, uv: true, ..Self::DEFAULT };
+    /// All of them, and as many groups of lights as there may be.
+    pub const ALL: Self = Self {
+        lobes: true,
+        cryptomatte: true,
+        position: true,
+        motion: true,
+        uv: true,
+        light_groups: LightGroups::MOST as u8,
+        ..Self::DEFAULT
+    };
+
+    /// All names in scene files, but `all`.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Self::NAMES.into_iter().map(|(name, _)| name).chain([Self::LIGHT_GROUPS])
+    }
 }

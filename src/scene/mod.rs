@@ -15,6 +15,7 @@ mod fiber_detail;
 pub(crate) mod force;
 pub(crate) mod identity;
 mod layers;
+mod light_groups;
 pub mod load;
 pub(crate) mod motif;
 pub(crate) mod motion;
@@ -31,6 +32,7 @@ pub use builder::{SceneBuilder, SceneError};
 pub use camera::{Camera, Footprint};
 pub use fiber_detail::FiberDetail;
 pub use layers::{LayerName, Layers};
+pub use light_groups::LightGroups;
 
 use crate::{
     geometry::{
@@ -518,6 +520,8 @@ pub struct Material {
     pub surface: SurfaceMaterial,
     /// What its albedo is multiplied with, by a mesh's texture coordinates.
     pub texture: Option<AlbedoTexture>,
+    /// Whether the camera sees nothing where it is, not even what is behind it.
+    pub holdout: bool,
 }
 
 /// A picture over a surface.
@@ -582,6 +586,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// The lights.
     pub lights: Vec<Light>,
+    /// The groups that they are in.
+    pub light_groups: LightGroups,
     /// The floor.
     pub ground: Option<Ground>,
     /// What was subtracted from all positions, millimetres.

@@ -32,6 +32,8 @@ pub(super) struct MaterialPlan {
     coat: Option<(f64, f64)>,
     /// A picture over it, where it was named, and how often it is repeated.
     texture: Option<(PathBuf, Span, [f64; 2])>,
+    /// Whether the camera sees nothing where it is.
+    holdout: bool,
 }
 
 /// Every `[material.NAME]`; `None` for one with mistakes.
@@ -57,14 +59,15 @@ fn material(table: Reader<'_>, context: &Context<'_>) -> Option<MaterialPlan> {
         (roughness, table.f64_or("ior", defaults::IOR, Range::between(1.01, 4.0)))
     });
     table.finish();
-    Some(MaterialPlan { albedo, coat, texture })
+    Some(MaterialPlan { albedo, coat, texture, holdout: false })
 }
 
 /// The material that a table names under `material`, or a diffuse one of its `albedo`.
 pub(super) fn material_of(table: &Reader<'_>, context: &Context<'_>, materials: &Materials) -> Option<MaterialPlan> {
     let albedo = table.rgb("albedo", Range::UNIT);
     let Some(name) = table.string("material") else {
-        return Some(MaterialPlan { albedo: albedo.unwrap_or([defaults::ALBEDO; 3]), coat: None, texture: None });
+        let albedo = albedo.unwrap_or([defaults::ALBEDO; 3]);
+        return Some(MaterialPlan { albedo, coat: None, texture: None, holdout: false });
     };
     if albedo.is_some() {
         table.error_at("albedo", "give `material` or `albedo`, not both", None);
@@ -108,7 +111,8 @@ impl MaterialPlan {
             None => SurfaceMaterial::diffuse(albedo),
             Some((roughness, ior)) => SurfaceMaterial::coated(albedo, roughness as f32, ior as f32),
         };
-        made.push((self, Material { surface, texture }));
+        let holdout = self.holdout;
+        made.push((self, Material { surface, texture, holdout }));
         Some(made.len() - 1)
     }
 }
@@ -157,7 +161,8 @@ fn mesh(table: Reader<'_>, context: &Context<'_>, materials: &Materials, frame: 
         table.error_at("name", "the name of a mesh cannot be empty", None);
     }
     let transform = placement(&table, context);
-    let material = material_of(&table, context, materials);
+    let holdout = table.bool_or("holdout", false);
+    let material = material_of(&table, context, materials).map(|material| MaterialPlan { holdout, ..material });
     let mut smooth = false;
     let source = match (table.string("path"), table.has("shape")) {
         (Some(_), true) => {

@@ -38,7 +38,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 pub use definitions::{Definitions, load_definitions};
 
 use super::{
-    RenderSettings, Scene,
+    LightGroups, RenderSettings, Scene,
     animation::numbered,
     builder::{OutputSettings, SceneBuilder},
     defaults,
@@ -52,6 +52,7 @@ use crate::input::{
     reader::{Range, Reader},
     system::in_words,
 };
+use crate::light::Light;
 use crate::math::words::counted;
 
 /// What the command line adds to a scene file.
@@ -445,7 +446,7 @@ struct Plans {
     fabrics: Vec<Option<cloth::FabricPlan>>,
     meshes: Vec<Option<mesh::MeshPlan>>,
     camera: Option<CameraSetup>,
-    lights: Vec<Option<view::LightPlan>>,
+    lights: Vec<Option<view::GroupedLight>>,
     ground: Option<view::GroundPlan>,
 }
 
@@ -492,7 +493,10 @@ impl Plans {
         let mut made = Vec::new();
         let objects = self.meshes.into_iter().flatten();
         let objects = objects.filter_map(|plan| plan.make(self.detail.flow, context, &mut made)).collect();
-        let lights = self.lights.into_iter().flatten().filter_map(|light| light.make(context)).collect();
+        let lights = self.lights.into_iter().flatten();
+        let (groups, lights): (Vec<Option<String>>, Vec<Light>) =
+            lights.filter_map(|of| Some((of.group, of.light.make(context)?))).unzip();
+        let light_groups = LightGroups::new(groups.iter().map(Option::as_deref)).unwrap_or_default();
         let ground = self.ground.and_then(|plan| plan.make(context, &mut made));
         Some(SceneBuilder {
             name: name.to_owned(),
@@ -505,6 +509,7 @@ impl Plans {
             objects,
             materials: made.into_iter().map(|(_, material)| material).collect(),
             lights,
+            light_groups,
             ground,
             garments,
             warnings,

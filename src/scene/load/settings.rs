@@ -128,11 +128,12 @@ pub(super) fn output(table: Reader<'_>) -> OutputSettings {
         for (name, _) in table.strings("layers") {
             match Layers::NAMES.iter().find(|(known, _)| *known == name) {
                 Some((_, layer)) => *layer(&mut layers) = true,
+                None if name == Layers::LIGHT_GROUPS => layers.light_groups = Layers::ALL.light_groups,
                 None if name == "all" => layers = Layers::ALL,
                 None => table.error_at(
                     "layers",
                     format!("unknown layer `{}`", shortened(name)),
-                    Some(&format!("known are {} and all", Layers::NAMES.map(|(known, _)| known).join(", "))),
+                    Some(&format!("known are {} and all", Layers::names().collect::<Vec<_>>().join(", "))),
                 ),
             }
         }

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, Mat3A, Vec3A};
 
 use super::{
     super::{
-        Material,
+        LightGroups, Material,
         builder::GroundSetup,
         camera::Projection,
         defaults,
@@ -19,7 +19,10 @@ use super::{
 };
 use crate::{
     image,
-    input::{diagnostic::Span, document::Value},
+    input::{
+        diagnostic::{Span, shortened},
+        document::Value,
+    },
     light::{AreaLight, Environment, EnvironmentMap, Light, Shape},
     math::{Rgb, frame::orthonormal_basis},
 };
@@ -158,6 +161,12 @@ fn lens(table: &Reader<'_>, context: &Context<'_>, projection: Projection, other
 /// What light may be.
 const BRIGHT: Range = Range::at_least(0.0);
 
+/// A light of a scene file, and the group that it is in.
+pub(super) struct GroupedLight {
+    pub(super) group: Option<String>,
+    pub(super) light: LightPlan,
+}
+
 /// A light whose image is not read yet.
 pub(super) enum LightPlan {
     Ready(Light),
@@ -165,17 +174,25 @@ pub(super) enum LightPlan {
 }
 
 /// Reads every `[[light]]`. Where nothing is said of light, not even `light = []`, cloth and meshes have a sky and a sun.
-pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<LightPlan>> {
+pub(super) fn lights(root: &Reader<'_>, context: &Context<'_>) -> Vec<Option<GroupedLight>> {
     if !root.has("light") && (root.has("fabric") || root.has("mesh")) {
         let sky = Environment { radiance: Rgb::from(defaults::SKY), image: None, visible: true };
         let towards = DVec3::from(defaults::SUN_TOWARDS).normalize();
         let sun = sun(towards, radians(defaults::SUN_RADIUS), Rgb::from(defaults::SUN_IRRADIANCE));
-        return [Light::Environment(sky), sun].map(|light| Some(LightPlan::Ready(light))).into();
+        let plain = |light| Some(GroupedLight { group: None, light: LightPlan::Ready(light) });
+        return [Light::Environment(sky), sun].map(plain).into();
     }
-    root.tables("light").into_iter().map(|table| light(table, context)).collect()
+    let lights: Vec<Option<GroupedLight>> =
+        root.tables("light").into_iter().map(|table| light(table, context)).collect();
+    if LightGroups::new(lights.iter().flatten().map(|light| light.group.as_deref())).is_none() {
+        let most = LightGroups::MOST;
+        let hint = format!("lights without a `group` are one, `{}`", LightGroups::OTHERS);
+        root.error_at("light", format!("expected at most {most} groups of lights"), Some(&hint));
+    }
+    lights
 }
 
-fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
+fn light(table: Reader<'_>, context: &Context<'_>) -> Option<GroupedLight> {
     type Read = fn(&Reader<'_>, &Context<'_>) -> Option<LightPlan>;
     let kinds: [(&str, Read); 7] = [
         ("environment", environment),
@@ -187,8 +204,14 @@ fn light(table: Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
         ("sphere", |table, context| area(table, sphere(table, context), false)),
     ];
     let plan = table.kind("type", &kinds).and_then(|read| read(&table, context));
+    let group = table.string("group").map(str::to_owned);
+    let names_a_layer = |name: &String| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if let Some(name) = group.as_ref().filter(|name| !names_a_layer(name)) {
+        let message = format!("`{}` names no layer: expected letters, digits and _", shortened(name));
+        table.error_at("group", message, Some("group = \"key\""));
+    }
     table.finish();
-    plan
+    plan.map(|light| GroupedLight { group, light })
 }
 
 fn environment(table: &Reader<'_>, context: &Context<'_>) -> Option<LightPlan> {
