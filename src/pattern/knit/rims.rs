@@ -85,24 +85,39 @@ pub(super) fn drawn(knit: &Knit, given: Option<Vec<DVec2>>, rows: &[Vec<Stitch>]
     Ok(profile)
 }
 
-/// A tube that is rounded to a ring at its top.
+/// A tube that is rounded to a ring at its top, which is flat where rows are few.
 fn tube(knit: &Knit, rows: usize, radius: f64) -> Result<Vec<DVec2>, ChartError> {
     const STEPS: u32 = 8;
+    /// How high the rounding is at least, over how far it goes inwards.
+    const FLATTEST: f64 = 0.3;
     let [width, height] = knit.gauge();
     let (wide, long) = (width * f64::from(knit.stitches) / TAU, height * rows as f64);
     let round = (wide - radius).max(0.0);
-    let straight = long - 0.25 * TAU * round;
-    if straight < height {
-        let least = ((0.25 * TAU * round) / height).ceil() + 1.0;
+    // A quarter of an ellipse's outline, after Ramanujan; one row of the tube goes straight up.
+    let arc_length =
+        |high: f64| 0.125 * TAU * (3.0 * (round + high) - ((3.0 * round + high) * (round + 3.0 * high)).sqrt());
+    let fits = |high: f64| arc_length(high) + height <= long;
+    if !fits(FLATTEST * round) {
+        let least = (arc_length(FLATTEST * round) / height).ceil() + 1.0;
         let problem = format!("a tube of {rows} rows is too short to be drawn together");
         return Err(ChartError::new(None, problem, format!("{least} rows or more")));
     }
+    let mut high = round;
+    if !fits(round) {
+        let mut low = FLATTEST * round;
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            *if fits(middle) { &mut low } else { &mut high } = middle;
+        }
+        high = low;
+    }
+    let straight = long - arc_length(high);
     let arc = (1..=STEPS).map(|k| {
         let (sin, cos) = (0.25 * TAU * f64::from(k) / f64::from(STEPS)).sin_cos();
-        DVec2::new(radius + round * cos, straight + round * sin)
+        DVec2::new(radius + round * cos, straight + high * sin)
     });
     // Points as close as those of the arc: between far and near ones a smooth curve would swing.
-    let count = (straight * f64::from(STEPS) / (0.25 * TAU * round).max(1.0)).ceil().clamp(1.0, 2000.0) as u32;
+    let count = (straight * f64::from(STEPS) / arc_length(high).max(1.0)).ceil().clamp(1.0, 2000.0) as u32;
     let up = (0..=count).map(|k| DVec2::new(wide, straight * f64::from(k) / f64::from(count)));
     Ok(up.chain(arc).collect())
 }
