@@ -155,10 +155,15 @@ impl Knit {
             * (u64::from(self.stitches) * u64::from(self.rows) * u64::from(self.points) + u64::from(self.rows))
     }
 
-    /// Rows that are knitted unless rows or a height are asked for: those of a chart that is shaped, by itself or over a profile, once.
+    /// Rows that are knitted unless rows or a height are asked for: those of a chart that is shaped, by itself or over a profile, once,
+    /// and all of one that is `written` out.
     pub fn rows_of(chart: &Chart, form: &Form, written: bool) -> u32 {
-        let once = chart.is_shaped() || (written && matches!(form, Form::Revolution(_)));
-        if once { chart.rows() } else { COUNT }
+        match (chart.is_shaped(), written) {
+            (true, _) => chart.rows(),
+            (false, true) if matches!(form, Form::Revolution(_)) => chart.rows(),
+            (false, true) => chart.rows().max(COUNT),
+            (false, false) => COUNT,
+        }
     }
 
     /// That a chart is cut off, if it is, for people.
