@@ -124,8 +124,10 @@ pub struct Knitted {
     pub strands: Vec<PatternStrand>,
     /// The colour of each yarn: 0 where there is no colour work.
     pub colors: Vec<u16>,
-    /// Width of a stitch and distance between rows.
+    /// Width of a stitch and distance between rows; of rows of other widths those of the kind that has most of them.
     pub gauge: [f64; 2],
+    /// Width of a stitch in each row.
+    pub widths: Vec<f64>,
 }
 
 /// Yarn in a stitch of plain knit of middling tightness, in units: Peirce's closed loop has 16.7, firm cloth 14.
@@ -214,6 +216,12 @@ impl Knit {
         })
     }
 
+    /// The same of a piece of these rows, unless sections of it have sizes of their own.
+    fn repeat_of(&self, rows: &[Vec<Stitch>], size: [Option<f64>; 2]) -> Option<Repeat> {
+        let open = size[0].is_none() && self.flat && self.colors.is_none() && self.edges != Edges::Tile;
+        self.repeat().filter(|_| !open || !kinds::in_sections(rows))
+    }
+
     fn repeat_in(&self, whole: Whole) -> Option<Repeat> {
         let chart = self.chart.smallest(whole);
         let wide = chart.even_width(LARGEST_CELL)?;
@@ -232,10 +240,10 @@ impl Knit {
         if let [Some(width), Some(height)] = self.size() {
             return [width, height];
         }
-        match self.repeat() {
+        let rows = self.worked().unwrap_or_default();
+        match self.repeat_of(&rows, self.size()) {
             Some(repeat) => self.cell(&repeat, self.size(), self.points).gauge(),
             None => {
-                let rows = self.worked().unwrap_or_default();
                 let points = if short_rows::any(&rows) { self.points } else { COARSE };
                 self.rows_of_a_kind(&rows, self.size(), points).gauge(self.size())
             }

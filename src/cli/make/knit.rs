@@ -256,7 +256,9 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     args.output.hold(piece.least_points().map_err(|e| wrong(&e))?)?;
     let task = format!("knitting {} x {}", counted(piece.stitches, "stitch"), counted(piece.rows, "row"));
     let working = Working::on(task, args.output.quiet);
-    let Knitted { strands, gauge, colors } = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
+    let knitted = piece.pressed(&thickness).map_err(|e| wrong(&e))?;
+    let Measures { stitches, across, up } = piece.measures(&knitted);
+    let Knitted { strands, gauge, colors, widths: _ } = knitted;
     drop(working);
     if !args.output.quiet {
         args.warn(&piece, &thickness, &strands);
@@ -268,7 +270,6 @@ pub(super) fn run(args: &KnitArgs) -> Result<(), Failure> {
     if !args.output.quiet {
         let Knit { rows, form, .. } = &piece;
         let [width, height] = gauge;
-        let Measures { stitches, across, up } = piece.measures(gauge);
         let (stitches, period) = (from_to(stitches.map(|n| n.to_string())), across[1]);
         let across = from_to(across.map(|length| format!("{length:.3}")));
         log::say(&format!("{width:.4} from stitch to stitch, {height:.4} from row to row"));

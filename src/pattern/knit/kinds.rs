@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Knit, cell::Cell};
-use crate::pattern::chart::{Chart, Stitch};
+use crate::pattern::chart::{Act, Chart, Stitch};
 
 /// Cells of rows that are alike, and which row takes which.
 #[derive(Default)]
@@ -17,6 +17,32 @@ impl Kinds {
     pub(super) fn of(&self, row: usize) -> Option<(&Cell, usize)> {
         let kind = self.of_row.get(row).copied().flatten()?;
         Some((&self.cells[kind], 0))
+    }
+
+    /// Width of a stitch in each row: that of its kind, if none is given. Near rows of another kind widths go over into each other.
+    pub(super) fn widths(&self, given: Option<f64>) -> Vec<f64> {
+        /// Rows to each side over which they do.
+        const REACH: usize = 3;
+        let own = self.gauge([given, None])[0];
+        let known: Vec<(usize, f64)> = self
+            .of_row
+            .iter()
+            .enumerate()
+            .filter_map(|(row, kind)| Some((row, given.unwrap_or(self.cells[(*kind)?].gauge()[0]))))
+            .collect();
+        let at = |row: usize| {
+            let after = known.partition_point(|k| k.0 < row);
+            match (after.checked_sub(1).map(|i| known[i]), known.get(after)) {
+                (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (row - a.0) as f64 / (b.0 - a.0) as f64,
+                (a, b) => a.or(b.copied()).map_or(own, |k| k.1),
+            }
+        };
+        let widths: Vec<f64> = (0..self.of_row.len()).map(at).collect();
+        let mean = |row: usize| {
+            let near = &widths[row.saturating_sub(REACH)..(row + REACH + 1).min(widths.len())];
+            near.iter().sum::<f64>() / near.len() as f64
+        };
+        (0..widths.len()).map(mean).collect()
     }
 
     /// That of the cell that most rows take, unless it is given.
@@ -56,10 +82,25 @@ impl Knit {
         let cell = |kind: &Vec<bool>| {
             let row: Vec<&str> = kind.iter().map(|purl| if *purl { "p" } else { "k" }).collect();
             let chart = Chart::parse(&[row.join(" ")]).expect("knits and purls are a chart");
-            Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size)
+            let relaxed = |points, size| Cell::relaxed(&chart, kind.len() as u32, self.yarn(size), points, size);
+            // Of few points it would find another size than a piece of nothing else has.
+            let own = if points < self.points { relaxed(self.points, size).gauge().map(Some) } else { size };
+            relaxed(points, own)
         };
         Kinds { cells: known.par_iter().map(cell).collect(), of_row }
     }
+}
+
+/// Whether rows of plain knit and purl stitches lie in sections of several rows, each of other columns, as a welt of ribbing below
+/// stockinette: which draw together by as much as each does by itself.
+pub(super) fn in_sections(rows: &[Vec<Stitch>]) -> bool {
+    const LEAST: usize = 6;
+    let is_plain = |s: &Stitch| s.act == Act::Draw && s.parents == 1 && s.layer == 0 && !s.twisted;
+    let kinds: Option<Vec<Vec<bool>>> =
+        rows.iter().map(|row| column_signs(row).filter(|_| row.iter().all(is_plain))).collect();
+    let Some(kinds) = kinds else { return false };
+    let sections: Vec<&[Vec<bool>]> = kinds.chunk_by(|a, b| a == b).collect();
+    sections.len() > 1 && sections.iter().all(|section| section.len() >= LEAST)
 }
 
 /// Knit or purl along a row, once around its repeat, if that is short.

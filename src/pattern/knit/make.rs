@@ -8,7 +8,7 @@ use super::{
     cell::Cell,
     colors::Way,
     curl::Curl,
-    kinds::Kinds,
+    kinds::{self, Kinds},
     loops::{Border, Loops},
     piece::{self, Laying, State, Surface, Thread, ease, settle, sheet::Sheet},
     pressed::{self, Alike, flatten_where_touching},
@@ -47,19 +47,25 @@ struct Layout {
     /// Width and height of a stitch that the piece is knitted to, and as they are found where these are open.
     size: [Option<f64>; 2],
     gauge: [f64; 2],
+    /// Width of a stitch in each row.
+    widths: Vec<f64>,
+    /// Whether rows of other widths are laid as their cells have them. Beside decreases that would tear a flat piece.
+    in_sections: bool,
 }
 
 impl Layout {
     fn new(knit: &Knit, rows: &[Vec<Stitch>], profile: Option<&Revolution>) -> Self {
         let size = profile.map_or(knit.size(), |p| knit.size_on(p, rows).map(Some));
         let points_of_cell = if profile.is_some() { COARSE } else { knit.points };
-        let cell = knit.repeat().map(|repeat| knit.cell(&repeat, size, points_of_cell));
+        let cell = knit.repeat_of(rows, size).map(|repeat| knit.cell(&repeat, size, points_of_cell));
         let even = cell.is_some() && profile.is_none();
         let points = if even || short_rows::any(rows) { knit.points } else { COARSE };
         let kinds = if cell.is_none() { knit.rows_of_a_kind(rows, size, points) } else { Kinds::default() };
         let gauge = cell.as_ref().map_or_else(|| kinds.gauge(size), Cell::gauge);
         let back = cell.as_ref().filter(|_| knit.is_double()).map(Cell::turned);
-        Self { cell, back, kinds, rows: rows.len(), even, points, size, gauge }
+        let widths = if cell.is_some() { vec![gauge[0]; rows.len()] } else { kinds.widths(size[0]) };
+        let in_sections = kinds::in_sections(rows);
+        Self { cell, back, kinds, rows: rows.len(), even, points, size, gauge, widths, in_sections }
     }
 
     /// How far apart two layers lie.
@@ -121,7 +127,7 @@ impl Knit {
         let [width, height] = layout.gauge;
         let extent = DVec2::new(width * f64::from(self.stitches), height * f64::from(self.rows));
         let to_middle = match &surface {
-            Surface::Plane { .. } => DVec3::new(0.0, -0.5 * extent.y, 0.0),
+            Surface::Plane { .. } | Surface::Rows { .. } => DVec3::new(0.0, -0.5 * extent.y, 0.0),
             Surface::Round { .. } | Surface::Bent(_) => DVec3::ZERO,
         };
         if let (false, Some(cell)) = (self.flat || self.is_double(), &layout.cell) {
@@ -138,7 +144,8 @@ impl Knit {
             .collect();
         flatten_where_touching(&mut strands, yarn, &alike);
         let colors = ways.iter().map(|w| w.color).collect();
-        Ok(Knitted { strands, colors, gauge: layout.gauge.map(|length| length * diameter) })
+        let widths = layout.widths.iter().map(|width| width * diameter).collect();
+        Ok(Knitted { strands, colors, gauge: layout.gauge.map(|length| length * diameter), widths })
     }
 
     /// A patch that repeats, of one colour, centred.
@@ -166,7 +173,8 @@ impl Knit {
         };
         let mut strands: Vec<_> = (0..self.rows as usize).map(row).collect();
         flatten_where_touching(&mut strands, yarn, &Alike::Tile { period: size * diameter, shear: 0.0 });
-        Ok(Knitted { colors: vec![0; strands.len()], strands, gauge: [width * diameter, height * diameter] })
+        let gauge = [width * diameter, height * diameter];
+        Ok(Knitted { colors: vec![0; strands.len()], strands, gauge, widths: vec![gauge[0]; self.rows as usize] })
     }
 
     /// The ways of its yarns through its rows, of which the first may go from right to left.
@@ -222,20 +230,22 @@ impl Knit {
         match (&self.form, profile) {
             (_, Some(revolution)) => Surface::Round { revolution, height },
             (Form::Tube, _) => {
-                let revolution = piece::tube(self.stitches, width, f64::from(self.rows), height);
+                let revolution = piece::tube(self.stitches, &layout.widths, height);
                 Surface::Round { revolution, height }
             }
             _ if !loops.levels().is_empty() => Surface::Bent(Sheet::relaxed(loops.levels(), rows, layout.gauge)),
-            _ => Surface::Plane { width, height },
+            _ if layout.even => Surface::Plane { width, height },
+            _ => Surface::Rows { widths: layout.widths.clone(), height },
         }
     }
 
     /// The yarns as they are laid out.
     fn laid(&self, layout: &Layout, loops: &Loops, surface: &Surface, ways: &[Way]) -> Vec<Thread> {
+        let by_cells = layout.in_sections || !matches!(surface, Surface::Rows { .. });
         let laying = Laying {
             loops,
             surface,
-            cells: &|row| layout.cell_of(row),
+            cells: &|row| layout.cell_of(row).filter(|_| by_cells),
             back: layout.back.as_ref(),
             even: layout.even,
             own_cells: layout.cell.is_some(),

@@ -26,6 +26,8 @@ use crate::{geometry::spline::through_points, math::special::smooth_step};
 pub(super) enum Surface {
     /// In the plane; widths of stitches and heights of rows.
     Plane { width: f64, height: f64 },
+    /// The same where rows have widths of their own: of their stitches, from the first row on.
+    Rows { widths: Vec<f64>, height: f64 },
     /// About the y axis; rows are turns of one spiral.
     Round { revolution: Revolution, height: f64 },
     /// Flat cloth that short rows bend.
@@ -37,6 +39,7 @@ impl Surface {
     fn across(&self, p: &Place) -> f64 {
         match self {
             Self::Plane { width, .. } => *width,
+            Self::Rows { widths, .. } => width_at(widths, p.up),
             Self::Bent(sheet) => sheet.width(),
             Self::Round { revolution, height } => TAU * revolution.radius((p.up + p.at - 0.5) * height),
         }
@@ -46,6 +49,7 @@ impl Surface {
     fn place(&self, row: i32, p: &Place) -> DVec3 {
         match self {
             Self::Plane { width, height } => DVec3::new(p.at * width, p.up * height, p.out),
+            Self::Rows { widths, height } => DVec3::new(p.at * width_at(widths, p.up), p.up * height, p.out),
             Self::Round { revolution, height } => revolution.place(p.at, (p.up + p.at - 0.5) * height, p.out),
             Self::Bent(sheet) => sheet.place(row, p),
         }
@@ -55,7 +59,7 @@ impl Surface {
     fn directions(&self, row: i32, p: &Place) -> [DVec3; 2] {
         match self {
             Self::Bent(sheet) => sheet.directions(row, p),
-            Self::Plane { .. } | Self::Round { .. } => [DVec3::X, DVec3::Y],
+            Self::Plane { .. } | Self::Rows { .. } | Self::Round { .. } => [DVec3::X, DVec3::Y],
         }
     }
 }
@@ -299,7 +303,7 @@ impl Laying<'_> {
         // Where a round begins anew within a repeat, stitches stand beside others than in their cell.
         let breaks = round && cell.is_some_and(|cell| !self.loops.wide.is_multiple_of(cell.wide as usize));
         // Whether it begins and ends at the sides, and not beside another field.
-        let flat = matches!(self.surface, Surface::Plane { .. });
+        let flat = matches!(self.surface, Surface::Plane { .. } | Surface::Rows { .. });
         let fields = &self.loops.courses[self.courses_of(course.row)];
         let ends = [course.first == 0, fields.iter().all(|f| f.first <= course.first)].map(|end| flat && end);
         for (k, piece) in pieces.iter().enumerate() {
@@ -372,8 +376,8 @@ impl Laying<'_> {
                 self.lead(course, k, piece, first, out);
                 return;
             }
-            // Bent round, or by short rows.
-            (Some((cell, r)), Surface::Round { .. } | Surface::Bent(_)) => {
+            // Bent round, or by short rows, or of rows of other widths.
+            (Some((cell, r)), Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_)) => {
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
                     let place = self.place_of(course, k, (cell, r), p, f64::from(g[1] - r as f32));
@@ -437,8 +441,23 @@ impl Laying<'_> {
     }
 }
 
-/// Radius of a tube of so many stitches.
-pub(super) fn tube(stitches: u32, width: f64, rows: f64, height: f64) -> Revolution {
-    let radius = width * f64::from(stitches) / TAU;
-    Revolution::new(&[DVec2::new(radius, 0.0), DVec2::new(radius, rows * height)])
+/// The width of a stitch so many rows up, between the middles of rows that have these.
+fn width_at(widths: &[f64], up: f64) -> f64 {
+    let along = (up - 0.5).clamp(0.0, (widths.len() - 1) as f64);
+    let row = (along as usize).min(widths.len().saturating_sub(2));
+    let next = widths[(row + 1).min(widths.len() - 1)];
+    widths[row] + (next - widths[row]) * (along - row as f64)
+}
+
+/// A tube of so many stitches, of rows with these widths of a stitch.
+pub(super) fn tube(stitches: u32, widths: &[f64], height: f64) -> Revolution {
+    let radius = |width: f64| width * f64::from(stitches) / TAU;
+    let (rows, even) = (widths.len(), widths.iter().all(|width| *width == widths[0]));
+    let ends = [0.0, rows as f64].map(|up| DVec2::new(radius(width_at(widths, up)), up * height));
+    if even {
+        return Revolution::new(&ends);
+    }
+    let middles = widths.iter().enumerate().map(|(row, width)| DVec2::new(radius(*width), (row as f64 + 0.5) * height));
+    let profile: Vec<DVec2> = [ends[0]].into_iter().chain(middles).chain([ends[1]]).collect();
+    Revolution::new(&profile)
 }

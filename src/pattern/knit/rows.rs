@@ -1,6 +1,6 @@
 //! The rows of a piece as they are worked: as the chart has them, with sides that hold.
 
-use super::{Closing, Knit, Repeat, YARN_PER_STITCH, cell::Cell, gaps, short_rows};
+use super::{Closing, Knit, Repeat, YARN_PER_STITCH, cell::Cell, gaps, kinds, short_rows};
 use crate::pattern::{
     MAX_POINTS,
     chart::{Act, ChartError, Stitch},
@@ -118,7 +118,10 @@ impl Knit {
     pub(super) fn next(&self, rows: &[Vec<Stitch>]) -> Option<Vec<Stitch>> {
         let bound_off = self.is_finished() && self.rims.top == Closing::BoundOff && self.repeat().is_some();
         let last = rows.last().filter(|_| bound_off)?;
-        let next = self.chart.work(self.stitches, self.rows + 1, u64::MAX).ok()?.pop()?;
+        let next = match kinds::in_sections(rows) {
+            true => last.clone(),
+            false => self.chart.work(self.stitches, self.rows + 1, u64::MAX).ok()?.pop()?,
+        };
         let is_plain = |s: &Stitch| s.act == Act::Draw && s.parents == 1 && s.layer == 0 && !s.twisted;
         (next.len() == last.len() && next.iter().all(is_plain)).then_some(next)
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Edges, Form, Knit, STITCHES_PER_SQUARE};
+use super::{Edges, Form, Knit, Knitted, STITCHES_PER_SQUARE};
 use crate::{
     math::words,
     pattern::{
@@ -314,10 +314,11 @@ impl Form {
 }
 
 impl Knit {
-    /// How large it is, where stitches have this width and rows this distance.
-    pub fn measures(&self, [width, height]: [f64; 2]) -> Measures {
-        let widths = self.widths().unwrap_or_default();
-        let [fewest, most] = widths.iter().fold([self.stitches; 2], |[a, b], &row| [a.min(row), b.max(row)]);
+    /// How large it came out.
+    pub fn measures(&self, made: &Knitted) -> Measures {
+        let height = made.gauge[1];
+        let counts = self.widths().unwrap_or_default();
+        let [fewest, most] = counts.iter().fold([self.stitches; 2], |[a, b], &row| [a.min(row), b.max(row)]);
         let (across, up) = match &self.form {
             Form::Revolution(profile) => {
                 let surface = Revolution::new(profile);
@@ -326,7 +327,9 @@ impl Knit {
                 (around.fold([f64::MAX, 0.0], |[a, b], way| [a.min(way), b.max(way)]), surface.length())
             }
             Form::Flat | Form::Tube => {
-                ([fewest, most].map(|stitches| f64::from(stitches) * width), f64::from(self.rows) * height)
+                let first = f64::from(self.stitches) * made.widths.first().unwrap_or(&made.gauge[0]);
+                let wide = counts.iter().zip(&made.widths).map(|(count, width)| f64::from(*count) * width);
+                (wide.fold([first; 2], |[a, b], row| [a.min(row), b.max(row)]), f64::from(self.rows) * height)
             }
         };
         Measures { stitches: [fewest, most], across, up }

@@ -446,3 +446,66 @@ fn what_does_not_hold_together_is_told() {
         "{wrong}"
     );
 }
+
+/// One decrease far above does not change the size of the stitches below it: a piece that has no repeat is as wide and high as plain
+/// stockinette is.
+#[test]
+fn shaping_does_not_change_the_gauge() {
+    let piece = |chart: &[&str], form: Form| Knit {
+        chart: Chart::parse(chart).unwrap(),
+        stitches: 22,
+        rows: 24,
+        form,
+        ..knit("stockinette", 22, 24)
+    };
+    for form in [Form::Flat, Form::Tube] {
+        let plain = piece(&["24: k"], form.clone()).gauge();
+        for chart in [
+            &["20: k", "k10 k2tog k10", "3: k"],
+            &["20: k", "k10 kfb k11", "3: k"],
+            &["10: k", "k9 bo4 k9", "k9 co4 k9"],
+        ] {
+            let gauge = piece(chart, form.clone()).gauge();
+            for (own, plain) in gauge.iter().zip(plain) {
+                assert!((own / plain - 1.0).abs() < 0.01, "{chart:?} {form:?}: {gauge:?} beside {plain}");
+            }
+        }
+    }
+}
+
+/// A welt of ribbing is drawn in, and stockinette above it is as wide as it is by itself.
+#[test]
+fn sections_are_as_wide_as_their_stitches() {
+    let alone = |pattern: &str| knit(pattern, 20, 20).gauge()[0];
+    let (rib, plain) = (alone("rib2x2"), alone("stockinette"));
+    for (chart, form) in [
+        (["16: k2 p2", "16: k"], Form::Flat),
+        (["16: k2 p2", "16: k"], Form::Tube),
+        (["16: k2 p2", "10: k"], Form::Flat),
+    ] {
+        let piece = Knit {
+            chart: Chart::parse(&chart).unwrap(),
+            stitches: 24,
+            rows: chart.iter().map(|line| line[..2].parse::<u32>().unwrap()).sum(),
+            form: form.clone(),
+            ..knit("stockinette", 24, 32)
+        };
+        let made = piece.knitted(1.0).unwrap();
+        let last = made.widths.len() - 1;
+        assert!((made.widths[4] / rib - 1.0).abs() < 0.02, "{form:?}: {} of {rib}", made.widths[4]);
+        assert!((made.widths[last - 2] / plain - 1.0).abs() < 0.02, "{form:?}: {} of {plain}", made.widths[last - 2]);
+        // The yarns themselves are so wide, within a stitch and the loops of both sides.
+        let wide = |rows: std::ops::Range<f32>| {
+            let points = made.strands.iter().flat_map(|s| s.curve.points.iter().zip(&s.coordinates));
+            let of_rows =
+                points.filter(|(_, at)| rows.contains(&at[1]) && (2.0..22.0).contains(&at[0])).map(|(p, _)| p.x);
+            of_rows.fold([f64::MAX, f64::MIN], |[a, b], x| [a.min(x), b.max(x)])
+        };
+        let ratio = |rows| {
+            let [from, to] = wide(rows);
+            to - from
+        };
+        let (welt, body) = (ratio(3.0..10.0), ratio(22.0..25.0));
+        assert!((0.55..0.8).contains(&(welt / body)), "{form:?}: a welt {welt} wide below {body}");
+    }
+}

@@ -48,7 +48,7 @@ impl KnitPlan {
     fn origin(&self, made: &Knitted) -> String {
         let [across, up] = made.gauge.map(|mm| 100.0 / mm);
         let Knit { rows, form, .. } = &self.knit;
-        let Measures { stitches, across: size, up: height } = self.knit.measures(made.gauge);
+        let Measures { stitches, across: size, up: height } = self.knit.measures(made);
         let (stitches, width) = (from_to(stitches.map(|n| n.to_string())), from_to(size.map(|mm| format!("{mm:.0}"))));
         let size = match form {
             Form::Flat if self.knit.edges == Edges::Tile => format!(", period {:.4} x {height:.4} mm", size[1]),
