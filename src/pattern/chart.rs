@@ -16,7 +16,7 @@
 //! | `c4f`, `c4b` | a cable: two stitches cross two; those in front move to the left (`f`) or to the right (`b`). From 2 to 24; the front has the odd one |
 //! | `t3f`, `t3b` | the same with purl stitches behind |
 //! | `2/1lc`, `2/1rc`, `2/1lpc`, `2/1rpc` | the same in other words: two stitches in front of one, to the left or right, knit or purl behind |
-//! | `-`, `-4` | stitches that stay on the needle: a short row turns beside them, and the next row begins there |
+//! | `-`, `-4` | stitches that stay on the needle: a short row turns beside them, and the next row begins there; one that is slipped beside them by both rows is wrapped |
 //! | `ds` | a double stitch: slipped with the yarn pulled over the needle; the first plain stitch after such a turn is one by itself |
 //! | `bo4`, `bop4` | stitches that are bound off, knitted or purled: each is passed over the next one, the last one over the `k` or `p` behind them |
 //! | `co4` | stitches that are cast on within a row, as backward loops: over what the row below has bound off, or at a side |

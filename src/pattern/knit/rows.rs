@@ -24,6 +24,9 @@ struct Held {
 impl Knit {
     /// Whether every loop is worked before it is held for too long.
     fn check_held(&self, rows: &[Vec<Stitch>]) -> Result<(), ChartError> {
+        // What the yarn wraps where it turns is not drawn up by it.
+        let is_unworked = |s: Option<&Stitch>| s.is_some_and(|s| s.act == Act::Unworked);
+        let is_wrapped = |row: &[Stitch], j: usize| is_unworked(row.get(j + 1)) || j > 0 && is_unworked(row.get(j - 1));
         let is_held = |s: &Stitch| matches!(s.act, Act::Pass { .. } | Act::Tuck);
         if !rows.iter().flatten().any(is_held) {
             return Ok(());
@@ -37,6 +40,7 @@ impl Knit {
             for (j, s) in row.iter().enumerate() {
                 let before = below.get(s.first_parent as usize).copied().unwrap_or_default();
                 let own = match s.act {
+                    Act::Pass { .. } if is_wrapped(row, j) => before,
                     Act::Pass { .. } => Held { rows: before.rows + 1, slipped: before.slipped + 1 },
                     Act::Tuck => Held { rows: before.rows + 1, ..before },
                     Act::Unworked | Act::Double => before,

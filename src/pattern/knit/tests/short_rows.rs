@@ -1,6 +1,9 @@
 //! Short rows: which charts a yarn can go through, what is drawn through what where it turns, and the form of the cloth.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    f64::consts::{PI, TAU},
+};
 
 use super::{
     super::{
@@ -25,6 +28,11 @@ fn shaped(rows: &[&str]) -> Knit {
     let chart = Chart::parse(rows).unwrap();
     Knit { rows: chart.rows(), chart, ..knit("stockinette", 16, 1) }
 }
+
+/// The wedge with wraps, which lie where they are, and with wraps that are picked up: on needles that go to the right too.
+const WRAPPED: [&str; 8] = ["k", "k", "-4 sl k11", "-4 slwyif k11", "-8 sl k7", "-8 slwyif k7", "k", "k"];
+const PICKED_UP: [&str; 10] =
+    ["k", "k", "-3 sl k12", "-3 ds k9 sl -2", "-6 sl k6 ds -2", "-6 ds k3 sl -5", "k10 ds -5", "k", "k", "k"];
 
 /// Points in a frame that stands on the feet of a loop: across, up and out.
 fn upright(ring: &[DVec3], points: &[DVec3]) -> Vec<DVec3> {
@@ -81,7 +89,9 @@ fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
 
 #[test]
 fn a_yarn_turns_and_all_of_it_is_drawn_through() {
-    for (name, rows) in [("wedge", &WEDGE[..]), ("dart", &DART), ("band", &BAND)] {
+    let charts =
+        [("wedge", &WEDGE[..]), ("dart", &DART), ("band", &BAND), ("wrapped", &WRAPPED), ("picked up", &PICKED_UP)];
+    for (name, rows) in charts {
         let piece = shaped(rows);
         let mut made = Vec::new();
         let passes = passed(|| made = piece.strands(1.0).unwrap());
@@ -90,6 +100,34 @@ fn a_yarn_turns_and_all_of_it_is_drawn_through() {
         assert_eq!((made.len(), passes), (1, 0), "{name}");
         assert_eq!(undrawn(&piece), [], "{name}");
         assert!(found.share <= 0.02, "{name}: {found:?}");
+    }
+}
+
+/// How often a yarn goes around another, as both are seen from the front.
+fn turns_around(way: &[DVec3], leg: &[DVec3]) -> f64 {
+    let middle = leg.iter().sum::<DVec3>() / leg.len() as f64;
+    let angle = |p: &DVec3| (p.z - middle.z).atan2(p.x - middle.x);
+    let by = |w: &[DVec3]| (angle(&w[1]) - angle(&w[0]) + PI).rem_euclid(TAU) - PI;
+    way.windows(2).map(by).sum::<f64>() / TAU
+}
+
+#[test]
+fn a_wrap_lies_around_its_stitch() {
+    let piece = shaped(&WRAPPED);
+    let stitches = yarn_of_stitches(&piece, true);
+    // Behind the stitch on the way there, in front of it on the way back, and around both of its legs.
+    for (row, column) in [(2, 4), (4, 8)] {
+        let [there, back] = [row, row + 1].map(|r| &stitches[&(r, column)]);
+        let own = &stitches[&(row - 1, column)];
+        let legs: Vec<DVec3> = own.iter().filter(|p| (p.y - there[there.len() / 2].y).abs() < 1.5).copied().collect();
+        let [there_z, back_z, own_z] =
+            [&there[..], &back[..], &legs[..]].map(|p| p.iter().map(|p| p.z).sum::<f64>() / p.len() as f64);
+        let mut way = there.clone();
+        way.reverse();
+        way.extend(back);
+        let around = turns_around(&way, &legs);
+        eprintln!("{there_z:.2} {own_z:.2} {back_z:.2} {around:.2}");
+        assert!(there_z < own_z && own_z < back_z && around.abs() > 0.4, "{there_z} {own_z} {back_z} {around}");
     }
 }
 
