@@ -33,6 +33,8 @@ pub(super) struct Head {
     pub(super) odd: Option<bool>,
     /// "Set-up row": whether it comes before the first one.
     pub(super) set_up: bool,
+    /// "Short row 1": whether its number is one of short rows.
+    pub(super) short: bool,
 }
 
 /// Which rows are repeated.
@@ -76,6 +78,8 @@ pub(super) enum Ending {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Copies {
     pub(super) which: Which,
+    /// Whether its numbers are those of short rows.
+    pub(super) short: bool,
     pub(super) often: Often,
     /// How high the piece is then, if that is said, mm.
     pub(super) height: Option<f64>,
@@ -159,7 +163,7 @@ fn head_tokens(text: &str) -> Vec<Token> {
 }
 
 fn is_row(word: &str) -> bool {
-    is_round(word) || matches!(word, "row" | "rows" | "r")
+    is_round(word) || matches!(word, "row" | "rows" | "r" | "sr")
 }
 
 fn is_round(word: &str) -> bool {
@@ -249,6 +253,8 @@ impl Reading {
             ":" | "." => return Ok(Then::EndBehind),
             // "All even-numbered rows"
             "-" if next == "numbered" => {}
+            "short" if next == "-" || is_row(next) => head.short = true,
+            "-" if head.short && !self.known && is_row(next) => {}
             // "1st row - k2"
             "-" | "\u{2013}" | "\u{2014}" if !is_number(next) => return Ok(Then::EndBehind),
             "-" | "\u{2013}" | "\u{2014}" => self.range = true,
@@ -257,6 +263,7 @@ impl Reading {
             word if is_row(word) => {
                 self.known = true;
                 head.round |= is_round(word);
+                head.short |= word == "sr";
                 self.goes_on |= head.rows.is_empty();
             }
             word if word.starts_with(['(', '[']) && plain_words(word).iter().any(|w| is_all(w)) => {
@@ -420,10 +427,23 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
             Line::CastOn(number(n).unwrap_or_default())
         }
         ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,
+        ref words if is_title_of_short_rows(text, words) => Line::Nothing,
         ["break" | "cut", "yarn" | "the", ..] | ["weave", "in", ..] | ["worked", "over", ..] => Line::Nothing,
         ref words if binds_off(words) && !words.iter().any(|w| number(w).is_some()) => Line::BindOff,
         _ => Line::More(text.to_owned()),
     })
+}
+
+/// "Short rows:", "Work short rows as follows:", "Short-row shaping".
+fn is_title_of_short_rows(text: &str, words: &[&str]) -> bool {
+    let filler = |w: &&str| {
+        matches!(
+            *w,
+            "work" | "begin" | "shape" | "with" | "as" | "follows" | "shaping" | "the" | "heel" | "shoulder" | "back"
+        ) || matches!(*w, "short" | "row" | "rows" | "short-row" | "short-rows" | "german" | "now" | "section" | "neck")
+    };
+    let names = words.iter().any(|w| w.starts_with("short")) && words.iter().all(filler);
+    names && (text.ends_with(':') || words.contains(&"shaping") || words.contains(&"section"))
 }
 
 /// Where in a line another sentence begins that is about rows: "Row 1: Knit. Row 2: Purl."
@@ -458,6 +478,12 @@ fn begins(text: &str) -> bool {
 impl Copies {
     /// "Repeat rows 1 and 2", "rep the last 4 rows twice more", "these 4 rows form the pattern", "cont in patt until ...".
     pub(super) fn read(words: &[&str], text: &str, line: usize) -> Result<Option<Self>> {
+        // "Rep short rows 1 and 2"
+        let is_short = words.windows(2).any(|w| w[0] == "short" && is_row(w[1]))
+            || words.iter().any(|w| w.starts_with("short-row"));
+        let words: Vec<&str> =
+            words.iter().filter(|w| !(is_short && **w == "short")).map(|w| w.trim_start_matches("short-")).collect();
+        let words = &words[..];
         let (verb, rest) = match words {
             [
                 verb @ ("rep" | "repeat" | "work" | "continue" | "cont"),
@@ -514,7 +540,7 @@ impl Copies {
             (_, None) if height.is_some() || goes_on(rest) => Often::Open,
             (_, None) => return error(line, format!("\"{}\" says no end of the repeat", short(&rest.join(" "))), ENDS),
         };
-        Ok(Some(Self { which, often, height, ending }))
+        Ok(Some(Self { which, short: is_short, often, height, ending }))
     }
 }
 

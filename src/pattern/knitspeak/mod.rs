@@ -7,19 +7,22 @@
 //! the next one begins there.
 
 mod lines;
+mod needle;
 mod parser;
 mod rows;
 mod step;
 #[cfg(test)]
 mod tests;
+mod turns;
 mod words;
 
 use std::fmt;
 
+use needle::Needle;
 pub use rows::EveryFew;
 use rows::{Again, Until, written};
+use turns::{Stop, Turn};
 
-use super::chart::{Act, Chart};
 use crate::input::diagnostic::excerpt;
 
 /// Why instructions could not be followed.
@@ -59,8 +62,8 @@ const MOST_ROUNDS: u32 = 1_000_000;
 const MOST_NESTED: usize = 16;
 
 const KNOWN: &str = "k, p, tbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, pfb, m1l, m1r, m1p, sl1, \
-                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f, 2/1 LC and LT are known; write repeats as *...; \
-                     rep from * to end, [...] 3 times";
+                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f, 2/1 LC and LT are known; write \
+                     repeats as *...; rep from * to end, [...] 3 times";
 
 /// Instructions that have been read: which rows they are of, but not over how many stitches.
 #[derive(Clone, Debug)]
@@ -184,23 +187,18 @@ impl Instructions {
 
     /// As [`Self::work`], for at least `otherwise` rows where nothing is asked for.
     fn worked(&self, cast_on: u32, asked: Asked, otherwise: usize) -> Result<Worked> {
-        let reads = |row: &Written| row.body.reads_the_row_below();
-        let mut needle = Needle {
-            found: cast_on,
-            behind: 0,
-            faces: self.rows.iter().any(reads).then(Vec::new),
-            rows: Vec::with_capacity(self.rows.len()),
-        };
+        let mut needle = Needle::new(cast_on, &self.rows);
         let (set_up, pattern) = self.rows.split_at(self.set_up);
         set_up.iter().try_for_each(|row| needle.work(row))?;
         let begun = needle.found;
         pattern.iter().try_for_each(|row| needle.work(row))?;
-        let shaped = needle.found != cast_on;
+        // Rows that turn are there as often as they are told, as those that change the number of stitches.
+        let shaped = needle.found != cast_on || self.turns();
         let more_asked = asked != Asked::Nothing;
         let least = if let Asked::Rows(rows) = asked { rows as usize } else { otherwise };
         // Over an odd number of rows the other side comes next.
-        let other_side_next = self.rows.len() % 2 == 1 && self.rows[0].side != self.second_side();
-        let from_both_sides = !shaped && needle.behind == 0 && other_side_next && self.rows.len() < least;
+        let other_side_next = needle.next != self.rows[0].side;
+        let from_both_sides = !shaped && needle.behind == 0 && other_side_next && needle.rows.len() < least;
         // What set-up rows are for is repeated, whether it is told or not; so is what is shaped, where more rows are asked for.
         let goes_on = !pattern.is_empty()
             && !self.ends
@@ -248,8 +246,7 @@ impl Instructions {
     fn copy(&self, again: &Again, needle: &Needle, k: usize) -> Written {
         let row = &self.rows[again.rows[k % again.rows.len()]];
         // Rows go on by turns, whichever they repeat.
-        let side = if needle.rows.len().is_multiple_of(2) { self.rows[0].side } else { self.second_side() };
-        Written { line: again.line, side, count: None, ..row.clone() }
+        Written { line: again.line, side: needle.next, count: None, ..row.clone() }
     }
 
     /// Repeats rows until there are so many stitches.
@@ -303,75 +300,10 @@ impl Instructions {
         }
     }
 
-    /// The side of the rows after the first one and every other one from there on.
-    fn second_side(&self) -> Side {
-        match self.rows.get(1) {
-            Some(row) => row.side,
-            None if self.rows[0].round => self.rows[0].side,
-            None => self.rows[0].side.other(),
-        }
+    /// Whether any row turns before its end.
+    fn turns(&self) -> bool {
+        self.rows.iter().any(|row| row.body.turns())
     }
-}
-
-/// The stitches on the needle, and the rows below them.
-#[derive(Clone)]
-struct Needle {
-    found: u32,
-    /// Those that the row before has left when it turned.
-    behind: u32,
-    /// Which of them show a purl stitch on the right side, from the left, if anyone asks.
-    faces: Option<Vec<bool>>,
-    rows: Vec<String>,
-}
-
-impl Needle {
-    fn work(&mut self, row: &Written) -> Result<()> {
-        let number = self.rows.len() + 1;
-        let mut place = Place {
-            line: row.line,
-            row: number,
-            side: row.side,
-            found: self.found,
-            left: self.found - self.behind,
-            rounds: MOST_ROUNDS,
-            faces: self.faces.as_deref().unwrap_or_default(),
-            steps: Vec::new(),
-        };
-        row.body.work(self.behind, &mut place)?;
-        let (worked, ahead) = (place.steps, place.left);
-        let made = worked.iter().map(|s| s.makes.saturating_mul(s.count)).fold(0, u32::saturating_add);
-        if made == 0 && worked.iter().any(|s| s.name.starts_with("bo")) {
-            let problem = format!("row {number} binds off all stitches");
-            return error(row.line, problem, "the piece is bound off by a line of its own: Bind off");
-        }
-        if made == 0 || made > MOST_STITCHES {
-            return error(row.line, format!("row {number} makes {made} stitches"), "1 to 20000 fit on a needle");
-        }
-        if let Some(count) = row.count.filter(|count| *count != made) {
-            let problem = format!("row {number} makes {made} stitches, and says that it has {count}");
-            return error(row.line, problem, "another number of `stitches` fits, or the row is another one");
-        }
-        let text = row.side.seen_from_right(worked, row.line, number)?;
-        if let Some(faces) = &mut self.faces {
-            *faces = shown(&text, faces, self.found);
-        }
-        (self.found, self.behind) = (made, ahead);
-        self.rows.push(text);
-        Ok(())
-    }
-}
-
-/// Which stitches of a row show a purl stitch on the right side, where those below show such `faces`.
-fn shown(row: &str, faces: &[bool], found: u32) -> Vec<bool> {
-    let worked = Chart::parse(&[row]).and_then(|chart| chart.work(found, 1, u64::MAX)).unwrap_or_default();
-    let face = |s: &super::chart::Stitch| match s.act {
-        Act::Draw => s.purl,
-        Act::Pass { .. } | Act::Tuck | Act::Unworked | Act::Double => {
-            faces.get(s.first_parent as usize).copied().unwrap_or_default()
-        }
-        Act::Over | Act::Lift { .. } | Act::Bobble | Act::BindOff | Act::CastOn => s.purl,
-    };
-    worked.into_iter().flatten().filter(|s| s.act != Act::BindOff).map(|s| face(&s)).collect()
 }
 
 /// Which side faces the knitter.
@@ -388,9 +320,18 @@ struct Written {
     side: Side,
     /// Whether it goes round.
     round: bool,
+    /// The side that it says it is on.
+    said: Option<Side>,
     /// How many stitches it says that it has in the end.
     count: Option<u32>,
     body: Sequence,
+}
+
+impl Written {
+    /// How many times it brings the next row to the other side than a row that goes from end to end.
+    fn flips(&self) -> usize {
+        self.body.parts().count().saturating_sub(1)
+    }
 }
 
 /// One or more of the same step.
@@ -414,158 +355,28 @@ enum Look {
 #[derive(Clone, Debug)]
 enum Item {
     Steps(Steps),
-    /// A step until so many stitches are left.
-    Until(Steps, u32),
-    /// Stitches that look so, until so many are left.
-    Look(Look, u32),
+    /// A step as far as that.
+    Until(Steps, Stop),
+    /// Stitches that look so, as far as that.
+    Look(Look, Stop),
     /// A sequence so many times.
     Times(Sequence, u32),
-    /// A sequence until so many stitches are left.
-    Repeat(Sequence, u32),
-    /// The row ends here.
-    Turn,
+    /// A sequence as far as that.
+    Repeat(Sequence, Stop),
+    /// The yarn turns.
+    Turn(Turn),
+    /// Stitches around which wraps lie, which are worked with them.
+    Wrapped(Steps),
+    /// A double stitch, which is worked as one.
+    Doubled(Steps),
+    /// Wraps are worked with their stitches, in this row or from here on.
+    PickUp {
+        always: bool,
+    },
 }
 
 #[derive(Clone, Debug, Default)]
 struct Sequence(Vec<Item>);
-
-/// How far a row has come.
-struct Place<'a> {
-    line: usize,
-    row: usize,
-    side: Side,
-    /// Stitches that it has found, and those that are left.
-    found: u32,
-    left: u32,
-    /// Rounds of repeats that are left: repeats of what takes no stitch would never end.
-    rounds: u32,
-    faces: &'a [bool],
-    steps: Vec<Steps>,
-}
-
-impl Place<'_> {
-    fn wrong<T>(&self, problem: &str, hint: impl Into<String>) -> Result<T> {
-        error(self.line, format!("row {} {problem}", self.row), hint)
-    }
-
-    fn push(&mut self, steps: Steps) {
-        match self.steps.last_mut() {
-            Some(last) if last.name == steps.name => last.count = last.count.saturating_add(steps.count),
-            _ if steps.count > 0 => self.steps.push(steps),
-            _ => {}
-        }
-    }
-
-    /// Knits the next stitches, or purls them.
-    fn look(&mut self, look: Look, count: u32) -> Result<()> {
-        if look == Look::Below && self.faces.is_empty() {
-            return self
-                .wrong("is the first one, and no stitches are there to look at", "say which are knitted: k2, p2");
-        }
-        for _ in 0..count {
-            let at = (self.found - self.left) as usize;
-            let purl = match (look, self.side) {
-                (Look::Below, Side::Right) => self.faces.iter().rev().nth(at).copied().unwrap_or_default(),
-                (Look::Below, Side::Wrong) => self.faces.get(at).copied().unwrap_or_default(),
-                (look, _) => look == Look::Purl,
-            };
-            let name = if purl == (self.side == Side::Right) { "p" } else { "k" };
-            self.push(Steps { name: name.to_owned(), takes: 1, makes: 1, count: 1 });
-            self.left -= 1;
-        }
-        Ok(())
-    }
-}
-
-impl Sequence {
-    /// Whether what is worked depends on how the stitches below look.
-    fn reads_the_row_below(&self) -> bool {
-        self.0.iter().any(|item| match item {
-            Item::Look(look, _) => *look == Look::Below,
-            Item::Times(sequence, _) | Item::Repeat(sequence, _) => sequence.reads_the_row_below(),
-            Item::Steps(_) | Item::Until(..) | Item::Turn => false,
-        })
-    }
-
-    /// Works a row that begins where `behind` stitches were left.
-    fn work(&self, behind: u32, place: &mut Place<'_>) -> Result<()> {
-        let unworked = |count| Steps { name: "-".to_owned(), takes: 1, makes: 1, count };
-        place.push(unworked(behind));
-        self.follow(place)?;
-        let left = place.left;
-        if left > 0 && !matches!(self.0.last(), Some(Item::Turn)) {
-            let problem = format!("leaves {left} of {} stitches unworked", place.found - behind);
-            return place.wrong(&problem, "rep from * to end, `turn` for a short row, or another number of `stitches`");
-        }
-        place.push(unworked(left));
-        Ok(())
-    }
-
-    fn takes(&self) -> u32 {
-        let of = |item: &Item| match item {
-            Item::Steps(steps) => steps.takes.saturating_mul(steps.count),
-            Item::Times(sequence, times) => sequence.takes().saturating_mul(*times),
-            Item::Until(..) | Item::Look(..) | Item::Repeat(..) | Item::Turn => 0,
-        };
-        self.0.iter().map(of).fold(0, u32::saturating_add)
-    }
-
-    fn follow(&self, place: &mut Place<'_>) -> Result<()> {
-        let Some(fewer) = place.rounds.checked_sub(1) else {
-            return place.wrong(&format!("repeats more than {MOST_ROUNDS} times"), "fewer repeats");
-        };
-        place.rounds = fewer;
-        for item in &self.0 {
-            match item {
-                Item::Steps(steps) => {
-                    let takes = steps.takes.saturating_mul(steps.count);
-                    if takes > place.left {
-                        let problem = format!("needs {takes} stitches for {}, {} are left", steps.name, place.left);
-                        return place.wrong(&problem, "another number of `stitches` fits");
-                    }
-                    place.left -= takes;
-                    place.push(steps.clone());
-                }
-                Item::Until(steps, last) => {
-                    let room = place.left.saturating_sub(*last);
-                    if steps.takes == 0 || !room.is_multiple_of(steps.takes) {
-                        return place.wrong(&format!("has {room} stitches, which {} does not fit", steps.name), KNOWN);
-                    }
-                    place.push(Steps { count: room / steps.takes, ..steps.clone() });
-                    place.left -= room;
-                }
-                Item::Look(look, last) => place.look(*look, place.left.saturating_sub(*last))?,
-                Item::Turn => {}
-                Item::Times(sequence, times) => {
-                    for _ in 0..*times {
-                        sequence.follow(place)?;
-                    }
-                }
-                Item::Repeat(sequence, last) => {
-                    let takes = sequence.takes();
-                    let room = place.left.saturating_sub(*last);
-                    if takes == 0 || room == 0 || !room.is_multiple_of(takes) {
-                        let rest = room.checked_rem(takes).unwrap_or(0);
-                        let problem = format!("repeats over {takes} stitches, but has {room} for it");
-                        let fewer = if rest > 0 && room > rest {
-                            format!("{rest} fewer `stitches`, or ")
-                        } else {
-                            String::new()
-                        };
-                        return place.wrong(&problem, format!("{fewer}{} more `stitches` fit", takes - rest));
-                    }
-                    for _ in 0..room / takes {
-                        sequence.follow(place)?;
-                    }
-                }
-            }
-            if place.steps.len() > MOST_STITCHES as usize {
-                return place.wrong(&format!("has more than {MOST_STITCHES} steps"), "fewer repeats");
-            }
-        }
-        Ok(())
-    }
-}
 
 impl Side {
     fn name(self) -> &'static str {

@@ -60,6 +60,10 @@ struct Reading {
     rows: BTreeMap<usize, Written>,
     /// How many rows come before the one that is written as the first: set-up rows, and others without a number.
     set_up: usize,
+    /// After which numbers another row stands that has none of its own: a short row.
+    extra: Vec<usize>,
+    /// The short rows by their numbers, and where they are.
+    short: BTreeMap<usize, usize>,
     /// Rows that are told to be like all others of a side, and how far they are apart.
     fill: Vec<(usize, usize, Written)>,
     first_side: Side,
@@ -81,6 +85,8 @@ pub(super) fn written(text: &str) -> Result<Instructions> {
     let mut reading = Reading {
         rows: BTreeMap::new(),
         set_up: 0,
+        extra: Vec::new(),
+        short: BTreeMap::new(),
         fill: Vec::new(),
         first_side: Side::Right,
         is_sided: false,
@@ -154,7 +160,7 @@ impl Reading {
                 self.set_up = self.last();
             }
             self.is_numbered = true;
-            head.rows.iter_mut().for_each(|row| *row = self.place(*row));
+            head.rows = self.places(&head);
         }
         if head.next > 0 {
             self.fill_up(0);
@@ -169,7 +175,9 @@ impl Reading {
         }
         self.round |= head.round;
         if let (Some(side), Some(&first)) = (head.side, head.rows.first()) {
-            let first_side = if (first % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
+            let flips = self.rows.range(..first).map(|(_, row)| row.flips()).sum::<usize>();
+            let first_side =
+                if ((first + flips) % 2 == 1) == (side == Side::Right) { Side::Right } else { Side::Wrong };
             if self.is_sided && !self.round && first_side != self.first_side {
                 let problem = format!(
                     "{} is said to be on the {} side, and other rows say otherwise",
@@ -190,14 +198,21 @@ impl Reading {
                     let row = self.name(row);
                     return error(line, format!("{row} repeats a row that is not written before it"), KNOWN);
                 };
-                self.insert(row, Written { line, count: None, ..copy })?;
+                self.insert(row, Written { line, said: None, count: None, ..copy })?;
             }
             return Ok(());
         }
         let number = head.rows.first().copied().unwrap_or_default();
         let (body, count) = lines::counted(body);
         let body = parse_body(body, line, number)?;
-        let row = Written { line, side: Side::Right, round: false, count, body };
+        let row = Written {
+            line,
+            side: Side::Right,
+            round: false,
+            said: head.side.filter(|_| head.rows.len() == 1),
+            count,
+            body,
+        };
         if head.rows.is_empty() {
             // Rows of a side, of whichever numbers.
             let apart = head.all.unwrap_or(2);
@@ -209,14 +224,14 @@ impl Reading {
                 (None, side) if side == Some(self.first_side) => 1,
                 _ => 2,
             };
-            self.fill.push((first, apart, Written { count: None, ..row }));
+            self.fill.push((first, apart, Written { said: None, count: None, ..row }));
             return Ok(());
         }
         for &number in &head.rows {
             self.insert(number, row.clone())?;
         }
         if let (Some(apart), Some(&first)) = (head.all, head.rows.first()) {
-            self.fill.push((first, apart, Written { count: None, ..row }));
+            self.fill.push((first, apart, Written { said: None, count: None, ..row }));
         }
         Ok(())
     }
@@ -234,14 +249,61 @@ impl Reading {
 
     /// Where a row is that is written with such a number: 0 is none.
     fn place(&self, row: usize) -> usize {
-        if row == 0 { 0 } else { row.saturating_add(self.set_up) }
+        let extra = self.extra.iter().filter(|before| **before < row).count();
+        if row == 0 { 0 } else { row.saturating_add(self.set_up + extra) }
+    }
+
+    /// Where the rows of a head are. Short rows that are counted from 1 stand behind the others.
+    fn places(&mut self, head: &Head) -> Vec<usize> {
+        let mut places = Vec::with_capacity(head.rows.len());
+        for &row in &head.rows {
+            let last = self.number(self.last());
+            let goes_on = self
+                .short
+                .last_key_value()
+                .is_some_and(|(number, place)| number + 1 == row && *place != self.place(row - 1));
+            let place = if head.short && last > 0 && (row <= last || goes_on) {
+                self.extra.push(last);
+                self.last() + 1 + places.len()
+            } else {
+                self.place(row)
+            };
+            if head.short {
+                self.short.insert(row, place);
+            }
+            places.push(place);
+        }
+        places
+    }
+
+    /// Where rows of such numbers are, in a repeat: with those that stand between them.
+    fn repeated(&self, rows: &[usize]) -> Vec<usize> {
+        let mut places = Vec::with_capacity(rows.len());
+        for (k, &row) in rows.iter().enumerate() {
+            let next = match rows.get(k + 1) {
+                Some(next) if *next == row.saturating_add(1) => self.place(*next),
+                _ => self.place(row).saturating_add(1),
+            };
+            places.extend(self.place(row)..next);
+        }
+        places
+    }
+
+    /// The number of a row, or of the one before it that has one: 0 for set-up rows.
+    fn number(&self, place: usize) -> usize {
+        let mut number = place.saturating_sub(self.set_up);
+        while self.place(number) > place {
+            number -= 1;
+        }
+        number
     }
 
     /// What a row is called as it is written.
-    fn name(&self, row: usize) -> String {
-        match row.checked_sub(self.set_up) {
-            Some(number @ 1..) => format!("row {number}"),
-            _ => format!("set-up row {row}"),
+    fn name(&self, place: usize) -> String {
+        match self.number(place) {
+            0 => format!("set-up row {place}"),
+            number if self.place(number) == place => format!("row {number}"),
+            number => format!("the row behind row {number}"),
         }
     }
 
@@ -270,7 +332,7 @@ impl Reading {
         }
         // So that the last row of the repeat has its partner.
         let named = match &copies.which {
-            Which::Rows(rows) => self.place(rows.iter().copied().max().unwrap_or(0)),
+            Which::Rows(rows) if !copies.short => self.place(rows.iter().copied().max().unwrap_or(0)),
             _ => 0,
         };
         let more = named.min(MOST_ROWS).saturating_sub(self.last());
@@ -283,7 +345,17 @@ impl Reading {
             return error(line, problem, "as many as are written at most");
         }
         let rows: Vec<usize> = match &copies.which {
-            Which::Rows(rows) => rows.iter().map(|row| self.place(*row)).collect(),
+            Which::Rows(rows) if copies.short => {
+                let Some(places) = rows.iter().map(|row| self.short.get(row).copied()).collect() else {
+                    return error(
+                        line,
+                        "short rows are repeated that are not written before",
+                        "as in Short row 1 (RS): k20, w&t",
+                    );
+                };
+                places
+            }
+            Which::Rows(rows) => self.repeated(rows),
             Which::Last(count) => (last + 1 - (*count).min(last + 1)..=last).collect(),
             Which::From(first) => (self.place(*first)..=last).collect(),
             Which::All => (self.set_up + 1..=last).collect(),
@@ -318,7 +390,7 @@ impl Reading {
         };
         if let (Some(Ending::Row(number)), Some(at)) = (copies.ending, count.checked_sub(1)) {
             let last = rows[at % rows.len()];
-            if last != self.place(number) {
+            if self.number(last) != number {
                 let problem = format!("the repeats end with {}, and are to end with row {number}", self.name(last));
                 return error(line, problem, "another number of rows, or leave out what it ends with");
             }
@@ -328,7 +400,7 @@ impl Reading {
         }
         let copies: Vec<Written> = (0..count).map(|k| self.rows[&rows[k % rows.len()]].clone()).collect();
         for (k, copy) in copies.into_iter().enumerate() {
-            self.insert(last + 1 + k, Written { line, count: None, ..copy })?;
+            self.insert(last + 1 + k, Written { line, said: None, count: None, ..copy })?;
         }
         self.ends = true;
         Ok(())
@@ -343,7 +415,15 @@ impl Reading {
 
     /// After how many of the rows the piece may end, by what is said of its last row.
     fn every_few(&self, rows: &[Written]) -> Result<Option<EveryFew>> {
-        let Some((ending, line)) = self.ending else { return Ok(None) };
+        let parts = |row: &Written| row.body.parts().count();
+        let count = rows.iter().map(parts).sum::<usize>();
+        let Some((ending, line)) = self.ending else {
+            // No yarn hangs at an edge within short rows: they are worked to their end.
+            let again =
+                self.again.iter().find(|a| a.until == Until::Open && a.rows.iter().any(|r| rows[*r].body.turns()));
+            let apart = again.map(|again| again.rows.iter().map(|r| parts(&rows[*r])).sum::<usize>());
+            return Ok(apart.map(|apart| EveryFew { apart: apart as u32, rest: (count % apart) as u32 }));
+        };
         let found = match ending {
             Ending::On(Side::Right) if self.round => None,
             Ending::On(Side::Wrong) if self.round => {
@@ -352,19 +432,19 @@ impl Reading {
             Ending::On(side) => Some(EveryFew { apart: 2, rest: u32::from(side == rows[0].side) }),
             Ending::Row(number) => {
                 let Some(Again { rows: repeated, .. }) = &self.again else { return Ok(None) };
-                let place = self.place(number).wrapping_sub(1);
+                let place = self.repeated(&[number]).pop().unwrap_or_default().wrapping_sub(1);
                 let Some(at) = repeated.iter().position(|row| *row == place) else {
                     let problem = format!("row {number} is to be the last, and is not repeated");
                     return error(line, problem, "ending with one of the rows that are repeated");
                 };
                 // The repeat begins behind the rows that are written.
-                let apart = repeated.len();
-                Some(EveryFew { apart: apart as u32, rest: ((rows.len() + at + 1) % apart) as u32 })
+                let worked = |repeated: &[usize]| repeated.iter().map(|row| parts(&rows[*row])).sum::<usize>();
+                let apart = worked(repeated);
+                Some(EveryFew { apart: apart as u32, rest: ((count + worked(&repeated[..=at])) % apart) as u32 })
             }
         };
-        let count = rows.len();
         if self.again.is_none() && found.is_some_and(|ending| !ending.holds(count as u32)) {
-            let side = rows[count - 1].side.name();
+            let side = rows[rows.len() - 1].side.name();
             let problem = format!("row {count} is the last and on the {side} side");
             return error(line, problem, "a row more or fewer, or leave out what it ends with");
         }
@@ -386,15 +466,29 @@ impl Reading {
             self.first_side = Side::Wrong;
         }
         let mut rows = Vec::with_capacity(last);
+        let mut flips = 0;
         for number in 1..=last {
             let Some(mut row) = self.rows.remove(&number) else {
                 let problem = format!("{} is missing", self.name(number));
                 let hint = format!("rows 1 to {} are expected", last.saturating_sub(self.set_up).max(1));
                 return Err(KnitSpeakError { line: None, problem, hint });
             };
-            let odd = number % 2 == 1;
+            let odd = (number + flips) % 2 == 1;
             row.side = if self.round || odd == (self.first_side == Side::Right) { Side::Right } else { Side::Wrong };
             row.round = self.round;
+            flips += row.flips();
+            if let Some(said) = row.said.filter(|said| *said != row.side && !self.round && flips > 0) {
+                let problem = format!(
+                    "{} is said to be on the {} side, and turns before it say otherwise",
+                    self.name(number),
+                    said.name()
+                );
+                return error(
+                    row.line,
+                    problem,
+                    "a row that turns and goes back ends where it began: the next one is of that side",
+                );
+            }
             rows.push(row);
         }
         Ok(Instructions {

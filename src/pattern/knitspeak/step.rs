@@ -99,6 +99,9 @@ pub(super) fn instead_of(word: &str) -> Option<&'static str> {
         "rib" => "say which rib: *k2, p2; rep from * to end",
         "m" | "marker" => "markers are not counted: say how many stitches",
         "join" | "pick" | "pu" => "a piece is knitted of the stitches that are cast on; `form = \"tube\"` knits round",
+        "wrap" | "wraps" | "wrapped" => {
+            "say w&t where the row turns, and picking up wraps where they are worked with their stitches"
+        }
         "t" | "cr" | "tw" => "cables are c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC",
         _ => return None,
     })
@@ -205,6 +208,9 @@ fn as_they_appear(words: &mut Parser<'_>) -> bool {
 pub(super) fn phrase(words: &mut Parser<'_>) -> Result<Option<Phrase>> {
     if words.take_any(&MARKERS) {
         return Ok(Some(Phrase::Nothing));
+    }
+    if words.double_stitch() {
+        return Ok(Some(Phrase::Steps(one("ds", 1, 1))));
     }
     if let Some((_, name)) = SPELLED.iter().find(|(spelled, _)| words.take(spelled)) {
         return Ok(named(name).map(Phrase::Steps));
@@ -419,7 +425,6 @@ fn named(word: &str) -> Option<Steps> {
         "m1p" | "m1pl" | "m1lp" => ("m1lp", 0, 1),
         "m1pr" | "m1rp" => ("m1rp", 0, 1),
         "tuck" | "sl1yo" => ("tuck", 1, 1),
-        "ds" => ("ds", 1, 1),
         "miss" => ("miss", 1, 1),
         "slwyif" => ("slwyif", 1, 1),
         "mb" | "bobble" => ("mb", 1, 1),

@@ -1,3 +1,7 @@
+//! Written instructions and the rows of charts that they are.
+
+mod short_rows;
+
 use super::*;
 
 fn rows(text: &str, stitches: u32) -> Vec<String> {
@@ -74,18 +78,6 @@ fn mistakes_are_named() {
     assert!(wrong("Row 1: c26f", 26).problem.contains("c26f"));
     let deep = format!("Row 1: {}k1", "[".repeat(100));
     assert!(wrong(&deep, 1).problem.contains("deep"));
-}
-
-#[test]
-fn short_rows_turn_and_the_next_row_begins_there() {
-    let wedge = "Row 1 (RS): k5, w&t\nRow 2 (WS): p to end\nRow 3: k3, turn, leaving rem sts unworked\nRow 4: DS, p2\n\
-                 Row 5: knit\nRow 6: p6, wrap and turn\nRow 7: k4, turn\nRow 8: p to end";
-    assert_eq!(rows(wedge, 8), ["-3 k5", "-3 k5", "-5 k3", "-5 ds k2", "k8", "k6 -2", "-2 k4 -2", "-2 k6"]);
-    let wrong = |text: &str| chart_rows(text, 8).unwrap_err();
-    assert!(wrong("Row 1: k5, turn, p5").problem.contains("\"p5\" comes after the turn"));
-    assert!(wrong("Row 1: *k2, turn; rep from * to end").problem.contains("comes after the turn"));
-    assert!(wrong("Row 1: k5, turn\nRow 2: p6").problem.contains("needs 6"));
-    assert!(wrong("Row 1: k5\nRow 2: p8").hint.contains("`turn`"));
 }
 
 #[test]

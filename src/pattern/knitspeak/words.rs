@@ -1,11 +1,12 @@
 //! The words of a row: steps, repeats and brackets.
 
 use super::{
-    Item, KNOWN, MOST_NESTED, MOST_STITCHES, Result, Sequence, Steps,
+    Item, KNOWN, MOST_NESTED, MOST_ROWS, MOST_STITCHES, Result, Sequence, Steps,
     lines::number,
     parser::Parser,
     short,
     step::{self, Phrase},
+    turns::Stop,
 };
 
 /// Words, brackets and signs of a row.
@@ -59,17 +60,43 @@ pub(super) fn parse_body(text: &str, line: usize, row: usize) -> Result<Sequence
     if let Some(token) = parser.peek(0) {
         return parser.wrong(&format!("\"{}\" closes nothing", short(token)), KNOWN);
     }
-    // "Row 2: P."
-    if let [Item::Steps(steps)] = &sequence.0[..]
-        && matches!(tokens.iter().map(String::as_str).find(|t| *t != ","), Some("k" | "p"))
-        && tokens.iter().filter(|t| *t != ",").count() == 1
+    // "Row 2: P.", "Row 2: P, picking up wraps."
+    let stitches = |item: &&mut Item| !matches!(item, Item::PickUp { .. });
+    let [first, second] = [0, 1].map(|k| tokens.get(k).map(String::as_str));
+    if matches!((first, second), (Some("k" | "p"), None | Some(",")))
+        && sequence.0.iter_mut().filter(stitches).count() == 1
+        && let Some(item) = sequence.0.iter_mut().find(stitches)
+        && let Item::Steps(steps) = item
     {
-        sequence = Sequence(vec![Item::Until(steps.clone(), 0)]);
+        *item = Item::Until(steps.clone(), Stop::Left(0));
     }
-    match sequence.0.is_empty() {
-        true => parser.wrong("has no stitches", KNOWN),
+    if sequence.0.is_empty() {
+        return parser.wrong("has no stitches", KNOWN);
+    }
+    let sequence = unrolled(sequence);
+    let is_inside = |item: &Item| matches!(item, Item::Times(body, _) | Item::Repeat(body, _) if body.turns());
+    match sequence.0.len() > MOST_ROWS || sequence.0.iter().any(is_inside) {
+        true => parser.wrong(
+            "turns within a repeat",
+            "say how often: [k5, turn, p5, turn] 3 times; or write a row for each turn",
+        ),
         false => Ok(sequence),
     }
+}
+
+/// Repeats that turn, written out: rows end where they turn.
+fn unrolled(sequence: Sequence) -> Sequence {
+    let mut out = Vec::with_capacity(sequence.0.len());
+    for item in sequence.0 {
+        match item {
+            Item::Times(body, times) if body.turns() && body.0.len().saturating_mul(times as usize) <= MOST_ROWS => {
+                let body = unrolled(body);
+                (0..times).for_each(|_| out.extend(body.0.iter().cloned()));
+            }
+            item => out.push(item),
+        }
+    }
+    Sequence(out)
 }
 
 /// Where a repeat begins, by the items before it.
@@ -151,7 +178,7 @@ impl Parser<'_> {
         if let Some((repeat, from)) = ending {
             let rest = Sequence(out.0.split_off(from));
             if let Some(Item::Repeat(_, last)) = out.0.get_mut(repeat) {
-                *last = rest.takes();
+                *last = Stop::Left(rest.takes());
             }
             out.0.extend(rest.0);
         }
@@ -206,7 +233,7 @@ impl Parser<'_> {
                         (Some(last), _) => Item::Repeat(body, last),
                         // "(k1, p1) rep 3 times"
                         (None, Some(times)) => Item::Times(body, times),
-                        (None, None) => Item::Repeat(body, 0),
+                        (None, None) => Item::Repeat(body, Stop::Left(0)),
                     });
                 }
                 _ => return self.wrong("a repeat without a * where it begins", KNOWN),
@@ -224,21 +251,21 @@ impl Parser<'_> {
             // Once as written, and so many times more.
             None => match self.times()? {
                 Some(times) => Item::Times(body, times + u32::from(!apart)),
-                None => Item::Repeat(body, 0),
+                None => Item::Repeat(body, Stop::Left(0)),
             },
         })
     }
 
-    /// "to end", "to last 3 sts", "until 3 sts remain": how many stitches are left then.
-    pub(super) fn until(&mut self) -> Result<Option<u32>> {
-        let across = self.take_any(&[&["across", "row"], &["across"], &["around"]]).then_some(0);
+    /// "to end", "to last 3 sts", "until 3 sts remain", "to wrapped st".
+    pub(super) fn until(&mut self) -> Result<Option<Stop>> {
+        let across = self.take_any(&[&["across", "row"], &["across"], &["around"]]).then_some(Stop::Left(0));
         Ok(self.until_said()?.or(across))
     }
 
-    fn until_said(&mut self) -> Result<Option<u32>> {
+    fn until_said(&mut self) -> Result<Option<Stop>> {
         if self.take_any(&[&["all", "sts"], &["all", "stitches"], &["every", "st"], &["each", "st"]]) {
             self.take_any(&[&["across"], &["to", "end"]]);
-            return Ok(Some(0));
+            return Ok(Some(Stop::Left(0)));
         }
         // "k2, p2 to end" is of the purls only.
         if !matches!(self.peek(0), Some("to" | "until")) {
@@ -250,13 +277,16 @@ impl Parser<'_> {
             self.take(&["of"]);
             self.take(&["the"]);
             self.take_any(&[&["row"], &["rnd"], &["round"]]);
-            return Ok(Some(0));
+            return Ok(Some(Stop::Left(0)));
+        }
+        if let Some(stop) = self.mark() {
+            return Ok(Some(stop));
         }
         if self.take(&["last"]) {
             let count = self.number(0);
             self.at += usize::from(count.is_some());
             self.stitches();
-            return Ok(Some(count.unwrap_or(1)));
+            return Ok(Some(Stop::Left(count.unwrap_or(1))));
         }
         if let Some(count) = self.number(0)
             && matches!(self.peek(1), Some("st" | "sts" | "stitches" | "stitch"))
@@ -274,13 +304,14 @@ impl Parser<'_> {
                 &["left"],
             ]);
             if left {
-                return Ok(Some(count));
+                return Ok(Some(Stop::Left(count)));
             }
         }
         if matches!(self.peek(0), Some("m" | "marker" | "pm" | "mkr")) {
             return self.wrong("markers are not counted", "say how many stitches: k5, or k to last 5 sts");
         }
-        self.wrong("expected \"to end\" or \"to last 3 sts\"", KNOWN)
+        let named = self.peek(0).map(short).unwrap_or_default();
+        self.wrong(&format!("expected \"to end\", \"to last 3 sts\" or \"to wrapped st\", found \"{named}\""), KNOWN)
     }
 
     /// "3 times", "twice", "once more", "4 more times", "x 6".
@@ -313,12 +344,15 @@ impl Parser<'_> {
     }
 
     fn step(&mut self) -> Result<Option<Item>> {
-        if let Some(turn) = self.turn()? {
+        if let Some(turn) = self.turn() {
             return Ok(Some(turn));
         }
+        if let Some(closed) = self.closed()? {
+            return Ok(closed);
+        }
         if let Some(look) = step::look(self) {
-            let last = self.until()?.unwrap_or(0);
-            return Ok(Some(Item::Look(look, last)));
+            let stop = self.until()?.unwrap_or(Stop::Left(0));
+            return Ok(Some(Item::Look(look, stop)));
         }
         let start = self.at;
         let Some(phrase) = step::phrase(self)? else {
@@ -336,7 +370,7 @@ impl Parser<'_> {
         Ok(Some(match self.until()? {
             Some(last) => Item::Until(Steps { count: 1, ..steps }, last),
             // "Row 2: Purl."
-            None if whole_row => Item::Until(steps, 0),
+            None if whole_row => Item::Until(steps, Stop::Left(0)),
             None => match self.times()? {
                 Some(times) => {
                     let count = steps.count.saturating_mul(times).min(MOST_STITCHES + 1);
@@ -345,37 +379,5 @@ impl Parser<'_> {
                 None => Item::Steps(steps),
             },
         }))
-    }
-
-    /// "turn", "w&t", "wrap and turn", "turn, leaving rem sts unworked".
-    fn turn(&mut self) -> Result<Option<Item>> {
-        const WORDS: [&[&str]; 9] = [
-            &["turn", "work"],
-            &["turn"],
-            &["w&t"],
-            &["w+t"],
-            &["wt"],
-            &["wrap", "and", "turn"],
-            &["wrap", "&", "turn"],
-            &["wrap", "next", "st", "and", "turn"],
-            &["wrap", "next", "st", ",", "turn"],
-        ];
-        if !self.take_any(&WORDS) {
-            return Ok(None);
-        }
-        self.separators();
-        if self.take_any(&[&["leaving"], &["leave"]]) {
-            self.take_any(&[&["rem"], &["remaining"]]);
-            self.stitches();
-            self.take(&["unworked"]);
-            self.separators();
-        }
-        match self.peek(0) {
-            None => Ok(Some(Item::Turn)),
-            Some(after) => self.wrong(
-                &format!("\"{}\" comes after the turn", short(after)),
-                "a row ends where it turns: go on with the next one, as in Row 2: p10",
-            ),
-        }
     }
 }
