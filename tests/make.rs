@@ -607,16 +607,20 @@ fn written_instructions_are_knitted_from_the_command_line_and_from_a_file() {
     assert_eq!(read("a.txt"), read("c.txt"));
 }
 
-/// Short rows of instructions are those of charts.
+/// Short rows and brioche of instructions are those of charts.
 #[test]
-fn written_short_rows_are_those_of_charts() {
+fn written_short_rows_and_brioche_are_those_of_charts() {
     let folder = directory();
     let d = folder.path();
     let wedge = "Row 1 (RS): k\nRow 2: p\nShort row 3 (RS): k to last 4 sts, w&t\nShort row 4 (WS): p to end\n\
                  Row 5: k to 3 sts before last wrapped st, w&t\nRow 6: p\nRow 7: k, picking up wraps\nRow 8: p\nBind off.";
     let of_charts =
         ["2: k", "-3 sl k8", "-3 ds k8", "-6 sl k5", "-6 ds k5", "2: k12"].map(|row| ["--chart", row]).concat();
-    let pairs: [[(&[&str], &str); 2]; 1] = [[(&["--instructions", wedge], "8"), (&of_charts, "8")]];
+    let brioche = "Row 1: *sl1yo, brk1; rep from *\nRow 2: *sl1yo, brk1; rep from *";
+    let pairs: [[(&[&str], &str); 2]; 2] = [
+        [(&["--instructions", wedge], "8"), (&of_charts, "8")],
+        [(&["--instructions", brioche], "6"), (&["--pattern", "brioche"], "6")],
+    ];
     for pair in pairs {
         let made = pair.map(|(how, rows)| {
             let size = ["--stitches", "12", "--rows", rows, "-o", "a.txt"];

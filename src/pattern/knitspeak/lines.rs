@@ -35,6 +35,8 @@ pub(super) struct Head {
     pub(super) set_up: bool,
     /// "Short row 1": whether its number is one of short rows.
     pub(super) short: bool,
+    /// "Row 1A", "Row 1 (MC)": whether it is one of two rows of a number, each of its own yarn.
+    pub(super) pass: bool,
 }
 
 /// Which rows are repeated.
@@ -166,6 +168,11 @@ fn is_row(word: &str) -> bool {
     is_round(word) || matches!(word, "row" | "rows" | "r" | "sr")
 }
 
+/// Names of the yarns of a knit of two colours.
+fn is_color(word: &str) -> bool {
+    matches!(word, "mc" | "cc" | "lc" | "dc" | "c1" | "c2" | "ca" | "cb")
+}
+
 fn is_round(word: &str) -> bool {
     matches!(word, "rnd" | "rnds" | "round" | "rounds")
 }
@@ -271,7 +278,16 @@ impl Reading {
             }
             // "(RS)", "(24 sts)", "(dec row)"
             word if word.starts_with(['(', '['])
-                && (side_of(word).is_some() || is_count(word) || plain_words(word).iter().any(|w| is_row(w))) => {}
+                && (side_of(word).is_some()
+                    || is_count(word)
+                    || plain_words(word).iter().any(|w| is_row(w) || is_color(w))) =>
+            {
+                head.pass |= plain_words(word).iter().any(|w| is_color(w));
+            }
+            // "Row 1 MC:"
+            word if is_color(word) && !head.rows.is_empty() && (next == ":" || next.starts_with('(')) => {
+                head.pass = true
+            }
             word if is_all(word) => head.all = head.all.or(Some(1)),
             word if is_of_a_side(word) => {
                 if matches!(word, "even" | "odd") {
@@ -305,7 +321,10 @@ impl Reading {
             return Ok(Then::EndBefore);
         }
         let head = &mut self.head;
-        let Some(n) = number(word).map(|n| n as usize) else {
+        // "Row 1A"
+        let letter = word.strip_suffix(['a', 'b']).filter(|digits| self.known && digits.parse::<u32>().is_ok());
+        head.pass |= letter.is_some();
+        let Some(n) = number(letter.unwrap_or(word)).map(|n| n as usize) else {
             if self.known && self.goes_on && head.all.is_none() {
                 return error(line, format!("\"{}\" is no row", short(word)), "as in Row 1:");
             }

@@ -6,6 +6,7 @@
 //! on, and each becomes a row of a chart over the whole width. A row that turns leaves the rest of the stitches for later, and
 //! the next one begins there.
 
+mod brioche;
 mod lines;
 mod needle;
 mod parser;
@@ -62,7 +63,7 @@ const MOST_ROUNDS: u32 = 1_000_000;
 const MOST_NESTED: usize = 16;
 
 const KNOWN: &str = "k, p, tbl, yo, k2tog, ssk, skp, p2tog, ssp, k3tog, sssk, sk2p, p3tog, cdd, kfb, pfb, m1l, m1r, m1p, sl1, \
-                     sl1 wyif, tuck, mb, turn, w&t, ds and cables such as c4f, 2/1 LC and LT are known; write \
+                     sl1 wyif, tuck, sl1yo, brk1, brp1, mb, turn, w&t, ds and cables such as c4f, 2/1 LC and LT are known; write \
                      repeats as *...; rep from * to end, [...] 3 times";
 
 /// Instructions that have been read: which rows they are of, but not over how many stitches.
@@ -324,13 +325,15 @@ struct Written {
     said: Option<Side>,
     /// How many stitches it says that it has in the end.
     count: Option<u32>,
+    /// Whether the next row is of the same side, as the second colour's in brioche: the stitches are slid to the other end.
+    slides: bool,
     body: Sequence,
 }
 
 impl Written {
     /// How many times it brings the next row to the other side than a row that goes from end to end.
     fn flips(&self) -> usize {
-        self.body.parts().count().saturating_sub(1)
+        self.body.parts().count().saturating_sub(1) + usize::from(self.slides)
     }
 }
 
@@ -373,6 +376,8 @@ enum Item {
     PickUp {
         always: bool,
     },
+    /// The stitches are slid to the other end of the needle: the next row is of the same side.
+    Slide,
 }
 
 #[derive(Clone, Debug, Default)]

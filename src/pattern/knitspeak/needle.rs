@@ -1,7 +1,7 @@
 //! The stitches on the needle, and rows that are worked over them.
 
 use super::{
-    Item, KNOWN, Look, MOST_ROUNDS, MOST_STITCHES, Result, Sequence, Side, Steps, Written, error,
+    Item, KNOWN, Look, MOST_ROUNDS, MOST_STITCHES, Result, Sequence, Side, Steps, Written, brioche, error,
     turns::{Close, Mark, Turned},
 };
 use crate::pattern::chart::{Act, Chart, Stitch};
@@ -16,6 +16,8 @@ pub(super) struct Needle {
     pub(super) next: Side,
     /// Which of them show a purl stitch on the right side, from the left, if anyone asks.
     faces: Option<Vec<bool>>,
+    /// Which of them lie with a yarn over, likewise.
+    overs: Option<Vec<bool>>,
     /// Where rows have turned, and the stitches there are not worked yet.
     marks: Vec<Mark>,
     /// Where the row before has turned: what closes it comes now.
@@ -30,11 +32,14 @@ impl Needle {
     pub(super) fn new(cast_on: u32, rows: &[Written]) -> Self {
         let asks = |what: fn(&Item) -> bool| rows.iter().any(|row| row.body.any(what));
         let looks = asks(|item| matches!(item, Item::Look(Look::Below, _)));
+        let is_brioche =
+            asks(|item| matches!(item, Item::Steps(s) | Item::Until(s, _) if brioche::takes_over(&s.name)));
         Self {
             found: cast_on,
             behind: 0,
             next: rows.first().map_or(Side::Right, |row| row.side),
             faces: looks.then(Vec::new),
+            overs: is_brioche.then(Vec::new),
             marks: Vec::new(),
             turned: None,
             picks_up: false,
@@ -51,7 +56,7 @@ impl Needle {
             self.work_part(row, part, side, count)?;
             side = side.other();
         }
-        self.next = if row.round { side.other() } else { side };
+        self.next = if row.round || row.slides { side.other() } else { side };
         Ok(())
     }
 
@@ -73,6 +78,7 @@ impl Needle {
             left: self.found - self.behind,
             rounds: MOST_ROUNDS,
             faces: self.faces.as_deref().unwrap_or_default(),
+            overs: self.overs.as_deref().unwrap_or_default(),
             marks: &self.marks,
             wrapped: Vec::new(),
             picks_up: [self.picks_up; 2],
@@ -119,7 +125,7 @@ impl Needle {
 
     /// How the stitches look that a row has made, if anyone asks.
     fn look(&mut self, row: &str) {
-        if self.faces.is_none() {
+        if self.faces.is_none() && self.overs.is_none() {
             return;
         }
         let worked = Chart::parse(&[row]).and_then(|chart| chart.work(self.found, 1, u64::MAX)).unwrap_or_default();
@@ -131,6 +137,14 @@ impl Needle {
                 Act::Draw | Act::Over | Act::Lift { .. } | Act::Bobble | Act::BindOff | Act::CastOn => s.purl,
             };
             *faces = worked.iter().map(face).collect();
+        }
+        if let Some(overs) = &mut self.overs {
+            let has_over = |s: &Stitch| match s.act {
+                Act::Tuck => true,
+                Act::Pass { .. } | Act::Unworked | Act::Double => below(overs, s),
+                Act::Draw | Act::Over | Act::Lift { .. } | Act::Bobble | Act::BindOff | Act::CastOn => false,
+            };
+            *overs = worked.iter().map(has_over).collect();
         }
     }
 
@@ -162,6 +176,7 @@ pub(super) struct Place<'a> {
     /// Rounds of repeats that are left: repeats of what takes no stitch would never end.
     rounds: u32,
     faces: &'a [bool],
+    pub(super) overs: &'a [bool],
     pub(super) marks: &'a [Mark],
     /// Wrapped stitches, from the left, that are worked with their wraps.
     pub(super) wrapped: Vec<u32>,
@@ -192,8 +207,9 @@ impl Place<'_> {
             let problem = format!("needs {takes} stitches for {}, {} are left", steps.name, self.left);
             return self.wrong(&problem, "another number of `stitches` fits");
         }
+        brioche::check(self, steps)?;
         self.left -= takes;
-        self.push(steps.clone());
+        self.push(brioche::charted(steps));
         Ok(())
     }
 
@@ -262,6 +278,7 @@ impl Place<'_> {
                     self.picks_up[0] = true;
                     self.picks_up[1] |= always;
                 }
+                Item::Slide => {}
                 Item::Times(sequence, times) => {
                     for _ in 0..*times {
                         self.follow(&sequence.0)?;
@@ -324,7 +341,7 @@ impl Sequence {
             Item::Steps(steps) | Item::Wrapped(steps) | Item::Doubled(steps) => steps.takes.saturating_mul(steps.count),
             Item::Times(sequence, times) => sequence.takes().saturating_mul(*times),
             Item::Until(..) | Item::Look(..) | Item::Repeat(..) => 0,
-            Item::Turn(_) | Item::PickUp { .. } => 0,
+            Item::Turn(_) | Item::PickUp { .. } | Item::Slide => 0,
         };
         self.0.iter().map(of).fold(0, u32::saturating_add)
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Instructions, KNOWN, KnitSpeakError, MOST_ROWS, Result, Side, Written, error,
+    Instructions, Item, KNOWN, KnitSpeakError, MOST_ROWS, Result, Side, Written, error,
     lines::{self, Copies, Ending, Head, Line, Often, Which},
     words::parse_body,
 };
@@ -60,8 +60,12 @@ struct Reading {
     rows: BTreeMap<usize, Written>,
     /// How many rows come before the one that is written as the first: set-up rows, and others without a number.
     set_up: usize,
-    /// After which numbers another row stands that has none of its own: a short row.
+    /// After which numbers another row stands that has none of its own: the second of a number, or a short row.
     extra: Vec<usize>,
+    /// Numbers of which there are two rows, each of its own yarn.
+    pairs: Vec<usize>,
+    /// Those that name a yarn, with their lines.
+    of_a_yarn: Vec<(usize, usize)>,
     /// The short rows by their numbers, and where they are.
     short: BTreeMap<usize, usize>,
     /// Rows that are told to be like all others of a side, and how far they are apart.
@@ -86,6 +90,8 @@ pub(super) fn written(text: &str) -> Result<Instructions> {
         rows: BTreeMap::new(),
         set_up: 0,
         extra: Vec::new(),
+        pairs: Vec::new(),
+        of_a_yarn: Vec::new(),
         short: BTreeMap::new(),
         fill: Vec::new(),
         first_side: Side::Right,
@@ -160,6 +166,9 @@ impl Reading {
                 self.set_up = self.last();
             }
             self.is_numbered = true;
+            if head.pass {
+                self.of_a_yarn.extend(head.rows.iter().map(|row| (*row, line)));
+            }
             head.rows = self.places(&head);
         }
         if head.next > 0 {
@@ -205,12 +214,18 @@ impl Reading {
         let number = head.rows.first().copied().unwrap_or_default();
         let (body, count) = lines::counted(body);
         let body = parse_body(body, line, number)?;
+        let slides = body.any(|item| matches!(item, Item::Slide));
+        if !self.pairs.is_empty() && (head.all.is_some() || head.rows.is_empty()) {
+            let problem = "rows of a side, where each number has two rows";
+            return error(line, problem, "write each of them, as in Row 2A: and Row 2B:");
+        }
         let row = Written {
             line,
             side: Side::Right,
             round: false,
             said: head.side.filter(|_| head.rows.len() == 1),
             count,
+            slides,
             body,
         };
         if head.rows.is_empty() {
@@ -253,7 +268,8 @@ impl Reading {
         if row == 0 { 0 } else { row.saturating_add(self.set_up + extra) }
     }
 
-    /// Where the rows of a head are. Short rows that are counted from 1 stand behind the others.
+    /// Where the rows of a head are. Short rows that are counted from 1 stand behind the others, and so does the second row of a
+    /// number.
     fn places(&mut self, head: &Head) -> Vec<usize> {
         let mut places = Vec::with_capacity(head.rows.len());
         for &row in &head.rows {
@@ -262,12 +278,19 @@ impl Reading {
                 .short
                 .last_key_value()
                 .is_some_and(|(number, place)| number + 1 == row && *place != self.place(row - 1));
-            let place = if head.short && last > 0 && (row <= last || goes_on) {
+            let is_second =
+                head.pass && row == last && !self.pairs.contains(&row) && self.rows.contains_key(&self.place(row));
+            let place = if is_second || (head.short && last > 0 && (row <= last || goes_on)) {
                 self.extra.push(last);
                 self.last() + 1 + places.len()
             } else {
                 self.place(row)
             };
+            if is_second {
+                self.pairs.push(row);
+                let first = self.place(row);
+                self.rows.entry(first).and_modify(|first| first.slides = true);
+            }
             if head.short {
                 self.short.insert(row, place);
             }
@@ -282,7 +305,7 @@ impl Reading {
         for (k, &row) in rows.iter().enumerate() {
             let next = match rows.get(k + 1) {
                 Some(next) if *next == row.saturating_add(1) => self.place(*next),
-                _ => self.place(row).saturating_add(1),
+                _ => self.place(row).saturating_add(1 + usize::from(self.pairs.contains(&row))),
             };
             places.extend(self.place(row)..next);
         }
@@ -356,6 +379,11 @@ impl Reading {
                 places
             }
             Which::Rows(rows) => self.repeated(rows),
+            // Both rows of each number.
+            Which::Last(count) if !self.pairs.is_empty() => {
+                let first = self.number(last).saturating_sub(count - 1).max(1);
+                (self.place(first)..=last).collect()
+            }
             Which::Last(count) => (last + 1 - (*count).min(last + 1)..=last).collect(),
             Which::From(first) => (self.place(*first)..=last).collect(),
             Which::All => (self.set_up + 1..=last).collect(),
@@ -370,6 +398,13 @@ impl Reading {
         }
         if rows.is_empty() {
             return error(line, "no row is there to repeat", KNOWN);
+        }
+        if !self.pairs.is_empty() && matches!(copies.often, Often::Rows(_) | Often::RowsInAll(_) | Often::Through(_)) {
+            return error(
+                line,
+                "rows are counted, where each number has two of them",
+                "as in Rep rows 1-2 10 times more",
+            );
         }
         let count = match copies.often {
             Often::More(times) => (times as usize).saturating_mul(rows.len()),
@@ -425,6 +460,13 @@ impl Reading {
             return Ok(apart.map(|apart| EveryFew { apart: apart as u32, rest: (count % apart) as u32 }));
         };
         let found = match ending {
+            Ending::On(_) if rows.iter().any(|row| row.slides) => {
+                return error(
+                    line,
+                    "two rows are of each side, of which either may be the last",
+                    "as in ending with row 2",
+                );
+            }
             Ending::On(Side::Right) if self.round => None,
             Ending::On(Side::Wrong) if self.round => {
                 return error(line, "rounds have no wrong side to end with", "rows go back and forth: Row 1 (RS)");
@@ -464,6 +506,14 @@ impl Reading {
         }
         if !self.is_sided && !self.set_up.is_multiple_of(2) {
             self.first_side = Side::Wrong;
+        }
+        if let Some((row, line)) = self.of_a_yarn.iter().find(|(row, _)| !self.pairs.contains(row)) {
+            let problem = format!("row {row} is told to be of a yarn, and is the only row {row}");
+            return error(
+                *line,
+                problem,
+                "the yarns of rows are `rows` of the fabric; Row 1A and Row 1B are two rows of one side",
+            );
         }
         let mut rows = Vec::with_capacity(last);
         let mut flips = 0;

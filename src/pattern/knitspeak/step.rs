@@ -1,6 +1,6 @@
 //! The stitches of a row by their words.
 
-use super::{super::chart::WIDEST_CABLE, KNOWN, Look, MOST_STITCHES, Result, Steps, parser::Parser, short};
+use super::{super::chart::WIDEST_CABLE, KNOWN, Look, MOST_STITCHES, Result, Steps, brioche, parser::Parser, short};
 
 /// What words say.
 pub(super) enum Phrase {
@@ -99,8 +99,14 @@ pub(super) fn instead_of(word: &str) -> Option<&'static str> {
         "rib" => "say which rib: *k2, p2; rep from * to end",
         "m" | "marker" => "markers are not counted: say how many stitches",
         "join" | "pick" | "pu" => "a piece is knitted of the stitches that are cast on; `form = \"tube\"` knits round",
+        "yf" | "yfwd" | "ytf" => {
+            "brioche slips a stitch with a yarn over: sl1yo; a stitch with the yarn before it is sl1 wyif"
+        }
         "wrap" | "wraps" | "wrapped" => {
             "say w&t where the row turns, and picking up wraps where they are worked with their stitches"
+        }
+        "br4st" | "brkyobrk" | "brpyobrp" | "brkyobrkyobrk" => {
+            "of one stitch no more than two are made, and of no more than three one: kfb, m1l, brk2tog, brssk, brLsl dec, brRsl dec"
         }
         "t" | "cr" | "tw" => "cables are c4f, c4b, t3f, t3b, 2/1 LC, 2/1 RPC",
         _ => return None,
@@ -209,6 +215,9 @@ pub(super) fn phrase(words: &mut Parser<'_>) -> Result<Option<Phrase>> {
     if words.take_any(&MARKERS) {
         return Ok(Some(Phrase::Nothing));
     }
+    if brioche::slipped(words) {
+        return Ok(Some(Phrase::Steps(one("tuck", 1, 1))));
+    }
     if words.double_stitch() {
         return Ok(Some(Phrase::Steps(one("ds", 1, 1))));
     }
@@ -219,6 +228,11 @@ pub(super) fn phrase(words: &mut Parser<'_>) -> Result<Option<Phrase>> {
         return Ok(Some(Phrase::Steps(steps)));
     }
     let word = words.peek(0).unwrap_or_default().to_owned();
+    if let Some((name, takes, makes)) = brioche::named(&word) {
+        words.skip(1);
+        words.take(&["dec"]);
+        return Ok(Some(Phrase::Steps(one(name, takes, makes))));
+    }
     if let Some(steps) = named(&word) {
         words.skip(1);
         return Ok(Some(Phrase::Steps(through_back(words, steps))));

@@ -1,5 +1,6 @@
 //! Written instructions and the rows of charts that they are.
 
+mod brioche;
 mod short_rows;
 
 use super::*;

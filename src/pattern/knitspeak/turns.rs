@@ -412,6 +412,26 @@ impl Parser<'_> {
             self.at += 1;
         }
     }
+
+    /// "slide", "do not turn": the next row is of the same side.
+    pub(super) fn slide(&mut self) -> bool {
+        const NOT: [&[&str]; 5] =
+            [&["do", "not", "turn"], &["don't", "turn"], &["dont", "turn"], &["without", "turning"], &["slide"]];
+        if !self.take_any(&NOT) {
+            return false;
+        }
+        // "do not turn, slide sts to other end of needle"
+        self.commas();
+        self.take(&["slide"]);
+        let filler = |w: &str| {
+            matches!(w, "sts" | "stitches" | "work" | "the" | "all" | "back" | "to" | "other" | "opposite" | "right")
+                || matches!(w, "end" | "tip" | "of" | "needle" | "needles" | "beginning" | "row")
+        };
+        while self.peek(0).is_some_and(filler) {
+            self.at += 1;
+        }
+        true
+    }
 }
 
 /// Whether a clause ends before a word.

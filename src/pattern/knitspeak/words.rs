@@ -74,6 +74,10 @@ pub(super) fn parse_body(text: &str, line: usize, row: usize) -> Result<Sequence
         return parser.wrong("has no stitches", KNOWN);
     }
     let sequence = unrolled(sequence);
+    let slides = |item: &Item| matches!(item, Item::Slide);
+    if sequence.any(slides) && sequence.0.iter().position(slides) != Some(sequence.0.len() - 1) {
+        return parser.wrong("slides before its end", "a row is worked to its end, and then slid: k to end, slide");
+    }
     let is_inside = |item: &Item| matches!(item, Item::Times(body, _) | Item::Repeat(body, _) if body.turns());
     match sequence.0.len() > MOST_ROWS || sequence.0.iter().any(is_inside) {
         true => parser.wrong(
@@ -346,6 +350,9 @@ impl Parser<'_> {
     fn step(&mut self) -> Result<Option<Item>> {
         if let Some(turn) = self.turn() {
             return Ok(Some(turn));
+        }
+        if self.slide() {
+            return Ok(Some(Item::Slide));
         }
         if let Some(closed) = self.closed()? {
             return Ok(closed);
