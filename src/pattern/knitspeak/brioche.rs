@@ -1,6 +1,6 @@
 //! Brioche: stitches that are slipped with a yarn over, and worked together with it in the next row.
 
-use super::{Result, Side, Steps, needle::Place, parser::Parser};
+use super::{Steps, parser::Parser};
 
 /// Steps of brioche that work a stitch together with its yarn over, and the steps of charts that they are: the yarn over goes
 /// with its stitch there.
@@ -27,27 +27,6 @@ pub(super) fn takes_over(name: &str) -> bool {
 /// The step of a chart that a step is.
 pub(super) fn charted(steps: &Steps) -> Steps {
     Steps { name: found(&steps.name).unwrap_or(&steps.name).to_owned(), ..steps.clone() }
-}
-
-/// Whether one of the stitches that each step takes has a yarn over; those that are cast on have none, and are worked as they are.
-pub(super) fn check(place: &Place<'_>, steps: &Steps) -> Result<()> {
-    if place.overs.is_empty() || !takes_over(&steps.name) {
-        return Ok(());
-    }
-    let has_over = |at: u32| {
-        let column = if place.side == Side::Right { place.found.checked_sub(at + 1) } else { Some(at) };
-        column.and_then(|column| place.overs.get(column as usize)).copied().unwrap_or_default()
-    };
-    let first = place.found - place.left;
-    for k in 0..steps.count {
-        let own = first + k * steps.takes..first + (k + 1) * steps.takes;
-        if !own.clone().any(has_over) {
-            let problem = format!("works {} where stitch {} has no yarn over", steps.name, own.start + 1);
-            return place
-                .wrong(&problem, "it is slipped with one in the row before: sl1yo; without one it is k1 or p1");
-        }
-    }
-    Ok(())
 }
 
 /// "yf, sl 1 purlwise, yo", "sl1 wyif, yo": a stitch that is slipped with a yarn over.

@@ -10,6 +10,7 @@ mod brioche;
 mod lines;
 mod needle;
 mod parser;
+mod place;
 mod rows;
 mod step;
 #[cfg(test)]
@@ -344,6 +345,13 @@ struct Steps {
     takes: u32,
     makes: u32,
     count: u32,
+}
+
+impl Steps {
+    /// So many stitches, each of one.
+    fn of(name: &str, count: u32) -> Self {
+        Self { name: name.to_owned(), takes: 1, makes: 1, count }
+    }
 }
 
 /// Stitches that are told by how they look from the right side.

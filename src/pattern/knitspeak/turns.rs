@@ -1,6 +1,6 @@
 //! Short rows: where a row turns, what closes the turn, and rows that go as far as another one has turned.
 
-use super::{Item, Result, Side, Steps, lines::number, needle::Place, parser::Parser, short};
+use super::{Item, Result, Side, Steps, lines::number, parser::Parser, short};
 
 /// How a turn is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,9 +16,9 @@ pub(super) enum Close {
 /// A turn in a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
-    close: Close,
+    pub(super) close: Close,
     /// How many stitches it says that it leaves.
-    leaves: Option<u32>,
+    pub(super) leaves: Option<u32>,
 }
 
 /// How a row has turned, and the step by which the yarn goes around what is wrapped.
@@ -51,16 +51,16 @@ pub(super) struct Mark {
     /// The stitch that is wrapped or doubled, from the left.
     pub(super) column: u32,
     /// Stitches to the left of the gap.
-    gap: u32,
+    pub(super) gap: u32,
     /// The step by which the yarn goes around a stitch that is wrapped.
-    passing: &'static str,
+    pub(super) passing: &'static str,
     /// The row that begins there, from 0, and its side.
     pub(super) row: usize,
     pub(super) side: Side,
 }
 
 impl Marked {
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Wrapped => "wrapped stitch",
             Self::Double => "double stitch",
@@ -68,7 +68,7 @@ impl Marked {
         }
     }
 
-    fn is(self, mark: &Mark) -> bool {
+    pub(super) fn is(self, mark: &Mark) -> bool {
         match self {
             Self::Wrapped => mark.close == Close::Wrap,
             Self::Double => mark.close != Close::Wrap,
@@ -87,122 +87,12 @@ impl Mark {
     }
 
     /// Where it is for a row on a side of so many stitches: the marked stitch by those before it, and the gap.
-    fn places(&self, side: Side, found: u32) -> Option<[u32; 2]> {
+    pub(super) fn places(&self, side: Side, found: u32) -> Option<[u32; 2]> {
         match side {
             Side::Right => Some([found.checked_sub(self.column + 1)?, found.checked_sub(self.gap)?]),
             Side::Wrong => Some([self.column, self.gap]),
         }
     }
-}
-
-/// Which way the yarn passes the stitch that it wraps, first on its way there and then back, both as the knitter sees it: where
-/// it is after the last stitch.
-fn passing(last: Option<&Steps>) -> &'static str {
-    match last {
-        Some(steps) if steps.name.starts_with('p') => "slwyif",
-        _ => "sl",
-    }
-}
-
-impl Place<'_> {
-    /// Begins the row where the one before has turned, and closes the turn.
-    pub(super) fn begin(&mut self, behind: u32, turned: Option<&Mark>, items: &[Item]) {
-        match turned {
-            Some(mark) if mark.close == Close::Wrap => {
-                self.push(Steps::of("-", behind.saturating_sub(1)));
-                self.push(Steps::of(mark.passing, 1));
-            }
-            Some(mark) if mark.close == Close::Double && !is_double(items.first()) => {
-                self.push(Steps::of("-", behind));
-                self.push(Steps::of("ds", 1));
-                self.left = self.left.saturating_sub(1);
-            }
-            _ => self.push(Steps::of("-", behind)),
-        }
-    }
-
-    /// Turns, and gives how that is closed.
-    pub(super) fn turn(&mut self, turn: &Turn) -> Result<Turned> {
-        let (left, passing) = (self.left, passing(self.steps.last()));
-        if let Some(leaves) = turn.leaves.filter(|leaves| *leaves != left) {
-            let problem = format!("turns beside {left} stitches, and says that it leaves {leaves}");
-            return self.wrong(&problem, "another number of `stitches` fits, or the row is another one");
-        }
-        if turn.close == Close::Wrap {
-            if left == 0 {
-                return self.wrong("has no stitch left to wrap (w&t)", "it ends at the edge: `turn`, or nothing");
-            }
-            self.push(Steps::of(passing, 1));
-        }
-        Ok((turn.close, passing))
-    }
-
-    /// The places of what is marked ahead: the stitch, and the gap.
-    fn ahead(&self, of: Marked) -> impl Iterator<Item = [u32; 2]> {
-        let at = self.found - self.left;
-        let places = self.marks.iter().filter(move |mark| of.is(mark)).filter_map(|m| m.places(self.side, self.found));
-        places.filter(move |[stitch, gap]| if of == Marked::Gap { *gap >= at } else { *stitch >= at })
-    }
-
-    /// How many stitches are worked until a stop.
-    pub(super) fn room(&self, stop: Stop) -> Result<u32> {
-        let (of, before, past) = match stop {
-            Stop::Left(last) => return Ok(self.left.saturating_sub(last)),
-            Stop::Before(of, count) => (of, count, None),
-            Stop::Past(of, count) => (of, 0, Some(count)),
-        };
-        let at = self.found - self.left;
-        let places = self.ahead(of).map(|[stitch, gap]| if of == Marked::Gap { gap } else { stitch });
-        let Some(place) = places.min() else {
-            return self.wrong(&format!("comes to no {}", of.name()), "say how many stitches: k5, or k to last 5 sts");
-        };
-        let to = place - at;
-        // The stitch itself is worked too.
-        let own = if past.is_some() && of != Marked::Gap { 1 } else { 0 };
-        let behind = self.left.saturating_sub(to + own);
-        match (past, to.checked_sub(before)) {
-            (Some(past), _) if past <= behind => Ok(to + own + past),
-            (Some(past), _) => {
-                self.wrong(&format!("has {behind} stitches behind the {}, not {past}", of.name()), "fewer of them")
-            }
-            (None, Some(room)) => Ok(room),
-            (None, None) => {
-                let problem = format!("has {to} stitches before the {}, not {before}", of.name());
-                self.wrong(&problem, "fewer of them, or `turn`")
-            }
-        }
-    }
-
-    /// Whether wraps lie around the next stitches, which are worked with them.
-    pub(super) fn wrapped(&mut self, count: u32) -> Result<()> {
-        let at = self.found - self.left;
-        for place in at..at + count.min(self.left) {
-            if !self.ahead(Marked::Wrapped).any(|[stitch, _]| stitch == place) {
-                return self.wrong(
-                    &format!("has no wrap around stitch {}", place + 1),
-                    "w&t wraps the stitch behind the turn",
-                );
-            }
-            self.wrapped.push(if self.side == Side::Right { self.found - 1 - place } else { place });
-        }
-        Ok(())
-    }
-
-    /// Whether the next stitches are double ones.
-    pub(super) fn doubled(&mut self, count: u32) -> Result<()> {
-        let at = self.found - self.left;
-        match (at..at + count.min(self.left)).find(|p| !self.ahead(Marked::Double).any(|[stitch, _]| stitch == *p)) {
-            Some(place) => {
-                let problem = format!("has no double stitch where stitch {} is", place + 1);
-                self.wrong(&problem, "a row that turns makes the first stitch of the next one double")
-            }
-            None => Ok(()),
-        }
-    }
-}
-
-fn is_double(item: Option<&Item>) -> bool {
-    matches!(item, Some(Item::Steps(steps)) if steps.name == "ds")
 }
 
 /// A double stitch, in words.
