@@ -187,13 +187,14 @@ impl Film {
         let sums = &tile.sums;
         let n = f64::from(samples);
         let color = |sum: &[NarrowSum; 3]| sum.map(|v| (v.value() / n) as f32);
+        let radiance = |sum: &[NarrowSum; 3]| color(sum).map(|c| c * tile.scale);
         let alpha = sums.alpha[i].value();
         let of_cover = |sum: NarrowSum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let far_of_cover = |sum: Sum| if alpha > 0.0 { (sum.value() / alpha) as f32 } else { 0.0 };
         let normal = |sum: &[NarrowSum; 3]| Vec3A::from(color(sum)).normalize_or_zero().to_array();
         let mut lights = [[0.0; 3]; LightGroups::MOST];
-        for (light, sum) in lights.iter_mut().zip(sums.lights_of(i)) {
-            *light = color(sum).map(|c| c * tile.scale);
+        for (light, sum) in lights.iter_mut().zip(&sums.lights[sums.lights_of(i)]) {
+            *light = radiance(sum);
         }
         Pixel {
             color: mean.map(|c| c as f32 * tile.scale),
@@ -205,10 +206,7 @@ impl Film {
             position: sums.position.get(i).map_or([0.0; 3], |p| p.map(far_of_cover)),
             motion: sums.motion.get(i).map_or([0.0; 2], |m| m.map(of_cover)),
             uv: sums.uv.get(i).map_or([0.0; 2], |uv| uv.map(of_cover)),
-            parts: sums
-                .parts
-                .get(i)
-                .map_or_else(Default::default, |p| std::array::from_fn(|k| color(&p[k]).map(|c| c * tile.scale))),
+            parts: sums.parts.get(i).map_or_else(Default::default, |p| std::array::from_fn(|k| radiance(&p[k]))),
             lights,
             samples,
         }

@@ -1,6 +1,6 @@
 //! Tiles and the sums of their pixels.
 
-use std::collections::TryReserveError;
+use std::{collections::TryReserveError, ops::Range};
 
 use super::{
     LightParts, Matte, Sample,
@@ -124,8 +124,7 @@ impl Sums {
         one(&mut self.motion, i, motion, j);
         one(&mut self.uv, i, uv, j);
         one(&mut self.parts, i, parts, j);
-        let groups = self.groups();
-        (0..groups).for_each(|k| one(&mut self.lights, groups * i + k, lights, groups * j + k));
+        self.lights_of(i).zip(other.lights_of(j)).for_each(|(i, j)| one(&mut self.lights, i, lights, j));
     }
 
     /// Groups of lights.
@@ -133,9 +132,9 @@ impl Sums {
         self.lights.len() / self.count.len().max(1)
     }
 
-    /// Those of a pixel's groups of lights.
-    pub(super) fn lights_of(&self, i: usize) -> &[[NarrowSum; 3]] {
-        &self.lights[self.groups() * i..self.groups() * (i + 1)]
+    /// Where those of a pixel's groups of lights are.
+    pub(super) fn lights_of(&self, i: usize) -> Range<usize> {
+        self.groups() * i..self.groups() * (i + 1)
     }
 }
 
@@ -209,8 +208,8 @@ impl Tile {
                 add_each(sum, (value * down).to_array());
             }
         }
-        let groups = sums.groups();
-        for (sum, value) in sums.lights[groups * i..groups * (i + 1)].iter_mut().zip(sample.lights) {
+        let own = sums.lights_of(i);
+        for (sum, value) in sums.lights[own].iter_mut().zip(sample.lights) {
             add_each(sum, (value * down).to_array());
         }
         true

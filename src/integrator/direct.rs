@@ -70,8 +70,7 @@ impl Integrator<'_> {
                 match path.shares {
                     // The path's first scattering at cloth: the light belongs to this very vertex's lobes.
                     None => {
-                        sample.radiance += found.sum();
-                        sample.lights[self.light_groups.of(index)] += found.sum();
+                        self.add_light(sample, index, found.sum());
                         sample.parts.add_lobes(events, found);
                     }
                     Some(_) => self.add(sample, events, path, index, found.sum()),

@@ -262,13 +262,19 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Adds light of a light, by its place among all, that was scattered `events` times to a sample, to the part that it belongs to
-    /// and to its group.
+    /// Adds light of a light, by its place among all, that was scattered `events` times to a sample, to its group and to the part that it
+    /// belongs to.
     #[inline]
     fn add(&self, sample: &mut Sample, events: u32, path: &Path<'_>, index: usize, light: Rgb) {
+        self.add_light(sample, index, light);
+        sample.parts.add(events, path.shares.as_ref(), light);
+    }
+
+    /// Adds light of a light to a sample and to its group, whatever part it belongs to.
+    #[inline]
+    fn add_light(&self, sample: &mut Sample, index: usize, light: Rgb) {
         sample.radiance += light;
         sample.lights[self.light_groups.of(index)] += light;
-        sample.parts.add(events, path.shares.as_ref(), light);
     }
 
     /// Adds what comes from area lights nearer than `end`, weighed against shadow rays towards them. Whether the
