@@ -93,7 +93,7 @@ impl Row {
         let colors: Vec<u16> = (first..last).map(of).collect();
         let used = in_use(colors.iter().copied());
         let round = lattice.ring && last - first == lattice.counts[0];
-        let holds = caught(&colors, &|_| true, &used, stranded.catch, round);
+        let holds = caught(&colors, &|_| true, &used, stranded.catch, round, run.line as i32);
         Self { first, round, colors, used, holds }
     }
 

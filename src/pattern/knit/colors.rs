@@ -1,7 +1,7 @@
 //! Colour work: which yarn knits which stitch, and where the others are meanwhile.
 //!
 //! Each colour is a yarn of its own. In stranded work, in a row of several colours each one makes its own loops and floats behind those of the
-//! others, from edge to edge; one that a few rows do not need is carried up the side, or inside of a tube. Floats keep
+//! others, from edge to edge, where it is caught and turns behind the edge stitch; one that a few rows do not need is carried up the side, or inside of a tube. Floats keep
 //! their order, the first colour's below, so that no two yarns wind around each other. In intarsia each field of a colour has
 //! a yarn, which turns where the field ends and is linked there with its neighbour's. In double knitting two colours knit a
 //! layer each, and change layers where the picture changes its colour.
@@ -269,7 +269,11 @@ impl Loops {
             let stitches: Vec<u16> = (0..n).map(of).collect();
             let used = in_use(stitches.iter().copied());
             let is_loop = |k: usize| matches!(course.visits[k].1, Visit::Loop(_));
-            let holds = caught(&stitches, &is_loop, &used, colors.catch, self.border.round.is_some());
+            let round = self.border.round.is_some();
+            let mut holds = caught(&stitches, &is_loop, &used, colors.catch, round, course.row);
+            if !round && colors.catch.is_some() {
+                catch_at_edges(&stitches, &is_loop, &used, &mut holds);
+            }
             for (rank, &color) in used.iter().enumerate() {
                 let own = |k: usize| {
                     let (column, visit) = course.visits[k];
@@ -280,8 +284,10 @@ impl Loops {
                     };
                     (column, Visit::Float { at })
                 };
+                // Below the first row it would be seen.
+                let goes_down = |working: u16| course.row > 0 && used.iter().find(|c| **c != working) == Some(&color);
                 let holds = (0..n).map(|k| match holds[k] {
-                    Some((float, _)) if float == color => Hold::Caught,
+                    Some((float, working)) if float == color => Hold::Caught { down: goes_down(working) },
                     Some((_, working)) if working == color => Hold::Catches,
                     _ => Hold::None,
                 });
@@ -317,13 +323,14 @@ fn fields(course: &Course, of: &dyn Fn(usize) -> u16) -> Vec<Course> {
 const LIFT: f64 = 0.42;
 
 /// After which stitches of a row of some colours a float is caught between two loops of one colour: its colour and that of
-/// the working yarn.
+/// the working yarn. From row to row not above each other, where they would be seen from the front.
 pub(crate) fn caught(
     colors: &[u16],
     is_loop: &dyn Fn(usize) -> bool,
     used: &[u16],
     catch: Option<u32>,
     round: bool,
+    row: i32,
 ) -> Vec<Option<(u16, u16)>> {
     let n = colors.len();
     let mut holds = vec![None; n];
@@ -345,6 +352,8 @@ pub(crate) fn caught(
             let count = (to - from).div_ceil(longest) - 1;
             for i in 1..=count {
                 let ideal = from + (to - from) * i / (count + 1);
+                let aside = usize::from((to - from).div_ceil(count + 1) < longest);
+                let ideal = if row % 2 == 0 { ideal - aside } else { ideal + aside };
                 // Between two loops of one colour, where nothing else is held.
                 let fits = |k: &usize| {
                     let (a, b) = ((k - 1) % n, k % n);
@@ -358,6 +367,17 @@ pub(crate) fn caught(
         }
     }
     holds
+}
+
+/// The same beside the edge stitches of a flat row: what floats there would be drawn out of them where it turns.
+fn catch_at_edges(colors: &[u16], is_loop: &dyn Fn(usize) -> bool, used: &[u16], holds: &mut [Option<(u16, u16)>]) {
+    let n = colors.len();
+    for joint in [0, n.saturating_sub(2)].into_iter().filter(|j| j + 1 < n) {
+        let working = colors[joint];
+        let fits = working == colors[joint + 1] && is_loop(joint) && is_loop(joint + 1) && holds[joint].is_none();
+        let float = used.iter().copied().find(|&color| color != working);
+        holds[joint] = holds[joint].or(float.filter(|_| fits).map(|float| (float, working)));
+    }
 }
 
 #[cfg(test)]

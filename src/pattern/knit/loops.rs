@@ -21,7 +21,10 @@ pub(in super::super) const BELLY: f64 = 1.9;
 pub(in super::super) enum Hold {
     None,
     /// The float goes between the cloth and the working yarn.
-    Caught,
+    Caught {
+        /// Whether it goes on below what it was above, so that it is held: nothing else floats there.
+        down: bool,
+    },
     /// The working yarn goes behind the float.
     Catches,
     /// The yarn goes over to the other layer.

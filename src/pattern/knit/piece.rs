@@ -173,9 +173,10 @@ impl Laying<'_> {
 
     /// Whether a field of a row begins beside another one, for a yarn that comes from the row below.
     fn is_inside(&self, row: i32, c: usize, backwards: bool) -> bool {
-        // Colours that are stranded go through all of a round.
-        let all = self.courses_of(row);
-        !self.loops.border.turns && if backwards { c + 1 < all.end } else { c > all.start }
+        // Colours that are stranded all go through all of a row.
+        let courses = &self.loops.courses;
+        let first = courses[c].first;
+        if backwards { courses[self.courses_of(row)].iter().any(|other| other.first > first) } else { first > 0 }
     }
 
     /// Whether the yarns of both layers go around each other before a row.

@@ -52,6 +52,8 @@ const CLOSING: f64 = 0.6;
 const BESIDE_STRAND: f64 = 0.1;
 /// How far yarn lies off the cloth where it passes stitches.
 const FLOAT: f64 = 1.7;
+/// How far below its row, in rows, a float goes on where it has been caught: between the feet of this row and of that below.
+const BELOW: f64 = 0.8;
 /// Places of a piece.
 const STEPS: usize = 64;
 
@@ -155,8 +157,16 @@ impl Loops {
             .iter()
             .map(|course| {
                 let step = self.step(course);
-                let feet: Vec<Foot> = course.visits.iter().map(|(_, v)| self.foot(course, v)).collect();
-                let n = feet.len();
+                let n = course.visits.len();
+                let foot = |k: usize| {
+                    let (own, before) = (self.foot(course, &course.visits[k].1), course.hold((k + n - 1) % n));
+                    // Where a float has been caught it is below the yarn that holds it, for one stitch.
+                    match before == (Hold::Caught { down: true }) {
+                        true => Foot { up: self.up(course.row) - BELOW, ..own },
+                        false => own,
+                    }
+                };
+                let feet: Vec<Foot> = (0..n).map(foot).collect();
                 // Whether the yarn goes from one side of the cloth to the other between a visit and the next one.
                 let changes = |k: usize| feet[k].behind * feet[(k + 1) % n].behind < 0.0;
                 let is_lifted = |k: usize| self.made_by(&course.visits[k].1).is_some_and(Loop::is_lifted);
@@ -186,9 +196,9 @@ impl Loops {
                     };
                     let (up, out) = match course.hold(k) {
                         Hold::None => (0.5 * (a.up + b.up), out),
-                        // The float dips below the feet of the stitches that hold it, in front of the yarn between them.
-                        Hold::Caught => (self.up(course.row) - 0.5, -1.0),
-                        Hold::Catches => (self.up(course.row) - 0.8, -3.0),
+                        // The float goes in front of the yarn between the stitches that hold it.
+                        Hold::Caught { .. } => (self.up(course.row) - 0.5, -1.0),
+                        Hold::Catches => (self.up(course.row) - 0.6, -2.8),
                         Hold::Crosses => (0.5 * (a.up + b.up) + course.lift, out),
                     };
                     // A strand between stitches of both sides leaves the room to the one that is on the other side of it.
@@ -229,7 +239,11 @@ impl Loops {
                                 l if self.is_bound_within(l) => self.bound_piece(l, *column, own, ends, step),
                                 l => self.loop_piece(l, *column, own, ends, step),
                             },
-                            Visit::Pass { .. } | Visit::Float { .. } => pass_piece(*column, course.row, own, ends),
+                            Visit::Pass { .. } => pass_piece(*column, course.row, own, ends),
+                            Visit::Float { .. } => {
+                                let turns = [left.is_none(), joints[k].is_none()];
+                                float_piece(pass_piece(*column, course.row, own, ends), turns)
+                            }
                             Visit::Through { at } => self.through_piece(*column, *at, step, [k == 0, k + 1 == n]),
                         }
                     })
@@ -274,6 +288,21 @@ fn pass_piece(column: u32, row: i32, foot: Foot, ends: [Foot; 2]) -> Piece {
     };
     let (places, grid) = (0..=STEPS).map(piece).unzip();
     Piece { places, grid, yarn: PASSED, bends: PASSED }
+}
+
+/// The yarn floats behind a stitch, or turns behind it where that is the first or the last one of its row.
+fn float_piece(mut piece: Piece, [at_left, at_right]: [bool; 2]) -> Piece {
+    // Half way it is drawn towards the edge, beside which it would be seen.
+    const KEPT: usize = STEPS * 3 / 10;
+    let (from, to) = (if at_left { STEPS - KEPT } else { 0 }, if at_right { KEPT } else { STEPS });
+    // The float of a row of one stitch keeps a step.
+    let kept = from.min(to.max(1) - 1)..=to.max(1);
+    let share = (kept.end() - kept.start()) as f64 / STEPS as f64;
+    piece.places = piece.places[kept.clone()].to_vec();
+    piece.grid = piece.grid[kept].to_vec();
+    piece.yarn *= share;
+    piece.bends *= share;
+    piece
 }
 
 /// Yarn that passes a stitch, in shares of a stitch's: a little more than its width.

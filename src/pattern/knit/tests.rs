@@ -300,6 +300,41 @@ fn each_colour_is_a_yarn_whose_floats_are_on_the_back() {
     }
 }
 
+/// At the sides of flat work what floats is caught, and turns behind the edge stitch: it does not hang out of the cloth.
+#[test]
+fn floats_turn_behind_the_edge_stitches() {
+    let [plain, two, round] = ["aaaaaaaaaaaaaaaaaaaa", "aaaaaaaaabbaaaaaaaaa", "aaaaaaaabaabaaaaaaaa"];
+    let made = in_colors(&[plain, two, round, two, two, plain], Form::Flat).knitted(1.0).unwrap();
+    assert_eq!(made.colors, [0, 1]);
+    let found = measured(&made.strands);
+    assert!(found.share <= 0.02, "{found:?}");
+    let [ground, float] = [&made.strands[0], &made.strands[1]];
+    let far = |points: &[DVec3], side: f64| points.iter().map(|p| side * p.x).fold(0.0, f64::max) / made.gauge[0];
+    for side in [-1.0, 1.0] {
+        // In stitches from the middle.
+        let (own, edge) = (far(&float.curve.points, side), far(&ground.curve.points, side));
+        assert!((9.0..9.9).contains(&own), "side {side}: the float reaches {own}");
+        assert!(edge > own + 0.1, "side {side}: the float reaches {own}, the edge {edge}");
+    }
+    // Where it is caught, beside the edge stitches and between, it lies before the yarn that knits there.
+    let depths = |yarn: &PatternStrand, row: f32, wale: f32| -> Vec<f64> {
+        let is_there = |[w, c]: &[f32; 2]| (w - wale).abs() < 0.1 && (row..row + 0.3).contains(c);
+        let at = yarn.coordinates.iter().zip(&yarn.curve.points).filter(|(grid, _)| is_there(grid));
+        at.map(|(_, p)| p.z).collect()
+    };
+    for (row, wales) in [(2.0, [1.0, 3.0, 15.0, 19.0]), (3.0, [1.0, 4.0, 15.0, 19.0])] {
+        for wale in wales {
+            let [own, working] = [float, ground].map(|yarn| depths(yarn, row, wale));
+            let own = own.iter().sum::<f64>() / own.len() as f64;
+            let behind = working.iter().copied().fold(0.0, f64::min);
+            assert!(
+                own > behind + 0.4,
+                "row {row} at {wale}: the float at {own}, the yarn that catches it at {behind}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_colour_that_is_not_needed_for_long_is_cut() {
     let mut rows = vec!["bbbbbbbb"];
