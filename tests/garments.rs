@@ -397,6 +397,12 @@ fn panels_without_names_are_chosen_by_number() {
         told.contains("  panels     1 without a name: ") && told.contains("\n             2 without a name: "),
         "{told}"
     );
+    let lines: Vec<&str> = told.lines().filter(|l| l.contains(" without a name: ")).collect();
+    assert!(lines[0].ends_with("of stockinette") && lines[1].ends_with("of rib1x1"), "{told}");
+    assert!(told.contains(" of stockinette and rib1x1 in 2 panels"), "{told}");
+    let json: serde_json::Value =
+        serde_json::from_str(&yarnray(d, &["info", "s.toml", "--json"]).good().stdout).unwrap();
+    assert_eq!(json["garments"][0]["panels"][1]["cloth"], "rib1x1", "{json}");
     let scene = load(&d.join("s.toml"), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let left_of = |fabric: &Fabric| across(&scene, fabric)[0];
     let [stockinette, rib] = scene.fabrics.as_slice() else { panic!("{} fabrics", scene.fabrics.len()) };

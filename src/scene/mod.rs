@@ -470,10 +470,10 @@ impl Fabric {
 pub struct GarmentFacts {
     /// Its mesh.
     pub path: String,
-    /// The name of its cloth.
+    /// The name of its cloth, of which panels may have others.
     pub cloth: String,
-    /// Its panels, each with its number of stitches.
-    pub panels: Vec<(String, u64)>,
+    /// Its panels, by the numbers that choose them.
+    pub panels: Vec<PanelFacts>,
     /// Stitches of all panels; crossings of a weave.
     pub stitches: u64,
     /// Place and radius of the part that is laid, millimetres, where that is not all: stitches, yarns and points are of it.
@@ -502,6 +502,17 @@ pub struct GarmentFacts {
     pub bounds: (DVec3, DVec3),
     /// What was repaired or found out, one line each.
     pub repairs: Vec<String>,
+}
+
+/// What is known of a panel of a garment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PanelFacts {
+    /// The name of its group, empty if it has none.
+    pub name: String,
+    /// The name of its cloth.
+    pub cloth: String,
+    /// Its stitches; crossings of a weave.
+    pub stitches: u64,
 }
 
 /// A floor.

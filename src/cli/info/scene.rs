@@ -14,7 +14,7 @@ use crate::{
     },
     math::words::{bytes_in_words, counted},
     plan::{Feature, Memory, Plan},
-    scene::{CurveKind, Fabric, GarmentFacts, Scene, Tufts},
+    scene::{CurveKind, Fabric, GarmentFacts, PanelFacts, Scene, Tufts},
 };
 
 /// The diameter by which overlap of scenes and garments is measured: yarns of several plies count as wide as they are in the mean.
@@ -29,7 +29,9 @@ fn length_of(fabric: &Fabric) -> f64 {
 fn garment_json(facts: &GarmentFacts) -> Value {
     let numbered = facts.panels.iter().zip(1..);
     let panels: Vec<Value> = numbered
-        .map(|((name, stitches), number)| json!({"number": number, "panel": name, "stitches": stitches}))
+        .map(|(panel, number)| {
+            json!({"number": number, "panel": panel.name, "cloth": panel.cloth, "stitches": panel.stitches})
+        })
         .collect();
     let [p5, p50, p95] = facts.uv_ratio;
     json!({
@@ -44,6 +46,24 @@ fn garment_json(facts: &GarmentFacts) -> Value {
     })
 }
 
+/// The names of what its panels are of, from that of the garment on.
+fn cloths_of(facts: &GarmentFacts) -> String {
+    let mut names = Vec::new();
+    for panel in &facts.panels {
+        if !names.contains(&panel.cloth.as_str()) {
+            names.push(&panel.cloth);
+        }
+    }
+    if let Some(own) = names.iter().position(|name| *name == facts.cloth) {
+        names[..=own].rotate_right(1);
+    }
+    match names.as_slice() {
+        [] => facts.cloth.clone(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 fn garment_lines(facts: &GarmentFacts) -> String {
     let [p5, p50, p95] = facts.uv_ratio;
     let mut text = format!(
@@ -52,7 +72,7 @@ fn garment_lines(facts: &GarmentFacts) -> String {
          than a tenth, {:.1} % is compressed by more than a tenth\n",
         facts.path,
         counted(facts.stitches, "stitch"),
-        facts.cloth,
+        cloths_of(facts),
         counted(facts.panels.len(), "panel"),
         facts.yarn_length / 1000.0,
         counted(facts.control_points, "control point"),
@@ -80,13 +100,13 @@ fn garment_lines(facts: &GarmentFacts) -> String {
 }
 
 /// Panels with the numbers by which a scene may choose them, for people.
-fn panel_lines(panels: &[(String, u64)]) -> String {
+fn panel_lines(panels: &[PanelFacts]) -> String {
     const MOST: usize = 24;
     let mut text = String::new();
-    for ((name, stitches), number) in panels.iter().take(MOST).zip(1..) {
+    for (PanelFacts { name, cloth, stitches }, number) in panels.iter().take(MOST).zip(1..) {
         let label = if number == 1 { "panels" } else { "" };
         let name = if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
-        text += &format!("  {label:<9} {number:>2} {name}: {}\n", counted(*stitches, "stitch"));
+        text += &format!("  {label:<9} {number:>2} {name}: {} of {cloth}\n", counted(*stitches, "stitch"));
     }
     if panels.len() > MOST {
         let others = counted((panels.len() - MOST) as u64, "other");

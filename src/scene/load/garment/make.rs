@@ -22,7 +22,7 @@ use crate::{
     geometry::{curve::Curve, mesh::Mesh},
     math::words::counted,
     pattern::knit::too_many_strands,
-    scene::{FabricMotion, GarmentFacts, Taken, Yarn},
+    scene::{FabricMotion, GarmentFacts, PanelFacts, Taken, Yarn},
 };
 
 /// For each rule its colours where each is a yarn of its own, and the yarns in the library that they are.
@@ -219,10 +219,15 @@ impl GarmentPlan {
     fn facts(&self, garment: &Garment, amounts: &[(f64, u64)], tex: &[Option<f64>]) -> GarmentFacts {
         let report = garment.report();
         let (lengths, points): (Vec<f64>, Vec<u64>) = amounts.iter().copied().unzip();
+        let panel = |i: usize| PanelFacts {
+            name: report.panels[i].group.clone(),
+            cloth: self.rules[report.cloth[i]].cloth.name.clone(),
+            stitches: report.stitches[i],
+        };
         GarmentFacts {
             path: self.path.display().to_string(),
             cloth: self.rules[0].cloth.name.clone(),
-            panels: report.panels.iter().map(|p| p.group.clone()).zip(report.stitches.iter().copied()).collect(),
+            panels: (0..report.panels.len()).map(panel).collect(),
             stitches: report.all_stitches(),
             near: self.near,
             yarn_length: lengths.iter().sum(),
