@@ -172,6 +172,8 @@ pub(in super::super) struct Loops {
     levels: Vec<Vec<f64>>,
     /// Where rows wave, how far each stitch of each row is above its row's height, from the left; else nothing.
     waves: Vec<Vec<(f64, f64)>>,
+    /// In shaped flat cloth, whose wales lean, where the first stitch of each row is; else nothing.
+    shaped: Vec<f64>,
     /// Whether any stitch is a bobble.
     bobbles: bool,
     /// How far each layer of a cloth of two is from the middle between them, in yarn diameters; 0 where there is one.
@@ -320,6 +322,19 @@ impl Loops {
     /// Whether decreases and yarn-overs move its wales, so that rows wave.
     pub(in super::super) fn has_waves(&self) -> bool {
         !self.waves.is_empty()
+    }
+
+    /// Whether decreases and increases shape it, so that its wales lean.
+    pub(in super::super) fn is_shaped(&self) -> bool {
+        !self.shaped.is_empty()
+    }
+
+    /// For the cast-on edge, each row, and the top of the last one, where its first stitch is and how far up it begins, in rows.
+    pub(in super::super) fn lines(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let cast_on = self.loops.first().filter(|l| l.row < 0).map_or(self.shaped[0], |l| l.at);
+        let rows = (0..self.rows).map(|row| [self.shaped[row as usize], self.up(row)]);
+        let top = [self.shaped[self.shaped.len() - 1], self.up(self.rows)];
+        std::iter::once([cast_on, -1.0]).chain(rows).chain(std::iter::once(top))
     }
 
     pub(in super::super) fn has_bobbles(&self) -> bool {

@@ -10,7 +10,7 @@ use super::{
     curl::Curl,
     kinds::{self, Kinds},
     loops::{Border, Loops},
-    piece::{self, Laying, State, Surface, Thread, ease, settle, sheet::Sheet},
+    piece::{self, Laying, State, Surface, Thread, ease, settle, shaped::Shaped, sheet::Sheet},
     pressed::{self, Alike, flatten_where_touching},
     rims, short_rows,
 };
@@ -49,7 +49,7 @@ struct Layout {
     gauge: [f64; 2],
     /// Width of a stitch in each row.
     widths: Vec<f64>,
-    /// Whether rows of other widths are laid as their cells have them. Beside decreases that would tear a flat piece.
+    /// Whether rows of other widths are laid as their cells have them.
     in_sections: bool,
 }
 
@@ -128,7 +128,7 @@ impl Knit {
         let extent = DVec2::new(width * f64::from(self.stitches), height * f64::from(self.rows));
         let to_middle = match &surface {
             Surface::Plane { .. } | Surface::Rows { .. } => DVec3::new(0.0, -0.5 * extent.y, 0.0),
-            Surface::Round { .. } | Surface::Bent(_) => DVec3::ZERO,
+            Surface::Round { .. } | Surface::Bent(_) | Surface::Shaped(_) => DVec3::ZERO,
         };
         if let (false, Some(cell)) = (self.flat || self.is_double(), &layout.cell) {
             roll_up(&mut threads, &Curl::of(cell, extent), to_middle);
@@ -234,6 +234,9 @@ impl Knit {
                 Surface::Round { revolution, height }
             }
             _ if !loops.levels().is_empty() => Surface::Bent(Sheet::relaxed(loops.levels(), rows, layout.gauge)),
+            _ if loops.is_shaped() => {
+                Surface::Shaped(Shaped::relaxed(rows, &loops.lines().collect::<Vec<_>>(), &layout.widths, height))
+            }
             _ if layout.even => Surface::Plane { width, height },
             _ => Surface::Rows { widths: layout.widths.clone(), height },
         }
@@ -241,7 +244,11 @@ impl Knit {
 
     /// The yarns as they are laid out.
     fn laid(&self, layout: &Layout, loops: &Loops, surface: &Surface, ways: &[Way]) -> Vec<Thread> {
-        let by_cells = layout.in_sections || !matches!(surface, Surface::Rows { .. });
+        let by_cells = match surface {
+            Surface::Rows { .. } => layout.in_sections,
+            Surface::Shaped(_) => false,
+            Surface::Plane { .. } | Surface::Round { .. } | Surface::Bent(_) => true,
+        };
         let laying = Laying {
             loops,
             surface,

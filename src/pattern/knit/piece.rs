@@ -3,6 +3,8 @@
 
 mod drawn;
 pub(super) mod follow;
+mod net;
+pub(super) mod shaped;
 pub(super) mod sheet;
 mod thread;
 
@@ -11,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 pub(super) use self::thread::{State, Thread, ease, settle};
-use self::{drawn::drawn_points, sheet::Sheet};
+use self::{drawn::drawn_points, shaped::Shaped, sheet::Sheet};
 use super::{
     super::revolution::Revolution,
     STITCH_WIDTH, YARN_PER_STITCH,
@@ -32,6 +34,8 @@ pub(super) enum Surface {
     Round { revolution: Revolution, height: f64 },
     /// Flat cloth that short rows bend.
     Bent(Sheet),
+    /// Flat cloth that decreases and increases shape.
+    Shaped(Shaped),
 }
 
 impl Surface {
@@ -41,6 +45,7 @@ impl Surface {
             Self::Plane { width, .. } => *width,
             Self::Rows { widths, .. } => width_at(widths, p.up),
             Self::Bent(sheet) => sheet.width(),
+            Self::Shaped(shaped) => shaped.width(),
             Self::Round { revolution, height } => TAU * revolution.radius((p.up + p.at - 0.5) * height),
         }
     }
@@ -52,6 +57,7 @@ impl Surface {
             Self::Rows { widths, height } => DVec3::new(p.at * width_at(widths, p.up), p.up * height, p.out),
             Self::Round { revolution, height } => revolution.place(p.at, (p.up + p.at - 0.5) * height, p.out),
             Self::Bent(sheet) => sheet.place(row, p),
+            Self::Shaped(shaped) => shaped.place(p),
         }
     }
 
@@ -59,6 +65,7 @@ impl Surface {
     fn directions(&self, row: i32, p: &Place) -> [DVec3; 2] {
         match self {
             Self::Bent(sheet) => sheet.directions(row, p),
+            Self::Shaped(shaped) => shaped.directions(p),
             Self::Plane { .. } | Self::Rows { .. } | Self::Round { .. } => [DVec3::X, DVec3::Y],
         }
     }
@@ -304,7 +311,7 @@ impl Laying<'_> {
         // Where a round begins anew within a repeat, stitches stand beside others than in their cell.
         let breaks = round && cell.is_some_and(|cell| !self.loops.wide.is_multiple_of(cell.wide as usize));
         // Whether it begins and ends at the sides, and not beside another field.
-        let flat = matches!(self.surface, Surface::Plane { .. } | Surface::Rows { .. });
+        let flat = matches!(self.surface, Surface::Plane { .. } | Surface::Rows { .. } | Surface::Shaped(_));
         let fields = &self.loops.courses[self.courses_of(course.row)];
         let ends = [course.first == 0, fields.iter().all(|f| f.first <= course.first)].map(|end| flat && end);
         for (k, piece) in pieces.iter().enumerate() {
@@ -378,7 +385,7 @@ impl Laying<'_> {
                 return;
             }
             // Bent round, or by short rows, or of rows of other widths.
-            (Some((cell, r)), Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_)) => {
+            (Some((cell, r)), _) => {
                 let rest = cell.rest(r, course.first + k);
                 for (p, g) in cell.visit(r, course.first + k) {
                     let place = self.place_of(course, k, (cell, r), p, f64::from(g[1] - r as f32));

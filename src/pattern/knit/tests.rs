@@ -2,6 +2,7 @@ mod double;
 mod gaps;
 mod openwork;
 mod rims;
+mod shaped;
 mod short_rows;
 mod topology;
 

@@ -32,6 +32,8 @@ pub(super) struct Maker<'a> {
     middles: Vec<Vec<f64>>,
     /// How far each stitch is above the beginning of its row, in rows, where rows wave; else nothing.
     rises: Vec<Vec<f64>>,
+    /// Whether it is flat and shaped, so that its wales lean.
+    shaped: bool,
     loops: Vec<Loop>,
     /// The loop made at each stitch.
     made: Vec<Vec<u32>>,
@@ -49,6 +51,7 @@ impl<'a> Maker<'a> {
             border,
             middles: Vec::new(),
             rises: Vec::new(),
+            shaped: false,
             loops: Vec::new(),
             made: Vec::new(),
             cast: Vec::new(),
@@ -230,6 +233,10 @@ impl<'a> Maker<'a> {
             mean += self.border.short(parent.at - at);
             self.loops[own as usize].parents.push(p);
         }
+        // Where wales lean, a foot is where its own row has it.
+        if self.shaped {
+            return;
+        }
         // Where others come from far or pass each other they have done so when they are worked.
         const FAR: f64 = 0.8;
         let stitches = if self.border.turns { self.rows[0].len() as f64 } else { 1.0 };
@@ -332,7 +339,8 @@ impl<'a> Maker<'a> {
             let Some((below, _)) = self.under(r) else { return 0.0 };
             let turn = if self.border.turns { self.rows[r].len() as f64 } else { 1.0 };
             let of = |(s, at): (&Stitch, &f64)| {
-                if s.act == Act::CastOn {
+                // Shaped cloth gives way where three become one.
+                if s.act == Act::CastOn || (self.shaped && s.layer == 0) {
                     return 0.0;
                 }
                 let lean = self.parent_middle(&self.middles[below], s, *at) - at;
@@ -412,6 +420,7 @@ impl<'a> Maker<'a> {
             room,
             levels,
             waves,
+            shaped: if self.shaped { self.middles.iter().map(|row| row[0]).collect() } else { Vec::new() },
             bobbles: self.rows.iter().flatten().any(|s| s.act == Act::Bobble),
             apart: 0.0,
             ribbed: false,

@@ -87,7 +87,7 @@ impl<'a> Laying<'a> {
             // Layers that are bound off together lean to each other.
             Surface::Plane { .. } => (self.even && (side == 0.0 || self.plain(own))).then_some(cell),
             // Where wales lean or cross nothing is as it would be in even rows: all of a repeat is taken as it is.
-            Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_) => {
+            Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_) | Surface::Shaped(_) => {
                 (cell.0.leans || self.plain(own)).then_some(cell)
             }
         }
@@ -130,7 +130,7 @@ impl<'a> Laying<'a> {
                 let at = p.x / width / self.loops.wide as f64;
                 Place { at, up: row + p.y / height - r as f64, out }
             }
-            (Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_), Visit::Loop(i)) => {
+            (Surface::Rows { .. } | Surface::Round { .. } | Surface::Bent(_) | Surface::Shaped(_), Visit::Loop(i)) => {
                 let own = &self.loops.loops[i as usize];
                 let lean = own.foot - own.at + (self.head(own) - own.foot) * head;
                 let count = if self.loops.border.turns { course.visits.len() as f64 } else { 1.0 };

@@ -4,14 +4,11 @@
 
 use glam::DVec3;
 
-use super::super::shape::Place;
+use super::{super::shape::Place, net::Net};
 use crate::{
     geometry::spline::catmull_rom,
     math::special::hermite,
-    pattern::{
-        chart::{Act, Stitch},
-        rods::Fire,
-    },
+    pattern::chart::{Act, Stitch},
 };
 
 /// Stiffness of the net against shear and against bending, over that against stretching: it is blocked, and bulges only where
@@ -22,11 +19,6 @@ const BEND: f64 = 1.2;
 const STRAINED: f64 = 0.02;
 /// How far its middle is out of its plane then at first, in diameters.
 const BULGE: f64 = 1.0;
-/// Most steps, and the force at which it is at rest: that of a spring longer by so much.
-const STEPS: usize = 8000;
-const CALM: f64 = 2e-4;
-/// The longest step in time, of points of mass 1 and springs of stiffness 1.
-const TIME: f64 = 0.3;
 
 /// Stitches of one column from the cast-on edge to the bind-off.
 struct Column {
@@ -43,25 +35,11 @@ pub(in super::super) struct Sheet {
     width: f64,
 }
 
-struct Spring {
-    ends: [usize; 2],
-    rest: f64,
-    firm: f64,
-}
-
-/// Three points that want to be on a line, the second one at a share of the way.
-struct Line {
-    points: [usize; 3],
-    share: f64,
-}
-
-/// The net as it is laid: which points make a column, and what holds them.
-struct Net {
-    points: Vec<DVec3>,
+/// The net as it is laid, and which points make a column.
+struct Laid {
+    net: Net,
     /// For each column its points and their levels, upwards.
     columns: Vec<Vec<(usize, f64)>>,
-    springs: Vec<Spring>,
-    lines: Vec<Line>,
 }
 
 /// The first point of a column that is as high as a level.
@@ -74,46 +52,37 @@ fn next_above(column: &[(usize, f64)], level: f64) -> Option<(usize, f64)> {
     column.get(column.partition_point(|(_, own)| *own < level + 1e-9)).copied()
 }
 
-impl Net {
+impl Laid {
     fn new(levels: &[Vec<f64>], rows: &[Vec<Stitch>], [width, height]: [f64; 2]) -> Self {
         let n = rows[0].len();
         let makes = |s: &Stitch| !matches!(s.act, Act::Unworked | Act::Double);
-        let mut net = Self { points: Vec::new(), columns: Vec::new(), springs: Vec::new(), lines: Vec::new() };
+        let mut laid = Self { net: Net::new(BEND), columns: Vec::new() };
         for j in 0..n {
             let own = (0..rows.len()).filter(|&r| makes(&rows[r][j])).map(|r| levels[r][j]);
             let all = std::iter::once(-1.0).chain(own).chain(std::iter::once(levels[rows.len()][j]));
             let at = j as f64 + 0.5 - 0.5 * n as f64;
-            let column = all.map(|level| {
-                net.points.push(DVec3::new(at * width, level * height, 0.0));
-                (net.points.len() - 1, level)
-            });
+            let column = all.map(|level| (laid.net.add(DVec3::new(at * width, level * height, 0.0)), level));
             let column = column.collect();
-            net.columns.push(column);
+            laid.columns.push(column);
         }
-        net.hold_columns(height);
+        laid.hold_columns(height);
         // The edges are rows too.
         let all = vec![true; n];
         let worked = |r: usize| rows[r].iter().map(makes).collect::<Vec<bool>>();
-        net.hold_row(&vec![-1.0; n], &all, [width, height]);
-        (0..rows.len()).for_each(|r| net.hold_row(&levels[r], &worked(r), [width, height]));
-        net.hold_row(&levels[rows.len()], &all, [width, height]);
-        net
-    }
-
-    fn hold(&mut self, a: usize, b: usize, rest: f64, firm: f64) {
-        if a != b {
-            self.springs.push(Spring { ends: [a, b], rest, firm });
-        }
+        laid.hold_row(&vec![-1.0; n], &all, [width, height]);
+        (0..rows.len()).for_each(|r| laid.hold_row(&levels[r], &worked(r), [width, height]));
+        laid.hold_row(&levels[rows.len()], &all, [width, height]);
+        laid
     }
 
     fn hold_columns(&mut self, height: f64) {
         for column in std::mem::take(&mut self.columns) {
             for w in column.windows(2) {
-                self.hold(w[0].0, w[1].0, height * (w[1].1 - w[0].1), 1.0);
+                self.net.hold(w[0].0, w[1].0, height * (w[1].1 - w[0].1), 1.0);
             }
             for w in column.windows(3) {
                 let share = (w[1].1 - w[0].1) / (w[2].1 - w[0].1);
-                self.lines.push(Line { points: [w[0].0, w[1].0, w[2].0], share });
+                self.net.straighten([w[0].0, w[1].0, w[2].0], share);
             }
             self.columns.push(column);
         }
@@ -126,70 +95,25 @@ impl Net {
                 continue;
             }
             let [left, right] = [j - 1, j].map(|k| point_at(&self.columns[k], levels[k]));
-            self.hold(left, right, width, 1.0);
+            self.net.hold(left, right, width, 1.0);
             for (from, to) in [(left, j), (right, j - 1)] {
                 if let Some((above, level)) = next_above(&self.columns[to], levels[to]) {
-                    self.hold(from, above, width.hypot(height * (level - levels[to])), SHEAR);
+                    self.net.hold(from, above, width.hypot(height * (level - levels[to])), SHEAR);
                 }
             }
             if j >= 2 && worked[j - 2] {
                 let far = point_at(&self.columns[j - 2], levels[j - 2]);
-                self.lines.push(Line { points: [far, left, right], share: 0.5 });
+                self.net.straighten([far, left, right], 0.5);
             }
         }
-    }
-
-    /// Pulls of all springs; gives the largest.
-    fn forces(&self, forces: &mut [DVec3]) -> f64 {
-        forces.fill(DVec3::ZERO);
-        for Spring { ends: [a, b], rest, firm } in &self.springs {
-            let d = self.points[*b] - self.points[*a];
-            let length = d.length().max(1e-9);
-            let pull = d * (firm * (length - rest) / length);
-            forces[*a] += pull;
-            forces[*b] -= pull;
-        }
-        for Line { points: [a, b, c], share } in &self.lines {
-            let off = self.points[*b] - self.points[*a].lerp(self.points[*c], *share);
-            forces[*a] += off * (BEND * (1.0 - share));
-            forces[*b] -= off * BEND;
-            forces[*c] += off * (BEND * share);
-        }
-        forces.iter().map(|f| f.length_squared()).fold(0.0, f64::max).sqrt()
-    }
-
-    /// How much springs across and up are longer or shorter than at rest, in the mean, over their length.
-    fn strain(&self) -> f64 {
-        let firm = || self.springs.iter().filter(|s| s.firm == 1.0);
-        let of = |s: &Spring| (self.points[s.ends[0]].distance(self.points[s.ends[1]]) / s.rest - 1.0).abs();
-        firm().map(of).sum::<f64>() / firm().count().max(1) as f64
     }
 
     /// Lets it leave its plane, to the front.
     fn bulge(&mut self) {
-        let low = self.points.iter().copied().fold(DVec3::MAX, DVec3::min);
-        let high = self.points.iter().copied().fold(DVec3::MIN, DVec3::max);
-        for p in &mut self.points {
+        let [low, high] = self.net.bounds();
+        for p in &mut self.net.points {
             let side = (2.0 * *p - low - high) / (high - low).max(DVec3::splat(1e-9));
             p.z = BULGE * (1.0 - side.x * side.x) * (1.0 - side.y * side.y);
-        }
-    }
-
-    fn relax(&mut self) {
-        let n = self.points.len();
-        let (mut forces, mut speeds) = (vec![DVec3::ZERO; n], vec![DVec3::ZERO; n]);
-        let mut fire = Fire::new(TIME);
-        for _ in 0..STEPS {
-            if self.forces(&mut forces) < CALM {
-                return;
-            }
-            let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
-            let (power, force2, speed2) = (dot(&forces, &speeds), dot(&forces, &forces), dot(&speeds, &speeds));
-            let (keep, turn) = fire.adapt(power, force2.sqrt(), speed2.sqrt());
-            for ((p, v), f) in self.points.iter_mut().zip(&mut speeds).zip(&forces) {
-                *v = *v * keep + *f * (turn + fire.dt);
-                *p += *v * fire.dt;
-            }
         }
     }
 }
@@ -216,20 +140,19 @@ impl Column {
 impl Sheet {
     /// Lets a net of stitches of a size find its form. `levels` are those of each stitch of each row and, behind them, the tops.
     pub(in super::super) fn relaxed(levels: &[Vec<f64>], rows: &[Vec<Stitch>], size: [f64; 2]) -> Self {
-        let mut net = Net::new(levels, rows, size);
-        net.relax();
-        if net.strain() > STRAINED {
-            net.bulge();
-            net.relax();
+        let mut laid = Laid::new(levels, rows, size);
+        laid.net.relax();
+        if laid.net.strain() > STRAINED {
+            laid.bulge();
+            laid.net.relax();
         }
-        let low = net.points.iter().copied().fold(DVec3::MAX, DVec3::min);
-        let high = net.points.iter().copied().fold(DVec3::MIN, DVec3::max);
+        let [low, high] = laid.net.bounds();
         let middle = 0.5 * (low + high);
         let column = |points: &Vec<(usize, f64)>| Column {
             levels: points.iter().map(|p| p.1).collect(),
-            at: points.iter().map(|p| net.points[p.0] - middle).collect(),
+            at: points.iter().map(|p| laid.net.points[p.0] - middle).collect(),
         };
-        Self { columns: net.columns.iter().map(column).collect(), levels: levels.to_vec(), width: size[0] }
+        Self { columns: laid.columns.iter().map(column).collect(), levels: levels.to_vec(), width: size[0] }
     }
 
     pub(super) fn width(&self) -> f64 {

@@ -32,6 +32,8 @@ struct Form<'a> {
     head_at: f64,
     held: i32,
     swap: Option<Swap>,
+    /// In shaped cloth, by how many stitches wales lean below its feet and above its head, in a row's height.
+    leans: Option<[f64; 2]>,
     /// How deep head and feet dive.
     head_depth: f64,
     foot_depth: f64,
@@ -96,6 +98,9 @@ impl<'a> Form<'a> {
             head_at,
             held: own.held.unwrap_or(own.row + 1),
             swap: None,
+            leans: loops
+                .is_shaped()
+                .then(|| [loops.lean_below(own), loops.lean_above(own)].map(|lean| lean.unwrap_or(head_at - foot.at))),
             head_depth: DEPTH + LAYER * f64::from(own.rank),
             foot_depth: loops.foot_depth(own),
             // Its head is as wide as what is drawn through it.
@@ -146,6 +151,16 @@ impl<'a> Form<'a> {
         Place { at, up, out: self.out(along) }
     }
 
+    /// Where its middle is in shaped cloth, at a share of its height: it follows its wale from row to row.
+    fn leaning(&self, [below, above]: [f64; 2], head: f64) -> f64 {
+        let base = self.loops.up(self.own.row);
+        let rows = self.loops.up(self.held) - base;
+        let up = self.foot.up + (self.head_up(self.foot.at) - self.foot.up) * head - base;
+        let lean = self.head_at - self.foot.at;
+        let share = (up / rows.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        self.foot.at + below * up.min(0.0) + lean * share + above * (up - rows).max(0.0)
+    }
+
     /// How far across it is.
     fn across(&self, along: &Along) -> f64 {
         let &Along { t, head, upper, inside, side, end } = along;
@@ -161,11 +176,12 @@ impl<'a> Form<'a> {
         // Layers that are bound off together are beside each other before what closes them comes through.
         let bound_off = self.loops.border.finished && self.held == self.loops.rows;
         let behind = if own.side != 0.0 && bound_off { smooth_step((head - 0.2) / 0.4) } else { upper };
-        let moved = self.swap.map_or(behind, |s| s.moved(head));
-        foot.at
-            + (head_at - foot.at) * moved
-            + step * across
-            + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step * own.wide))
+        let middle = match (self.swap, self.leans) {
+            (Some(swap), _) => foot.at + (head_at - foot.at) * swap.moved(head),
+            (None, Some(leans)) => self.leaning(leans, head),
+            (None, None) => foot.at + (head_at - foot.at) * behind,
+        };
+        middle + step * across + (1.0 - inside) * (end.at - (foot.at + side * 0.5 * step * own.wide))
     }
 
     /// How far out of the cloth it is.
@@ -206,6 +222,12 @@ fn laid_over(own: &Loop, child: f64, [foot, head_depth]: [f64; 2], head: f64) ->
     };
     let (low, high) = (smooth_step((head - from) / over), smooth_step(2.0 * head - 1.0));
     foot * (1.0 - low) - child * (legs * low + (head_depth - legs) * high)
+}
+
+/// None of nothing.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 /// A loop on its way to where it is worked passes others, between the heads of its own row and the feet of that above.
@@ -253,6 +275,24 @@ impl Loops {
         Piece { places, grid, yarn: own.yarn, bends }
     }
 
+    /// By how many stitches a loop leans from those of the row below that it is drawn through, if they have not changed places.
+    fn lean_below(&self, own: &Loop) -> Option<f64> {
+        let parents = own.parents.iter().map(|&p| &self.loops[p as usize]);
+        let parents = parents.filter(|p| p.row < own.row && own.layer == 0.0);
+        let leans = parents.map(|p| (own.foot - p.at) / f64::from(own.row - p.row));
+        mean(leans)
+    }
+
+    /// By how many stitches what is drawn through a loop leans on its way up.
+    fn lean_above(&self, own: &Loop) -> Option<f64> {
+        let of = |child: &Loop| {
+            let next = child.children.iter().map(|&c| &self.loops[c as usize]);
+            let next = next.filter(|c| c.row > child.row && c.layer == 0.0);
+            mean(next.map(|c| (c.foot - child.at) / f64::from(c.row - child.row)))
+        };
+        mean(own.children.iter().filter_map(|&c| of(&self.loops[c as usize])))
+    }
+
     pub(super) fn child_sign(&self, own: &Loop) -> f64 {
         let sign = own.children.first().map_or(own.sign, |&c| self.loops[c as usize].sign);
         if sign == 0.0 { 1.0 } else { sign }
@@ -274,7 +314,7 @@ impl Loops {
         } else if beside && !bound {
             over = child.sign * LAYER * (last - f64::from(own.rank));
             depth = DEPTH + LAYER * last;
-        } else if stitches(across) < FAR {
+        } else if self.is_shaped() || stitches(across) < FAR {
             return None;
         }
         // Heads reach so far up from the row below, and feet down from that above.

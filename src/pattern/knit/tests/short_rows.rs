@@ -44,7 +44,7 @@ fn upright(ring: &[DVec3], points: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Loops that are not drawn through what they should be; of those with others beside them.
-fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
+pub(super) fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
     let rows = piece.worked().unwrap();
     let mirrored = super::super::short_rows::from_right(&rows, true);
     let rims = piece.rims;

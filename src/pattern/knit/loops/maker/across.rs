@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{Maker, net::Net};
-use crate::pattern::chart::Stitch;
+use crate::pattern::chart::{Act, Stitch};
 
 /// Rounds of looking for it.
 const ROUNDS: usize = 100;
@@ -39,10 +39,12 @@ impl Maker<'_> {
         if !is_shaped {
             return;
         }
-        if self.border.round.is_none() {
+        let is_flat = self.border.round.is_none();
+        if is_flat {
             self.lie_over_each_other();
+            self.shaped = self.rows.iter().flatten().all(|s| s.act != Act::Unworked);
         }
-        if !self.border.stacked {
+        if !self.border.stacked && !self.shaped {
             self.share_shaping();
         }
     }

@@ -1,0 +1,82 @@
+//! Flat pieces that decreases and increases shape: rows lie square to their wales, and every loop is drawn through what it should be.
+
+use super::{short_rows::undrawn, *};
+use crate::pattern::rods::passing::passed;
+
+fn piece(stitches: u32, rows: &[String]) -> Knit {
+    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+    let chart = Chart::parse(&rows).unwrap();
+    Knit { rows: chart.rows(), chart, ..knit("stockinette", stitches, 1) }
+}
+
+/// Two stitches less in the middle of every other row, or more, beside a stitch that stands.
+fn mitre(rows: u32) -> Knit {
+    let side = rows / 2 + 4;
+    let row = |r: u32| if r % 2 == 1 { format!("k{0} cdd k{0}", side - r / 2 - 1) } else { "k".to_owned() };
+    piece(2 * side + 1, &(0..rows).map(row).collect::<Vec<_>>())
+}
+
+/// Two stitches more, beside the one in the middle.
+fn shawl(rows: u32) -> Knit {
+    let row = |r: u32| if r % 2 == 1 { format!("k{0} yo k yo k{0}", 4 + r / 2) } else { "k".to_owned() };
+    piece(9, &(0..rows).map(row).collect::<Vec<_>>())
+}
+
+/// A stitch less at either side of every other row.
+fn raglan(rows: u32) -> Knit {
+    let row = |r: u32| if r % 2 == 1 { format!("k2 ssk k{} k2tog k2", rows + 2 - r) } else { "k".to_owned() };
+    piece(rows + 9, &(0..rows).map(row).collect::<Vec<_>>())
+}
+
+/// Where a strand is in a row, on the mean, at columns of some range.
+fn place(strands: &[PatternStrand], row: i32, columns: std::ops::Range<f32>) -> DVec3 {
+    let points = strands.iter().flat_map(|s| s.curve.points.iter().zip(&s.coordinates));
+    let own: Vec<DVec3> = points
+        .filter(|(_, [wale, course])| course.floor() as i32 == row && columns.contains(wale))
+        .map(|(p, _)| *p)
+        .collect();
+    own.iter().sum::<DVec3>() / own.len() as f64
+}
+
+#[test]
+fn every_loop_of_shaped_cloth_is_drawn_through() {
+    for (name, piece) in [("mitre", mitre(16)), ("shawl", shawl(16)), ("raglan", raglan(16))] {
+        let mut made = Vec::new();
+        let passes = passed(|| made = piece.strands(1.0).unwrap());
+        let found = measured(&made);
+        assert_eq!((made.len(), passes), (1, 0), "{name}");
+        assert_eq!(undrawn(&piece), [], "{name}");
+        assert!(found.share <= 0.02, "{name}: {found:?}");
+    }
+}
+
+/// Each arm of a row loses or gains half of its stitches a row: that says by how much it slants.
+#[test]
+fn rows_of_a_mitre_turn_a_corner() {
+    for (name, piece, row, bend) in [("mitre", mitre(24), 8, -1.0), ("shawl", shawl(24), 18, 1.0)] {
+        let made = piece.knitted(1.0).unwrap();
+        let count = piece.worked().unwrap()[row as usize].len() as f32;
+        let half = (0.5 * count).floor();
+        let at = |from: f32| place(&made.strands, row, from..from + 2.0);
+        let left = at(half - 3.0) - at(1.0);
+        let right = at(count - 3.0) - at(half + 1.0);
+        let slant = |arm: DVec3| arm.y.atan2(arm.x);
+        let expected = (0.5 * made.gauge[0] / made.gauge[1]).atan();
+        let found = 0.5 * bend * (slant(left) - slant(right));
+        assert!((found - expected).abs() < 6.0_f64.to_radians(), "{name}: {found} {expected}");
+    }
+}
+
+/// Beside a raglan's edge stitches are as wide and as high as elsewhere.
+#[test]
+fn shaped_cloth_keeps_its_gauge() {
+    let piece = raglan(24);
+    let made = piece.knitted(1.0).unwrap();
+    let [width, height] = made.gauge;
+    for (row, from) in [(4, 4.0), (4, 14.0), (14, 3.0), (14, 8.0)] {
+        let [own, right, above] = [(row, from), (row, from + 4.0), (row + 4, from - 2.0)]
+            .map(|(row, from)| place(&made.strands, row, from..from + 2.0));
+        let (wide, high) = ((right - own).length() / 4.0, (above.y - own.y) / 4.0);
+        assert!((wide / width - 1.0).abs() < 0.06 && (high / height - 1.0).abs() < 0.06, "{row} {from}: {wide} {high}");
+    }
+}
