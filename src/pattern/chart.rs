@@ -176,6 +176,18 @@ pub struct Stitch {
     pub layer: i8,
 }
 
+impl Stitch {
+    /// Whether it is in the wale of those that it takes: strands of a cable change places.
+    pub(super) fn is_in_line(&self) -> bool {
+        self.parents > 0 && self.layer == 0
+    }
+
+    /// Whether it is a knit or a purl stitch above one other.
+    pub(super) fn is_plain(&self) -> bool {
+        self.act == Act::Draw && self.parents == 1 && self.layer == 0 && !self.twisted
+    }
+}
+
 /// Rows of a knit, from the cast-on edge.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chart {

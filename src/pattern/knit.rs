@@ -7,6 +7,7 @@
 //! Last, yarns are pressed flat where they lie on each other (`pressed`). Inside this folder the unit is the distance at which the centre lines
 //! of two yarns touch: the diameter of yarn that stays round ([`Thickness`]).
 
+mod bonds;
 mod cell;
 mod colors;
 mod crowded;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Knit, cell::Cell};
-use crate::pattern::chart::{Act, Chart, Stitch};
+use crate::pattern::chart::{Chart, Stitch};
 
 /// Cells of rows that are alike, and which row takes which.
 #[derive(Default)]
@@ -95,9 +95,8 @@ impl Knit {
 /// stockinette: which draw together by as much as each does by itself.
 pub(super) fn in_sections(rows: &[Vec<Stitch>]) -> bool {
     const LEAST: usize = 6;
-    let is_plain = |s: &Stitch| s.act == Act::Draw && s.parents == 1 && s.layer == 0 && !s.twisted;
     let kinds: Option<Vec<Vec<bool>>> =
-        rows.iter().map(|row| column_signs(row).filter(|_| row.iter().all(is_plain))).collect();
+        rows.iter().map(|row| column_signs(row).filter(|_| row.iter().all(Stitch::is_plain))).collect();
     let Some(kinds) = kinds else { return false };
     let sections: Vec<&[Vec<bool>]> = kinds.chunk_by(|a, b| a == b).collect();
     sections.len() > 1 && sections.iter().all(|section| section.len() >= LEAST)

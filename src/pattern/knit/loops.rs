@@ -11,6 +11,8 @@ use super::{
 
 /// How far feet and heads reach beyond the line where they hold each other, in rows (2.28 diameters apart).
 pub(in super::super) const REACH: f64 = 0.775 / 2.28;
+/// The room that three stitches take that become one, in rows.
+pub(in super::super) const TRIPLE: f64 = 0.8;
 /// The yarn of a bobble, in shares of a stitch's.
 pub(in super::super) const BOBBLE: f64 = 10.0;
 /// The room that a bobble takes above its row, in rows.

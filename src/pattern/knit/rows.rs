@@ -126,8 +126,7 @@ impl Knit {
             true => last.clone(),
             false => self.chart.work(self.stitches, self.rows + 1, u64::MAX).ok()?.pop()?,
         };
-        let is_plain = |s: &Stitch| s.act == Act::Draw && s.parents == 1 && s.layer == 0 && !s.twisted;
-        (next.len() == last.len() && next.iter().all(is_plain)).then_some(next)
+        (next.len() == last.len() && next.iter().all(Stitch::is_plain)).then_some(next)
     }
 }
 

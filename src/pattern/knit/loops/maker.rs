@@ -3,7 +3,7 @@
 mod across;
 mod net;
 
-use super::{super::rims::CastOn, BELLY, BOBBLE, Border, Course, Loop, Loops, Visit};
+use super::{super::rims::CastOn, BELLY, BOBBLE, Border, Course, Loop, Loops, TRIPLE, Visit};
 use crate::pattern::chart::{Act, Stitch, Top};
 
 /// Yarn of what is no whole loop, in shares of a stitch's.
@@ -332,7 +332,6 @@ impl<'a> Maker<'a> {
     /// How far up each row begins, in mean rows, and how much higher rows are than without room to change places: three
     /// stitches that become one take it, cables, and stitches that lean far; and, above them, bobbles.
     fn heights(&self) -> Heights {
-        const TRIPLE: f64 = 0.8;
         const CROSSING: f64 = 0.5;
         let belly = |r: usize| if self.rows[r].iter().any(|s| s.act == Act::Bobble) { BELLY } else { 0.0 };
         let room = |r: usize| {

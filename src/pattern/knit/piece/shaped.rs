@@ -7,7 +7,14 @@
 
 use glam::DVec3;
 
-use super::{super::shape::Place, net::Net};
+use super::{
+    super::{
+        bonds::{self, At, Bond, Made, Origin},
+        loops::TRIPLE,
+        shape::Place,
+    },
+    net::Net,
+};
 use crate::{
     geometry::spline::{catmull_rom, through_points},
     pattern::chart::{Act, Stitch},
@@ -16,8 +23,6 @@ use crate::{
 /// Stiffness of the net against shear and against bending, over that against stretching: rows turn corners within few stitches.
 const SHEAR: f64 = 0.25;
 const BEND: f64 = 0.1;
-/// How much farther than a row is high three stitches are from the one that they become, in rows: what room they take.
-const TRIPLE: f64 = 0.8;
 
 /// The beginnings of a row's stitches, from the left.
 struct Line {
@@ -67,17 +72,17 @@ impl Line {
     }
 }
 
-/// Gives what is not known what is beside it.
+/// Gives what is not known the mean of what is known on either side of it.
 fn filled(known: Vec<Option<f64>>) -> Vec<f64> {
-    let value = |k: usize| {
+    let beside = |k: usize| {
         let sides = [known[..k].iter().rev().find_map(|v| *v), known[k + 1..].iter().find_map(|v| *v)];
-        let beside: Vec<f64> = sides.into_iter().flatten().collect();
-        known[k].unwrap_or_else(|| beside.iter().sum::<f64>() / beside.len().max(1) as f64)
+        let sides: Vec<f64> = sides.into_iter().flatten().collect();
+        sides.iter().sum::<f64>() / sides.len().max(1) as f64
     };
-    (0..known.len()).map(value).collect()
+    known.iter().enumerate().map(|(k, value)| value.unwrap_or_else(|| beside(k))).collect()
 }
 
-/// The net as it is laid: the numbers of the points of each line, and what each point is drawn through.
+/// The net as it is laid: the numbers of the points of each line.
 struct Laid<'a> {
     net: Net,
     lines: Vec<Vec<usize>>,
@@ -114,88 +119,63 @@ impl<'a> Laid<'a> {
         self.widths[line.saturating_sub(1).min(self.widths.len() - 1)]
     }
 
-    /// The stitches of the line below that a stitch of a line takes, or lies between: the first one and the last one.
-    fn below(&self, line: usize, j: usize) -> Option<[usize; 2]> {
-        let Some(stitch) = self.stitch(line, j) else { return (line > 0).then_some([j, j]) };
-        let last = self.lines[line - 1].len() - 1;
-        let first = stitch.first_parent as usize;
-        let ends = match stitch.parents {
-            0 => [first.saturating_sub(1), first],
-            parents => [first, first + usize::from(parents) - 1],
+    /// What a stitch of a line is made of. The top goes on as the last row.
+    fn made(&self, [line, j]: At) -> Option<Made> {
+        let (line, column) = (usize::try_from(line).ok()?, usize::try_from(j).ok()?);
+        self.lines.get(line)?.get(column)?;
+        let Some(below) = line.checked_sub(1) else { return Some(Made { origin: Origin::Cast, below: [0; 2] }) };
+        let Some(stitch) = self.rows.get(below).map(|row| row[column]) else {
+            return Some(Made { origin: Origin::Drawn, below: [j; 2] });
         };
-        Some(ends.map(|p| p.min(last)))
+        let Made { origin, below: ends } = Made::of(&stitch);
+        let last = self.lines[below].len() as isize - 1;
+        let origin = if stitch.act == Act::CastOn { Origin::Cast } else { origin };
+        Some(Made { origin, below: ends.map(|p| p.clamp(0, last)) })
     }
 
-    /// The stitch of a row; none for the cast-on edge and the top.
-    fn stitch(&self, line: usize, j: usize) -> Option<&'a Stitch> {
-        self.rows.get(line.checked_sub(1)?).map(|row| &row[j])
-    }
-
-    /// Whether a stitch stands in the wale of what it takes: strands of a cable change places.
-    fn is_in_line(&self, line: usize, j: usize) -> bool {
-        line > 0 && self.stitch(line, j).is_none_or(|s| s.parents > 0 && s.layer == 0 && s.act != Act::CastOn)
+    fn node(&self, [line, j]: At) -> usize {
+        self.lines[line as usize][j as usize]
     }
 
     /// Holds the stitches of a line to each other and to those below.
     fn hold(&mut self, line: usize) {
-        let (width, count) = (self.width(line), self.lines[line].len());
-        let height = if line > 0 { (self.from[line][1] - self.from[line - 1][1]) * self.height } else { 0.0 };
-        for j in 0..count {
-            let own = self.lines[line][j];
-            if j + 1 < count {
-                self.net.hold(own, self.lines[line][j + 1], width, 1.0);
-            }
-            if j > 0 && j + 1 < count {
-                self.net.straighten([self.lines[line][j - 1], own, self.lines[line][j + 1]], 0.5);
-            }
-            let Some([first, last]) = self.below(line, j) else { continue };
-            let stitch = self.stitch(line, j);
-            for p in first..=last {
-                let parent = self.lines[line - 1][p];
-                let (rest, firm) = match stitch {
-                    Some(s) if s.act == Act::CastOn => continue,
-                    Some(s) if s.parents == 0 => ((0.5 * width).hypot(height), SHEAR),
-                    Some(s) if s.layer != 0 => (self.net.points[own].distance(self.net.points[parent]), 1.0),
-                    Some(s) if s.parents > 2 => (height + TRIPLE * self.height, 1.0),
-                    _ => (height, 1.0),
-                };
-                self.net.hold(parent, own, rest, firm);
-            }
-            if !self.is_in_line(line, j) {
-                continue;
-            }
-            // A wale of three stitches wants to be straight.
-            if first == last
-                && line > 1
-                && self.is_in_line(line - 1, first)
-                && let Some([under, same]) = self.below(line - 1, first)
-                && under == same
-            {
-                self.net.straighten([self.lines[line - 2][under], self.lines[line - 1][first], own], 0.5);
-            }
-            // Two beside each other, as what they take: a mesh with four corners.
-            if j + 1 < count
-                && self.is_in_line(line, j + 1)
-                && let Some([right, _]) = self.below(line, j + 1)
-                && right == last + 1
-            {
-                let rest = width.hypot(height);
-                self.net.hold(self.lines[line - 1][last], self.lines[line][j + 1], rest, SHEAR);
-                self.net.hold(self.lines[line - 1][right], own, rest, SHEAR);
-            }
+        let mut bonds = Vec::new();
+        let count = self.lines[line].len() as isize;
+        (0..count).for_each(|j| bonds::of_stitch(&|at| self.made(at), [line as isize, j], &mut bonds));
+        let up = |line: usize| self.from[line][1];
+        let (width, height) = (self.width(line), (up(line) - up(line.saturating_sub(1))) * self.height);
+        for bond in bonds {
+            let (ends, rest, firm) = match bond {
+                Bond::Beside(ends) => (ends, width, 1.0),
+                Bond::Drawn { ends, count } if count > 2 => (ends, height + TRIPLE * self.height, 1.0),
+                Bond::Drawn { ends, .. } => (ends, height, 1.0),
+                Bond::Crossed(ends) => {
+                    let [parent, own] = ends.map(|end| self.net.points[self.node(end)]);
+                    (ends, own.distance(parent), 1.0)
+                }
+                Bond::Between(ends) => (ends, (0.5 * width).hypot(height), SHEAR),
+                Bond::Askew(ends) => (ends, width.hypot(height), SHEAR),
+                Bond::Straight(places) => {
+                    self.net.straighten(places.map(|place| self.node(place)), 0.5);
+                    continue;
+                }
+            };
+            let [a, b] = ends.map(|end| self.node(end));
+            self.net.hold(a, b, rest, firm);
         }
     }
 
-    /// By how many stitches each leans from what it takes, and what is made of each on the line below likewise.
+    /// By how many stitches each stitch of a line leans from what it takes, and before that those below it to what is made of them.
     fn leans(&self, line: usize) -> [Vec<f64>; 2] {
         let [under, own] = [line - 1, line].map(|l| self.lines[l].len());
         let mut above: Vec<[f64; 2]> = vec![[0.0; 2]; under];
         let mut from_below = vec![None; own];
-        for (j, lean) in from_below.iter_mut().enumerate().filter(|(j, _)| self.is_in_line(line, *j)) {
-            let Some([first, last]) = self.below(line, j) else { continue };
+        for (j, lean) in from_below.iter_mut().enumerate() {
+            let made = self.made([line as isize, j as isize]).filter(|made| made.origin == Origin::Drawn);
+            let Some([first, last]) = made.map(|made| made.below.map(|p| p as usize)) else { continue };
             let by = |p: usize| self.at(line, j) - self.at(line - 1, p);
-            for (p, own) in above.iter_mut().enumerate().take(last + 1).skip(first) {
-                *own = [own[0] + by(p), own[1] + 1.0];
+            for (p, [sum, count]) in above.iter_mut().enumerate().take(last + 1).skip(first) {
+                (*sum, *count) = (*sum + by(p), *count + 1.0);
             }
             *lean = Some(0.5 * (by(first) + by(last)));
         }
@@ -216,6 +196,7 @@ impl Shaped {
             first: *first,
             up: *up,
             points: numbers.iter().map(|n| laid.net.points[*n] - middle).collect(),
+            // Beyond the edges none leans.
             to_above: vec![0.0; numbers.len()],
             from_below: vec![0.0; numbers.len()],
         };

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{Maker, net::Net};
-use crate::pattern::chart::{Act, Stitch};
+use crate::pattern::chart::Act;
 
 /// Rounds of looking for it.
 const ROUNDS: usize = 100;
@@ -109,7 +109,7 @@ impl Maker<'_> {
         // What takes each stitch: stitches of the row above.
         let mut children: Vec<Vec<Vec<usize>>> = self.rows.iter().map(|r| vec![Vec::new(); r.len()]).collect();
         for r in 1..self.rows.len() {
-            for (j, s) in self.rows[r].iter().enumerate().filter(|(_, s)| is_in_line(s)) {
+            for (j, s) in self.rows[r].iter().enumerate().filter(|(_, s)| s.is_in_line()) {
                 for p in s.first_parent..s.first_parent + u32::from(s.parents) {
                     let n = children[r - 1].len();
                     children[r - 1][p as usize % n].push(j);
@@ -147,7 +147,7 @@ impl Maker<'_> {
             (None, true) => add(1.0 - 0.5 * width - at, 2.0),
             (None, false) => {}
         }
-        if is_in_line(&row[j]) {
+        if row[j].is_in_line() {
             add(self.parent_middle(&self.middles[r - 1], &row[j], at) - at, 1.0);
         }
         for &c in children {
@@ -158,9 +158,4 @@ impl Maker<'_> {
         }
         if stiffness > 0.0 { pull / stiffness } else { 0.0 }
     }
-}
-
-/// Whether a stitch is in the wale of those that it takes: strands of a cable change places.
-fn is_in_line(stitch: &Stitch) -> bool {
-    stitch.parents > 0 && stitch.layer == 0
 }

@@ -8,7 +8,10 @@ use glam::DVec2;
 
 use crate::pattern::{
     chart::{Act, Stitch},
-    knit::{ROW_HEIGHT, STITCH_WIDTH},
+    knit::{
+        ROW_HEIGHT, STITCH_WIDTH,
+        bonds::{self, At, Bond, Made},
+    },
     rods::Fire,
 };
 
@@ -72,7 +75,7 @@ impl Net {
     }
 
     /// A stitch of a row, counted on beyond the sides and below the first row.
-    fn node(&self, r: isize, j: isize) -> Node {
+    fn node(&self, [r, j]: At) -> Node {
         let (wide, high) = (self.wide as isize, self.high as isize);
         let periods = DVec2::new(j.div_euclid(wide) as f64, r.div_euclid(high) as f64);
         Node { point: (r.rem_euclid(high) * wide + j.rem_euclid(wide)) as usize, periods }
@@ -84,46 +87,32 @@ impl Net {
 
     /// Holds the stitches of a row to each other and to those below.
     fn hold_row(&mut self, rows: &[Vec<Stitch>], r: usize) {
-        let (here, wide) = (r as isize, self.wide as isize);
-        let stitch = |r: isize, j: isize| &rows[r.rem_euclid(self.high as isize) as usize][j.rem_euclid(wide) as usize];
-        // The stitches below that one takes, or lies between: the first one and the last one.
-        let below = |r: isize, j: isize| -> [isize; 2] {
-            let (s, round) = (stitch(r, j), j.div_euclid(wide) * wide);
-            let first = round + s.first_parent as isize;
-            if s.parents == 0 { [first - 1, first] } else { [first, first + isize::from(s.parents) - 1] }
+        let [wide, high] = [self.wide, self.high].map(|count| count as isize);
+        let made = |[r, j]: At| {
+            let made = Made::of(&rows[r.rem_euclid(high) as usize][j.rem_euclid(wide) as usize]);
+            let round = j.div_euclid(wide) * wide;
+            Some(Made { below: made.below.map(|p| p + round), ..made })
         };
-        let is_in_line = |s: &Stitch| s.layer == 0 && s.parents > 0;
-        let (mut springs, mut lines) = (Vec::new(), Vec::new());
-        for j in 0..wide {
-            let (s, own, next) = (stitch(here, j), self.node(here, j), self.node(here, j + 1));
-            springs.push(Spring { ends: [own, next], rest: STITCH_WIDTH, firm: 1.0 });
-            lines.push([self.node(here, j - 1), own, next]);
-            let [first, last] = below(here, j);
-            for p in first..=last {
-                let parent = self.node(here - 1, p);
-                let (rest, firm) = match s.parents {
-                    0 => ((0.5 * STITCH_WIDTH).hypot(ROW_HEIGHT), SHEAR),
-                    // Stitches that change places stay as far from each other as they are.
-                    _ if s.layer != 0 => (self.at(own).distance(self.at(parent)), 1.0),
-                    _ => (ROW_HEIGHT, 1.0),
-                };
-                springs.push(Spring { ends: [parent, own], rest, firm });
-            }
-            // A wale of three stitches wants to be straight.
-            let under = stitch(here - 1, first);
-            if is_in_line(s) && first == last && is_in_line(under) && under.parents == 1 {
-                lines.push([self.node(here - 2, below(here - 1, first)[0]), self.node(here - 1, first), own]);
-            }
-            // Two beside each other, as what they take: a mesh with four corners.
-            let right = below(here, j + 1)[0];
-            if is_in_line(s) && is_in_line(stitch(here, j + 1)) && right == last + 1 {
-                let rest = STITCH_WIDTH.hypot(ROW_HEIGHT);
-                springs.push(Spring { ends: [self.node(here - 1, last), next], rest, firm: SHEAR });
-                springs.push(Spring { ends: [self.node(here - 1, right), own], rest, firm: SHEAR });
-            }
+        let mut bonds = Vec::new();
+        (0..wide).for_each(|j| bonds::of_stitch(&made, [r as isize, j], &mut bonds));
+        for bond in bonds {
+            let (ends, rest, firm) = match bond {
+                Bond::Beside(ends) => (ends, STITCH_WIDTH, 1.0),
+                Bond::Drawn { ends, .. } => (ends, ROW_HEIGHT, 1.0),
+                // Stitches that change places stay as far from each other as they are.
+                Bond::Crossed(ends) => {
+                    let [parent, own] = ends.map(|end| self.at(self.node(end)));
+                    (ends, own.distance(parent), 1.0)
+                }
+                Bond::Between(ends) => (ends, (0.5 * STITCH_WIDTH).hypot(ROW_HEIGHT), SHEAR),
+                Bond::Askew(ends) => (ends, STITCH_WIDTH.hypot(ROW_HEIGHT), SHEAR),
+                Bond::Straight(places) => {
+                    self.lines.push(places.map(|place| self.node(place)));
+                    continue;
+                }
+            };
+            self.springs.push(Spring { ends: ends.map(|end| self.node(end)), rest, firm });
         }
-        self.springs.append(&mut springs);
-        self.lines.append(&mut lines);
     }
 
     /// Forces on the points, and on the logarithms of width and height; gives the largest of a point.
