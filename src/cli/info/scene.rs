@@ -12,6 +12,7 @@ use crate::{
         overlap::{Overlap, overlap_of_plied},
         strand::Folds,
     },
+    input::diagnostic::listed,
     math::words::{bytes_in_words, counted},
     plan::{Feature, Memory, Plan},
     scene::{CurveKind, Fabric, GarmentFacts, PanelFacts, Scene, Tufts},
@@ -46,22 +47,17 @@ fn garment_json(facts: &GarmentFacts) -> Value {
     })
 }
 
-/// The names of what its panels are of, from that of the garment on.
+/// The names of what its panels are of, that of the garment first.
 fn cloths_of(facts: &GarmentFacts) -> String {
-    let mut names = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
     for panel in &facts.panels {
-        if !names.contains(&panel.cloth.as_str()) {
-            names.push(&panel.cloth);
+        match panel.cloth.as_str() {
+            name if names.contains(&name) => {}
+            name if name == facts.cloth => names.insert(0, name),
+            name => names.push(name),
         }
     }
-    if let Some(own) = names.iter().position(|name| *name == facts.cloth) {
-        names[..=own].rotate_right(1);
-    }
-    match names.as_slice() {
-        [] => facts.cloth.clone(),
-        [one] => (*one).to_owned(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
+    listed(names.into_iter().map(str::to_owned), "and")
 }
 
 fn garment_lines(facts: &GarmentFacts) -> String {

@@ -49,7 +49,7 @@ struct Layout {
     gauge: [f64; 2],
     /// Width of a stitch in each row.
     widths: Vec<f64>,
-    /// Whether rows of other widths are laid as their cells have them.
+    /// Whether rows of other widths, of a piece that does not repeat, are laid as their cells have them.
     in_sections: bool,
 }
 
@@ -64,7 +64,7 @@ impl Layout {
         let gauge = cell.as_ref().map_or_else(|| kinds.gauge(size), Cell::gauge);
         let back = cell.as_ref().filter(|_| knit.is_double()).map(Cell::turned);
         let widths = if cell.is_some() { vec![gauge[0]; rows.len()] } else { kinds.widths(size[0]) };
-        let in_sections = kinds::in_sections(rows);
+        let in_sections = cell.is_none() && kinds::in_sections(rows);
         Self { cell, back, kinds, rows: rows.len(), even, points, size, gauge, widths, in_sections }
     }
 

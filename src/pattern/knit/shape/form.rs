@@ -71,10 +71,8 @@ impl<'a> Form<'a> {
         let over = own.sign == 0.0;
         let children = || own.children.iter().map(|&c| &loops.loops[c as usize]);
         let count = own.children.len().max(1) as f64;
-        let mean = |of: &dyn Fn(&Loop) -> f64| children().map(of).sum::<f64>() / count;
         let border = loops.border;
-        let head_at =
-            if own.children.is_empty() { own.at } else { own.at + mean(&|c: &Loop| border.short(c.foot - own.at)) };
+        let head_at = own.at + mean(children().map(|c| border.short(c.foot - own.at))).unwrap_or(0.0);
         let spread = match over && own.side != 0.0 {
             // Cast on for both layers, it is as wide as others where its layer is alone.
             true => 2.0,
@@ -104,7 +102,7 @@ impl<'a> Form<'a> {
             head_depth: DEPTH + LAYER * f64::from(own.rank),
             foot_depth: loops.foot_depth(own),
             // Its head is as wide as what is drawn through it.
-            spread: if own.children.is_empty() { spread } else { spread * mean(&|c: &Loop| c.wide) },
+            spread: spread * mean(children().map(|c| c.wide)).unwrap_or(1.0),
             crossing,
             // A tuck stays on its side of the stitch that it is worked with, and so does what is drawn through a lifted strand.
             reach: ends.map(|end| match (over && own.rank > 0) || end.through || through_strand {
