@@ -12,10 +12,13 @@ pub(super) mod passing;
 mod relaxation;
 mod search;
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::geometry::contact::nearest;
+use search::OnStrands;
 
 /// One yarn: some of the points, in order.
 #[derive(Clone, Debug)]
@@ -77,10 +80,9 @@ const DEEP: f64 = 0.4;
 /// press together.
 pub(super) const APART: f64 = 1.02;
 /// Contacts are looked for this much beyond touching.
-const MARGIN: f64 = 0.8;
-/// If one in so many points has gone half of that, and if any has after so many steps, they are looked for again.
-const MANY: usize = 200;
-const OFTEN: usize = 12;
+const MARGIN: f64 = 0.65;
+/// If one in so many points has gone far, all are looked for again.
+const MANY: usize = 8;
 /// The longest step of a point.
 const STEP: f64 = 0.06;
 /// The longest step in time.
@@ -96,8 +98,16 @@ struct Neighbour {
     segment: u32,
     /// By how many periods it must be moved.
     cells: [i8; 2],
-    /// How far from contact both were when they were looked for.
-    gap: f32,
+    /// They do not touch before both together have travelled so far.
+    until: f32,
+}
+
+/// What the segments of one chunk may touch.
+#[derive(Default)]
+struct Touching {
+    /// Those of its segment i are from `starts[i]` to `starts[i + 1]`.
+    starts: Vec<u32>,
+    neighbours: Vec<Neighbour>,
 }
 
 /// Pushes of contact on both ends of a segment.
@@ -128,8 +138,8 @@ struct Outside {
     virial: DVec2,
 }
 
-/// Points, their speeds, the forces on them, and where they were before.
-type Moving<'a> = (&'a mut [DVec3], &'a mut [DVec3], &'a [DVec3], &'a [DVec3]);
+/// Points, their speeds and steps, the forces on them, and where they were before.
+type Moving<'a> = (&'a mut [DVec3], &'a mut [DVec3], &'a mut [f32], &'a [DVec3], &'a [DVec3]);
 
 /// What is worked out anew in each step.
 #[derive(Default)]
@@ -139,11 +149,40 @@ struct Work {
     pulls: Vec<DVec3>,
     pushes: Vec<Push>,
     forces: Vec<DVec3>,
-    /// How far each segment has gone since neighbours were looked for.
-    gone: Vec<f32>,
-    /// Neighbours of segment i are those from `starts[i]` to `starts[i + 1]`.
-    starts: Vec<u32>,
-    neighbours: Vec<Neighbour>,
+    /// The last step of each point.
+    steps: Vec<f32>,
+    /// How far each segment has travelled, in all its steps since all neighbours were looked for.
+    travelled: Vec<f32>,
+    /// Where segments are on their strands.
+    on_strands: OnStrands,
+    /// For each chunk of segments.
+    touching: Vec<Touching>,
+}
+
+impl Work {
+    /// What a segment may touch.
+    fn neighbours(&self, segment: usize) -> &[Neighbour] {
+        let of_chunk = &self.touching[segment / CHUNK];
+        &of_chunk.neighbours[of_chunk.range(segment % CHUNK)]
+    }
+}
+
+impl Touching {
+    /// Where those of a segment are.
+    fn range(&self, segment: usize) -> Range<usize> {
+        self.starts[segment] as usize..self.starts[segment + 1] as usize
+    }
+
+    /// What a segment may touch.
+    fn of_mut(&mut self, segment: usize) -> &mut [Neighbour] {
+        let range = self.range(segment);
+        &mut self.neighbours[range]
+    }
+}
+
+/// How far segments so far apart may come nearer before they touch, less than what sums of steps are rounded by.
+fn gap(distance: f64) -> f32 {
+    (distance - APART) as f32 - 1e-4
 }
 
 /// How FIRE goes on: its step in time, and how much speeds turn towards forces.
@@ -191,7 +230,7 @@ struct Step {
     push: f64,
     /// In time.
     dt: f64,
-    /// Square of the distance beyond which a point has gone far.
+    /// Square of the distance beyond which a point has gone too far.
     far: f64,
 }
 
@@ -222,39 +261,61 @@ impl Rods {
         }
     }
 
-    /// Moves all points by one step; gives how many are farther than `step.far` (squared) from where they were before.
-    fn advance(&mut self, speeds: &mut [DVec3], forces: &[DVec3], before: &[DVec3], step: Step) -> usize {
+    /// Moves all points by one step; tells whether any is farther than `step.far` (squared) from where it was before.
+    fn advance(&mut self, speeds: &mut [DVec3], work: &mut Work, before: &[DVec3], step: Step) -> bool {
         let Step { keep, push, dt, far } = step;
         let limit = STEP / dt;
-        let advance = |(points, speeds, forces, before): Moving<'_>| -> usize {
-            let mut gone = 0;
-            for (((p, v), f), b) in points.iter_mut().zip(speeds).zip(forces).zip(before) {
+        let Work { forces, steps, .. } = work;
+        steps.resize(self.points.len(), 0.0);
+        let advance = |(points, speeds, steps, forces, before): Moving<'_>| -> bool {
+            let mut gone = false;
+            for ((((p, v), s), f), b) in points.iter_mut().zip(speeds).zip(steps).zip(forces).zip(before) {
                 *v = *v * keep + *f * push;
-                let size2 = v.length_squared();
-                if size2 > limit * limit {
-                    *v *= limit / size2.sqrt();
+                let size = v.length();
+                if size > limit {
+                    *v *= limit / size;
                 }
                 *p += *v * dt;
-                gone += usize::from(p.distance_squared(*b) > far);
+                *s = (size.min(limit) * dt) as f32;
+                gone |= p.distance_squared(*b) > far;
             }
             gone
         };
         if self.points.len() <= CHUNK {
-            return advance((&mut self.points, speeds, forces, before));
+            return advance((&mut self.points, speeds, steps, forces, before));
         }
         let parts = self.points.par_chunks_mut(CHUNK).zip(speeds.par_chunks_mut(CHUNK));
-        let parts = parts.zip(forces.par_chunks(CHUNK)).zip(before.par_chunks(CHUNK));
-        parts.map(|(((p, v), f), b)| advance((p, v, f, b))).sum()
+        let parts = parts.zip(steps.par_chunks_mut(CHUNK)).zip(forces.par_chunks(CHUNK)).zip(before.par_chunks(CHUNK));
+        parts.map(|((((p, v), s), f), b)| advance((p, v, s, f, b))).reduce(|| false, |a, b| a | b)
     }
 
-    /// How far each segment has gone since points were at `before`; half of what its cell has been strained with it.
-    fn gone(&self, before: &[DVec3], strained: f64, gone: &mut Vec<f32>) {
-        let of = |i: usize| (self.points[i].distance(before[i]) + 0.5 * strained) as f32 + 1e-4;
-        fill(gone, before.len(), |i| if i + 1 < before.len() { of(i).max(of(i + 1)) } else { of(i) });
+    /// Adds the last step to what segments have travelled, and half of what the cell was `strained` in it.
+    fn travel(&self, strained: f64, work: &mut Work) {
+        let Work { steps, travelled, .. } = work;
+        let more = |i: usize| steps[i].max(steps[(i + 1).min(steps.len() - 1)]) + 0.5 * strained as f32;
+        let add = |(first, own): (usize, &mut [f32])| {
+            own.iter_mut().zip(first..).for_each(|(travelled, i)| *travelled += more(i));
+        };
+        if travelled.len() <= CHUNK {
+            add((0, travelled));
+        } else {
+            travelled.par_chunks_mut(CHUNK).enumerate().for_each(|(c, own)| add((c * CHUNK, own)));
+        }
+        for s in self.strands.iter().filter(|s| s.jump.is_some()) {
+            // More than it was.
+            travelled[s.start + s.count - 1] += steps[s.start];
+        }
+    }
+
+    /// The segments of which an end is one of some points.
+    fn segments_of(&self, points: &[bool]) -> Vec<bool> {
+        let mut of: Vec<bool> = points.windows(2).map(|ends| ends[0] || ends[1]).collect();
+        of.extend(points.last());
         for s in self.strands.iter().filter(|s| s.jump.is_some()) {
             let last = s.start + s.count - 1;
-            gone[last] = of(last).max(of(s.start));
+            of[last] = points[last] || points[s.start];
         }
+        of
     }
 
     /// Pushes of segments that touch; gives the derivative of their energy by the logarithms of the cell's width and height.
@@ -262,12 +323,16 @@ impl Rods {
         let mut pushes = std::mem::take(&mut work.pushes);
         pushes.clear();
         pushes.resize(self.points.len(), Push::default());
-        let touch = |(c, own): (usize, &mut [Push])| self.touch(c * CHUNK, own, [apart, stiffness], work);
-        let outside: Vec<Outside> = if pushes.len() <= CHUNK {
-            vec![touch((0, &mut pushes))]
-        } else {
-            pushes.par_chunks_mut(CHUNK).enumerate().map(touch).collect()
+        let mut touching = std::mem::take(&mut work.touching);
+        let touch = |(c, (own, near)): (usize, (&mut [Push], &mut Touching))| {
+            self.touch(c * CHUNK, own, near, [apart, stiffness], work)
         };
+        let outside: Vec<Outside> = if pushes.len() <= CHUNK {
+            pushes.chunks_mut(CHUNK).zip(&mut touching).enumerate().map(touch).collect()
+        } else {
+            pushes.par_chunks_mut(CHUNK).zip(&mut touching).enumerate().map(touch).collect()
+        };
+        work.touching = touching;
         // In their order, whatever the number of threads.
         let mut virial = DVec2::ZERO;
         for chunk in outside {
@@ -278,16 +343,24 @@ impl Rods {
         virial
     }
 
-    /// Pushes of the segments of one chunk, from `first` on, and what they push elsewhere.
-    fn touch(&self, first: usize, own: &mut [Push], [apart, stiffness]: [f64; 2], work: &Work) -> Outside {
-        let Work { edges, gone, starts, neighbours, .. } = work;
+    /// Pushes of the segments of one chunk, from `first` on, by what is near them, and what they push elsewhere.
+    fn touch(
+        &self,
+        first: usize,
+        own: &mut [Push],
+        near: &mut Touching,
+        [apart, stiffness]: [f64; 2],
+        work: &Work,
+    ) -> Outside {
+        let Work { edges, travelled, .. } = work;
         let period = self.period.unwrap_or_default();
         let mut outside = Outside::default();
         for i in first..first + own.len() {
             let (p0, p1) = (self.points[i], self.points[i] + edges[i]);
-            for other in &neighbours[starts[i] as usize..starts[i + 1] as usize] {
+            for other in near.of_mut(i - first) {
                 let j = other.segment as usize;
-                if other.gap > gone[i] + gone[j] {
+                let together = travelled[i] + travelled[j];
+                if other.until > together {
                     continue;
                 }
                 let [x, y] = other.cells.map(f64::from);
@@ -295,6 +368,7 @@ impl Rods {
                 let near = nearest(p0, p1, q0, q0 + edges[j]);
                 let square = near.between.length_squared();
                 if square >= apart * apart {
+                    other.until = together + gap(square.sqrt());
                     continue;
                 }
                 let distance = square.sqrt().max(1e-6);

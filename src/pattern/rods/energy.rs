@@ -7,7 +7,7 @@ impl Rods {
     /// Energy of stretching, bending and contact, with contact as a relaxation begins.
     pub(in super::super) fn energy(&self) -> f64 {
         let has = self.has_segment();
-        let mut work = Work::default();
+        let mut work = Work { on_strands: self.on_strands(), ..Work::default() };
         self.search(&has, &mut work);
         self.along(&has, &work) + self.between(&work)
     }
@@ -37,7 +37,7 @@ impl Rods {
         let period = self.period.unwrap_or_default();
         let mut sum = 0.0;
         for i in 0..self.points.len() {
-            for other in &work.neighbours[work.starts[i] as usize..work.starts[i + 1] as usize] {
+            for other in work.neighbours(i) {
                 let j = other.segment as usize;
                 let [x, y] = other.cells.map(f64::from);
                 let (p, q) = (self.points[i], self.points[j] + glam::DVec3::new(x * period.x, y * period.y, 0.0));

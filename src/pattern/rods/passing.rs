@@ -39,7 +39,7 @@ pub(super) fn watch(before: &Rods, after: &Rods, has: &[bool], work: &Work) {
         None => rods.points[(i + 1).min(rods.points.len() - 1)],
     };
     for i in (0..after.points.len()).filter(|&i| has[i]) {
-        for other in &work.neighbours[work.starts[i] as usize..work.starts[i + 1] as usize] {
+        for other in work.neighbours(i) {
             let j = other.segment as usize;
             let ends = |rods: &Rods| {
                 let [x, y] = other.cells.map(f64::from);

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 #[cfg(test)]
 use super::passing;
-use super::{APART, CONTACT, Fire, MANY, MARGIN, OFTEN, Rods, Run, STEP, Step, TIME, Work, sums};
+use super::{APART, CONTACT, Fire, MANY, MARGIN, Rods, Run, STEP, Step, TIME, Work, sums};
 
 impl Rods {
     /// Relaxes; gives the steps it took and the largest force that is left.
@@ -32,11 +32,10 @@ struct Relaxation<'a> {
     weight: f64,
     cell_speed: DVec2,
     fire: Fire,
-    /// Where points were when neighbours were looked for, and how many have gone far since then.
+    /// Where points were when what is near each of them was looked for, and whether any has gone too far since then.
     before: Vec<DVec3>,
-    gone: usize,
-    /// Steps since then, and how far the cell's rim has moved in them.
-    since: usize,
+    gone: bool,
+    /// How far the cell's rim has moved since that was done for all.
     strained: f64,
     /// The largest force of the last step.
     largest: f64,
@@ -48,14 +47,13 @@ impl<'a> Relaxation<'a> {
         Self {
             run,
             has: rods.has_segment(),
-            work: Work::default(),
+            work: Work { on_strands: rods.on_strands(), ..Work::default() },
             speeds: vec![DVec3::ZERO; n],
             weight: (n as f64).sqrt(),
             cell_speed: DVec2::ZERO,
             fire: Fire::new(TIME / run.firm.max(1.0).sqrt()),
             before: Vec::new(),
-            gone: n,
-            since: 0,
+            gone: n > 0,
             strained: 0.0,
             largest: 0.0,
         }
@@ -83,15 +81,22 @@ impl<'a> Relaxation<'a> {
 
     /// Looks for neighbours again where points have gone far.
     fn look(&mut self, rods: &Rods) {
-        self.since += 1;
-        // In a large piece a few that still find their way do not hold up all others.
-        if self.gone > rods.points.len() / MANY || (self.gone > 0 && self.since >= OFTEN) {
-            self.since = 0;
-            rods.search(&self.has, &mut self.work);
-            self.before.clone_from(&rods.points);
-            self.strained = 0.0;
+        if self.gone {
+            // Those too that will soon have gone too far.
+            let far = (0.25 * MARGIN - self.strained).max(0.0).powi(2);
+            let places = rods.points.iter().zip(&self.before);
+            let moved: Vec<bool> = places.map(|(p, before)| p.distance_squared(*before) > far).collect();
+            let count = moved.iter().filter(|moved| **moved).count();
+            if self.before.is_empty() || count > moved.len() / MANY {
+                rods.search(&self.has, &mut self.work);
+                self.before.clone_from(&rods.points);
+                self.strained = 0.0;
+            } else {
+                rods.search_again(&self.has, &rods.segments_of(&moved), &mut self.work);
+                let places = self.before.iter_mut().zip(&rods.points).zip(moved);
+                places.filter(|(_, moved)| *moved).for_each(|((before, p), _)| *before = *p);
+            }
         }
-        rods.gone(&self.before, self.strained, &mut self.work.gone);
     }
 
     /// Forces on points, for yarns that keep so far `apart`; gives that on the cell's width and height.
@@ -122,17 +127,20 @@ impl<'a> Relaxation<'a> {
         let last = passing::before(rods);
         let far = (0.5 * MARGIN - self.strained).max(0.0).powi(2);
         let step = Step { keep, push, dt, far };
-        self.gone = rods.advance(&mut self.speeds, &self.work.forces, &self.before, step);
+        self.gone = rods.advance(&mut self.speeds, &mut self.work, &self.before, step);
+        let mut strained = 0.0;
         if let Some(period) = rods.period {
             self.cell_speed = self.cell_speed * keep + cell_force * push;
             // In a step the cell's rim moves no farther than a point may.
             let by = self.cell_speed * dt / self.weight;
             let by = by.clamp(DVec2::splat(-STEP) / period, DVec2::splat(STEP) / period);
             // Its images move with it.
-            self.strained += (by * period).abs().max_element();
+            strained = (by * period).abs().max_element();
+            self.strained += strained;
             rods.scale(DVec2::ONE + by);
             self.before.iter_mut().for_each(|p| *p *= (DVec2::ONE + by).extend(1.0));
         }
+        rods.travel(strained, &mut self.work);
         #[cfg(test)]
         if let Some(last) = last {
             passing::watch(&last, rods, &self.has, &self.work);

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{ALONG, APART, CHUNK, MARGIN, Neighbour, Rods, Work};
+use super::{ALONG, APART, CHUNK, MARGIN, Neighbour, Rods, Touching, Work, fill, gap};
 use crate::geometry::contact::{PointGrid, Walk, nearest};
 
 /// Segments by their middles, with the images that a periodic cell has of them.
@@ -17,7 +17,8 @@ struct Middles {
 }
 
 /// Where each segment is on its strand.
-struct OnStrands {
+#[derive(Default)]
+pub(super) struct OnStrands {
     /// How far along it.
     along: Vec<f64>,
     /// The strand's number.
@@ -30,57 +31,79 @@ struct OnStrands {
 struct Search<'a> {
     rods: &'a Rods,
     has: &'a [bool],
+    /// Those around which is looked, where that is not all.
+    moved: Option<&'a [bool]>,
+    /// How far each has travelled.
+    travelled: &'a [f32],
     edges: &'a [DVec3],
     halves: &'a [f64],
     /// The longest segment, but for few.
     longest: f64,
+    /// How near those are that may touch.
+    touch: f64,
     middles: &'a Middles,
     grid: &'a PointGrid,
-    on_strands: OnStrands,
+    on_strands: &'a OnStrands,
 }
 
 impl Rods {
     /// Finds what may touch in the steps to come.
     pub(super) fn search(&self, has: &[bool], work: &mut Work) {
-        let n = self.points.len();
         self.edges(&mut work.edges);
+        work.travelled.clear();
+        work.travelled.resize(self.points.len(), 0.0);
+        work.touching = self.touching(has, None, work);
+    }
+
+    /// The same around segments alone that have `moved`; what others may touch among themselves stays.
+    pub(super) fn search_again(&self, has: &[bool], moved: &[bool], work: &mut Work) {
+        self.edges(&mut work.edges);
+        work.touching = self.touching(has, Some(moved), work);
+    }
+
+    /// What may touch, for each chunk of segments: around those that have moved anew.
+    fn touching(&self, has: &[bool], moved: Option<&[bool]>, work: &Work) -> Vec<Touching> {
+        let n = self.points.len();
         let edges = &work.edges;
-        let halves: Vec<f64> = edges.iter().map(|e| 0.5 * e.length()).collect();
+        let mut halves = Vec::new();
+        fill(&mut halves, n, |i| 0.5 * edges[i].length());
         // One that is stretched must not make all cells wide.
         let longest =
             2.0 * halves.iter().copied().fold(0.05, f64::max).min(1.5 * halves.iter().sum::<f64>() / n as f64);
-        let reach = APART + MARGIN + longest;
+        // What is not looked at again may have gone on its way, and come back.
+        let touch = APART + if moved.is_some() { 1.5 * MARGIN } else { MARGIN };
+        let reach = touch + longest;
         let middles = self.middles(edges, reach);
         let grid = PointGrid::new(&middles.points, reach, None);
-        let on_strands = self.on_strands();
-        let search =
-            Search { rods: self, has, edges, halves: &halves, longest, middles: &middles, grid: &grid, on_strands };
-        let chunks: Vec<(Vec<u32>, Vec<Neighbour>)> = (0..n.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|c| {
-                let mut walk = if self.period.is_some() { grid.walk() } else { grid.walk_ahead() };
-                let mut found = Vec::new();
-                let counts = (c * CHUNK..((c + 1) * CHUNK).min(n))
-                    .map(|i| {
-                        let before = found.len();
-                        search.around(i, &mut found, &mut walk);
-                        (found.len() - before) as u32
-                    })
-                    .collect();
-                (counts, found)
-            })
-            .collect();
-        work.starts.clear();
-        work.starts.push(0);
-        work.neighbours.clear();
-        let mut sum = 0;
-        for (counts, found) in chunks {
-            for count in counts {
-                sum += count;
-                work.starts.push(sum);
+        let search = Search {
+            rods: self,
+            has,
+            moved,
+            travelled: &work.travelled,
+            edges,
+            halves: &halves,
+            longest,
+            touch,
+            middles: &middles,
+            grid: &grid,
+            on_strands: &work.on_strands,
+        };
+        let of_chunk = |c: usize| {
+            let mut walk = if search.finds_both() { grid.walk() } else { grid.walk_ahead() };
+            let mut found = Touching { starts: vec![0], neighbours: Vec::new() };
+            for i in c * CHUNK..((c + 1) * CHUNK).min(n) {
+                match moved {
+                    Some(moved) if !moved[i] => {
+                        let stays = |other: &&Neighbour| !moved[other.segment as usize];
+                        found.neighbours.extend(work.neighbours(i).iter().filter(stays));
+                    }
+                    _ => search.around(i, &mut found.neighbours, &mut walk),
+                }
+                found.starts.push(found.neighbours.len() as u32);
             }
-            work.neighbours.extend(found);
-        }
+            found
+        };
+        (0..n.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect()
     }
 
     /// Whether both ends of a segment stay where they are.
@@ -91,20 +114,16 @@ impl Rods {
     /// Middles of segments, with those of images that are within `reach` of the cell.
     fn middles(&self, edges: &[DVec3], reach: f64) -> Middles {
         let n = self.points.len();
-        let mut points = Vec::with_capacity(n);
-        let mut images: Vec<(u32, [i8; 2])> = Vec::with_capacity(n);
-        let mut own_cells = vec![[0_i32; 2]; if self.period.is_some() { n } else { 0 }];
-        for i in 0..n {
-            let mut middle = self.points[i] + 0.5 * edges[i];
-            if let Some(period) = self.period {
-                let cell = (middle.truncate() / period).floor();
-                own_cells[i] = [cell.x as i32, cell.y as i32];
-                middle -= (cell * period).extend(0.0);
-            }
-            points.push(middle);
-            images.push((i as u32, [0, 0]));
-        }
+        let mut points = Vec::new();
+        fill(&mut points, n, |i| self.points[i] + 0.5 * edges[i]);
+        let mut images: Vec<(u32, [i8; 2])> = (0..n as u32).map(|i| (i, [0, 0])).collect();
+        let mut own_cells = Vec::new();
         if let Some(period) = self.period {
+            for middle in &mut points {
+                let cell = (middle.truncate() / period).floor();
+                own_cells.push([cell.x as i32, cell.y as i32]);
+                *middle -= (cell * period).extend(0.0);
+            }
             let around = (DVec2::splat(reach) / period).ceil().as_ivec2();
             let all = (-around.y..=around.y).flat_map(|y| (-around.x..=around.x).map(move |x| (x, y)));
             for (x, y) in all.filter(|cell| *cell != (0, 0)) {
@@ -121,7 +140,7 @@ impl Rods {
         Middles { points, images, own_cells }
     }
 
-    fn on_strands(&self) -> OnStrands {
+    pub(super) fn on_strands(&self) -> OnStrands {
         let n = self.points.len();
         let (mut along, mut strand) = (vec![0.0; n], vec![0_u32; n]);
         let mut lengths = Vec::with_capacity(self.strands.len());
@@ -139,40 +158,48 @@ impl Rods {
 }
 
 impl Search<'_> {
+    /// Whether each of a pair is found around the other. (Images do not lie in the grid as what they are of does.)
+    fn finds_both(&self) -> bool {
+        self.rods.period.is_some() || self.moved.is_some()
+    }
+
     /// What segment `i` may touch: each pair once.
     fn around(&self, i: usize, found: &mut Vec<Neighbour>, walk: &mut Walk<'_>) {
-        let Self { has, edges, halves, middles, .. } = self;
+        let Self { has, moved, travelled, edges, halves, middles, touch, .. } = self;
         if !has[i] {
             return;
         }
-        let touch = APART + MARGIN;
         let periodic = self.rods.period.is_some();
         let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
         let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
+        let per_square = 1.0 / edges[i].length_squared().max(1e-18);
         // Most of what cells hold is too far away: that is told of many at once.
         walk.within(middle, touch + half + 0.5 * self.longest, |near| {
             let (j, mut cells) = middles.images[near.index as usize];
             let j = j as usize;
-            // Each pair once. (Images do not lie in the grid as what they are of does.)
-            let both = periodic || self.grid.share_cell(i, near.index as usize);
-            if both && (j < i || (j == i && cells <= [0, 0])) {
+            let both = self.finds_both() || self.grid.share_cell(i, near.index as usize);
+            let looks = moved.is_none_or(|moved| moved[j]);
+            if both && looks && (j < i || (j == i && cells <= [0, 0])) {
                 return;
             }
-            let widest = touch + half + halves[j];
-            let apart = near.at.distance_squared(middle) > widest * widest || (stays && self.rods.stays(j));
+            // No nearer than its middle is, less half of its length.
+            let off = near.at - p0;
+            let beside = off - edges[i] * (off.dot(edges[i]) * per_square).clamp(0.0, 1.0);
+            let widest = touch + halves[j];
+            let apart = beside.length_squared() > widest * widest || (stays && self.rods.stays(j));
             if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
                 return;
             }
             let half_j = 0.5 * edges[j];
             let between = nearest(p0, p1, near.at - half_j, near.at + half_j).between.length();
-            if between > touch {
+            if between > *touch {
                 return;
             }
             if periodic {
                 let own = middles.own_cells[i].iter().zip(&middles.own_cells[j]);
                 cells.iter_mut().zip(own).for_each(|(cell, (a, b))| *cell += (a - b) as i8);
             }
-            found.push(Neighbour { segment: j as u32, cells, gap: (between - APART) as f32 });
+            found.push(Neighbour { segment: j as u32, cells, until: travelled[i] + travelled[j] + gap(between) });
         });
     }
 
@@ -180,7 +207,7 @@ impl Search<'_> {
     /// image next door is near in space alone, unless the period is shorter than this.)
     #[inline]
     fn same_piece(&self, i: usize, j: usize, away: DVec3) -> bool {
-        let OnStrands { along, strand, lengths } = &self.on_strands;
+        let OnStrands { along, strand, lengths } = self.on_strands;
         if strand[i] != strand[j] {
             return false;
         }
