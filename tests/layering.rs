@@ -78,6 +78,7 @@ const FROM_FFI: [(&str, &[&str]); 4] = [
             "ffi::embree::RawHit",
             "ffi::embree::RawRay",
             "ffi::embree::SceneBuilder",
+            "ffi::heap",
         ],
     ),
 ];

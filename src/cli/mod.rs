@@ -221,7 +221,7 @@ fn take_negative_numbers(command: clap::Command) -> clap::Command {
 
 /// Runs the program with the process's arguments.
 pub fn run() -> ExitCode {
-    heap::give_back_large_pieces();
+    heap::keep_small_pieces();
     let matches = take_negative_numbers(Cli::command()).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match cli.command {

@@ -19,7 +19,10 @@ use glam::{DVec3, Vec3A, Vec4};
 
 pub use crate::ffi::embree::EmbreeError;
 use crate::{
-    ffi::embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
+    ffi::{
+        embree::{BvhLayout, CommittedScene, CurveBasis, Device, RawHit, RawRay, SceneBuilder},
+        heap,
+    },
     geometry::{
         curve::Basis,
         material_indices::MaterialIndices,
@@ -135,6 +138,8 @@ impl World {
         compact_bvh: bool,
         threads: usize,
     ) -> Result<Self, EmbreeError> {
+        // What curves were made of.
+        heap::give_back();
         let device = Device::new(threads)?;
         let layout = if compact_bvh { BvhLayout::Compact } else { BvhLayout::Fast };
         let mut builder = SceneBuilder::new(&device, layout)?;

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     cloth::Cloth,
-    ffi::oidn::Denoiser,
+    ffi::{heap, oidn::Denoiser},
     image::{self, output::Format},
     plan::Memory,
     render::{
@@ -54,6 +54,7 @@ fn run_one(args: &RenderArgs) -> Result<(), Failure> {
     let (pool, threads) = thread_pool(scene.render.threads)?;
     let _lock = Lock::take(args)?;
     let old = old_checkpoint(args)?;
+    heap::give_back();
     let load = started.elapsed();
     log::phase("load", load);
     // Of a sequence: what came while a later frame was loaded.
