@@ -44,11 +44,13 @@ pub(crate) struct PointGrid {
     /// The cells in order, each with its first entry; one more at the end.
     cells: Vec<(Key, u32)>,
     /// The cell of each point.
-    cell_of: Vec<u32>,
+    cell_of: Vec<Key>,
 }
 
 /// Points whose distances are found at once.
 const LANES: usize = 8;
+/// Points that are not worth two threads.
+const FEW: usize = 4096;
 /// So much farther, as a share of the way from the grid's first point, a distance in single precision may be.
 const ROUNDED: f32 = 1e-6;
 
@@ -91,22 +93,23 @@ impl PointGrid {
             _ => DVec3::splat(reach),
         };
         let key_of = |p: DVec3| key_of(p, size, wrap);
-        let mut order: Vec<(Key, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key_of(p), i as u32)).collect();
+        let cell_of: Vec<Key> = points.par_iter().with_min_len(FEW).map(|&p| key_of(p)).collect();
+        let mut order: Vec<(Key, u32)> = cell_of.iter().zip(0..).map(|(&key, index)| (key, index)).collect();
         order.par_sort_unstable();
         let mut cells: Vec<(Key, u32)> = Vec::new();
-        let mut cell_of = vec![0; points.len()];
-        for (at, &(key, index)) in order.iter().enumerate() {
+        for (at, &(key, _)) in order.iter().enumerate() {
             if cells.last().is_none_or(|last| last.0 != key) {
                 cells.push((key, at as u32));
             }
-            cell_of[index as usize] = cells.len() as u32 - 1;
         }
         cells.push((Key::MAX, points.len() as u32));
-        let entries: Vec<Entry> = order.iter().map(|&(_, index)| Entry { at: points[index as usize], index }).collect();
+        let entry = |&(_, index): &(Key, u32)| Entry { at: points[index as usize], index };
+        let entries: Vec<Entry> = order.par_iter().with_min_len(FEW).map(entry).collect();
         let origin = entries.first().map_or(DVec3::ZERO, |entry| entry.at);
-        let nowhere = || std::iter::repeat_n(f32::INFINITY, LANES);
-        let places = [0, 1, 2]
-            .map(|axis| entries.iter().map(|entry| (entry.at - origin)[axis] as f32).chain(nowhere()).collect());
+        let places = [0, 1, 2].map(|axis| {
+            let place = |i: usize| entries.get(i).map_or(f32::INFINITY, |entry| (entry.at - origin)[axis] as f32);
+            (0..entries.len() + LANES).into_par_iter().with_min_len(FEW).map(place).collect()
+        });
         Self { wrap, size, entries, places, origin, cells, cell_of }
     }
 
@@ -168,6 +171,38 @@ impl PointGrid {
     }
 }
 
+/// The cubes around some points: those that hold one, and all that touch these.
+pub(crate) struct Cubes {
+    size: DVec3,
+    /// In order.
+    cubes: Vec<Key>,
+}
+
+impl Cubes {
+    /// Cubes so wide around points.
+    pub(crate) fn around(points: impl Iterator<Item = DVec3>, size: f64) -> Self {
+        let size = DVec3::splat(size);
+        let mut cubes: Vec<Key> = points.map(|p| key_of(p, size, None)).collect();
+        // Points that follow each other are mostly in one.
+        cubes.dedup();
+        cubes.par_sort_unstable();
+        cubes.dedup();
+        let beside = |&own: &Key| {
+            let [z, y, x] = cell(own);
+            (0..27).map(move |k| key([z + k / 9 - 1, y + k / 3 % 3 - 1, x + k % 3 - 1]))
+        };
+        let mut cubes: Vec<Key> = cubes.iter().flat_map(beside).collect();
+        cubes.par_sort_unstable();
+        cubes.dedup();
+        Self { size, cubes }
+    }
+
+    /// Whether one of them holds a point.
+    pub(crate) fn hold(&self, point: DVec3) -> bool {
+        self.cubes.binary_search(&key_of(point, self.size, None)).is_ok()
+    }
+}
+
 /// Cells that are remembered along x, y and z, as powers of two: a yarn that forms loops comes back to those that it left.
 const REMEMBERED: [u32; 3] = [2, 1, 1];
 
@@ -204,7 +239,7 @@ impl<'a> Walk<'a> {
     /// Every point in the 27 cells around a point, itself too, in an order that depends on the points alone.
     pub(crate) fn around(&mut self, point: usize) -> impl Iterator<Item = &'a Entry> {
         let grid = self.grid;
-        let runs = self.go_to(grid.cells[grid.cell_of[point] as usize].0);
+        let runs = self.go_to(grid.cell_of[point]);
         runs.iter().flat_map(|run| &grid.entries[run.start as usize..run.end as usize])
     }
 
@@ -304,6 +339,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn cubes_hold_what_is_near_points() {
+        let mut stream = Stream::new(17);
+        let mut point = || 8.0 * (DVec3::from([0; 3].map(|_| f64::from(stream.next()))) - 0.5);
+        let points: Vec<DVec3> = (0..20).map(|_| point()).collect();
+        let cubes = Cubes::around(points.iter().copied(), 0.5);
+        let mut far = 0;
+        for _ in 0..2000 {
+            let at = point();
+            let nearest = points.iter().map(|p| (*p - at).abs().max_element()).fold(f64::INFINITY, f64::min);
+            assert!(cubes.hold(at) || nearest > 0.5, "{at}");
+            assert!(!cubes.hold(at) || nearest < 1.0, "{at}");
+            far += usize::from(!cubes.hold(at));
+        }
+        assert!(far > 500, "{far}");
     }
 
     #[test]

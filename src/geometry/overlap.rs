@@ -39,6 +39,8 @@ const ALONG: f64 = 2.0;
 const PIECE: f64 = 0.35;
 /// Pieces that one thread takes at once.
 const CHUNK: usize = 512;
+/// So many tell a share of a twentieth to a hundredth of itself, or nearly.
+const ENOUGH: u32 = 1 << 14;
 /// More pieces are not compared: 1.5 GB.
 const MOST_PIECES: usize = 1 << 24;
 
@@ -126,24 +128,27 @@ pub fn overlap_of_plied<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], 
     Some(Overlap::of(&pieces, &rings, Looked::All))
 }
 
-/// About the same, by one in eight pieces: to warn of much.
+/// About the same, by one in eight pieces, and of many by [`ENOUGH`]: to warn of much.
 pub fn sampled_overlap<'a>(curves: impl Iterator<Item = (&'a Curve, &'a [f64], f64)>) -> Option<Overlap> {
     let (pieces, rings) = pieces(curves)?;
-    Some(Overlap::of(&pieces, &rings, Looked::Eighth))
+    Some(Overlap::of(&pieces, &rings, Looked::OneIn((pieces.len() as u32 / ENOUGH).max(8))))
 }
 
 /// The pieces that are looked at.
 #[derive(Clone, Copy, PartialEq)]
 enum Looked {
     All,
-    /// One in eight, at steps that fall in with no period of the cloth.
-    Eighth,
+    /// One in so many, at steps that fall in with no period of the cloth.
+    OneIn(u32),
 }
 
 impl Looked {
     fn at(self, index: usize) -> bool {
-        // The golden ratio, in 32 bits.
-        self == Self::All || (index as u32).wrapping_mul(0x9e37_79b1) < u32::MAX / 8
+        match self {
+            Self::All => true,
+            // The golden ratio, in 32 bits.
+            Self::OneIn(many) => (index as u32).wrapping_mul(0x9e37_79b1) < u32::MAX / many,
+        }
     }
 }
 
@@ -227,7 +232,7 @@ impl<'a> Near<'a> {
                     },
                 );
             };
-            if looked == Looked::Eighth {
+            if looked != Looked::All {
                 look(&members.iter().copied().filter(|&own| looked.at(own)).collect::<Vec<_>>());
                 continue;
             }

@@ -11,6 +11,7 @@ mod thread;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 pub(super) use self::thread::{State, Thread, ease, settle};
 use self::{drawn::drawn_points, shaped::Shaped, sheet::Sheet};
@@ -76,7 +77,7 @@ pub(super) struct Laying<'a> {
     pub(super) loops: &'a Loops,
     pub(super) surface: &'a Surface,
     /// The cell of each row of the chart, and the row in it; none where rows have no repeat.
-    pub(super) cells: &'a dyn Fn(usize) -> Option<(&'a Cell, usize)>,
+    pub(super) cells: &'a (dyn Fn(usize) -> Option<(&'a Cell, usize)> + Sync),
     /// The cell of the back layer, of a cloth of two.
     pub(super) back: Option<&'a Cell>,
     /// Whether all of the piece repeats as its cell does.
@@ -100,10 +101,12 @@ impl Laying<'_> {
     pub(super) fn threads(&self, ways: &[Way]) -> Vec<Thread> {
         let mut pieces = self.loops.pieces();
         self.follow(&mut pieces);
-        ways.iter().map(|way| self.thread(way, &pieces)).collect()
+        let mut rows: Vec<Thread> = pieces.par_iter().enumerate().map(|(c, own)| self.row(c, own)).collect();
+        ways.iter().map(|way| self.thread(way, &pieces, &mut rows)).collect()
     }
 
-    fn thread(&self, way: &Way, pieces: &[Vec<Piece>]) -> Thread {
+    /// A yarn on its way; of the `rows` it takes its own.
+    fn thread(&self, way: &Way, pieces: &[Vec<Piece>], rows: &mut [Thread]) -> Thread {
         let mut all = Thread::default();
         // Where it begins, and where it is.
         let (mut start, mut here): (Option<Place>, Option<(i32, Place)>) = (None, None);
@@ -112,7 +115,7 @@ impl Laying<'_> {
             let is_own = |c: &usize| of(*c).color == way.color && (of(*c).first == 0) == (first == 0);
             let is_own = |c: &usize| is_own(c) && (first == 0 || of(*c).visits.iter().any(|v| v.0 == first));
             let Some(c) = self.courses_of(row).find(is_own) else { continue };
-            let mut own = self.row(c, &pieces[c]);
+            let mut own = std::mem::take(&mut rows[c]);
             let ends = pieces[c].first().zip(pieces[c].last());
             let Some(ends) = ends.map(|(a, b)| [a.places[0], b.places[b.places.len() - 1]]) else { continue };
             if backwards {

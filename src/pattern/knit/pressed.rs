@@ -5,14 +5,14 @@
 //! and ends half way to it. Its area stays if there is room beside; else the ellipse ends where it meets the
 //! next strand, and the yarn is denser there. In bends that are tighter than the yarn is thick it gives way to itself.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-use glam::{DVec2, DVec3, IVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Thickness;
 use crate::{
-    geometry::contact::{Entry, PointGrid, Walk, nearest},
+    geometry::contact::{Cubes, Entry, PointGrid, Walk, nearest},
     pattern::{PatternStrand, relax::sheared},
 };
 
@@ -300,27 +300,16 @@ fn add_images(segments: &mut Vec<Segment>, (period, shear): (DVec2, f64), reach:
 
 /// The segments of all strands, one behind the other: those near to one that is asked for, unless it is all of them.
 fn segments(strands: &[PatternStrand], asked: &dyn Fn(u32) -> bool, reach: f64, all: bool) -> Vec<Segment> {
-    let cell = |p: DVec3| (p / reach).floor().as_ivec3();
-    let mut near = HashSet::new();
-    let mut index = 0;
-    for points in strands.iter().filter(|_| !all).map(|s| &s.curve.points) {
-        let mut last = None;
-        for point in &points[..points.len().saturating_sub(1)] {
-            let own = cell(*point);
-            if asked(index) && last != Some(own) {
-                near.extend((0..27).map(|k| own + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
-                last = Some(own);
-            }
-            index += 1;
-        }
-    }
+    let starts = strands.iter().flat_map(|s| s.curve.points.iter().take(s.curve.points.len().saturating_sub(1)));
+    let asked_for = (0..).zip(starts).filter(|(index, _)| !all && asked(*index));
+    let near = Cubes::around(asked_for.map(|(_, point)| *point), reach);
     let mut out = Vec::new();
     let mut index = 0;
     for (strand, s) in (0..).zip(strands) {
         let mut along = 0.0;
         for w in s.curve.points.windows(2) {
             let segment = Segment { from: w[0], to: w[1], strand, index, along };
-            if all || near.contains(&cell(segment.middle())) {
+            if all || near.hold(segment.middle()) {
                 out.push(segment);
             }
             along += w[0].distance(w[1]);

@@ -10,6 +10,7 @@ mod form;
 mod rims;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use self::bobble::PILED;
 use super::{
@@ -154,7 +155,7 @@ impl Loops {
     /// The way of the yarn along each course, in the order of [`Loops::courses`], visit by visit.
     pub(in super::super) fn pieces(&self) -> Vec<Vec<Piece>> {
         self.courses
-            .iter()
+            .par_iter()
             .map(|course| {
                 let step = self.step(course);
                 let n = course.visits.len();

@@ -9,7 +9,11 @@ mod topology;
 use std::collections::BTreeSet;
 
 use super::{
-    super::{StrandKind, bend::folded, chart::PATTERNS},
+    super::{
+        StrandKind,
+        bend::{excess, folded},
+        chart::PATTERNS,
+    },
     loops::{Border, Loops},
     *,
 };
@@ -42,7 +46,7 @@ fn measured(strands: &[PatternStrand]) -> Overlap {
 fn deepest_fold(strands: &[PatternStrand]) -> f64 {
     let folds = strands.iter().flat_map(|s| {
         s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            *fold = folded(*fold, w, 0.5);
+            *fold = folded(*fold, excess(w, 0.5));
             Some(*fold)
         })
     });

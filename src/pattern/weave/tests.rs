@@ -7,7 +7,10 @@ use std::{
 use glam::DVec2;
 
 use super::{
-    super::{bend::folded, draft::NAMES},
+    super::{
+        bend::{excess, folded},
+        draft::NAMES,
+    },
     *,
 };
 use crate::geometry::{
@@ -438,7 +441,7 @@ fn wefts_turn_without_folding_into_themselves() {
         for weft in turned(name, order).iter().filter(|s| s.kind == StrandKind::Weft) {
             // Beyond the outermost crossings.
             let fold = weft.curve.points.windows(3).zip(&weft.coordinates).scan(0.0, |fold: &mut f64, (w, at)| {
-                *fold = if (0.51..15.49).contains(&at[0]) { 0.0 } else { folded(*fold, w, 1.0) };
+                *fold = if (0.51..15.49).contains(&at[0]) { 0.0 } else { folded(*fold, excess(w, 1.0)) };
                 Some(*fold)
             });
             let deepest = fold.fold(0.0, f64::max);
@@ -457,7 +460,7 @@ fn wefts_come_from_pile_into_a_selvedge_without_folding() {
     let made = weave.strands().unwrap();
     for weft in made.iter().filter(|s| s.kind == StrandKind::Weft) {
         let deepest = weft.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            *fold = folded(*fold, w, weave.half_rooms[1]);
+            *fold = folded(*fold, excess(w, weave.half_rooms[1]));
             Some(*fold)
         });
         let deepest = deepest.fold(0.0, f64::max);

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{
     super::{
@@ -40,6 +41,9 @@ const FOLLOWED: [Followed; 2] = [Followed { foot: 0.12, leg: 0.12 }, Followed { 
 /// Found by trying 25 pairs on two ribs of six rows: from 0.3 to 0.7 legs miss loops of 2 x 2 rib, from 0.5 to 0.9 heads catch on those beside them
 /// in 1 x 1 rib and stretch the yarn by 1 %.
 const BOUND: [f64; 2] = [0.45, 0.8];
+
+/// Loops that one thread takes at once.
+const CHUNK: usize = 256;
 
 /// How far what lies along a row is moved, by where it is across the cloth.
 #[derive(Default)]
@@ -201,7 +205,11 @@ impl<'a> Laying<'a> {
             let (c, k) = at[i].filter(|_| needed(i))?;
             self.moved(&loops.courses[c], k, &pieces[c][k], followed)
         };
-        (0..at.len()).map(|i| moved(i).or(at[i].map(|_| Moved::default()))).collect()
+        (0..at.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|i| moved(i).or(at[i].map(|_| Moved::default())))
+            .collect()
     }
 
     /// How far the heads below a row, and the feet and the legs above it are moved, in a layer.
@@ -234,7 +242,8 @@ impl<'a> Laying<'a> {
     /// Moves what is in its closed form with what it is drawn through and what is drawn through it.
     pub(super) fn follow(&self, pieces: &mut [Vec<Piece>]) {
         let tried = FOLLOWED.map(|followed| self.followed(pieces, followed));
-        let held = |moved: &Vec<(usize, Vec<Piece>)>| moved.iter().map(|(c, own)| self.held(*c, own)).sum::<usize>();
+        let held =
+            |moved: &Vec<(usize, Vec<Piece>)>| moved.par_iter().map(|(c, own)| self.held(*c, own)).sum::<usize>();
         let best = tried.into_iter().rev().max_by_key(held);
         for (c, own) in best.into_iter().flatten() {
             pieces[c] = own;
@@ -245,13 +254,12 @@ impl<'a> Laying<'a> {
     fn followed(&self, pieces: &[Vec<Piece>], followed: Followed) -> Vec<(usize, Vec<Piece>)> {
         let known = self.known(pieces, followed);
         let is_closed = |visit: &Visit| matches!(visit, Visit::Loop(i) if known[*i as usize].is_none());
-        let mut moved = Vec::new();
         if known.iter().all(Option::is_none) {
-            return moved;
+            return Vec::new();
         }
-        for (c, course) in self.loops.courses.iter().enumerate() {
+        let moved = |(c, course): (usize, &Course)| {
             if !course.visits.iter().any(|(_, visit)| is_closed(visit)) {
-                continue;
+                return None;
             }
             let layers: &[f64] = if self.loops.is_double() { &[1.0, 0.0, -1.0] } else { &[0.0] };
             let fields: Vec<_> = layers.iter().map(|l| (*l, self.around(course, &known, followed, *l))).collect();
@@ -283,9 +291,9 @@ impl<'a> Laying<'a> {
                     }
                 }
             }
-            moved.push((c, own));
-        }
-        moved
+            Some((c, own))
+        };
+        self.loops.courses.par_iter().enumerate().filter_map(moved).collect()
     }
 
     /// How many loops of a course in its closed form are drawn through by what a cell has.

@@ -1,20 +1,21 @@
 //! A yarn as points on its way through a piece, and how those of them that may move relax.
 
-use std::collections::HashSet;
-
-use glam::{DVec3, IVec3};
+use glam::DVec3;
+use rayon::prelude::*;
 
 use super::super::shape::spaced;
 use crate::{
-    geometry::spline::through_points,
+    geometry::{contact::Cubes, spline::through_points},
     pattern::{
-        bend::folded,
+        bend::{excess, folded},
         rods::{Rods, Run, Strand},
     },
 };
 
 /// The longest segment, in diameters.
 const LONGEST: f64 = 1.0;
+/// Points that one thread takes at once.
+const CHUNK: usize = 1024;
 
 /// A yarn on its way through the cloth.
 #[derive(Clone, Debug, Default)]
@@ -173,20 +174,12 @@ pub(in super::super) fn settle(threads: &mut [Thread], run: &Run) {
     // Where each point of the rods is from.
     let mut from: Vec<(usize, usize)> = Vec::new();
     let whole = threads.iter().all(|t| t.state.iter().all(|s| *s != State::Rest));
-    let cube = |p: DVec3| (p / CUBE).floor().as_ivec3();
-    let mut near: HashSet<IVec3> = HashSet::new();
-    if !whole {
-        for t in threads.iter() {
-            for (p, _) in t.points.iter().zip(&t.state).filter(|(_, s)| **s == State::Move) {
-                let own = cube(*p);
-                let beside = |k: i32| IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-                near.extend((0..27).map(|k| own + beside(k)));
-            }
-        }
-    }
+    let states = threads.iter().flat_map(|t| t.points.iter().zip(&t.state));
+    let moving = states.filter(|(_, state)| !whole && **state == State::Move).map(|(point, _)| *point);
+    let near = Cubes::around(moving, CUBE);
     for (k, t) in threads.iter().enumerate() {
         let n = t.points.len();
-        let taken: Vec<bool> = t.points.iter().map(|p| whole || near.contains(&cube(*p))).collect();
+        let taken: Vec<bool> = t.points.par_iter().with_min_len(CHUNK).map(|p| whole || near.hold(*p)).collect();
         let mut i = 0;
         while i < n {
             if !taken[i] {
@@ -217,20 +210,25 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
     const FOLD: f64 = 0.1;
     const ROUNDS: usize = 8;
     let reach = per_stitch / 4;
+    let mut left = usize::MAX;
     for _ in 0..ROUNDS {
         let folds: Vec<Vec<usize>> = threads
             .iter()
             .map(|t| {
-                let along = t.points.windows(3).scan(0.0, |fold, w| {
-                    *fold = folded(*fold, w, radius);
+                let excess: Vec<f64> = t.points.par_windows(3).with_min_len(CHUNK).map(|w| excess(w, radius)).collect();
+                let along = excess.into_iter().scan(0.0, |fold, excess| {
+                    *fold = folded(*fold, excess);
                     Some(*fold)
                 });
                 along.enumerate().filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
             })
             .collect();
-        if folds.iter().all(Vec::is_empty) {
+        // What is left does not unfold.
+        let count = folds.iter().map(Vec::len).sum();
+        if count >= left {
             return;
         }
+        left = count;
         let states: Vec<Vec<State>> = threads.iter().map(|t| t.state.clone()).collect();
         for ((t, own), folds) in threads.iter_mut().zip(&states).zip(folds) {
             t.state.iter_mut().filter(|s| **s == State::Move).for_each(|s| *s = State::Rest);
