@@ -2,7 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
+use arrayvec::ArrayVec;
 use glam::DVec2;
+use rayon::prelude::*;
 use wide::f32x8;
 
 use super::{
@@ -17,6 +19,20 @@ use crate::{
     },
     math::sampler::Stream,
 };
+
+/// Ways that one thread takes at once.
+const CHUNK: usize = 4096;
+/// Ways from a fibre.
+const TURNS: usize = 4;
+
+/// A fibre from which there are ways, of those that a line meets.
+struct LookedAt {
+    hit: usize,
+    /// How many it stands for.
+    weight: f32,
+    /// By which angles light is turned there.
+    turns: [f64; TURNS],
+}
 
 /// A way out of a ply from a fibre at which light was turned.
 #[derive(Clone, Copy)]
@@ -56,12 +72,18 @@ pub(super) fn after(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> A
     for asked in [Asked::Unscattered { rate }, Asked::Counted] {
         // First as if those inside and by the rim and along both axes were alike: of some there are too few to begin with.
         for alike in [true, true, true, false, false, false] {
-            let mut sums = Tables::default();
-            for way in &ways {
-                let law = way.law(&after);
-                sums.add(way, law.shares(), asked.counted(way), asked.fitted(way, &law));
-            }
-            sums.improve(&mut after, asked, alike);
+            let of_chunk = |ways: &[Way]| {
+                let mut sums = Tables::default();
+                for way in ways {
+                    let law = way.law(&after);
+                    sums.add(way, law.shares(), asked.counted(way), asked.fitted(way, &law));
+                }
+                sums
+            };
+            // In their order, whatever the number of threads.
+            let sums: Vec<Tables> = ways.par_chunks(CHUNK).map(of_chunk).collect();
+            let all = sums.into_iter().fold(Tables::default(), Tables::and);
+            all.improve(&mut after, asked, alike);
         }
     }
     after
@@ -70,9 +92,8 @@ pub(super) fn after(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> A
 /// Random ways, half of them onward and half back.
 fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
     const RAYS: usize = 16_000;
-    const TURNS: usize = 4;
     let mut stream = Stream::new(0xaf7e);
-    let mut ways = Vec::with_capacity(2 * TURNS * RAYS);
+    let mut rays = Vec::with_capacity(RAYS);
     for ray in 0..RAYS {
         let line = Line::random(lines, &sections[ray % sections.len()], None, &mut stream);
         let mut hits = line.hits(lines);
@@ -83,17 +104,26 @@ fn ways(lines: &Lines, sections: &[Vec<DVec2>], ply: &PlyShape) -> Vec<Way> {
         // Any other one stands for all but the first.
         let others = hits.len() - 1;
         let other = 1 + (f64::from(stream.next()) * others as f64) as usize;
-        let looked_at = [Some((&hits[0], 1.0)), hits.get(other).map(|hit| (hit, others as f32))];
-        for (later, hit) in looked_at.into_iter().enumerate() {
-            let Some((hit, weight)) = hit else { continue };
-            for turn in 0..TURNS {
-                let turn = (turn as f64 + f64::from(stream.next())) / TURNS as f64 * TAU;
-                let way = line.turned(lines, ply, (hit, &hits), later > 0, DVec2::from_angle(turn).rotate(line.along));
+        let looked_at = [(0, 1.0), (other, others as f32)].map(|(hit, weight)| {
+            let turn = |turn: usize| (turn as f64 + f64::from(stream.next())) / TURNS as f64 * TAU;
+            (hit < hits.len()).then(|| LookedAt { hit, weight, turns: std::array::from_fn(turn) })
+        });
+        rays.push((line, hits, looked_at));
+    }
+    // All that is random is drawn.
+    let of_ray = |(line, hits, looked_at): (Line<'_>, Vec<Hit>, [Option<LookedAt>; 2])| {
+        let mut ways = ArrayVec::<Way, { 2 * TURNS }>::new();
+        for (later, of) in looked_at.into_iter().enumerate() {
+            let Some(LookedAt { hit, weight, turns }) = of else { continue };
+            for turn in turns {
+                let w = DVec2::from_angle(turn).rotate(line.along);
+                let way = line.turned(lines, ply, (&hits[hit], &hits), later > 0, w);
                 ways.extend(way.map(|way| Way { weight, ..way }));
             }
         }
-    }
-    ways
+        ways
+    };
+    rays.into_par_iter().with_min_len(RAYS / 64).flat_map_iter(of_ray).collect()
 }
 
 impl Line<'_> {
@@ -185,6 +215,15 @@ impl Sums {
         self.fitted += weights * f32x8::splat(fitted);
     }
 
+    fn and(self, other: Self) -> Self {
+        Self {
+            ways: self.ways + other.ways,
+            weight: self.weight + other.weight,
+            counted: self.counted + other.counted,
+            fitted: self.fitted + other.fitted,
+        }
+    }
+
     /// Those of one number.
     fn of(&self, number: usize) -> Sum {
         let [ways, weight, counted, fitted] =
@@ -266,6 +305,12 @@ type Table = [[Sums; AfterFiber::KNOTS]; 2];
 struct Tables([Table; 4]);
 
 impl Tables {
+    fn and(mut self, other: Self) -> Self {
+        let all = self.0.iter_mut().flatten().flatten();
+        all.zip(other.0.iter().flatten().flatten()).for_each(|(sums, more)| *sums = sums.and(*more));
+        self
+    }
+
     fn add(&mut self, way: &Way, shares: f32x8, counted: f32, fitted: f32) {
         let table = &mut self.0[2 * usize::from(way.turn < 0.0) + usize::from(way.later)];
         let (below, at) = AfterFiber::knot(way.expected);
