@@ -78,7 +78,8 @@ pub(super) struct FibersAhead {
 /// The fibres of the plies on a way out from `shift` beside a place, in the direction `w` of the section's frame: of the place's own ply from
 /// the distance `own` on, if they are asked for, and of others from `free` on.
 ///
-/// A vertex asks a dozen times, from as many places of its code: one copy of this serves all of them, and is as fast as one in each.
+/// A vertex asks a dozen times, from as many places of its code: one copy of this serves all of them, and is as fast as one in each. It
+/// fills a list that is there, for one that is moved is copied with all the room that it has.
 #[inline(never)]
 pub(super) fn plies_ahead(
     view: &View<'_>,
@@ -86,11 +87,12 @@ pub(super) fn plies_ahead(
     (shift, w): (Vec3A, Vec3A),
     own: Option<f32>,
     free: f32,
-) -> PliesAhead {
+    plies: &mut PliesAhead,
+) {
     let from = &spot.inside;
     let (thin, wide) = (view.section.thinness(), from.wide(w));
     let shape = view.yarn.occluder().shape();
-    let mut plies = PliesAhead::new();
+    plies.clear();
     view.section.plies_ahead(shape, from, shift, w, |ahead| {
         let Some(free) = (if ahead.ply == spot.ply { own } else { Some(free) }) else { return };
         let PlyAhead { ply, foot, offset, length, stretched, .. } = ahead;
@@ -99,7 +101,6 @@ pub(super) fn plies_ahead(
         let fibers = FibersAhead { ply, offset, foot, tilt, chord, expected: tilt * chord.ahead(free - foot) };
         let _ = plies.try_push(fibers);
     });
-    plies
 }
 
 impl FibersAhead {

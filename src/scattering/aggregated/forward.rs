@@ -12,7 +12,7 @@ use super::{
         medium::TtWidth,
     },
     Spot, Turned, View,
-    ahead::{FibersAhead, STRETCHES, Stretch, nearest, plies_ahead},
+    ahead::{FibersAhead, PliesAhead, STRETCHES, Stretch, nearest, plies_ahead},
     way_in::{Place, WayIn},
 };
 use crate::{
@@ -220,18 +220,25 @@ impl Forward {
         let spot = view.first_spot(&crossing, depth, beside);
         let fiber = Fiber::new(view, spot, (view.camera, false), Rgb::ONE);
         let little = LITTLE[usize::from(!lit)] * (fiber.passed * weight).max_channel();
-        let forward = Self::follow(view, fiber, weight, little, stream);
-        Some(Self { first: Some(First { crossing, depth, beside }), ..forward })
+        let mut forward = Self::new(view, &fiber, weight);
+        forward.first = Some(First { crossing, depth, beside });
+        forward.follow(view, fiber, little, stream);
+        Some(forward)
+    }
+
+    /// Light of a path's weight that has not been followed yet, from a fibre.
+    #[inline]
+    pub(super) fn new(view: &View<'_>, first: &Fiber, weight: Rgb) -> Self {
+        let gain = view.yarn.node_gain[first.spot.ply];
+        Self { fibers: ArrayVec::new(), first: None, gain, weight, drawn: Drawn::NOTHING }
     }
 
     /// Follows light from a fibre to the next, and so on, until it is out or ends by chance, which it may where `little` is passed on.
     #[inline]
-    pub(super) fn follow(view: &View<'_>, first: Fiber, weight: Rgb, little: f32, stream: &mut Stream) -> Self {
-        let gain = view.yarn.node_gain[first.spot.ply];
-        let mut forward = Self { fibers: ArrayVec::new(), first: None, gain, weight, drawn: Drawn::NOTHING };
+    pub(super) fn follow(&mut self, view: &View<'_>, first: Fiber, little: f32, stream: &mut Stream) {
         let mut next = Some(first);
         while let Some(mut fiber) = next.take() {
-            let passed = (fiber.passed * weight).max_channel();
+            let passed = (fiber.passed * self.weight).max_channel();
             if passed < little {
                 if stream.next() * little >= passed {
                     // It may end here, and goes on no farther.
@@ -241,14 +248,14 @@ impl Forward {
                 }
             }
             if fiber.passed.max_channel() <= 0.0 {
-                forward.fibers.push(fiber);
+                self.fibers.push(fiber);
                 break;
             }
             // Of light that goes on so much is left where it meets the next one.
             let left = stream.next();
             let way = fiber.way(view, fiber.direction(stream));
             let mut stretches = ArrayVec::<PlyOnWay, STRETCHES>::new();
-            let through = if forward.fibers.len() == LAST {
+            let through = if self.fibers.len() == LAST {
                 1.0
             } else {
                 fiber.follow_way(view, &way, |stretch| {
@@ -256,18 +263,17 @@ impl Forward {
                 })
             };
             if left < through {
-                forward.drawn = Drawn::new(way.w, &forward.part(view, &fiber, fiber.lobe(way.w), through));
+                self.drawn = Drawn::new(way.w, &self.part(view, &fiber, fiber.lobe(way.w), through));
             } else {
                 stretches.sort_unstable_by(|a, b| a.fibers.foot.total_cmp(&b.fibers.foot));
                 next = fiber.next(view, &way, (&stretches, left), stream);
             }
             if next.is_none() {
                 // What F does not send out.
-                fiber.ended = (fiber.ended + fiber.passed - forward.drawn.share).max(Rgb::ZERO);
+                fiber.ended = (fiber.ended + fiber.passed - self.drawn.share).max(Rgb::ZERO);
             }
-            forward.fibers.push(fiber);
+            self.fibers.push(fiber);
         }
-        forward
     }
 
     /// A fibre at which light ends its chain, which `u` draws: where, how many fibres passed it on before, and its energy over the chance to
@@ -392,7 +398,9 @@ impl Fiber {
         let (yarn, spot) = (view.yarn, &self.spot);
         let shape = yarn.occluder().shape();
         let mut all = 1.0;
-        for fibers in plies_ahead(view, spot, (way.shift, way.w), Some(0.0), way.free) {
+        let mut ahead = PliesAhead::new();
+        plies_ahead(view, spot, (way.shift, way.w), Some(0.0), way.free, &mut ahead);
+        for &fibers in &ahead {
             let gaps = yarn.plies[fibers.ply].gaps;
             let own = fibers.ply == spot.ply;
             let through = if own {

@@ -42,7 +42,7 @@ use crate::{
         sampler::{OneOf, Stream},
     },
 };
-use ahead::{FibersAhead, plies_ahead};
+use ahead::{FibersAhead, PliesAhead, plies_ahead};
 use backward::{Backward, Lobe};
 use forward::Forward;
 use single::LateNode;
@@ -226,7 +226,8 @@ impl Spot {
     #[inline]
     fn past_own(&self, view: &View<'_>, shift: Vec3A, w: Vec3A, mut other: impl FnMut(FibersAhead)) -> Rgb {
         let free = 2.0 * view.section.thinness() * view.yarn.plies[self.ply].lead;
-        let ahead = plies_ahead(view, self, (shift, w), view.yarn.plies_overlap.then_some(free), free);
+        let mut ahead = PliesAhead::new();
+        plies_ahead(view, self, (shift, w), view.yarn.plies_overlap.then_some(free), free, &mut ahead);
         let mut depth = Rgb::ZERO;
         for fibers in ahead.iter().filter(|of| of.ply != self.ply && of.expected > 0.0) {
             depth += fibers.depth(view, &ahead);

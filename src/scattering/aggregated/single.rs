@@ -16,7 +16,7 @@ use super::{
         medium::PlyOptics,
     },
     Spot, Turned, View,
-    ahead::{FibersAhead, plies_ahead},
+    ahead::{FibersAhead, PliesAhead, plies_ahead},
     forward::ChainEnd,
     way_in::{WayBack, WayIn},
 };
@@ -262,7 +262,8 @@ impl Node {
         // A mean over the directions from which TT bends light into this one.
         let from_around = back.as_ref().filter(|_| cosine < 1.0).map(|back| back.bent(cosine));
         let bent = from_around.as_ref().map(|back| (Some(back), optics.after.turned(later, turn * cosine, short)));
-        let ahead = plies_ahead(view, spot, (shift, w), Some(0.0), free);
+        let mut ahead = PliesAhead::new();
+        plies_ahead(view, spot, (shift, w), Some(0.0), free, &mut ahead);
         let open = |back: Option<&WayBack>| back.map_or(1.0, WayBack::passes);
         let ways_back = [direct.0, from_around.as_ref().or(direct.0)];
         let mut out = WayOut { open: ways_back.map(open), ..WayOut::default() };

@@ -448,7 +448,8 @@ fn densities_match(pressed: Option<Pressed>) {
     let mut counts = [[0f64; 96]; 2];
     for _ in 0..n {
         // The directions of F and of the node are fixed in a vertex; they are drawn anew.
-        let again = Forward::follow(view, first, forward.weight, 0.0, &mut stream);
+        let mut again = Forward::new(view, &first, forward.weight);
+        again.follow(view, first, 0.0, &mut stream);
         if again.fibers.len() == 1 && stream.next() < again.drawn.chance {
             counts[0][cell(again.drawn.direction)] += 1.0;
         }
