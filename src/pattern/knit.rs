@@ -217,10 +217,17 @@ impl Knit {
         })
     }
 
-    /// The same of a piece of these rows, unless sections of it have sizes of their own.
+    /// The same of a piece of these rows, unless sections of it have sizes of their own or it lies on the bias.
     fn repeat_of(&self, rows: &[Vec<Stitch>], size: [Option<f64>; 2]) -> Option<Repeat> {
         let open = size[0].is_none() && self.flat && self.colors.is_none() && self.edges != Edges::Tile;
-        self.repeat().filter(|_| !open || !kinds::in_sections(rows))
+        let by_itself = (open && kinds::in_sections(rows)) || self.slants(rows);
+        self.repeat().filter(|_| !by_itself)
+    }
+
+    /// Whether a flat piece of these rows lies on the bias: all of it, and not stitches that a lace moves within its repeat.
+    fn slants(&self, rows: &[Vec<Stitch>]) -> bool {
+        let repeats = || self.repeat().is_some_and(|repeat| repeat.wide < self.stitches);
+        self.form == Form::Flat && self.edges != Edges::Tile && kinds::slant(rows) && !repeats()
     }
 
     fn repeat_in(&self, whole: Whole) -> Option<Repeat> {

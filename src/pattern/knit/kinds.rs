@@ -102,6 +102,31 @@ pub(super) fn in_sections(rows: &[Vec<Stitch>]) -> bool {
     sections.len() > 1 && sections.iter().all(|section| section.len() >= LEAST)
 }
 
+/// Whether most stitches of rows of one width go aside from what they are drawn through, row by row to one side, until the cloth lies
+/// stitches beside its cast-on edge: on the bias, as where one edge decreases and the other one increases.
+pub(super) fn slant(rows: &[Vec<Stitch>]) -> bool {
+    const FAR: i64 = 2;
+    if rows.windows(2).any(|pair| pair[0].len() != pair[1].len()) {
+        return false;
+    }
+    // The offset that half of a row's stitches have no more than, and the other half no less.
+    let aside = |row: &Vec<Stitch>| {
+        let mut offsets: Vec<i64> = row
+            .iter()
+            .enumerate()
+            .filter(|(_, stitch)| stitch.parents == 1 && stitch.is_in_line())
+            .map(|(j, stitch)| j as i64 - i64::from(stitch.first_parent))
+            .collect();
+        offsets.sort_unstable();
+        offsets.get(offsets.len() / 2).copied().filter(|_| 2 * offsets.len() > row.len()).unwrap_or(0)
+    };
+    let mut sum = 0;
+    rows.iter().any(|row| {
+        sum += aside(row);
+        sum.abs() >= FAR
+    })
+}
+
 /// Knit or purl along a row, once around its repeat, if that is short.
 fn column_signs(row: &[Stitch]) -> Option<Vec<bool>> {
     const LONGEST: usize = 12;

@@ -199,6 +199,8 @@ pub(in super::super) struct Border {
     pub(in super::super) rims: Rims,
     /// Whether it is cast on from left to right.
     pub(in super::super) mirrored: bool,
+    /// Whether stitches of a flat piece go aside from row to row, though rows are of one width: cloth on the bias.
+    pub(in super::super) slants: bool,
 }
 
 impl Border {

@@ -211,6 +211,7 @@ impl Knit {
             finished: self.is_finished(),
             rims: self.rims,
             mirrored,
+            slants: self.slants(rows),
         };
         let backwards = ways.iter().flat_map(|w| &w.rows).any(|s| s.row == rows.len() as i32 && s.backwards);
         match &self.colors {

@@ -351,6 +351,14 @@ impl Border {
     /// The borders of a periodic cell so many stitches wide.
     pub(in super::super) fn cell(wide: usize) -> Self {
         let round = Some(wide as f64);
-        Self { round, stacked: true, turns: false, finished: false, rims: Rims::default(), mirrored: false }
+        Self {
+            round,
+            stacked: true,
+            turns: false,
+            finished: false,
+            rims: Rims::default(),
+            mirrored: false,
+            slants: false,
+        }
     }
 }

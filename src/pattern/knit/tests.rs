@@ -171,6 +171,7 @@ fn rows_share_the_lean_that_decreases_make() {
         finished: true,
         rims: Rims::default(),
         mirrored: false,
+        slants: false,
     };
     let made = Loops::new(&rows, 100, border);
     let lean = |row: i32| {

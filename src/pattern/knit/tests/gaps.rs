@@ -112,6 +112,7 @@ fn no_loop_of_a_buttonhole_stays_live() {
                 finished: true,
                 rims: Rims::default(),
                 mirrored: false,
+                slants: false,
             };
             let loops = Loops::new(&rows, 12, border).loops;
             // The last loop of all is drawn out.

@@ -28,6 +28,12 @@ fn raglan(rows: u32) -> Knit {
     piece(rows + 9, &(0..rows).map(row).collect::<Vec<_>>())
 }
 
+/// A stitch less at one side of every other row, and one more at the other.
+fn bias(rows: u32) -> Knit {
+    let row = |r: u32| if r % 2 == 1 { "k2tog k15 yo k".to_owned() } else { "k".to_owned() };
+    piece(18, &(0..rows).map(row).collect::<Vec<_>>())
+}
+
 /// Where a strand is in a row, on the mean, at columns of some range.
 fn place(strands: &[PatternStrand], row: i32, columns: std::ops::Range<f32>) -> DVec3 {
     let points = strands.iter().flat_map(|s| s.curve.points.iter().zip(&s.coordinates));
@@ -40,7 +46,7 @@ fn place(strands: &[PatternStrand], row: i32, columns: std::ops::Range<f32>) -> 
 
 #[test]
 fn every_loop_of_shaped_cloth_is_drawn_through() {
-    for (name, piece) in [("mitre", mitre(16)), ("shawl", shawl(16)), ("raglan", raglan(16))] {
+    for (name, piece) in [("mitre", mitre(16)), ("shawl", shawl(16)), ("raglan", raglan(16)), ("bias", bias(16))] {
         let mut made = Vec::new();
         let passes = passed(|| made = piece.strands(1.0).unwrap());
         let found = measured(&made);
@@ -79,4 +85,30 @@ fn shaped_cloth_keeps_its_gauge() {
         let (wide, high) = ((right - own).length() / 4.0, (above.y - own.y) / 4.0);
         assert!((wide / width - 1.0).abs() < 0.06 && (high / height - 1.0).abs() < 0.06, "{row} {from}: {wide} {high}");
     }
+}
+
+/// Half a stitch a row to the side; its wales stand upright.
+#[test]
+fn cloth_on_the_bias_slants() {
+    let piece = bias(24);
+    let made = piece.knitted(1.0).unwrap();
+    let [width, height] = made.gauge;
+    let at = |row: i32, from: f32| place(&made.strands, row, from..from + 2.0);
+    let up = at(18, 8.0) - at(6, 8.0);
+    let (found, expected) = (up.x.atan2(up.y), (0.5 * width / height).atan());
+    assert!((found.abs() - expected).abs() < 4.0_f64.to_radians(), "{found} {expected}");
+    // Six stitches aside in twelve rows: that of which a stitch is made.
+    let wale = at(18, 8.0 - 6.0 * found.signum() as f32) - at(6, 8.0);
+    assert!(wale.x.abs() < 0.1 * wale.y, "{wale}");
+}
+
+/// Stitches that lace moves within its repeat are laid as its cell has them.
+#[test]
+fn lace_is_not_on_the_bias() {
+    let rows = ["yo k5 ssk", "k"].map(str::to_owned);
+    let lace = Knit { rows: 12, ..piece(21, &rows) };
+    let worked = lace.worked().unwrap();
+    assert!(kinds::slant(&worked) && !lace.slants(&worked));
+    let bias = bias(12);
+    assert!(bias.slants(&bias.worked().unwrap()));
 }

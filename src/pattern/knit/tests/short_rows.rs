@@ -48,7 +48,7 @@ pub(super) fn undrawn(piece: &Knit) -> Vec<(i32, i32)> {
     let rows = piece.worked().unwrap();
     let mirrored = super::super::short_rows::from_right(&rows, true);
     let rims = piece.rims;
-    let border = Border { round: None, stacked: false, turns: false, finished: true, rims, mirrored };
+    let border = Border { round: None, stacked: false, turns: false, finished: true, rims, mirrored, slants: false };
     let backwards = piece.ways(&rows, mirrored)[0].rows.iter().any(|s| s.row == rows.len() as i32 && s.backwards);
     let loops = Loops::bound_off(&rows, piece.stitches as usize, border, backwards, None);
     let mut place = BTreeMap::new();

@@ -34,8 +34,8 @@ impl Maker<'_> {
             self.rises = places.iter().enumerate().map(rise).collect();
             return;
         }
-        // Rows of one width stand over each other as their repeat does, whichever way its decreases lean.
-        let is_shaped = self.rows.windows(2).any(|w| w[0].len() != w[1].len());
+        // Other rows of one width stand over each other as their repeat does, whichever way its decreases lean.
+        let is_shaped = self.border.slants || self.rows.windows(2).any(|w| w[0].len() != w[1].len());
         if !is_shaped {
             return;
         }
