@@ -1,6 +1,9 @@
 //! What light meets after a fibre, counted on packings: [`AfterFiber`] is fitted to ways out of fibres that lines met.
 
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::{
+    f64::consts::{FRAC_PI_4, TAU},
+    ops::Add,
+};
 
 use arrayvec::ArrayVec;
 use glam::DVec2;
@@ -196,25 +199,19 @@ fn ahead(lines: &Lines, ply: &PlyShape, from: DVec2, w: DVec2, back: Option<f64>
     Some((wider * root * f64::from(ahead), offset))
 }
 
-/// What is counted of ways, and what the fit so far has of them: for each number of a row.
+/// What is counted of ways, and what the fit so far has of them.
 #[derive(Clone, Copy, Default)]
-struct Sums {
-    ways: f32x8,
-    weight: f32x8,
-    counted: f32x8,
-    fitted: f32x8,
+struct Sum<T = f32> {
+    ways: T,
+    weight: T,
+    counted: T,
+    fitted: T,
 }
 
-impl Sums {
-    /// What is said of `shares` of a way.
-    fn add(&mut self, shares: f32x8, weight: f32, counted: f32, fitted: f32) {
-        let weights = shares * f32x8::splat(weight);
-        self.ways += shares;
-        self.weight += weights;
-        self.counted += weights * f32x8::splat(counted);
-        self.fitted += weights * f32x8::splat(fitted);
-    }
+/// For each number of a row.
+type Sums = Sum<f32x8>;
 
+impl<T: Add<Output = T>> Sum<T> {
     fn and(self, other: Self) -> Self {
         Self {
             ways: self.ways + other.ways,
@@ -222,6 +219,15 @@ impl Sums {
             counted: self.counted + other.counted,
             fitted: self.fitted + other.fitted,
         }
+    }
+}
+
+impl Sums {
+    /// What is said of `shares` of a way.
+    fn add(&mut self, shares: f32x8, weight: f32, counted: f32, fitted: f32) {
+        let weights = shares * f32x8::splat(weight);
+        let (counted, fitted) = (weights * f32x8::splat(counted), weights * f32x8::splat(fitted));
+        *self = self.and(Self { ways: shares, weight: weights, counted, fitted });
     }
 
     /// Those of one number.
@@ -229,25 +235,6 @@ impl Sums {
         let [ways, weight, counted, fitted] =
             [self.ways, self.weight, self.counted, self.fitted].map(|lanes| lanes.to_array()[number]);
         Sum { ways, weight, counted, fitted }
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Sum {
-    ways: f32,
-    weight: f32,
-    counted: f32,
-    fitted: f32,
-}
-
-impl Sum {
-    fn and(self, other: Self) -> Self {
-        Self {
-            ways: self.ways + other.ways,
-            weight: self.weight + other.weight,
-            counted: self.counted + other.counted,
-            fitted: self.fitted + other.fitted,
-        }
     }
 }
 
