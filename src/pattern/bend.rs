@@ -1,6 +1,19 @@
 //! Bends that are tighter than a yarn is thick.
 
 use glam::DVec3;
+use rayon::prelude::*;
+
+/// Points that one thread takes at once.
+const CHUNK: usize = 1024;
+
+/// How far a yarn has [`folded`] after each three of its points.
+pub(super) fn folds(points: &[DVec3], radius: f64) -> impl Iterator<Item = f64> {
+    let excess: Vec<f64> = points.par_windows(3).with_min_len(CHUNK).map(|w| excess(w, radius)).collect();
+    excess.into_iter().scan(0.0, |fold, excess| {
+        *fold = folded(*fold, excess);
+        Some(*fold)
+    })
+}
 
 /// By how much more than its radius allows a yarn turns at the middle one of three points, in radians; less than zero where it
 /// turns less.

@@ -9,11 +9,7 @@ mod topology;
 use std::collections::BTreeSet;
 
 use super::{
-    super::{
-        StrandKind,
-        bend::{excess, folded},
-        chart::PATTERNS,
-    },
+    super::{StrandKind, bend::folds, chart::PATTERNS},
     loops::{Border, Loops},
     *,
 };
@@ -44,12 +40,7 @@ fn measured(strands: &[PatternStrand]) -> Overlap {
 
 /// How far strands of diameter 1 fold into themselves at most, in radians.
 fn deepest_fold(strands: &[PatternStrand]) -> f64 {
-    let folds = strands.iter().flat_map(|s| {
-        s.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            *fold = folded(*fold, excess(w, 0.5));
-            Some(*fold)
-        })
-    });
+    let folds = strands.iter().flat_map(|s| folds(&s.curve.points, 0.5));
     folds.fold(0.0, f64::max)
 }
 

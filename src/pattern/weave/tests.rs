@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::{
     super::{
-        bend::{excess, folded},
+        bend::{excess, folded, folds},
         draft::NAMES,
     },
     *,
@@ -459,11 +459,7 @@ fn wefts_come_from_pile_into_a_selvedge_without_folding() {
     let weave = Weave { edges: Edges::Selvedge, warps, wefts, ..weave("terry") };
     let made = weave.strands().unwrap();
     for weft in made.iter().filter(|s| s.kind == StrandKind::Weft) {
-        let deepest = weft.curve.points.windows(3).scan(0.0, |fold: &mut f64, w| {
-            *fold = folded(*fold, excess(w, weave.half_rooms[1]));
-            Some(*fold)
-        });
-        let deepest = deepest.fold(0.0, f64::max);
+        let deepest = folds(&weft.curve.points, weave.half_rooms[1]).fold(0.0, f64::max);
         eprintln!("{deepest:.2}");
         assert!(deepest < 0.7, "{deepest}");
     }

@@ -7,7 +7,7 @@ use super::super::shape::spaced;
 use crate::{
     geometry::{contact::Cubes, spline::through_points},
     pattern::{
-        bend::{excess, folded},
+        bend::folds,
         rods::{Rods, Run, Strand},
     },
 };
@@ -215,12 +215,8 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
         let folds: Vec<Vec<usize>> = threads
             .iter()
             .map(|t| {
-                let excess: Vec<f64> = t.points.par_windows(3).with_min_len(CHUNK).map(|w| excess(w, radius)).collect();
-                let along = excess.into_iter().scan(0.0, |fold, excess| {
-                    *fold = folded(*fold, excess);
-                    Some(*fold)
-                });
-                along.enumerate().filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
+                let along = folds(&t.points, radius).enumerate();
+                along.filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
             })
             .collect();
         // What is left does not unfold.
