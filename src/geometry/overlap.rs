@@ -3,6 +3,7 @@
 use std::{
     borrow::Cow,
     collections::BTreeMap,
+    ops::Range,
     sync::atomic::{AtomicU32, Ordering::Relaxed},
 };
 
@@ -312,32 +313,45 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
         let long = along.cross(from.lerp(to, u)).try_normalize()?;
         Some(long * (radius * (1.0 - ratio * ratio).sqrt()))
     };
-    let mut along = 0.0;
-    let mut here = chain.at(0, 0.0).at;
-    for segment in 0..chain.segments() {
-        let end = chain.at(segment, 1.0).at;
-        let size = PIECE * 2.0 * here.w.max(1e-300);
-        let steps = (end.truncate().distance(here.truncate()) * 1.05 / size).ceil().clamp(1.0, 256.0) as usize;
-        for step in 1..=steps {
-            let next = chain.at(segment, step as f64 / steps as f64).at;
-            let way = next.truncate() - here.truncate();
-            let (length, radius, u) = (way.length(), 0.5 * (here.w + next.w), (step as f64 - 0.5) / steps as f64);
-            let wider = wider(segment, u, way, radius).unwrap_or(DVec3::ZERO);
-            let piece = Piece {
-                from: here.truncate(),
-                to: next.truncate(),
-                radius,
-                wider,
-                round: radius,
-                curve: index,
-                along: along + 0.5 * length,
-            };
-            out.push(Piece { round: (radius * piece.short()).sqrt(), ..piece });
-            along += length;
-            here = next;
-            if out.len() > MOST_PIECES {
-                return along;
+    // The pieces of some segments, as if the curve began with them, and their length.
+    let pieces_of = |segments: Range<usize>| {
+        let mut own = Vec::new();
+        let mut along = 0.0;
+        let mut here = chain.at(segments.start, 0.0).at;
+        for segment in segments {
+            let end = chain.at(segment, 1.0).at;
+            let size = PIECE * 2.0 * here.w.max(1e-300);
+            let steps = (end.truncate().distance(here.truncate()) * 1.05 / size).ceil().clamp(1.0, 256.0) as usize;
+            for step in 1..=steps {
+                let next = chain.at(segment, step as f64 / steps as f64).at;
+                let way = next.truncate() - here.truncate();
+                let (length, radius, u) = (way.length(), 0.5 * (here.w + next.w), (step as f64 - 0.5) / steps as f64);
+                let piece = Piece {
+                    from: here.truncate(),
+                    to: next.truncate(),
+                    radius,
+                    wider: wider(segment, u, way, radius).unwrap_or(DVec3::ZERO),
+                    round: radius,
+                    curve: index,
+                    along: along + 0.5 * length,
+                };
+                own.push(Piece { round: (radius * piece.short()).sqrt(), ..piece });
+                along += length;
+                here = next;
             }
+        }
+        (own, along)
+    };
+    let (count, mut along) = (chain.segments(), 0.0);
+    let stretches: Vec<_> = (0..count).step_by(CHUNK).map(|start| start..(start + CHUNK).min(count)).collect();
+    for at_once in stretches.chunks(CHUNK) {
+        let parts: Vec<(Vec<Piece>, f64)> = at_once.par_iter().map(|segments| pieces_of(segments.clone())).collect();
+        for (pieces, length) in parts {
+            out.extend(pieces.into_iter().map(|piece| Piece { along: along + piece.along, ..piece }));
+            along += length;
+        }
+        if out.len() > MOST_PIECES {
+            break;
         }
     }
     along

@@ -28,6 +28,8 @@ const NARROWEST: f64 = 0.5;
 const ROUND: f64 = 0.98;
 /// The share of a bend's radius that a section takes on the inside.
 const INSIDE: f64 = 0.85;
+/// Segments longer than the mean one by this are looked for in parts.
+const LONGER: f64 = 1.25;
 /// Points that one thread takes at once.
 const CHUNK: usize = 512;
 
@@ -113,9 +115,10 @@ pub(in crate::pattern) fn flatten_where_touching(strands: &mut [PatternStrand], 
     if yarn.flatten == 1.0 {
         return;
     }
-    let lengths = || strands.iter().flat_map(|s| s.curve.points.windows(2).map(|w| w[0].distance(w[1])));
-    let (count, longest) = lengths().fold((0, 0.0), |(count, longest), l| (count + 1, f64::max(longest, l)));
-    let reach = Reach::of(yarn, longest);
+    let lengths = strands.iter().flat_map(|s| s.curve.points.windows(2).map(|w| w[0].distance(w[1])));
+    let (mut count, mut sum, mut longest) = (0, 0.0, 0.0);
+    lengths.for_each(|length| (count, sum, longest) = (count + 1, sum + length, f64::max(longest, length)));
+    let reach = Reach::of(yarn, [LONGER * sum / (count as f64).max(1.0), longest]);
     // Of those that are alike, the first.
     let first_of = firsts(alike, strands, count);
     let asked = |i: u32| first_of.get(i as usize).is_none_or(|first| *first == i);
@@ -151,15 +154,26 @@ struct Reach {
     far: f64,
     /// Middles of segments that may count are not farther.
     middles: f64,
+    /// Segments are looked for in parts that are no longer.
+    part: f64,
     /// Of the yarn that is thicker in places, its mean half width over its radius.
     half_width: f64,
 }
 
 impl Reach {
-    fn of(yarn: &Thickness, longest: f64) -> Self {
+    /// Of yarn whose longest segment, and longest part of one, are so long.
+    fn of(yarn: &Thickness, [part, longest]: [f64; 2]) -> Self {
         let room = yarn.radius * yarn.half_width;
         let far = room * yarn.flatten.sqrt();
-        Self { room, far, middles: 2.0 * far + longest, half_width: yarn.half_width }
+        Self { room, far, middles: 2.0 * far + longest, part, half_width: yarn.half_width }
+    }
+
+    /// The parts of a way, each by its middle, and half of their length.
+    fn parts(&self, from: DVec3, to: DVec3) -> (impl Iterator<Item = DVec3>, f64) {
+        let length = from.distance(to);
+        let count = (length / self.part).ceil().max(1.0);
+        let middles = (0..count as u32).map(move |k| from.lerp(to, (f64::from(k) + 0.5) / count));
+        (middles, 0.5 * length / count)
     }
 }
 
@@ -169,9 +183,18 @@ struct Around {
     segments: Vec<Segment>,
     /// Of the strands of a tile, what they end with.
     last_of: Vec<Segment>,
-    middles: Vec<DVec3>,
-    halves: Vec<f64>,
+    parts: Vec<Part>,
+    /// The middles of parts.
     grid: PointGrid,
+}
+
+/// A part of a segment.
+struct Part {
+    segment: u32,
+    /// Whether it is the first one.
+    first: bool,
+    /// Half of its length.
+    half: f64,
 }
 
 impl Around {
@@ -181,51 +204,81 @@ impl Around {
             last_of = segments.chunk_by(|a, b| a.strand == b.strand).map(|own| own[own.len() - 1]).collect();
             add_images(&mut segments, (*period, *shear), reach.middles);
         }
-        let middles: Vec<DVec3> = segments.iter().map(Segment::middle).collect();
-        let halves = segments.iter().map(|s| 0.5 * s.from.distance(s.to)).collect();
-        let grid = PointGrid::new(&middles, reach.middles, None);
-        Self { reach, segments, last_of, middles, halves, grid }
+        let (mut middles, mut parts) = (Vec::with_capacity(segments.len()), Vec::with_capacity(segments.len()));
+        for (segment, s) in (0..).zip(&segments) {
+            let (own, half) = reach.parts(s.from, s.to);
+            for (k, middle) in own.enumerate() {
+                middles.push(middle);
+                parts.push(Part { segment, first: k == 0, half });
+            }
+        }
+        let grid = PointGrid::new(&middles, 2.0 * reach.far + reach.part, None);
+        Self { reach, segments, last_of, parts, grid }
     }
 
     /// The sections at the starts of segments that are asked for, with the segments' indices.
     fn sections(&self, asked: impl Fn(u32) -> bool + Sync) -> Vec<(u32, Section)> {
-        let own = |entry: &Entry| &self.segments[entry.index as usize];
-        let is_asked = |entry: &&Entry| own(entry).index != IMAGE && asked(own(entry).index);
-        let entries = self.grid.in_order().par_iter().with_min_len(CHUNK).filter(is_asked);
+        let own = |entry: &Entry| {
+            let Part { segment, first, .. } = self.parts[entry.index as usize];
+            let index = self.segments[segment as usize].index;
+            (first && index != IMAGE && asked(index)).then_some((segment, index))
+        };
+        let entries = self.grid.in_order().par_iter().with_min_len(CHUNK).filter_map(own);
         entries
             .map_init(
                 || (self.grid.walk(), Vec::new()),
-                |state, entry| (own(entry).index, self.section(entry.index as usize, state)),
+                |state, (segment, index)| (index, self.section(segment as usize, state)),
             )
             .collect()
     }
 
     /// The section at the start of a segment, by the half of it that follows and the half of the one before.
     fn section(&self, i: usize, (walk, ways): &mut (Walk<'_>, Vec<DVec3>)) -> Section {
-        let Reach { room, far, middles: reach, half_width } = self.reach;
-        let (own, before, after) = (&self.segments[i], self.before(i), self.middles[i]);
+        let Reach { room, far, part, half_width, .. } = self.reach;
+        let (own, before, after) = (&self.segments[i], self.before(i), self.segments[i].middle());
+        let along = (after - before).normalize_or_zero();
         ways.clear();
-        let half = self.halves[i].max(own.from.distance(before));
-        walk.within(own.from, reach, |entry| {
-            let other = &self.segments[entry.index as usize];
-            // However they lie.
-            let most = 2.0 * far + half + self.halves[entry.index as usize];
-            if entry.at.distance_squared(own.from) > most * most {
-                return;
+        let mut look = |at: DVec3, half: f64| {
+            walk.within(at, 2.0 * far + half + 0.5 * part, |entry| {
+                let Part { segment, half: other_half, .. } = self.parts[entry.index as usize];
+                let other = &self.segments[segment as usize];
+                // However they lie.
+                let most = 2.0 * far + half + other_half;
+                if entry.at.distance_squared(at) > most * most {
+                    return;
+                }
+                if own.strand == other.strand && (own.along - other.along).abs() < ALONG * 2.0 * room {
+                    return;
+                }
+                let to = |end: DVec3| 0.5 * nearest(own.from, end, other.from, other.to).between;
+                // What lies on one side of the section is nearer to the half on that side.
+                let ahead = (entry.at - own.from).dot(along);
+                let way = if ahead > other_half {
+                    to(after)
+                } else if ahead < -other_half {
+                    to(before)
+                } else {
+                    let [a, b] = [to(before), to(after)];
+                    if b.length_squared() < a.length_squared() { b } else { a }
+                };
+                if way.length_squared() < far * far {
+                    ways.push(way);
+                }
+            });
+        };
+        let half = own.from.distance(after).max(own.from.distance(before));
+        if half <= 0.5 * part {
+            look(own.from, half);
+        } else {
+            for end in [before, after] {
+                let (middles, half) = self.reach.parts(own.from, end);
+                middles.for_each(|at| look(at, half));
             }
-            if own.strand == other.strand && (own.along - other.along).abs() < ALONG * 2.0 * room {
-                return;
-            }
-            let [a, b] = [before, after].map(|end| nearest(own.from, end, other.from, other.to).between);
-            let way = 0.5 * if b.length_squared() < a.length_squared() { b } else { a };
-            if way.length_squared() < far * far {
-                ways.push(way);
-            }
-        });
+        }
         if before != own.from {
             ways.extend(inwards(before, own.from, after).map(|way| INSIDE * half_width * way));
         }
-        Section::between((after - before).normalize_or_zero(), ways, [room, far])
+        Section::between(along, ways, [room, far])
     }
 
     /// The middle of what comes before a segment on its strand.
@@ -233,7 +286,7 @@ impl Around {
         let own = &self.segments[i];
         let follows = |i: &usize| self.segments[*i].strand == own.strand && self.segments[*i].index + 1 == own.index;
         match (i.checked_sub(1).filter(follows), self.last_of.get(own.strand as usize)) {
-            (Some(i), _) => self.middles[i],
+            (Some(i), _) => self.segments[i].middle(),
             // A row of a tile goes on before its first point as it ends.
             (None, Some(last)) => last.middle() + (own.from - last.to),
             (None, None) => own.from,

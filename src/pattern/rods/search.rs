@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{ALONG, APART, CHUNK, MARGIN, Neighbour, Rods, Touching, Work, fill, gap};
-use crate::geometry::contact::{PointGrid, Walk, nearest};
+use crate::geometry::contact::{PointGrid, Walk};
 
 /// Segments by their middles, with the images that a periodic cell has of them.
 struct Middles {
@@ -52,18 +52,20 @@ impl Rods {
         self.edges(&mut work.edges);
         work.travelled.clear();
         work.travelled.resize(self.points.len(), 0.0);
-        work.touching = self.touching(has, None, work);
+        work.touching.clear();
+        self.find_touching(has, None, work);
     }
 
     /// The same around segments alone that have `moved`; what others may touch among themselves stays.
     pub(super) fn search_again(&self, has: &[bool], moved: &[bool], work: &mut Work) {
         self.edges(&mut work.edges);
-        work.touching = self.touching(has, Some(moved), work);
+        self.find_touching(has, Some(moved), work);
     }
 
-    /// What may touch, for each chunk of segments: around those that have moved anew.
-    fn touching(&self, has: &[bool], moved: Option<&[bool]>, work: &Work) -> Vec<Touching> {
+    /// Finds what may touch, for each chunk of segments: around those that have moved anew.
+    fn find_touching(&self, has: &[bool], moved: Option<&[bool]>, work: &mut Work) {
         let n = self.points.len();
+        let known = std::mem::take(&mut work.touching);
         let edges = &work.edges;
         let mut halves = Vec::new();
         fill(&mut halves, n, |i| 0.5 * edges[i].length());
@@ -88,14 +90,14 @@ impl Rods {
             grid: &grid,
             on_strands: &work.on_strands,
         };
-        let of_chunk = |c: usize| {
+        let anew = |c: usize, known: &Touching| {
             let mut walk = if search.finds_both() { grid.walk() } else { grid.walk_ahead() };
-            let mut found = Touching { starts: vec![0], neighbours: Vec::new() };
-            for i in c * CHUNK..((c + 1) * CHUNK).min(n) {
+            let mut found = Touching { starts: vec![0], neighbours: Vec::with_capacity(known.neighbours.len()) };
+            for (at, i) in (c * CHUNK..((c + 1) * CHUNK).min(n)).enumerate() {
                 match moved {
                     Some(moved) if !moved[i] => {
                         let stays = |other: &&Neighbour| !moved[other.segment as usize];
-                        found.neighbours.extend(work.neighbours(i).iter().filter(stays));
+                        found.neighbours.extend(known.neighbours[known.range(at)].iter().filter(stays));
                     }
                     _ => search.around(i, &mut found.neighbours, &mut walk),
                 }
@@ -103,7 +105,16 @@ impl Rods {
             }
             found
         };
-        (0..n.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect()
+        let Some(moved) = moved else {
+            work.touching = (0..n.div_ceil(CHUNK)).into_par_iter().map(|c| anew(c, &Touching::default())).collect();
+            return;
+        };
+        let of_chunk = |(c, (known, moved_here)): (usize, (Touching, &[bool]))| {
+            let as_before =
+                !moved_here.contains(&true) && known.neighbours.iter().all(|other| !moved[other.segment as usize]);
+            if as_before { known } else { anew(c, &known) }
+        };
+        work.touching = known.into_par_iter().zip(moved.par_chunks(CHUNK)).enumerate().map(of_chunk).collect();
     }
 
     /// Whether both ends of a segment stay where they are.
@@ -171,7 +182,7 @@ impl Search<'_> {
         }
         let periodic = self.rods.period.is_some();
         let (half, middle, stays) = (halves[i], middles.points[i], self.rods.stays(i));
-        let (p0, p1) = (middle - 0.5 * edges[i], middle + 0.5 * edges[i]);
+        let p0 = middle - 0.5 * edges[i];
         let per_square = 1.0 / edges[i].length_squared().max(1e-18);
         // Most of what cells hold is too far away: that is told of many at once.
         walk.within(middle, touch + half + 0.5 * self.longest, |near| {
@@ -190,11 +201,7 @@ impl Search<'_> {
             if apart || !has[j] || self.same_piece(i, j, near.at - middle) {
                 return;
             }
-            let half_j = 0.5 * edges[j];
-            let between = nearest(p0, p1, near.at - half_j, near.at + half_j).between.length();
-            if between > *touch {
-                return;
-            }
+            let between = beside.length() - halves[j];
             if periodic {
                 let own = middles.own_cells[i].iter().zip(&middles.own_cells[j]);
                 cells.iter_mut().zip(own).for_each(|(cell, (a, b))| *cell += (a - b) as i8);

@@ -151,15 +151,24 @@ impl Thread {
         let old = std::mem::take(self);
         let n = old.points.len();
         let count = ((n - 1) as f64 * times).round() as usize;
-        for k in 0..=count {
+        let place = |k: usize| {
             let along = k as f64 * (n - 1) as f64 / count as f64;
-            let (i, t) = ((along as usize).min(n - 2), along - (along as usize).min(n - 2) as f64);
-            let point = through_points(&old.points, i, t);
+            let i = (along as usize).min(n - 2);
+            (i, along - i as f64)
+        };
+        let grid = |(i, t): (usize, f64)| {
             let (g, h) = (old.grid[i], old.grid[i + 1]);
             // Where a round begins anew, places jump.
             let h = if (0..2).any(|k| (h[k] - g[k]).abs() > 2.0) { g } else { h };
-            self.push(point, old.rest[i] / times, [0, 1].map(|k| g[k] + t as f32 * (h[k] - g[k])), old.state[i]);
-        }
+            [0, 1].map(|k| g[k] + t as f32 * (h[k] - g[k]))
+        };
+        let places = || (0..count + 1).into_par_iter().with_min_len(CHUNK).map(place);
+        *self = Self {
+            points: places().map(|(i, t)| through_points(&old.points, i, t)).collect(),
+            rest: places().map(|(i, _)| old.rest[i] / times).collect(),
+            grid: places().map(grid).collect(),
+            state: places().map(|(i, _)| old.state[i]).collect(),
+        };
     }
 }
 
