@@ -218,6 +218,8 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
     // How far a yarn may turn beyond what its radius allows, in radians; plies are seen to break at five times that.
     const FOLD: f64 = 0.1;
     const ROUNDS: usize = 8;
+    // Rounds go on while no larger share of the folds is left.
+    const UNFOLDS: f64 = 0.9;
     let reach = per_stitch / 4;
     let mut left = usize::MAX;
     for _ in 0..ROUNDS {
@@ -228,9 +230,9 @@ pub(in super::super) fn ease(threads: &mut [Thread], per_stitch: usize, radius: 
                 along.filter(|(_, fold)| *fold > FOLD).map(|(i, _)| i).collect()
             })
             .collect();
-        // What is left does not unfold.
-        let count = folds.iter().map(Vec::len).sum();
-        if count >= left {
+        // What is left hardly unfolds.
+        let count: usize = folds.iter().map(Vec::len).sum();
+        if count as f64 > UNFOLDS * left as f64 {
             return;
         }
         left = count;
