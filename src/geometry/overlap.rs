@@ -40,6 +40,8 @@ const ALONG: f64 = 2.0;
 const PIECE: f64 = 0.35;
 /// Pieces that one thread takes at once.
 const CHUNK: usize = 512;
+/// Stretches of a curve that are cut before their pieces are put together: few, so that memory is used again.
+const AT_ONCE: usize = 16;
 /// So many tell a share of a twentieth to a hundredth of itself, or nearly.
 const ENOUGH: u32 = 1 << 14;
 /// More pieces are not compared: 1.5 GB.
@@ -315,7 +317,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
     };
     // The pieces of some segments, as if the curve began with them, and their length.
     let pieces_of = |segments: Range<usize>| {
-        let mut own = Vec::new();
+        let mut own = Vec::with_capacity(2 * segments.len());
         let mut along = 0.0;
         let mut here = chain.at(segments.start, 0.0).at;
         for segment in segments {
@@ -344,7 +346,7 @@ fn cut(curve: &Curve, radii: &[f64], index: u32, out: &mut Vec<Piece>) -> f64 {
     };
     let (count, mut along) = (chain.segments(), 0.0);
     let stretches: Vec<_> = (0..count).step_by(CHUNK).map(|start| start..(start + CHUNK).min(count)).collect();
-    for at_once in stretches.chunks(CHUNK) {
+    for at_once in stretches.chunks(AT_ONCE) {
         let parts: Vec<(Vec<Piece>, f64)> = at_once.par_iter().map(|segments| pieces_of(segments.clone())).collect();
         for (pieces, length) in parts {
             out.extend(pieces.into_iter().map(|piece| Piece { along: along + piece.along, ..piece }));
