@@ -19,6 +19,7 @@ mod make;
 mod piece;
 mod pressed;
 mod rims;
+mod round;
 mod rows;
 mod shape;
 mod short_rows;

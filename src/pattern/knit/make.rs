@@ -10,9 +10,11 @@ use super::{
     curl::Curl,
     kinds::{self, Kinds},
     loops::{Border, Loops},
-    piece::{self, Laying, State, Surface, Thread, ease, settle, shaped::Shaped, sheet::Sheet},
+    piece::{Laying, State, Surface, Thread, ease, settle, shaped::Shaped, sheet::Sheet},
     pressed::{self, Alike, flatten_where_touching},
-    rims, short_rows,
+    rims,
+    round::Rounds,
+    short_rows,
 };
 use crate::{
     geometry::curve::{Basis, Curve},
@@ -54,11 +56,20 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(knit: &Knit, rows: &[Vec<Stitch>], profile: Option<&Revolution>) -> Self {
-        let size = profile.map_or(knit.size(), |p| knit.size_on(p, rows).map(Some));
-        let points_of_cell = if profile.is_some() { COARSE } else { knit.points };
+    /// What lies on a `profile`, or is `closed` at its top, is not even.
+    fn new(knit: &Knit, rows: &[Vec<Stitch>], profile: Option<&Revolution>, closed: bool) -> Self {
+        let bent = closed || profile.is_some();
+        let own = knit.size();
+        let repeat = knit.repeat_of(rows, own);
+        let size = match (profile, &repeat) {
+            (Some(profile), _) => knit.size_on(profile, rows).map(Some),
+            // Of few points its cell would find another one.
+            (None, Some(repeat)) if closed => knit.cell(repeat, own, knit.points).gauge().map(Some),
+            (None, _) => own,
+        };
+        let points_of_cell = if bent { COARSE } else { knit.points };
         let cell = knit.repeat_of(rows, size).map(|repeat| knit.cell(&repeat, size, points_of_cell));
-        let even = cell.is_some() && profile.is_none();
+        let even = cell.is_some() && !bent;
         let points = if even || short_rows::any(rows) { knit.points } else { COARSE };
         let kinds = if cell.is_none() { knit.rows_of_a_kind(rows, size, points) } else { Kinds::default() };
         let gauge = cell.as_ref().map_or_else(|| kinds.gauge(size), Cell::gauge);
@@ -114,14 +125,18 @@ impl Knit {
         let rows = self.worked()?;
         let mirrored = short_rows::from_right(&rows, self.is_finished());
         let ways = self.ways(&rows, mirrored);
-        let profile = self.profile(diameter, &rows)?;
-        let layout = Layout::new(self, &rows, profile.as_ref());
+        let ring = match self.rims.top {
+            Closing::BoundOff => None,
+            Closing::Drawn => Some(rims::drawn_to(self, &rows)?),
+        };
+        let profile = self.profile(diameter, ring);
+        let layout = Layout::new(self, &rows, profile.as_ref(), ring.is_some());
         if let Some(cell) = layout.cell.as_ref().filter(|_| profile.is_none()) {
             self.check_relaxed(cell)?;
         }
         let mut loops = self.loops(&rows, &ways, mirrored);
         loops.apart = layout.apart();
-        let surface = self.surface(&layout, profile, &loops, &rows);
+        let surface = self.surface(&layout, profile, ring, &loops, &rows)?;
         let mut threads = self.laid(&layout, &loops, &surface, &ways);
         self.relax(&layout, &mut threads, yarn.radius / diameter);
         let [width, height] = layout.gauge;
@@ -188,17 +203,15 @@ impl Knit {
         ways
     }
 
-    /// The profile that it is knitted to, in yarn diameters, if it has one.
-    fn profile(&self, diameter: f64, rows: &[Vec<Stitch>]) -> Result<Option<Revolution>, ChartError> {
-        let scaled = match &self.form {
-            Form::Revolution(profile) => Some(profile.iter().map(|p| *p / diameter).collect()),
-            _ => None,
+    /// The profile that it is knitted to, in yarn diameters, if it is given one; its top is drawn to a `ring`.
+    fn profile(&self, diameter: f64, ring: Option<f64>) -> Option<Revolution> {
+        let Form::Revolution(profile) = &self.form else { return None };
+        let scaled: Vec<DVec2> = profile.iter().map(|p| *p / diameter).collect();
+        let whole = match ring {
+            Some(ring) => rims::drawn(scaled, ring),
+            None => scaled,
         };
-        let profile = match self.rims.top {
-            Closing::BoundOff => scaled,
-            Closing::Drawn => Some(rims::drawn(self, scaled, rows)?),
-        };
-        Ok(profile.map(|points: Vec<DVec2>| Revolution::new(&points)))
+        Some(Revolution::new(&whole))
     }
 
     /// What is drawn through what, in all colours, where yarns go through the rows on these ways.
@@ -225,13 +238,22 @@ impl Knit {
         }
     }
 
-    /// What the piece lies on.
-    fn surface(&self, layout: &Layout, profile: Option<Revolution>, loops: &Loops, rows: &[Vec<Stitch>]) -> Surface {
+    /// What the piece lies on; a tube may be drawn to a `ring` at its top.
+    fn surface(
+        &self,
+        layout: &Layout,
+        profile: Option<Revolution>,
+        ring: Option<f64>,
+        loops: &Loops,
+        rows: &[Vec<Stitch>],
+    ) -> Result<Surface, ChartError> {
         let [width, height] = layout.gauge;
-        match (&self.form, profile) {
+        Ok(match (&self.form, profile) {
             (_, Some(revolution)) => Surface::Round { revolution, height },
             (Form::Tube, _) => {
-                let revolution = piece::tube(self.stitches, &layout.widths, height);
+                let counts = rows.iter().map(Vec::len).collect();
+                let revolution = Rounds { widths: &layout.widths, counts, height, ring }.tube()?;
+                let height = revolution.length() / rows.len() as f64;
                 Surface::Round { revolution, height }
             }
             _ if !loops.levels().is_empty() => Surface::Bent(Sheet::relaxed(loops.levels(), rows, layout.gauge)),
@@ -240,7 +262,7 @@ impl Knit {
             }
             _ if layout.even => Surface::Plane { width, height },
             _ => Surface::Rows { widths: layout.widths.clone(), height },
-        }
+        })
     }
 
     /// The yarns as they are laid out.

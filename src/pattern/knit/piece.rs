@@ -10,7 +10,7 @@ mod thread;
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 pub(super) use self::thread::{State, Thread, ease, settle};
@@ -458,17 +458,4 @@ fn width_at(widths: &[f64], up: f64) -> f64 {
     let row = (along as usize).min(widths.len().saturating_sub(2));
     let next = widths[(row + 1).min(widths.len() - 1)];
     widths[row] + (next - widths[row]) * (along - row as f64)
-}
-
-/// A tube of so many stitches, of rows with these widths of a stitch.
-pub(super) fn tube(stitches: u32, widths: &[f64], height: f64) -> Revolution {
-    let radius = |width: f64| width * f64::from(stitches) / TAU;
-    let (rows, even) = (widths.len(), widths.iter().all(|width| *width == widths[0]));
-    let ends = [0.0, rows as f64].map(|up| DVec2::new(radius(width_at(widths, up)), up * height));
-    if even {
-        return Revolution::new(&ends);
-    }
-    let middles = widths.iter().enumerate().map(|(row, width)| DVec2::new(radius(*width), (row as f64 + 0.5) * height));
-    let profile: Vec<DVec2> = [ends[0]].into_iter().chain(middles).chain([ends[1]]).collect();
-    Revolution::new(&profile)
 }

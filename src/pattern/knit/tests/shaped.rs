@@ -112,3 +112,77 @@ fn lace_is_not_on_the_bias() {
     let bias = bias(12);
     assert!(bias.slants(&bias.worked().unwrap()));
 }
+
+/// A skirt from its hem up, a sleeve from its cuff, and a mitten, whose cuffs are ribs.
+fn tubes() -> [(&'static str, Knit); 3] {
+    let round = |stitches: u32, top: Closing, rows: &[&str]| {
+        let rows: Vec<String> = rows.iter().map(|row| (*row).to_owned()).collect();
+        let rims = Rims { top, ..Rims::default() };
+        Knit { form: Form::Tube, rims, ..piece(stitches, &rows) }
+    };
+    let skirt = ["10: k", "k6 k2tog", "6: k", "k5 k2tog", "6: k", "k4 k2tog", "8: k"];
+    let sleeve = ["10: k1 p1", "7: k", "k yo k18 yo k", "5: k", "k yo k20 yo k", "5: k", "k yo k22 yo k", "8: k"];
+    let mitten = [
+        "8: k1 p1",
+        "12: k",
+        "k ssk k8 k2tog k k ssk k8 k2tog k",
+        "k",
+        "k ssk k6 k2tog k k ssk k6 k2tog k",
+        "k",
+        "k ssk k4 k2tog k k ssk k4 k2tog k",
+        "k ssk k2 k2tog k k ssk k2 k2tog k",
+        "k",
+    ];
+    [
+        ("skirt", round(48, Closing::BoundOff, &skirt)),
+        ("sleeve", round(20, Closing::BoundOff, &sleeve)),
+        ("mitten", round(28, Closing::Drawn, &mitten)),
+    ]
+}
+
+#[test]
+fn every_loop_of_shaped_tubes_is_drawn_through() {
+    for (name, piece) in tubes() {
+        let mut made = Vec::new();
+        let passes = passed(|| made = piece.strands(1.0).unwrap());
+        let found = measured(&made);
+        assert_eq!((made.len(), passes), (1, 0), "{name}");
+        // What is cast on is measured on plain tubes.
+        let wrong: Vec<_> = undrawn(&piece).into_iter().filter(|(row, _)| *row > 0).collect();
+        assert_eq!(wrong, [], "{name}");
+        assert!(found.share <= 0.02, "{name}: {found:?}");
+    }
+}
+
+/// Away from where counts and stitches change each round is as wide as its stitches.
+#[test]
+fn tubes_are_as_wide_as_their_stitches() {
+    for (name, piece) in tubes() {
+        let made = piece.knitted(1.0).unwrap();
+        let counts = piece.widths().unwrap();
+        let radius = |row: usize| {
+            let points = made.strands.iter().flat_map(|s| s.curve.points.iter().zip(&s.coordinates));
+            let own: Vec<f64> =
+                points.filter(|(_, at)| at[1].floor() == row as f32).map(|(p, _)| p.x.hypot(p.z)).collect();
+            own.iter().sum::<f64>() / own.len() as f64
+        };
+        let own = |row: usize| f64::from(counts[row]) * made.widths[row] / TAU;
+        let even = |row: usize| {
+            let near = row.saturating_sub(6)..(row + 7).min(counts.len());
+            near.clone().all(|r| counts[r] == counts[row] && (made.widths[r] / made.widths[row] - 1.0).abs() < 0.01)
+        };
+        for row in (2..counts.len() - 2).filter(|row| even(*row)) {
+            let (found, own) = (radius(row), own(row));
+            assert!((found / own - 1.0).abs() < 0.02, "{name}, round {row}: {found} for {own}");
+        }
+        let range = |of: &dyn Fn(usize) -> f64| {
+            (2..counts.len() - 2).map(of).fold([f64::MAX, 0.0], |[a, b], r| [a.min(r), b.max(r)])
+        };
+        let (found, own) = (range(&radius), range(&own));
+        println!("{name}: radii of {found:.2?} for {own:.2?}");
+        // What is drawn together is narrower.
+        let is_drawn = piece.rims.top == Closing::Drawn;
+        assert!(is_drawn || (found[0] / own[0] - 1.0).abs() < 0.05, "{name}");
+        assert!((found[1] / own[1] - 1.0).abs() < 0.05, "{name}");
+    }
+}

@@ -382,13 +382,14 @@ pub(super) fn yarn_of_stitches(piece: &Knit, turns: bool) -> Stitches {
 
 /// What is of each stitch in a yarn of a piece, from left to right. Round pieces are unrolled.
 pub(super) fn stitches_of(piece: &Knit, made: &Knitted, yarn: usize, turns: bool) -> Stitches {
-    let n = f64::from(piece.stitches);
-    let radius = made.gauge[0] * n / TAU;
-    let unrolled = |p: DVec3, wale: f32| match piece.form {
+    let counts = piece.widths().unwrap();
+    let radius = made.gauge[0] * f64::from(piece.stitches) / TAU;
+    let unrolled = |p: DVec3, [wale, course]: [f32; 2]| match piece.form {
         Form::Flat => p,
         _ => {
             // The turn nearest to where the stitch belongs.
-            let (turn, own) = (p.x.atan2(p.z) / TAU, f64::from(wale) / n);
+            let count = if course < 0.0 { piece.stitches } else { counts[(course as usize).min(counts.len() - 1)] };
+            let (turn, own) = (p.x.atan2(p.z) / TAU, f64::from(wale) / f64::from(count));
             DVec3::new((turn + (own - turn).round()) * TAU * radius, p.y, p.x.hypot(p.z) - radius)
         }
     };
@@ -398,7 +399,7 @@ pub(super) fn stitches_of(piece: &Knit, made: &Knitted, yarn: usize, turns: bool
         if std::mem::replace(&mut last, [*wale, *course]) == [*wale, *course] && !turns {
             continue;
         }
-        stitches.entry((course.floor() as i32, wale.floor() as i32)).or_default().push(unrolled(*p, *wale));
+        stitches.entry((course.floor() as i32, wale.floor() as i32)).or_default().push(unrolled(*p, [*wale, *course]));
     }
     for own in stitches.values_mut().filter(|own| own[0].x > own[own.len() - 1].x) {
         own.reverse();
