@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::super::{chart::ChartError, revolution::Revolution};
+use crate::math::words;
 
 /// The share of a round's height by which its radius differs from the next one's at most: cloth that widens faster would be flat
 /// and then wave.
@@ -43,13 +44,11 @@ impl Rounds<'_> {
         if let Some(ring) = self.ring {
             let most = |round: usize| ring + STEEPEST * height * ((rounds - round) as f64 - 0.5);
             if radii[0] > most(0) {
-                let least = ((own[rounds - 1] - ring) / (STEEPEST * height)).ceil() + 1.0;
-                let problem = format!("a tube of {rounds} rows is too short to be drawn together");
-                let hint = match least > rounds as f64 {
-                    true => format!("{least} rows or more"),
-                    false => "more rows, or decreases before the last".to_owned(),
-                };
-                return Err(ChartError::new(None, problem, hint));
+                let widest = own.iter().copied().fold(0.0, f64::max);
+                let least = ((widest - ring) / (STEEPEST * height)).ceil() + 1.0;
+                let rows = words::counted(rounds as u64, "row");
+                let problem = format!("a tube of {rows} is too short to be drawn together");
+                return Err(ChartError::new(None, problem, format!("{least} rows or more")));
             }
             radii.iter_mut().enumerate().for_each(|(round, radius)| *radius = radius.min(most(round)));
         }
@@ -132,5 +131,11 @@ mod tests {
         assert!((tube.radius(3.0) - 16.0 * 4.0 / TAU).abs() < 1e-6);
         let short = rounds(vec![16; 2], Some(3.5), &[4.0; 2]).tube().unwrap_err();
         assert_eq!(short.problem, "a tube of 2 rows is too short to be drawn together");
+        assert_eq!(short.hint, "4 rows or more");
+        assert!(rounds(vec![16; 4], Some(3.5), &[4.0; 4]).tube().is_ok());
+        // Halved every other round: so flat a crown would wave.
+        let counts = vec![64, 64, 32, 32, 16, 16, 8];
+        let flat = rounds(counts, Some(2.3), &[4.0; 7]).tube().unwrap_err();
+        assert_eq!(flat.hint, "15 rows or more");
     }
 }
