@@ -400,6 +400,23 @@ fn selvedges_make_one_strand_of_each_shuttle() {
     }
 }
 
+/// Overshot: a pattern weft and a ground weft by turns, which are carried past each other at the sides.
+#[test]
+fn wefts_that_are_carried_have_no_two_points_in_one_place() {
+    let tie_up = [[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [2, 4]].map(Vec::from);
+    let draft = Draft::from_loom(&[1, 2, 3, 4], &tie_up, &[1, 5, 1, 6, 2, 5, 2, 6]).unwrap();
+    let (warps, wefts) = (Extent::Yarns(24), Extent::Yarns(24));
+    for edges in [Edges::Selvedge, Edges::Fringe(20.0), Edges::Finished] {
+        let weave = Weave { edges, shuttles: vec![0, 1], warps, wefts, draft: draft.clone(), ..weave("plain") };
+        for strand in weave.strands().unwrap() {
+            let least = strand.curve.points.windows(2).map(|w| w[0].distance(w[1])).fold(f64::MAX, f64::min);
+            assert!(least > 1e-3, "{edges:?}, {:?} {}: {least}", strand.kind, strand.index);
+            let curve = strand.smooth().curve;
+            assert!(curve.flattening.is_none_or(|axes| axes.len() == curve.points.len()));
+        }
+    }
+}
+
 #[test]
 fn no_more_points_are_promised_than_the_longest_yarn_has() {
     for name in ["plain", "double cloth", "terry", "velvet", "corduroy"] {

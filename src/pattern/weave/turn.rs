@@ -12,6 +12,10 @@ use crate::math::special::smooth_step;
 
 /// Distance of the points of a turn, in radii of the weft.
 const STEP: f64 = 0.45;
+
+/// Points of a turn at most, and of what is carried past a pick: thin yarn far from its neighbours takes no more to be round.
+const MOST_POINTS: f64 = 64.0;
+
 /// How far a turn's middle reaches out from that of the outermost warp, in distances of yarns that touch.
 const BESIDE: f64 = 1.02;
 /// How far the weft's ends stand out, of that.
@@ -78,7 +82,7 @@ impl Edge {
         let round = half.length().min(reach);
         let (straight, arc) = (reach - round, FRAC_PI_2 * (half.length() + round));
         let length = 2.0 * straight + arc;
-        let steps = (length / (STEP * self.radius)).round().max(4.0) as usize;
+        let steps = (length / (STEP * self.radius)).round().clamp(4.0, MOST_POINTS) as usize;
         way.extend((1..steps).map(|k| {
             let share = k as f64 / steps as f64;
             let along = share * length;
@@ -115,7 +119,9 @@ impl Edge {
         };
         // Corners are quarters of ellipses.
         let up = self.beside(begin).min(0.5 * rise);
-        let step = STEP * self.radius;
+        let picks = 1 + self.picks.iter().filter(|y| (begin..to.0.y).contains(y)).count();
+        let least = (rise / picks as f64).max((self.lane(begin, lane) - from.0.x).abs()) / MOST_POINTS;
+        let step = (STEP * self.radius).max(least);
         let flat = 0.5 * (from.2.length() + to.2.length());
         let corner = |end: Point, sign: f64| {
             let reach = self.out * (self.lane(end.0.y, lane) - end.0.x);
@@ -137,9 +143,11 @@ impl Edge {
         };
         let (first, mut last) = (corner(from, 1.0), corner(to, -1.0));
         last.reverse();
-        let steps = ((rise - 2.0 * up) / step).ceil().max(1.0);
+        // Where the corners meet there is one place between them, and no two that fall together.
+        let straight = rise - 2.0 * up;
+        let steps = if straight > 0.01 * step { (straight / step).ceil() } else { 0.0 };
         let beside = (0..=steps as usize).map(|k| {
-            let y = begin + up + (rise - 2.0 * up) * k as f64 / steps;
+            let y = begin + up + straight * k as f64 / steps.max(1.0);
             let (_, wide, _, coordinates) = between(from, to, (y - begin) / rise);
             (DVec3::new(self.lane(y, lane), y, height(y)), wide, Vec3::X * flat, coordinates)
         });
