@@ -104,8 +104,8 @@ impl Rail<'_> {
 pub(super) enum Finish {
     /// Links of a chain, so far apart, mm, of yarn that takes so much room, and of its radius.
     Chain { link: f64, room: f64, radius: f64 },
-    /// Thread over and over the edge, as far in as `reach`.
-    Overcast { radius: f64, reach: f64 },
+    /// Thread over and over the edge, a turn each `step`, as far in as `reach`.
+    Overcast { step: f64, radius: f64, reach: f64 },
     /// To and fro between edges that are turned in, a turn each `step`. Places are mm from the seam's plane and out, on the
     /// left side and on the right.
     Mattress { step: f64, radius: f64, hooks: [[f64; 2]; 2] },
@@ -137,8 +137,10 @@ impl Edging {
     pub(super) fn new(way: Way, finish: Finish, cloth: usize, first: &Pose) -> Self {
         let step = match finish {
             Finish::Chain { link, .. } => link,
-            Finish::Overcast { radius, .. } => 2.6 * radius,
-            Finish::Mattress { step, .. } | Finish::Needle { step, .. } | Finish::Looper { step, .. } => step,
+            Finish::Overcast { step, .. }
+            | Finish::Mattress { step, .. }
+            | Finish::Needle { step, .. }
+            | Finish::Looper { step, .. } => step,
         };
         let mut lengths = vec![0.0];
         for pair in way.vertices.windows(2) {
@@ -196,7 +198,7 @@ fn points(rail: &Rail<'_>, finish: &Finish, count: usize, link: &[DVec3]) -> (Ve
             }
             radius
         }
-        Finish::Overcast { radius, reach } => {
+        Finish::Overcast { radius, reach, .. } => {
             // Round the edge: eight places of each turn.
             for i in 0..count * 8 {
                 let turn = i as f64 / 8.0;

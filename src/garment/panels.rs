@@ -226,7 +226,12 @@ impl Areas<'_> {
             flat.add(self.group(face), face.line as usize);
         }
         flat.note("triangle", "without area, left out", notes);
-        Ok((faces.iter().copied().filter(sound).collect(), 1e-7 * (total_uv / count).sqrt()))
+        let faces: Vec<Face> = faces.iter().copied().filter(sound).collect();
+        if faces.is_empty() {
+            let problem = "no triangle has an area both in space and in texture coordinates";
+            return Err(GarmentError::at(0, problem, "export the mesh with the flat panels that belong to it"));
+        }
+        Ok((faces, 1e-7 * (total_uv / count).sqrt()))
     }
 
     /// Faces that are wound against most of those that they are joined to within their part would be knitted inside out: turns
@@ -661,6 +666,9 @@ mod tests {
         assert!(none.problem.contains("texture coordinates have no area"));
         let line = panels("v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n").unwrap_err();
         assert!(line.problem.contains("no area in space") && line.of_mesh, "{line:?}");
+        // One triangle has an area in space alone, and the other one on its panel.
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt 2 0\nf 1/1 2/2 3/4\nf 1/1 2/2 4/3\n";
+        assert!(panels(text).unwrap_err().problem.contains("both in space and in texture"));
     }
 
     #[test]

@@ -292,7 +292,10 @@ impl Sewing {
                 let finish = if *knitted {
                     Finish::Chain { link: stitch.x.max(2.9 * room), room: *room, radius: *radius }
                 } else {
-                    Finish::Overcast { radius: 0.32 * d, reach: 3.0 * d }
+                    let radius = 0.32 * d;
+                    // Threads of open cloth are no reason for more turns than it has threads, about.
+                    let step = (2.6 * radius).max(0.5 * stitch.min_element());
+                    Finish::Overcast { step, radius, reach: 3.0 * d }
                 };
                 out.push(Edging::new(way, finish, cloth, first));
             }

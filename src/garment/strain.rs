@@ -30,6 +30,8 @@ pub(super) struct Shapes {
     /// Stitches and rows that repeat.
     pub(super) counts: [usize; 2],
     pub(super) strands: Vec<Shape>,
+    /// For each axis the strand of each of its lines.
+    lines: [Vec<Option<usize>>; 2],
     /// Stretches across and up and shears at which it is known, rising.
     nodes: [Vec<f32>; 3],
     /// How far yarns reach beyond their stitches, across and up, in stitches; and over and under the cloth, mm.
@@ -175,6 +177,10 @@ impl Shapes {
                 Shape { kind: strand.kind, index, radius: strand.radius, per_stitch, count, control, sections }
             })
             .collect();
+        let lines = [0, 1].map(|axis| {
+            let of_line = |line| strands.iter().position(|s: &Shape| s.axis() == axis && s.index == line);
+            (0..counts[1 - axis]).map(of_line).collect()
+        });
         let mut reach = DVec2::ZERO;
         for shape in &strands {
             let across = 1 - shape.axis();
@@ -188,6 +194,7 @@ impl Shapes {
         Ok(Self {
             counts,
             heights,
+            lines,
             strands,
             nodes: nodes.map(|n| n.into_iter().map(|v| v as f32).collect()),
             reach,
@@ -201,8 +208,7 @@ impl Shapes {
 
     /// The yarn of a line of an axis.
     pub(super) fn of_line(&self, axis: usize, line: usize) -> Option<&Shape> {
-        let index = line % self.counts[1 - axis];
-        self.strands.iter().find(|s| s.axis() == axis && s.index == index)
+        self.lines[axis][line % self.counts[1 - axis]].map(|strand| &self.strands[strand])
     }
 
     /// Whether it has warps and wefts.

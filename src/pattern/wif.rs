@@ -17,6 +17,8 @@ use crate::math::words::counted;
 /// The most threads of one system, and the most crossings.
 const MAX_THREADS: u64 = 1 << 20;
 const MAX_CROSSINGS: u64 = 1 << 27;
+/// The largest number that a measure or a colour has.
+const MAX_NUMBER: f64 = 1e9;
 
 /// Why a file is no draft.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -153,14 +155,15 @@ impl Sections {
 
 fn number(entry: &Entry, section: &str) -> Result<f64, WifError> {
     // Decimal commas occur.
-    let value = entry.value.replace(',', ".").parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+    let value = entry.value.replace(',', ".").parse::<f64>().ok().filter(|v| (0.0..=MAX_NUMBER).contains(v));
     value.ok_or_else(|| wrong(entry.line, format!("a number in [{section}] is expected, found \"{}\"", entry.value)))
 }
 
 /// Exactly `N` numbers between commas.
 fn numbers<const N: usize>(entry: &Entry, what: &str) -> Result<[f64; N], WifError> {
     let parts: Result<Vec<f64>, _> = entry.value.split(',').map(|part| part.trim().parse()).collect();
-    let numbers = parts.ok().and_then(|parts| parts.try_into().ok());
+    let numbers = parts.ok().and_then(|parts| <[f64; N]>::try_from(parts).ok());
+    let numbers = numbers.filter(|numbers| numbers.iter().all(|v| v.abs() <= MAX_NUMBER));
     numbers.ok_or_else(|| wrong(entry.line, format!("{what} is {N} numbers, found \"{}\"", entry.value)))
 }
 
@@ -487,6 +490,9 @@ mod tests {
             ("\n4=4\n[TIEUP]", "\nfour=4\n[TIEUP]", "line 21: [THREADING] has a line for each number, found \"FOUR\""),
             ("255,0,51", "255,x,0,51", "line 37: a colour is 3 numbers, found \"255,x,0,51\""),
             ("0,255\n", "0,x,255\n", "line 33: `Range` is 2 numbers, found \"0,x,255\""),
+            ("0,255\n", "nan,255\n", "line 33: `Range` is 2 numbers, found \"nan,255\""),
+            ("255,0,51", "255,inf,51", "line 37: a colour is 3 numbers, found \"255,inf,51\""),
+            ("Spacing=0.2", "Spacing=1e300", "line 10: a number in [WARP] is expected, found \"1e300\""),
         ] {
             let error = parse(TWILL.replacen(good, bad, 1).as_bytes()).unwrap_err();
             assert_eq!(error.without_hint(), problem);

@@ -93,7 +93,12 @@ impl Tile {
     pub fn of_strands(period: DVec2, mut strands: Vec<TileStrand>) -> Self {
         let upright = |s: &TileStrand| s.step[0] == 0 && s.step[1] != 0;
         let warps = strands.iter().filter(|s| upright(s)).count() as u32;
-        let across = strands.iter().filter(|s| s.step[0] != 0).map(|s| s.step[0].unsigned_abs()).sum::<u32>().max(1);
+        let across = strands
+            .iter()
+            .filter(|s| s.step[0] != 0)
+            .map(|s| s.step[0].unsigned_abs())
+            .fold(0, u32::saturating_add)
+            .max(1);
         let columns = if warps > 0 {
             warps
         } else {
