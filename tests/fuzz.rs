@@ -222,4 +222,15 @@ fn damaged_curves_drafts_and_instructions_never_panic() {
         let rows = knitspeak::chart_rows(&text, 10).map_err(|e| e.to_string())?;
         Chart::parse(&rows).map(|_| ()).map_err(|e| e.to_string())
     });
+    let turns = "Cast on 12 sts.\nRow 1 (RS): k5, turn, p5, turn, k to end\nRow 2: p\n\
+                 Row 3: [k2, turn, p2, turn] 3 times, k2tog, k to last 2 sts, kfb, k1\n\
+                 Repeat rows 2-3 until piece measures 3 cm, ending with a WS row.\n";
+    for (text, asked) in [rows, turns].into_iter().zip([(Some(7), false), (None, true)]) {
+        batter("worked instructions", text.as_bytes(), 1000, |bytes| {
+            let text = String::from_utf8_lossy(bytes);
+            let written = knitspeak::Instructions::read(&text).map_err(|e| e.to_string())?;
+            let asked = knitspeak::Asked::new(asked.0, asked.1);
+            written.work_piece(10, asked, 12).map(|_| ()).map_err(|e| e.to_string())
+        });
+    }
 }

@@ -1,6 +1,6 @@
 //! What a line is about: a row, rows that are repeated, or how the piece begins and ends.
 
-use super::{KNOWN, MOST_ROWS, Result, Side, error, short};
+use super::{KNOWN, MOST_ROWS, MOST_STITCHES, Result, Side, error, short, stitches_that_fit};
 
 /// A sentence of the text, from where it begins.
 #[derive(Clone, Debug)]
@@ -443,7 +443,11 @@ pub(super) fn read(text: &str, line: usize) -> Result<Line> {
                 let hint = "rows stand behind it, each with its head: Knit 4 rows; stitches that are cast on later, in their row";
                 return error(line, format!("\"{}\" is more than a cast-on", short(text)), hint);
             }
-            Line::CastOn(number(n).unwrap_or_default())
+            let count = number(n).unwrap_or_default();
+            if !(1..=MOST_STITCHES).contains(&count) {
+                return error(line, format!("{count} stitches are cast on"), stitches_that_fit());
+            }
+            Line::CastOn(count)
         }
         ["cast", "on", ..] | ["co" | "multiple" | "fasten" | "note" | "notes", ..] => Line::Nothing,
         ref words if is_title_of_short_rows(text, words) => Line::Nothing,

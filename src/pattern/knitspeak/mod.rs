@@ -57,6 +57,11 @@ const MOST_ROWS: usize = 20_000;
 
 const MOST_STITCHES: u32 = 20_000;
 
+/// How many stitches there may be.
+fn stitches_that_fit() -> String {
+    format!("1 to {MOST_STITCHES} fit on a needle")
+}
+
 /// Rounds of repeats in a row, within each other counted too.
 const MOST_ROUNDS: u32 = 1_000_000;
 

@@ -3,6 +3,7 @@
 use super::{
     Item, Look, MOST_ROUNDS, MOST_STITCHES, Result, Sequence, Side, Written, brioche, error,
     place::Place,
+    stitches_that_fit,
     turns::{Close, Mark},
 };
 use crate::pattern::chart::{Act, Chart, Stitch};
@@ -95,7 +96,7 @@ impl Needle {
             return error(row.line, problem, "the piece is bound off by a line of its own: Bind off");
         }
         if made == 0 || made > MOST_STITCHES {
-            return error(row.line, format!("row {number} makes {made} stitches"), "1 to 20000 fit on a needle");
+            return error(row.line, format!("row {number} makes {made} stitches"), stitches_that_fit());
         }
         if let Some(count) = count.filter(|count| *count != made) {
             let problem = format!("row {number} makes {made} stitches, and says that it has {count}");

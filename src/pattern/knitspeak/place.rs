@@ -149,8 +149,12 @@ impl Place<'_> {
                 Item::Repeat(sequence, stop) => {
                     let takes = sequence.takes();
                     let room = self.room(*stop)?;
-                    if takes == 0 || room == 0 || !room.is_multiple_of(takes) {
-                        let rest = room.checked_rem(takes).unwrap_or(0);
+                    if takes == 0 {
+                        let problem = "repeats what works none of the stitches that it finds, to no end";
+                        return self.wrong(problem, "as in *k1, yo; rep from * to end, or say how often");
+                    }
+                    if room == 0 || !room.is_multiple_of(takes) {
+                        let rest = room % takes;
                         let problem = format!("repeats over {takes} stitches, but has {room} for it");
                         let fewer = if rest > 0 && room > rest {
                             format!("{rest} fewer `stitches`, or ")

@@ -379,6 +379,7 @@ impl Reading {
                 places
             }
             Which::Rows(rows) => self.repeated(rows),
+            Which::Last(0) => Vec::new(),
             // Both rows of each number.
             Which::Last(count) if !self.pairs.is_empty() => {
                 let first = self.number(last).saturating_sub(count - 1).max(1);
@@ -433,9 +434,17 @@ impl Reading {
         if count > MOST_ROWS {
             return error(line, format!("{count} rows more are too many"), format!("at most {MOST_ROWS} are knitted"));
         }
-        let copies: Vec<Written> = (0..count).map(|k| self.rows[&rows[k % rows.len()]].clone()).collect();
-        for (k, copy) in copies.into_iter().enumerate() {
+        // Rows without a number of their own have none where they are repeated either.
+        let is_numbered: Vec<bool> = rows.iter().map(|&row| self.place(self.number(row)) == row).collect();
+        let mut number = self.number(last);
+        for k in 0..count {
+            let copy = self.rows[&rows[k % rows.len()]].clone();
             self.insert(last + 1 + k, Written { line, said: None, count: None, ..copy })?;
+            if is_numbered[k % rows.len()] {
+                number += 1;
+            } else {
+                self.extra.push(number);
+            }
         }
         self.ends = true;
         Ok(())
@@ -489,6 +498,18 @@ impl Reading {
             let side = rows[rows.len() - 1].side.name();
             let problem = format!("row {count} is the last and on the {side} side");
             return error(line, problem, "a row more or fewer, or leave out what it ends with");
+        }
+        if let Some((again, ends)) = self.again.as_ref().filter(|again| again.until == Until::Open).zip(found) {
+            // Rows are repeated whole: after so many of them the same numbers come again.
+            let numbers = again.rows.len() * ends.apart as usize;
+            let mut worked = again.rows.iter().cycle().take(numbers).scan(count, |count, row| {
+                *count += parts(&rows[*row]);
+                Some(*count)
+            });
+            if !ends.holds(count as u32) && !worked.any(|count| ends.holds(count as u32)) {
+                let problem = "none of the repeated rows ends on the side that the piece is to end on";
+                return error(line, problem, "a row that turns and goes back is two: leave out what it ends with");
+            }
         }
         Ok(found)
     }

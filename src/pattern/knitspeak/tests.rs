@@ -77,6 +77,12 @@ fn mistakes_are_named() {
     assert!(wrong("Row 1: 20/5 LC", 25).problem.contains("is no cable"));
     assert_eq!(rows("Row 1: c24f", 24), ["c24f"]);
     assert!(wrong("Row 1: c26f", 26).problem.contains("c26f"));
+    assert!(wrong("Cast on 4000000000 sts.\nRow 1: k", 4).problem.contains("4000000000 stitches are cast on"));
+    assert!(wrong("Cast on 0 sts.\nRow 1: k", 4).hint.contains("1 to 20000"));
+    assert!(wrong("Row 1: k1, *yo; rep from * to end", 4).problem.contains("none of the stitches"));
+    assert!(wrong("Row 1: [k5, turn, p5, turn] 0 times", 10).problem.contains("no stitches"));
+    let turns = "Row 1: [[k5, turn, p5, turn] 5000 times] 5000 times";
+    assert!(wrong(turns, 10).problem.contains("turns within a repeat"));
     let deep = format!("Row 1: {}k1", "[".repeat(100));
     assert!(wrong(&deep, 1).problem.contains("deep"));
 }
@@ -290,6 +296,33 @@ fn a_height_ends_with_the_row_that_is_said() {
     assert_eq!([even.nearest(20.9), even.nearest(21.1), even.nearest(0.2)], [20, 22, 2]);
     assert_eq!([odd.nearest(20.9), odd.nearest(0.1), fourth.nearest(20.4)], [21, 1, 22]);
     assert_eq!([even.from(20), odd.from(20), fourth.from(20)], [20, 21, 22]);
+}
+
+#[test]
+fn rows_that_turn_are_counted_with_what_they_go_back() {
+    // Each of them is two rows, of which the second one is on the wrong side.
+    let text = |ending: &str| {
+        format!("Row 1 (RS): k5, turn, p to end. Repeat row 1 until piece measures 10 cm, ending with a {ending} row.")
+    };
+    let error = Instructions::read(&text("RS")).unwrap_err();
+    assert!(error.problem.contains("none of the repeated rows ends on the side"), "{error}");
+    let (worked, rows) =
+        Instructions::read(&text("WS")).unwrap().work_piece(10, Asked::new(Some(7), false), 12).unwrap();
+    assert_eq!((worked.rows.len(), rows), (8, 8));
+}
+
+#[test]
+fn repeated_rows_have_numbers_where_those_that_they_repeat_do() {
+    let short = "Row 1 (RS): k\nRow 2: p\nShort row 1 (RS): k to last 4 sts, turn\nShort row 2: p to end\n\
+                 Row 3: k\nRow 4: p\nRep rows 1-4 twice more.\nRow 13: p\nRow 14: p";
+    // Four rows with two short ones between them, and all again twice; then two more.
+    let rows = rows(short, 10);
+    assert_eq!((rows.len(), rows[2].as_str(), rows[8].as_str(), rows[14].as_str()), (20, "-4 k6", "-4 k6", "-4 k6"));
+    assert_eq!(rows[18..], ["p10", "k10"]);
+    let pairs = "Row 1A (RS): k\nRow 1B (RS): k\nRow 2A: p\nRow 2B: p\nRep rows 1-2 once more.\nRow 5A: p\nRow 5B: p";
+    assert_eq!(chart_rows(pairs, 3).unwrap().len(), 10);
+    let none = "Row 1A (RS): k\nRow 1B (RS): k\nRep last 0 rows twice more.";
+    assert!(chart_rows(none, 3).unwrap_err().problem.contains("no row is there to repeat"));
 }
 
 #[test]

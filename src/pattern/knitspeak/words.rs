@@ -74,6 +74,9 @@ pub(super) fn parse_body(text: &str, line: usize, row: usize) -> Result<Sequence
         return parser.wrong("has no stitches", KNOWN);
     }
     let sequence = unrolled(sequence);
+    if sequence.0.is_empty() {
+        return parser.wrong("has no stitches", KNOWN);
+    }
     let slides = |item: &Item| matches!(item, Item::Slide);
     if sequence.any(slides) && sequence.0.iter().position(slides) != Some(sequence.0.len() - 1) {
         return parser.wrong("slides before its end", "a row is worked to its end, and then slid: k to end, slide");
@@ -93,9 +96,13 @@ fn unrolled(sequence: Sequence) -> Sequence {
     let mut out = Vec::with_capacity(sequence.0.len());
     for item in sequence.0 {
         match item {
-            Item::Times(body, times) if body.turns() && body.0.len().saturating_mul(times as usize) <= MOST_ROWS => {
+            Item::Times(body, times) if body.turns() => {
                 let body = unrolled(body);
-                (0..times).for_each(|_| out.extend(body.0.iter().cloned()));
+                if body.0.len().saturating_mul(times as usize) <= MOST_ROWS {
+                    (0..times).for_each(|_| out.extend(body.0.iter().cloned()));
+                } else {
+                    out.push(Item::Times(body, times));
+                }
             }
             item => out.push(item),
         }
